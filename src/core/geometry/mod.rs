@@ -1,0 +1,28 @@
+//! Shapes and what can be asked of them: frames, circle fits, planar hulls, meshes and their repair, signed
+//! distances, mass properties. Everything is in metres; nothing here knows of grippers or objects.
+
+mod bake;
+mod circle;
+mod distance;
+mod hull;
+mod mass;
+mod mesh;
+mod mesh_files;
+mod pose;
+mod primitive;
+mod repair;
+mod support_points;
+mod surface;
+
+pub use bake::{BakeError, SolidPart, bake, choose_cell};
+pub use circle::signed_curvature;
+pub use distance::{DistanceField, DistanceGrid};
+pub use hull::convex_hull_area;
+pub use mass::{MassProperties, mass_properties};
+pub use mesh::{Bounds, TriMesh};
+pub use mesh_files::{ColouredPart, MeshFileError, read_mesh, write_obj};
+pub use pose::Pose;
+pub use primitive::Primitive;
+pub use repair::{MeshError, Repaired, repair};
+pub use support_points::support_points;
+pub use surface::{SurfaceMesh, SurfaceVertex};

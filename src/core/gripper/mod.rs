@@ -1,0 +1,116 @@
+//! What a gripper is: two fingers, their compliant pads, what line pressure does to them, and the programme that
+//! the control box runs. Descriptions only; physics reads them.
+
+mod actuation;
+mod bend;
+mod finger;
+mod pad;
+mod programme;
+mod taxels;
+
+pub use actuation::{Actuation, TorquePoint};
+pub use bend::{BentFinger, FingerPlane, SegmentPose, bend};
+pub use finger::Finger;
+pub use pad::{Pad, PadLaw};
+pub use programme::{Phase, Programme};
+pub use taxels::TaxelGrid;
+
+use serde::{Deserialize, Serialize};
+
+/// Which of the two fingers. Left stands at negative x in the gripper frame and closes towards positive x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// The finger at negative x.
+    Left,
+    /// The finger at positive x.
+    Right,
+}
+
+impl Side {
+    /// Both, in the order in which arrays hold them.
+    pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
+
+    /// Position in arrays: left 0, right 1.
+    pub fn index(self) -> usize {
+        match self {
+            Self::Left => 0,
+            Self::Right => 1,
+        }
+    }
+
+    /// The name used in files and on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        }
+    }
+
+    /// Sign of the closing direction along x in the gripper frame.
+    pub fn closing_sign(self) -> f64 {
+        match self {
+            Self::Left => 1.0,
+            Self::Right => -1.0,
+        }
+    }
+}
+
+/// A parallel two-finger pneumatic soft gripper (paper, section IV-B: SoftGripping, 0 to 1.5 bar).
+///
+/// Gripper frame: origin midway between the fingers at the palm, z away from the fingertips, x the closing
+/// direction, y across the fingers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Gripper {
+    /// Distance between the two pads when open, and where the gripper is held.
+    pub mount: Mount,
+    /// Both fingers are alike.
+    pub finger: Finger,
+    /// The compliant inner side of each finger.
+    pub pad: Pad,
+    /// From line pressure to joint torque.
+    pub actuation: Actuation,
+}
+
+impl Gripper {
+    /// Distance of each neutral axis from the middle of the gripper when open [m].
+    pub fn half_gap(&self) -> f64 {
+        0.5 * self.mount.opening + self.pad.thickness
+    }
+
+    /// The grid of taxels on each pad.
+    pub fn taxels(&self) -> TaxelGrid {
+        TaxelGrid::new(&self.finger, &self.pad)
+    }
+
+    /// The plane in which a finger bends.
+    pub fn plane(&self, side: Side) -> FingerPlane {
+        FingerPlane::new(side, self.half_gap())
+    }
+}
+
+/// How the fingers stand relative to each other and to what they grasp.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Mount {
+    /// Pad to pad when open [m].
+    pub opening: f64,
+    /// Height of the palm above the middle of the resting object [m].
+    pub grasp_depth: f64,
+    /// Shift of the gripper from straight above the object, in world axes [m].
+    pub offset: [f64; 3],
+    /// Turn of the gripper about the vertical [degrees].
+    pub yaw_deg: f64,
+}
+
+impl Default for Mount {
+    fn default() -> Self {
+        Self {
+            opening: 0.084,     // our gripper, chosen to take the largest of the sixteen objects
+            grasp_depth: 0.088, // where the tips of 100 mm fingers meet a 20 mm object
+            offset: [0.0; 3],
+            yaw_deg: 0.0,
+        }
+    }
+}

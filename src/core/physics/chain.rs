@@ -1,0 +1,247 @@
+//! Dynamics of one planar finger: inertia, bias forces, stiffness and damping of the chain.
+//!
+//! With joint angles q, rigid segments l of mass m_l, inertia I_l and centre c_l, joints at p_i (finger plane):
+//!
+//! - inertia  M_ij = sum over l >= max(i, j) of  m_l (c_l - p_i) . (c_l - p_j) + I_l
+//! - bias     b_i  = sum over l >= i of  (c_l - p_i) x m_l a_l,  a_l the acceleration at zero joint acceleration
+//!   with gravity taken as an upward acceleration of the base (d'Alembert)
+//! - implicit A    = M + h C + h² K,  C and K diagonal
+//!
+//! A cross product here is the generalised force of a planar force f at r from a joint that turns x into y... in
+//! the finger plane theta grows from "along" towards "inward", so that it reads r.y f.x - r.x f.y.
+
+use crate::gripper::{Finger, Pad, SegmentPose, bend};
+use glam::DVec2;
+
+/// Constants of a chain; both fingers share them.
+#[derive(Clone, Debug)]
+pub(super) struct ChainModel {
+    /// Joints, N.
+    pub(super) joints: usize,
+    /// Lengths of the N + 1 segments [m].
+    pub(super) lengths: Vec<f64>,
+    /// Masses of the segments [kg].
+    pub(super) masses: Vec<f64>,
+    /// Inertias of the segments about their own centres [kg m²].
+    inertias: Vec<f64>,
+    /// Stiffness of each joint [N m/rad].
+    pub(super) stiffness: f64,
+    /// Damping of each joint [N m s/rad].
+    pub(super) damping: f64,
+    /// Largest angle of each joint, either way [rad].
+    pub(super) angle_limit: f64,
+    /// Stiffness of a joint beyond its limit [N m/rad].
+    pub(super) limit_stiffness: f64,
+}
+
+/// Beyond its limit a joint is this much stiffer: bellows that have closed up are solid rubber.
+const LIMIT_STIFFENING: f64 = 100.0;
+
+impl ChainModel {
+    pub(super) fn new(finger: &Finger, pad: &Pad) -> Self {
+        let lengths: Vec<f64> = finger.segment_lengths().collect();
+        let thickness = finger.back + pad.thickness;
+        let masses: Vec<f64> = lengths.iter().map(|l| finger.mass * l / finger.length).collect();
+        let inertias = masses
+            .iter()
+            .zip(&lengths)
+            .map(|(m, l)| m * (l * l + thickness * thickness) / 12.0)
+            .collect();
+        Self {
+            joints: finger.joints,
+            stiffness: finger.joint_stiffness(),
+            damping: finger.joint_damping(),
+            angle_limit: finger.curvature_limit * finger.segment_length(),
+            limit_stiffness: LIMIT_STIFFENING * finger.joint_stiffness(),
+            lengths,
+            masses,
+            inertias,
+        }
+    }
+
+    /// Lays out the segments; returns the tip.
+    pub(super) fn bend(&self, q: &[f64], segments: &mut [SegmentPose]) -> DVec2 {
+        bend(&self.lengths, q, segments)
+    }
+
+    /// Centre of a segment [m].
+    pub(super) fn centre(&self, segments: &[SegmentPose], j: usize) -> DVec2 {
+        segments[j].point(0.5 * self.lengths[j], 0.0)
+    }
+
+    /// Fills the inertia matrix M (N x N, both triangles) for the current layout.
+    pub(super) fn inertia(&self, segments: &[SegmentPose], m: &mut [f64]) {
+        let n = self.joints;
+        // Composite of the segments from the tip inward: mass, first and second moment about the plane's origin.
+        let (mut mass, mut first, mut second) = (0.0, DVec2::ZERO, 0.0);
+        for i in (0..n).rev() {
+            let link = i + 1;
+            let centre = self.centre(segments, link);
+            mass += self.masses[link];
+            first += centre * self.masses[link];
+            second += centre.length_squared() * self.masses[link] + self.inertias[link];
+            let p_i = segments[link].start;
+            for j in 0..=i {
+                let p_j = segments[j + 1].start;
+                let value = second - (p_i + p_j).dot(first) + mass * p_i.dot(p_j);
+                m[i * n + j] = value;
+                m[j * n + i] = value;
+            }
+        }
+    }
+
+    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane [m/s²]).
+    pub(super) fn bias(
+        &self,
+        segments: &[SegmentPose],
+        qd: &[f64],
+        gravity: DVec2,
+        accelerations: &mut [DVec2],
+        bias: &mut [f64],
+    ) {
+        let n = self.joints;
+        let mut at_start = -gravity;
+        let mut rate = 0.0;
+        for link in 1..=n {
+            rate += qd[link - 1];
+            let inward_pull = segments[link].along * (rate * rate * self.lengths[link]);
+            accelerations[link] = at_start - 0.5 * inward_pull;
+            at_start -= inward_pull;
+        }
+        let (mut force, mut moment) = (DVec2::ZERO, 0.0);
+        for i in (0..n).rev() {
+            let link = i + 1;
+            let f = accelerations[link] * self.masses[link];
+            force += f;
+            moment += turning(self.centre(segments, link), f);
+            bias[i] = moment - turning(segments[link].start, force);
+        }
+    }
+
+    /// Torque [N m] with which a joint at angle `q` resists beyond its limit, and its slope [N m/rad].
+    #[inline]
+    pub(super) fn limit_torque(&self, q: f64) -> (f64, f64) {
+        let beyond = q.abs() - self.angle_limit;
+        if beyond <= 0.0 {
+            (0.0, 0.0)
+        } else {
+            (self.limit_stiffness * beyond * q.signum(), self.limit_stiffness)
+        }
+    }
+}
+
+/// Generalised force of a planar force at r: positive when it turns "along" towards "inward".
+#[inline]
+pub(super) fn turning(r: DVec2, f: DVec2) -> f64 {
+    r.y * f.x - r.x * f.y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain(joints: usize) -> ChainModel {
+        ChainModel::new(
+            &Finger {
+                joints,
+                ..Finger::default()
+            },
+            &Pad::default(),
+        )
+    }
+
+    /// Kinetic energy straight from segment velocities.
+    fn kinetic_energy(model: &ChainModel, q: &[f64], qd: &[f64]) -> f64 {
+        let mut segments = vec![SegmentPose::default(); model.joints + 1];
+        model.bend(q, &mut segments);
+        let (mut at_start, mut rate, mut energy) = (DVec2::ZERO, 0.0, 0.0);
+        for link in 1..=model.joints {
+            rate += qd[link - 1];
+            let swing = segments[link].inward() * rate;
+            let centre = at_start + swing * (0.5 * model.lengths[link]);
+            energy += 0.5 * (model.masses[link] * centre.length_squared() + model.inertias[link] * rate * rate);
+            at_start += swing * model.lengths[link];
+        }
+        energy
+    }
+
+    #[test]
+    fn inertia_gives_the_kinetic_energy() {
+        let model = chain(7);
+        let q: Vec<f64> = (0..7).map(|i| 0.1 * f64::from(i) - 0.2).collect();
+        let qd: Vec<f64> = (0..7).map(|i| (f64::from(i) * 1.7).sin()).collect();
+        let mut segments = vec![SegmentPose::default(); 8];
+        model.bend(&q, &mut segments);
+        let mut m = vec![0.0; 49];
+        model.inertia(&segments, &mut m);
+        let quadratic: f64 = (0..7)
+            .flat_map(|i| (0..7).map(move |j| (i, j)))
+            .map(|(i, j)| 0.5 * qd[i] * m[i * 7 + j] * qd[j])
+            .sum();
+        let direct = kinetic_energy(&model, &q, &qd);
+        assert!((quadratic / direct - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bias_obeys_lagrange() {
+        // d/dt (dT/dqd) - dT/dq at zero joint acceleration: sum_j dM_ij/dt qd_j - dT/dq_i, by central differences.
+        let n = 5;
+        let model = chain(n);
+        let q: Vec<f64> = (0..n).map(|i| 0.3 - 0.1 * i as f64).collect();
+        let qd: Vec<f64> = (0..n).map(|i| 2.0 + (i as f64 * 1.1).cos()).collect();
+        let momentum = |q: &[f64]| -> Vec<f64> {
+            let mut segments = vec![SegmentPose::default(); n + 1];
+            model.bend(q, &mut segments);
+            let mut m = vec![0.0; n * n];
+            model.inertia(&segments, &mut m);
+            (0..n).map(|i| (0..n).map(|j| m[i * n + j] * qd[j]).sum()).collect()
+        };
+        let step = 1e-6;
+        let moved = |sign: f64| -> Vec<f64> { q.iter().zip(&qd).map(|(q, v)| q + sign * step * v).collect() };
+        let (ahead, behind) = (momentum(&moved(1.0)), momentum(&moved(-1.0)));
+        let mut segments = vec![SegmentPose::default(); n + 1];
+        model.bend(&q, &mut segments);
+        let (mut accelerations, mut bias) = (vec![DVec2::ZERO; n + 1], vec![0.0; n]);
+        model.bias(&segments, &qd, DVec2::ZERO, &mut accelerations, &mut bias);
+        for i in 0..n {
+            let shifted = |sign: f64| {
+                let mut q = q.clone();
+                q[i] += sign * step;
+                kinetic_energy(&model, &q, &qd)
+            };
+            let slope = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            let want = (ahead[i] - behind[i]) / (2.0 * step) - slope;
+            assert!(
+                (bias[i] - want).abs() < 1e-9,
+                "joint {i}: {} instead of {want}",
+                bias[i]
+            );
+        }
+    }
+
+    #[test]
+    fn a_straight_hanging_finger_feels_no_gravity_torque() {
+        let model = chain(10);
+        let mut segments = vec![SegmentPose::default(); 11];
+        model.bend(&[0.0; 10], &mut segments);
+        let (mut accelerations, mut bias) = (vec![DVec2::ZERO; 11], vec![0.0; 10]);
+        model.bias(
+            &segments,
+            &[0.0; 10],
+            DVec2::new(0.0, 9.81),
+            &mut accelerations,
+            &mut bias,
+        );
+        assert!(bias.iter().all(|b| b.abs() < 1e-18));
+        // Held out level by gravity across it, the first joint carries the weight of 95 mm at its middle.
+        model.bias(
+            &segments,
+            &[0.0; 10],
+            DVec2::new(9.81, 0.0),
+            &mut accelerations,
+            &mut bias,
+        );
+        let want = -0.95 * 0.030 * 9.81 * 0.5 * 0.095;
+        assert!((bias[0] / want - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,268 @@
+//! One contact as a convex term of the step's minimisation, after SAP (Castro et al. 2022) and irrotational
+//! contact fields (Castro et al. 2023).
+//!
+//! A contact joins body A (a finger segment or the object) to body B (the object or the world). n points from B
+//! to A, v is the velocity of A's point relative to B's, v_n = n . v, v_t = v - v_n n, x0 the compression at the
+//! start of the step and xi the shear of the skin at the start of the step.
+//!
+//! - normal impulse    gamma(v_n) = h f(x0 - h v_n) (1 - d v_n)+
+//!   with the pad law f and Hunt-Crossley dissipation d. It falls as v_n rises, so its potential is convex.
+//! - friction          e = xi + h v_t;  impulse -h k_t e while |h k_t e| <= mu gamma_lag, else -mu gamma_lag e/|e|
+//!   a shear spring with a slip limit (a Huber function of e). The limit uses a normal impulse from the step before
+//!   or from the last pass ("lag"), since a limit that followed v would not be the gradient of anything.
+//!
+//! A shear spring holds: a grasped object creeps 2e-7 mm/s, where velocity-regularised friction lets it slide at
+//! 0.015 to 0.066 mm/s. The shear modulus of rubber is E / 3, hence k_t = k / 3.
+
+use crate::gripper::PadLaw;
+use glam::{DMat3, DVec3};
+
+/// What a contact pushes against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Against {
+    /// A finger segment against the object.
+    Object,
+    /// A finger segment, or the object, against the world.
+    World,
+}
+
+/// Which body the contact acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Acting {
+    /// Segment `link` = finger (N + 1) + segment.
+    Segment(u32),
+    /// The grasped object.
+    Object,
+}
+
+/// A contact and its state within the solve.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contact {
+    /// Where its shear and lag are remembered between steps.
+    pub(super) site: u32,
+    /// Body A.
+    pub(super) acting: Acting,
+    /// Body B.
+    pub(super) against: Against,
+    /// From the reference point (the object's centre of mass) to the contact [m].
+    pub(super) arm: DVec3,
+    /// Unit normal, from B to A.
+    pub(super) normal: DVec3,
+    /// Compression at the start of the step [m]; negative while apart.
+    pub(super) compression: f64,
+    /// Law of compression.
+    pub(super) law: PadLaw,
+    /// Small-strain stiffness [N/m].
+    pub(super) stiffness: f64,
+    /// Rest length of the strand [m].
+    pub(super) height: f64,
+    /// Friction coefficient.
+    pub(super) mu: f64,
+    /// Slip limit mu gamma_lag [N s].
+    pub(super) limit: f64,
+    /// Shear at the start of the step, in the tangent plane [m].
+    pub(super) shear: DVec3,
+    /// Relative velocity at the current iterate [m/s].
+    pub(super) velocity: DVec3,
+    /// Its change along the search direction.
+    pub(super) change: DVec3,
+}
+
+/// What all contacts of a step share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ContactStep {
+    /// Step length, h [s].
+    pub(super) h: f64,
+    /// Dissipation, d [s/m].
+    pub(super) dissipation: f64,
+}
+
+/// Shear stiffness of rubber as a share of its compressive stiffness: G / E of an incompressible solid.
+const SHEAR_SHARE: f64 = 1.0 / 3.0;
+
+impl Contact {
+    /// Normal impulse gamma [N s] and -d gamma / d v_n, both non-negative.
+    #[inline]
+    pub(super) fn normal_impulse(&self, step: ContactStep, v_n: f64) -> (f64, f64) {
+        let ContactStep { h, dissipation: d } = step;
+        let damping = 1.0 - d * v_n;
+        let compression = self.compression - h * v_n;
+        if compression <= 0.0 || damping <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let (f, slope) = self.law.force(self.stiffness, self.height, compression);
+        (h * f * damping, h * (h * slope * damping + d * f))
+    }
+
+    /// Gradient of the contact's potential with respect to v [N s]: minus the impulse on A.
+    #[inline]
+    pub(super) fn gradient(&self, step: ContactStep, velocity: DVec3) -> DVec3 {
+        let v_n = self.normal.dot(velocity);
+        let (gamma, _) = self.normal_impulse(step, v_n);
+        let mut gradient = self.normal * -gamma;
+        if self.limit > 0.0 {
+            let e = self.shear + (velocity - self.normal * v_n) * step.h;
+            let pull = e * (step.h * self.shear_stiffness());
+            let size = pull.length();
+            gradient += if size <= self.limit {
+                pull
+            } else {
+                pull * (self.limit / size)
+            };
+        }
+        gradient
+    }
+
+    /// Hessian of the contact's potential with respect to v [kg], symmetric and positive semi-definite.
+    #[inline]
+    pub(super) fn hessian(&self, step: ContactStep) -> DMat3 {
+        let n = self.normal;
+        let v_n = n.dot(self.velocity);
+        let (_, along_normal) = self.normal_impulse(step, v_n);
+        // Tangential part: `all` times the tangent projector, less `radial` along the direction of slip.
+        let (mut all, mut radial, mut slip) = (0.0, 0.0, DVec3::ZERO);
+        if self.limit > 0.0 {
+            let e = self.shear + (self.velocity - n * v_n) * step.h;
+            let stiffness = self.shear_stiffness();
+            let size = e.length();
+            if step.h * stiffness * size <= self.limit {
+                all = step.h * step.h * stiffness;
+            } else {
+                all = step.h * self.limit / size;
+                radial = all;
+                slip = e / size;
+            }
+        }
+        let column =
+            |k: DVec3, n_k: f64, slip_k: f64| k * all + n * ((along_normal - all) * n_k) - slip * (radial * slip_k);
+        DMat3::from_cols(
+            column(DVec3::X, n.x, slip.x),
+            column(DVec3::Y, n.y, slip.y),
+            column(DVec3::Z, n.z, slip.z),
+        )
+    }
+
+    /// Stiffness of the skin in shear, k_t [N/m].
+    #[inline]
+    pub(super) fn shear_stiffness(&self) -> f64 {
+        self.stiffness * SHEAR_SHARE
+    }
+
+    /// Brings the slip limit up to date with the normal impulse at the current iterate.
+    pub(super) fn relag(&mut self, step: ContactStep) {
+        self.limit = self.mu * self.normal_impulse(step, self.normal.dot(self.velocity)).0;
+    }
+
+    /// Force on A [N]: its normal size, and its tangential part.
+    pub(super) fn force(&self, step: ContactStep) -> (f64, DVec3) {
+        let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
+        let tangential = -(self.gradient(step, self.velocity) + self.normal * gamma);
+        (gamma / step.h, tangential / step.h)
+    }
+
+    /// Shear of the skin at the end of the step [m], as far as friction lets it go.
+    pub(super) fn final_shear(&self, step: ContactStep) -> DVec3 {
+        if self.limit <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let v_n = self.normal.dot(self.velocity);
+        let e = self.shear + (self.velocity - self.normal * v_n) * step.h;
+        let impulse = step.h * self.shear_stiffness() * e.length();
+        if impulse > self.limit {
+            e * (self.limit / impulse)
+        } else {
+            e
+        }
+    }
+
+    /// By how much the lagged slip limit missed the true one where it mattered [N s], and the true one.
+    pub(super) fn lag_mismatch(&self, step: ContactStep) -> (f64, f64) {
+        let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
+        let truth = self.mu * gamma;
+        let used = self.force(step).1.length() * step.h;
+        let slips = used >= self.limit * (1.0 - 1e-9);
+        let mismatch = if slips {
+            (used - truth).abs()
+        } else {
+            (used - truth).max(0.0)
+        };
+        (mismatch, truth)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP: ContactStep = ContactStep {
+        h: 1.0 / 300.0,
+        dissipation: 2.0,
+    };
+
+    fn contact() -> Contact {
+        Contact {
+            site: 0,
+            acting: Acting::Object,
+            against: Against::World,
+            arm: DVec3::ZERO,
+            normal: DVec3::new(0.6, 0.0, 0.8),
+            compression: 1e-3,
+            law: PadLaw::NeoHookean,
+            stiffness: 156.0,
+            height: 0.008,
+            mu: 0.8,
+            limit: 2e-4,
+            shear: DVec3::new(4e-4, 1e-4, -3e-4),
+            velocity: DVec3::ZERO,
+            change: DVec3::ZERO,
+        }
+    }
+
+    #[test]
+    fn the_hessian_is_the_slope_of_the_gradient() {
+        // Sticking, slipping, apart, and separating faster than dissipation allows.
+        for (velocity, limit) in [
+            (DVec3::new(0.01, -0.02, 0.03), 1.0),
+            (DVec3::new(0.3, 0.4, -0.1), 1e-5),
+            (DVec3::new(1.0, 0.0, 1.0), 1e-5),
+            (DVec3::new(0.02, 0.03, -0.05), 0.0),
+        ] {
+            let mut c = Contact {
+                limit,
+                velocity,
+                ..contact()
+            };
+            let step = 1e-6;
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let slope = (c.gradient(STEP, velocity + axis * step) - c.gradient(STEP, velocity - axis * step))
+                    / (2.0 * step);
+                assert!(slope.abs_diff_eq(c.hessian(STEP) * axis, 1e-6), "{velocity} {limit}");
+            }
+            c.relag(STEP);
+            assert!(c.limit >= 0.0);
+        }
+    }
+
+    #[test]
+    fn friction_stays_within_its_limit_and_opposes_slip() {
+        let c = Contact {
+            limit: 1e-5,
+            velocity: DVec3::new(0.0, 0.5, 0.0),
+            ..contact()
+        };
+        let (_, tangential) = c.force(STEP);
+        assert!((tangential.length() * STEP.h / c.limit - 1.0).abs() < 1e-12);
+        assert!(tangential.y < 0.0);
+        let (normal, frictionless) = Contact { limit: 0.0, ..c }.force(STEP);
+        assert!(normal > 0.0 && frictionless.length() < 1e-18);
+    }
+
+    #[test]
+    fn a_contact_never_pulls() {
+        let c = Contact {
+            velocity: DVec3::new(3.0, 0.0, 3.0),
+            ..contact()
+        };
+        assert_eq!(c.force(STEP).0, 0.0);
+    }
+}

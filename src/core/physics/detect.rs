@@ -1,0 +1,335 @@
+//! Finding contacts: every strand of the pads casts a short ray from its foot along its axis.
+//!
+//! The ray is thick: a ball of the strand's radius moves from the foot outwards by sphere tracing until it touches
+//! something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels; rays
+//! that are as thick as the gaps between strands do not.
+//!
+//! With the rest position of the ball's centre at s and the touch at t, the strand is compressed by s - t along its
+//! axis, and by (s - t) (-n . u) along the surface normal n; apart, it is the same number below zero.
+
+use super::contact::{Acting, Against, Contact};
+use super::model::{Body, Model};
+use super::state::State;
+use super::workspace::{Spatial, Workspace};
+use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
+use glam::{DMat3, DVec3};
+
+/// Gaps up to this are contacts in waiting even when nothing moves [m].
+const STILL_MARGIN: f64 = 2e-4;
+/// Speed gained within a step that a contact in waiting allows for [m/s].
+const SPEED_MARGIN: f64 = 0.1;
+/// How much faster than now a body may become within a step before contacts are found one step late.
+const SPEED_FACTOR: f64 = 1.5;
+
+/// A surface that a strand has met.
+struct Hit {
+    /// Compression along the surface normal [m], negative while apart.
+    compression: f64,
+    /// Outward normal of the surface, unit length.
+    normal: DVec3,
+    /// Where the surface is met.
+    point: DVec3,
+}
+
+/// Fills `workspace.contacts` with everything that touches or may touch within the step.
+pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
+    workspace.contacts.clear();
+    let object = model.body.as_ref().map(|body| Solid::new(body, state));
+    let (linear, angular) = state.body_velocity(model);
+    for finger in 0..2 {
+        let first_link = finger * (model.chain.joints + 1);
+        for j in 0..=model.chain.joints {
+            let link = first_link + j;
+            let segment = workspace.segments[link];
+            let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
+            let reach = model.strands.reach[j] + model.strands.radius;
+            let link_velocity = workspace.spatial[link];
+            let speed =
+                link_velocity.linear_at(middle - workspace.reference).length() + link_velocity.angular.length() * reach;
+            let against_world = margin(model, speed);
+            let object_speed = linear.length() + object.as_ref().map_or(0.0, |o| angular.length() * o.body.radius);
+            let against_object = margin(model, speed + object_speed);
+            let near_object = object.as_ref().filter(|o| o.distance(middle) < reach + against_object);
+            let near_world =
+                !model.environment.is_empty() && model.environment.distance(middle) < reach + against_world;
+            if near_object.is_none() && !near_world {
+                continue;
+            }
+            let near = Near {
+                object: near_object.map(|o| (o, against_object)),
+                world: near_world.then_some(against_world),
+            };
+            detect_segment(
+                model,
+                state,
+                workspace,
+                &near,
+                Place {
+                    finger,
+                    segment_index: j,
+                    link,
+                    segment,
+                },
+            );
+        }
+    }
+    if let Some(body) = model.free_body()
+        && !model.environment.is_empty()
+    {
+        let speed = linear.length() + angular.length() * body.radius;
+        detect_resting(model, state, workspace, body, margin(model, speed));
+    }
+}
+
+/// Gap up to which contacts are kept, given the speed of approach [m].
+fn margin(model: &Model, speed: f64) -> f64 {
+    STILL_MARGIN + model.step.h * (SPEED_MARGIN + SPEED_FACTOR * speed)
+}
+
+/// What one segment may touch, and how far away it may still be.
+struct Near<'a> {
+    object: Option<(&'a Solid<'a>, f64)>,
+    world: Option<f64>,
+}
+
+#[derive(Clone, Copy)]
+struct Place {
+    finger: usize,
+    segment_index: usize,
+    link: usize,
+    segment: SegmentPose,
+}
+
+fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
+    let plane = model.planes[place.finger];
+    let local_axes = segment_axes(&plane, &place.segment);
+    for k in model.strands.of_segment(place.segment_index) {
+        let strand = &model.strands.all[k];
+        let (foot, axis) = strand.ray(&place.segment);
+        let ray = Ray {
+            foot: plane.point(foot, strand.across),
+            axis: plane.direction(axis),
+            radius: model.strands.radius,
+            rest: strand.height - model.strands.radius,
+        };
+        let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, margin));
+        let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
+        let (hit, against) = match (on_object, on_world) {
+            (Some(object), Some(world)) if world.compression > object.compression => (world, Against::World),
+            (Some(object), _) => (object, Against::Object),
+            (None, Some(world)) => (world, Against::World),
+            (None, None) => continue,
+        };
+        let site = place.finger * model.strands.all.len() + k;
+        let mu = match against {
+            Against::Object => model.pad_friction.on_object,
+            Against::World => model.pad_friction.on_world,
+        };
+        let shear = local_axes * state.shear[site];
+        workspace.contacts.push(Contact {
+            site: site as u32,
+            acting: Acting::Segment(place.link as u32),
+            against,
+            arm: hit.point - workspace.reference,
+            normal: hit.normal,
+            compression: hit.compression,
+            law: model.pad_law,
+            stiffness: strand.stiffness,
+            height: strand.height,
+            mu,
+            limit: mu * state.lag[site],
+            shear: shear - hit.normal * hit.normal.dot(shear),
+            velocity: DVec3::ZERO,
+            change: DVec3::ZERO,
+        });
+    }
+}
+
+/// Axes in which a pad's shear is remembered: along the segment, across it, inward. Columns, in the gripper frame.
+pub(super) fn segment_axes(plane: &FingerPlane, segment: &SegmentPose) -> DMat3 {
+    DMat3::from_cols(
+        plane.direction(segment.along),
+        DVec3::Y,
+        plane.direction(segment.inward()),
+    )
+}
+
+/// The object where it is now.
+struct Solid<'a> {
+    body: &'a Body,
+    object_from_gripper: DMat3,
+    centre: DVec3,
+}
+
+impl<'a> Solid<'a> {
+    fn new(body: &'a Body, state: &State) -> Self {
+        Self {
+            body,
+            object_from_gripper: state.body.matrix().transpose(),
+            centre: state.body.position,
+        }
+    }
+
+    #[inline]
+    fn local(&self, p: DVec3) -> DVec3 {
+        self.object_from_gripper * (p - self.centre) + self.body.centre
+    }
+
+    /// Distance [m], or a lower bound where the object is far.
+    #[inline]
+    fn distance(&self, p: DVec3) -> f64 {
+        let to_ball = (p - self.centre).length() - self.body.radius;
+        if to_ball > self.body.radius {
+            to_ball
+        } else {
+            self.body.field.distance(self.local(p))
+        }
+    }
+}
+
+/// The path of a strand's round end.
+struct Ray {
+    foot: DVec3,
+    axis: DVec3,
+    radius: f64,
+    /// Distance of the end's centre from the foot at rest [m].
+    rest: f64,
+}
+
+/// Below this gap the touch is computed from the slope of the distance instead of by more steps [m]; the error is
+/// its square over the surface's radius, 1e-8 m on a 10 mm ball.
+const CLOSE: f64 = 1e-5;
+/// Steps of sphere tracing before a ray that grazes along a surface is taken to touch where it is.
+const MOST_STEPS: usize = 32;
+/// A surface whose normal points ahead along the strand by more than this was passed, not met sideways: things
+/// beside a finger have a normal across it.
+const FROM_BEHIND: f64 = -0.7;
+
+impl Ray {
+    fn cast_solid(&self, solid: &Solid<'_>, margin: f64) -> Option<Hit> {
+        let foot = solid.local(self.foot);
+        let axis = solid.object_from_gripper * self.axis;
+        let field = &solid.body.field;
+        let hit = self.trace(foot, axis, margin, |p| field.distance(p), |p| field.normal(p))?;
+        let to_gripper = solid.object_from_gripper.transpose();
+        Some(Hit {
+            compression: hit.compression,
+            normal: to_gripper * hit.normal,
+            point: to_gripper * (hit.point - solid.body.centre) + solid.centre,
+        })
+    }
+
+    fn cast_environment(&self, model: &Model, margin: f64) -> Option<Hit> {
+        let environment = &model.environment;
+        let (distance, normal) = (|p| environment.distance(p), |p| environment.normal(p));
+        self.trace(self.foot, self.axis, margin, distance, normal)
+    }
+
+    /// Sphere tracing from `foot` along `axis`, both in the frame of the distance.
+    #[inline]
+    fn trace(
+        &self,
+        foot: DVec3,
+        axis: DVec3,
+        margin: f64,
+        distance: impl Fn(DVec3) -> f64,
+        normal: impl Fn(DVec3) -> DVec3,
+    ) -> Option<Hit> {
+        let limit = self.rest + margin;
+        let mut t = 0.0;
+        let mut gap = distance(foot) - self.radius;
+        if gap > limit {
+            return None;
+        }
+        for _ in 0..MOST_STEPS {
+            if gap < CLOSE {
+                break;
+            }
+            t += gap;
+            if t > limit {
+                return None;
+            }
+            gap = distance(foot + axis * t) - self.radius;
+        }
+        let centre = foot + axis * t;
+        let surface_normal = normal(centre);
+        let cosine = -surface_normal.dot(axis);
+        if cosine < FROM_BEHIND && t == 0.0 {
+            // The foot has come through a thin body: keep pushing back the way it came.
+            let compression = self.rest - gap;
+            return Some(Hit {
+                compression,
+                normal: -axis,
+                point: foot,
+            });
+        }
+        // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
+        let compression = (self.rest - t) * cosine - gap;
+        let point = centre - surface_normal * (self.radius + gap);
+        (compression > -margin).then_some(Hit {
+            compression,
+            normal: surface_normal,
+            point,
+        })
+    }
+}
+
+/// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
+fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
+    let environment = &model.environment;
+    if environment.distance(state.body.position) > body.radius + margin {
+        return;
+    }
+    let gripper_from_object = state.body.matrix();
+    let place = |p: DVec3| gripper_from_object * (p - body.centre) + state.body.position;
+    let first_site = 2 * model.strands.all.len();
+    let mut touch = |site: usize, compression: f64, normal: DVec3, point: DVec3| {
+        let shear = state.shear[site];
+        workspace.contacts.push(Contact {
+            site: site as u32,
+            acting: Acting::Object,
+            against: Against::World,
+            arm: point - workspace.reference,
+            normal,
+            compression,
+            law: PadLaw::Linear,
+            stiffness: body.support_stiffness,
+            height: 1.0,
+            mu: body.support_friction,
+            limit: body.support_friction * state.lag[site],
+            shear: shear - normal * normal.dot(shear),
+            velocity: DVec3::ZERO,
+            change: DVec3::ZERO,
+        });
+    };
+    // Height above the highest surface, as a plane in the object's frame: three products per corner.
+    let up = gripper_from_object.transpose() * environment.up();
+    let base = environment.height_above_top(place(DVec3::ZERO));
+    for (k, ball) in body.resting.0.iter().enumerate() {
+        if base + up.dot(ball.centre) - ball.radius < margin {
+            let centre = place(ball.centre);
+            let gap = environment.distance(centre) - ball.radius;
+            if gap < margin {
+                let normal = environment.normal(centre);
+                touch(first_site + k, -gap, normal, centre - normal * ball.radius);
+            }
+        }
+    }
+    let first_rim = first_site + model.resting_points();
+    for (k, p) in environment.rim().iter().enumerate() {
+        let local = gripper_from_object.transpose() * (*p - state.body.position) + body.centre;
+        let gap = body.field.distance(local);
+        if gap < margin {
+            let out_of_object = gripper_from_object * body.field.normal(local);
+            touch(first_rim + k, -gap, -out_of_object, *p);
+        }
+    }
+}
+
+impl Spatial {
+    /// Velocity of the point at `arm` from the reference point.
+    #[inline]
+    pub(super) fn linear_at(&self, arm: DVec3) -> DVec3 {
+        self.linear + self.angular.cross(arm)
+    }
+}

@@ -1,0 +1,37 @@
+//! Soft-finger physics: two planar chains with compliant pads and one rigid object, stepped by a single convex
+//! minimisation per step of length h.
+//!
+//! ```text
+//! v+ = argmin  1/2 (v - v*)' A (v - v*)  +  sum over contacts l_c(J_c v),     A = M + h C + h² K
+//! ```
+//!
+//! v: all joint rates, and six velocities of the object where it is free. M, C, K: inertia, damping and stiffness;
+//! v* carries torques, gravity and Coriolis forces. Springs, dampers and contacts are all taken at the *end* of the
+//! step, so that no stiffness, however large, makes a step unstable.
+//!
+//! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
+//! a touch costs), `solve` (the minimisation), `step` (all of it in order), [`Simulation`] (steps in time).
+
+mod chain;
+#[cfg(test)]
+mod closed_form;
+mod contact;
+mod detect;
+mod energy;
+mod environment;
+mod model;
+mod placement;
+mod simulation;
+mod skyline;
+mod solve;
+mod state;
+mod step;
+mod strands;
+mod workspace;
+
+pub use model::Model;
+pub use placement::Placement;
+pub use simulation::{Simulation, SimulationError};
+pub use state::State;
+pub use step::{Drive, NotFinite, StepReport, step};
+pub use workspace::Workspace;

@@ -1,0 +1,138 @@
+//! The constant description that a step reads: everything the scene says, resolved to numbers, in the gripper frame.
+
+use super::chain::ChainModel;
+use super::contact::ContactStep;
+use super::environment::Environment;
+use super::placement::Placement;
+use super::strands::Strands;
+use crate::geometry::{DistanceField, Pose};
+use crate::gripper::{FingerPlane, PadLaw, Side};
+use crate::objects::{ObjectModel, Resting};
+use crate::scene::Scene;
+use glam::{DMat3, DVec3};
+
+/// Constants of a simulation. Built once, never changed; a step is a function of it and a [`super::State`].
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub(super) step: ContactStep,
+    pub(super) chain: ChainModel,
+    pub(super) planes: [FingerPlane; 2],
+    pub(super) strands: Strands,
+    pub(super) pad_law: PadLaw,
+    /// Friction of the pads against the object and against the environment.
+    pub(super) pad_friction: PadFriction,
+    pub(super) body: Option<Body>,
+    pub(super) environment: Environment,
+    /// Gravity [m/s²].
+    pub(super) gravity: DVec3,
+    pub(super) tolerance: f64,
+    pub(super) max_iterations: u32,
+    pub(super) relag_passes: u32,
+    pub(super) world_from_gripper: Pose,
+}
+
+/// Friction coefficients of the pads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PadFriction {
+    pub(super) on_object: f64,
+    pub(super) on_world: f64,
+}
+
+/// The object as the solver sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Body {
+    pub(super) field: DistanceField,
+    pub(super) resting: Resting,
+    /// Centre of mass in the object's frame [m].
+    pub(super) centre: DVec3,
+    /// Radius of a ball about the centre of mass that holds the object [m].
+    pub(super) radius: f64,
+    /// Mass [kg].
+    pub(super) mass: f64,
+    /// Inertia about the centre of mass, in object axes [kg m²].
+    pub(super) inertia: DMat3,
+    pub(super) free: bool,
+    /// Stiffness of a contact point with the support [N/m].
+    pub(super) support_stiffness: f64,
+    pub(super) support_friction: f64,
+}
+
+/// A resting object is carried by at least three points.
+const RESTING_POINTS: f64 = 3.0;
+
+impl Model {
+    /// Resolves a scene. `h` is the step [s]; the scene's own clock gives it in trials, tests choose it freely.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>, placement: &Placement, h: f64) -> Self {
+        let gripper = &scene.gripper;
+        let surface_friction = |object: &ObjectModel| scene.object.friction.value().unwrap_or(object.friction);
+        let on_object = object.map_or(0.0, |o| (gripper.pad.friction * surface_friction(o)).sqrt());
+        let gravity_world = DVec3::new(0.0, 0.0, -scene.world.gravity);
+        let body = object.map(|object| Body {
+            field: object.field.clone(),
+            resting: object.resting.clone(),
+            centre: object.mass.centre,
+            radius: object.field.radius_about(object.mass.centre),
+            mass: object.mass.mass,
+            inertia: object.mass.inertia,
+            free: !scene.object.fixed,
+            support_stiffness: (object.mass.mass * scene.world.gravity / (RESTING_POINTS * scene.support.sink))
+                .max(scene.support.stiffness),
+            support_friction: (surface_friction(object) * scene.support.friction).sqrt(),
+        });
+        Self {
+            step: ContactStep {
+                h,
+                dissipation: gripper.pad.dissipation,
+            },
+            chain: ChainModel::new(&gripper.finger, &gripper.pad),
+            planes: Side::BOTH.map(|side| gripper.plane(side)),
+            strands: Strands::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
+            pad_law: gripper.pad.law,
+            pad_friction: PadFriction {
+                on_object,
+                on_world: (gripper.pad.friction * scene.support.friction).sqrt(),
+            },
+            body,
+            environment: Environment::new(&scene.support, &placement.world_from_gripper),
+            gravity: placement.world_from_gripper.inverse().direction(gravity_world),
+            tolerance: scene.solver.tolerance,
+            max_iterations: scene.solver.max_iterations,
+            relag_passes: scene.solver.relag_passes,
+            world_from_gripper: placement.world_from_gripper,
+        }
+    }
+
+    /// Joints of both fingers, 2 N.
+    pub(super) fn joint_count(&self) -> usize {
+        2 * self.chain.joints
+    }
+
+    /// Segments of both fingers, 2 (N + 1).
+    pub(super) fn link_count(&self) -> usize {
+        2 * (self.chain.joints + 1)
+    }
+
+    /// Unknowns of a step: all joint rates, and six for a free object.
+    pub(super) fn unknowns(&self) -> usize {
+        self.joint_count() + if self.free_body().is_some() { 6 } else { 0 }
+    }
+
+    /// The object, where it can move.
+    pub(super) fn free_body(&self) -> Option<&Body> {
+        self.body.as_ref().filter(|body| body.free)
+    }
+
+    /// Places where contact can be remembered: strands of both fingers, resting points, rim of the pedestal.
+    pub(super) fn sites(&self) -> usize {
+        2 * self.strands.all.len() + self.resting_points() + self.environment.rim().len()
+    }
+
+    pub(super) fn resting_points(&self) -> usize {
+        self.body.as_ref().map_or(0, |body| body.resting.0.len())
+    }
+
+    /// Step length, h [s].
+    pub fn step_length(&self) -> f64 {
+        self.step.h
+    }
+}

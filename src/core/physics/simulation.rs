@@ -1,0 +1,271 @@
+//! A simulated grasp in time: steps on a clock of whole ticks, pressure in, frames out.
+
+use super::contact::Acting;
+use super::model::Model;
+use super::placement::Placement;
+use super::state::State;
+use super::step::{self, Drive, StepReport, segment_axes_of};
+use super::workspace::{Spatial, Workspace};
+use crate::geometry::Pose;
+use crate::gripper::{Actuation, Phase};
+use crate::objects::ObjectModel;
+use crate::scene::{Clock, Scene};
+use crate::trial::{Frame, Quality, TaxelLoad};
+use glam::DVec3;
+
+/// A gripper and an object being simulated. One tick of the clock is one solver step.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    model: Model,
+    state: State,
+    workspace: Workspace,
+    clock: Clock,
+    actuation: Actuation,
+    tick: u64,
+    line_bar: f64,
+    phase: Phase,
+    /// Forces from outside; the torque in it is not used.
+    pulls: Drive,
+    totals: Totals,
+}
+
+/// Sums over all steps so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Totals {
+    newton: u64,
+    newton_max: u32,
+    unconverged: u64,
+    friction_residual: f64,
+}
+
+/// A simulation that had to stop.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the simulation stopped after {seconds:.3} s (step {tick}): {cause}")]
+pub struct SimulationError {
+    /// The step that failed.
+    pub tick: u64,
+    /// Its time [s].
+    pub seconds: f64,
+    /// What went wrong.
+    pub cause: step::NotFinite,
+}
+
+impl Simulation {
+    /// Sets up a scene at rest; placement comes with what had to be moved to make room.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
+        let placement = Placement::new(scene, object);
+        let clock = scene.timing.clock(scene.solver.accuracy);
+        let model = Model::new(scene, object, &placement, clock.step());
+        let simulation = Self {
+            state: State::new(&model, &placement),
+            workspace: Workspace::new(&model),
+            model,
+            clock,
+            actuation: scene.gripper.actuation.clone(),
+            tick: 0,
+            line_bar: 0.0,
+            phase: Phase::Close,
+            pulls: Drive::default(),
+            totals: Totals::default(),
+        };
+        (simulation, placement)
+    }
+
+    /// The clock that ticks count.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// Ticks passed.
+    pub fn tick(&self) -> u64 {
+        self.tick
+    }
+
+    /// The constants it runs on.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Joints, velocities, object.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Sets the line pressure [bar] from now on.
+    pub fn command(&mut self, bar: f64, phase: Phase) {
+        self.line_bar = bar;
+        self.phase = phase;
+    }
+
+    /// Pulls at the object's centre of mass [N, world axes] from now on, as a user does with the mouse.
+    pub fn pull_object(&mut self, force: DVec3) {
+        self.pulls.object_force = self.model.world_from_gripper.inverse().direction(force);
+    }
+
+    /// Takes one step.
+    pub fn advance(&mut self) -> Result<StepReport, SimulationError> {
+        let drive = Drive {
+            torque: self.actuation.torque(self.line_bar),
+            ..self.pulls
+        };
+        let report =
+            step::step(&self.model, &mut self.state, &mut self.workspace, &drive).map_err(|cause| SimulationError {
+                tick: self.tick,
+                seconds: self.clock.seconds(self.tick),
+                cause,
+            })?;
+        self.tick += 1;
+        self.totals.newton += u64::from(report.newton_iterations);
+        self.totals.newton_max = self.totals.newton_max.max(report.newton_iterations);
+        self.totals.unconverged += u64::from(!report.converged);
+        self.totals.friction_residual = self.totals.friction_residual.max(report.friction_residual);
+        Ok(report)
+    }
+
+    /// What a rig would sample now.
+    pub fn frame(&self) -> Frame {
+        Frame {
+            sample: (self.tick / u64::from(self.clock.ticks_per_sample)).saturating_sub(1) as u32,
+            t: self.clock.seconds(self.tick),
+            line_bar: self.line_bar,
+            phase: self.phase,
+            q: self.state.q.clone(),
+            world_from_object: self.world_from_object(),
+            taxels: self.taxel_loads(),
+        }
+    }
+
+    /// The object's frame in the world.
+    pub fn world_from_object(&self) -> Option<Pose> {
+        self.state.world_from_object(&self.model)
+    }
+
+    /// Statistics of the steps so far; the static residual is that of this moment.
+    pub fn quality(&self) -> Quality {
+        Quality {
+            finite: true,
+            converged: self.totals.unconverged == 0,
+            steps: self.tick,
+            unconverged_steps: self.totals.unconverged,
+            newton_mean: self.totals.newton as f64 / self.tick.max(1) as f64,
+            newton_max: self.totals.newton_max,
+            friction_residual: self.totals.friction_residual,
+            static_residual: self.static_residual(),
+        }
+    }
+
+    /// Forces on the loaded taxels in the last step.
+    fn taxel_loads(&self) -> Vec<TaxelLoad> {
+        let strands = &self.model.strands;
+        let mut loads: Vec<TaxelLoad> = Vec::new();
+        for contact in &self.workspace.contacts {
+            let Acting::Segment(link) = contact.acting else {
+                continue;
+            };
+            let (side, strand) = (
+                contact.site as usize / strands.all.len(),
+                contact.site as usize % strands.all.len(),
+            );
+            let (normal, tangential) = contact.force(self.model.step);
+            if strand >= strands.on_pad || normal <= 0.0 {
+                continue;
+            }
+            let force = contact.normal * normal + tangential;
+            let [along, across, inward] =
+                (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
+            loads.push(TaxelLoad {
+                taxel: (side * strands.on_pad + strand) as u16,
+                normal: -inward as f32,
+                along: along as f32,
+                across: across as f32,
+            });
+        }
+        loads.sort_by_key(|load| load.taxel);
+        loads
+    }
+
+    /// Total force [N] and torque about its centre of mass [N m] that fingers and support exert on the object, in
+    /// the gripper frame, in the last step.
+    pub fn object_wrench(&self) -> (DVec3, DVec3) {
+        let mut total = Spatial::default();
+        for contact in &self.workspace.contacts {
+            let (normal, tangential) = contact.force(self.model.step);
+            let on_acting = contact.normal * normal + tangential;
+            let on_object = match (contact.acting, contact.against) {
+                (Acting::Object, _) => on_acting,
+                (Acting::Segment(_), super::contact::Against::Object) => -on_acting,
+                (Acting::Segment(_), super::contact::Against::World) => continue,
+            };
+            total = total.plus(&Spatial {
+                linear: on_object,
+                angular: contact.arm.cross(on_object),
+            });
+        }
+        (total.linear, total.angular)
+    }
+
+    /// Deepest compression of any pad strand [m] and the largest ratio of friction to mu times normal force over
+    /// loaded contacts, in the last step.
+    pub fn contact_extremes(&self) -> (f64, f64) {
+        let mut extremes = (0.0f64, 0.0f64);
+        for contact in &self.workspace.contacts {
+            let (normal, tangential) = contact.force(self.model.step);
+            if matches!(contact.acting, Acting::Segment(_)) {
+                extremes.0 = extremes.0.max(contact.compression);
+            }
+            if normal > 1e-3 && contact.mu > 0.0 {
+                extremes.1 = extremes.1.max(tangential.length() / (contact.mu * normal));
+            }
+        }
+        extremes
+    }
+
+    /// Largest joint torque not balanced by springs, gravity and contacts, as a share of the actuation torque.
+    fn static_residual(&self) -> f64 {
+        let (model, ws) = (&self.model, &self.workspace);
+        let torque = self.actuation.torque(self.line_bar);
+        if torque == 0.0 {
+            return 0.0;
+        }
+        let n = model.chain.joints;
+        let mut scratch = ws.clone();
+        let mut at_rest = self.state.clone();
+        at_rest.velocity.fill(0.0);
+        step::lay_out(model, &at_rest, &mut scratch);
+        step::gather_dynamics(model, &at_rest, &mut scratch, &Drive { torque, ..self.pulls });
+        let mut largest = 0.0f64;
+        for k in 0..2 * n {
+            // At rest r holds h (torque - k q - gravity).
+            let known = scratch.rhs[k] / model.step.h;
+            let from_contacts: f64 = ws
+                .contacts
+                .iter()
+                .filter_map(|contact| match contact.acting {
+                    Acting::Segment(link) if beyond_joint(link as usize, k, n) => {
+                        let (normal, tangential) = contact.force(model.step);
+                        let linear = contact.normal * normal + tangential;
+                        Some(ws.columns[k].dot(&Spatial {
+                            linear,
+                            angular: contact.arm.cross(linear),
+                        }))
+                    }
+                    _ => None,
+                })
+                .sum();
+            let limit = model.chain.limit_torque(self.state.q[k]).0;
+            largest = largest.max((known + from_contacts - limit).abs());
+        }
+        largest / torque.abs()
+    }
+
+    /// Kinetic, elastic and potential energy [J], the latter relative to the gripper's frame.
+    pub fn energy(&self) -> f64 {
+        super::energy::mechanical_energy(&self.model, &self.state)
+    }
+}
+
+/// True when a segment lies beyond joint `k` (counted over both fingers of `n` joints).
+fn beyond_joint(link: usize, k: usize, n: usize) -> bool {
+    let (finger, segment) = (link / (n + 1), link % (n + 1));
+    finger == k / n && segment > k % n
+}

@@ -1,0 +1,376 @@
+//! The convex minimisation of a step, by Newton's method.
+//!
+//! v+ = argmin  1/2 v' A v - r' v + sum over contacts l_c(J_c v) + sum over joints l_j(v),   A = M + h C + h² K
+//!
+//! which is the problem of the module page with the square completed: r = A v*. The Hessian is exact, the line
+//! search works on the derivative alone (no potential is ever evaluated), and the start is the last velocity. Each
+//! l is convex, so the minimum is unique and Newton with this search cannot cycle.
+//!
+//! Layout of the unknowns: joint rates of the left finger, of the right finger, then for a free object its linear
+//! and angular velocity. Contact Hessians are summed per segment (6 x 6) before they go to joints: beyond joint i
+//! everything moves with column S_i, so that H_ij = S_i' (sum of blocks from the tip to the farther joint) S_j.
+
+use super::contact::{Acting, Against, Contact};
+use super::model::Model;
+use super::workspace::{Block, PerLink, Spatial, Workspace};
+use glam::DVec3;
+
+/// How a minimisation went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct SolveReport {
+    pub(super) iterations: u32,
+    pub(super) line_search_steps: u32,
+    pub(super) converged: bool,
+}
+
+/// A gradient this small compared with nothing at all counts as zero.
+const ABSOLUTE_TOLERANCE: f64 = 1e-13;
+
+/// Minimises over `velocity`, starting from it. Needs the workspace's dynamics and contacts; leaves each contact's
+/// relative velocity at the solution.
+pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
+    let mut report = SolveReport::default();
+    let mut passes = 0;
+    multiply_by_a(model, ws, velocity, Product::OfVelocity);
+    relative_velocities(model, velocity, ws, Product::OfVelocity);
+    loop {
+        let size = fill_gradient(model, q, velocity, ws);
+        if !size.gradient.is_finite() {
+            return report;
+        }
+        if size.gradient <= ABSOLUTE_TOLERANCE + model.tolerance * size.forces {
+            if passes == model.relag_passes {
+                report.converged = true;
+                return report;
+            }
+            passes += 1;
+            for contact in &mut ws.contacts {
+                contact.relag(model.step);
+            }
+            continue;
+        }
+        if report.iterations == model.max_iterations {
+            return report;
+        }
+        report.iterations += 1;
+        fill_hessian(model, q, velocity, ws);
+        ws.hessian.factorise();
+        for (d, g) in ws.direction.iter_mut().zip(&ws.gradient) {
+            *d = -g;
+        }
+        ws.hessian.solve(&mut ws.direction);
+        let direction = std::mem::take(&mut ws.direction);
+        multiply_by_a(model, ws, &direction, Product::OfDirection);
+        relative_velocities(model, &direction, ws, Product::OfDirection);
+        ws.direction = direction;
+        let share = line_search(model, q, velocity, ws, &mut report.line_search_steps);
+        for (v, d) in velocity.iter_mut().zip(&ws.direction) {
+            *v += share * d;
+        }
+        for (v, d) in ws.a_velocity.iter_mut().zip(&ws.a_direction) {
+            *v += share * d;
+        }
+        for contact in &mut ws.contacts {
+            contact.velocity += contact.change * share;
+        }
+    }
+}
+
+/// Which of two vectors a product is taken of, and so where it goes.
+#[derive(Clone, Copy, PartialEq)]
+enum Product {
+    OfVelocity,
+    OfDirection,
+}
+
+fn multiply_by_a(model: &Model, ws: &mut Workspace, x: &[f64], which: Product) {
+    let n = model.chain.joints;
+    let out = match which {
+        Product::OfVelocity => &mut ws.a_velocity,
+        Product::OfDirection => &mut ws.a_direction,
+    };
+    for finger in 0..2 {
+        let matrix = &ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
+        let part = &x[finger * n..(finger + 1) * n];
+        for (row, out) in matrix.chunks_exact(n).zip(&mut out[finger * n..(finger + 1) * n]) {
+            *out = row.iter().zip(part).map(|(a, b)| a * b).sum();
+        }
+    }
+    if let Some(body) = model.free_body() {
+        let linear = object_part(x, 2 * n).linear * body.mass;
+        let angular = ws.body_inertia * object_part(x, 2 * n).angular;
+        write_object_part(out, 2 * n, &Spatial { linear, angular });
+    }
+}
+
+fn object_part(x: &[f64], from: usize) -> Spatial {
+    match x.get(from..from + 6) {
+        Some([a, b, c, d, e, f]) => Spatial {
+            linear: DVec3::new(*a, *b, *c),
+            angular: DVec3::new(*d, *e, *f),
+        },
+        _ => Spatial::default(),
+    }
+}
+
+fn write_object_part(out: &mut [f64], from: usize, value: &Spatial) {
+    out[from..from + 3].copy_from_slice(&value.linear.to_array());
+    out[from + 3..from + 6].copy_from_slice(&value.angular.to_array());
+}
+
+/// Velocities of all segments, and from them the relative velocity of each contact.
+fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, which: Product) {
+    segment_velocities(model, x, ws);
+    let object = object_part(x, model.joint_count());
+    for contact in &mut ws.contacts {
+        let acting = match contact.acting {
+            Acting::Segment(link) => ws.spatial[link as usize].linear_at(contact.arm),
+            Acting::Object => object.linear_at(contact.arm),
+        };
+        let relative = match contact.against {
+            Against::Object => acting - object.linear_at(contact.arm),
+            Against::World => acting,
+        };
+        match which {
+            Product::OfVelocity => contact.velocity = relative,
+            Product::OfDirection => contact.change = relative,
+        }
+    }
+}
+
+/// Velocity of each segment for joint rates `x`, about the reference point.
+pub(super) fn segment_velocities(model: &Model, x: &[f64], ws: &mut Workspace) {
+    let n = model.chain.joints;
+    for finger in 0..2 {
+        let mut velocity = Spatial::default();
+        ws.spatial[finger * (n + 1)] = velocity;
+        for i in 0..n {
+            velocity = velocity.plus(&ws.columns[finger * n + i].scaled(x[finger * n + i]));
+            ws.spatial[finger * (n + 1) + i + 1] = velocity;
+        }
+    }
+}
+
+/// Sizes of the gradient and of the terms it is the sum of, in the norm of the diagonal of A.
+struct Size {
+    gradient: f64,
+    forces: f64,
+}
+
+fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
+    let n = model.chain.joints;
+    let mut on_object = Spatial::default();
+    for wrench in &mut ws.wrenches {
+        *wrench = PerLink {
+            object: Spatial::default(),
+            world: Spatial::default(),
+        };
+    }
+    for contact in &ws.contacts {
+        let linear = contact.gradient(model.step, contact.velocity);
+        let wrench = Spatial {
+            linear,
+            angular: contact.arm.cross(linear),
+        };
+        match (contact.acting, contact.against) {
+            (Acting::Segment(link), Against::Object) => {
+                let sum = &mut ws.wrenches[link as usize].object;
+                *sum = sum.plus(&wrench);
+            }
+            (Acting::Segment(link), Against::World) => {
+                let sum = &mut ws.wrenches[link as usize].world;
+                *sum = sum.plus(&wrench);
+            }
+            (Acting::Object, _) => on_object = on_object.plus(&wrench),
+        }
+    }
+    for ((g, a), r) in ws.gradient.iter_mut().zip(&ws.a_velocity).zip(&ws.rhs) {
+        *g = a - r;
+    }
+    let mut contact_size = 0.0;
+    for finger in 0..2 {
+        let mut beyond = Spatial::default();
+        for i in (0..n).rev() {
+            let k = finger * n + i;
+            let link = &ws.wrenches[finger * (n + 1) + i + 1];
+            beyond = beyond.plus(&link.object).plus(&link.world);
+            on_object = on_object.plus(&link.object.scaled(-1.0));
+            let limit = model.step.h * model.chain.limit_torque(q[k] + model.step.h * velocity[k]).0;
+            let from_contacts = ws.columns[k].dot(&beyond) + limit;
+            ws.gradient[k] += from_contacts;
+            contact_size += from_contacts * from_contacts / diagonal(model, ws, k);
+        }
+        // The rigid base half carries contacts too, which move the object only.
+        on_object = on_object.plus(&ws.wrenches[finger * (n + 1)].object.scaled(-1.0));
+    }
+    if model.free_body().is_some() {
+        let wrench = [on_object.linear.to_array(), on_object.angular.to_array()];
+        for (i, w) in wrench.iter().flatten().enumerate() {
+            ws.gradient[2 * n + i] += w;
+            contact_size += w * w / diagonal(model, ws, 2 * n + i);
+        }
+    }
+    let (mut gradient, mut momentum, mut known) = (0.0, 0.0, 0.0);
+    for k in 0..ws.gradient.len() {
+        let weight = 1.0 / diagonal(model, ws, k);
+        gradient += ws.gradient[k] * ws.gradient[k] * weight;
+        momentum += ws.a_velocity[k] * ws.a_velocity[k] * weight;
+        known += ws.rhs[k] * ws.rhs[k] * weight;
+    }
+    Size {
+        gradient: gradient.sqrt(),
+        forces: contact_size.max(momentum).max(known).sqrt(),
+    }
+}
+
+/// Diagonal entry of A.
+#[inline]
+fn diagonal(model: &Model, ws: &Workspace, k: usize) -> f64 {
+    let n = model.chain.joints;
+    if k < 2 * n {
+        let (finger, i) = (k / n, k % n);
+        ws.finger_matrix[finger * n * n + i * n + i]
+    } else {
+        let mass = model.body.as_ref().map_or(1.0, |body| body.mass);
+        match k - 2 * n {
+            3 => ws.body_inertia.x_axis.x,
+            4 => ws.body_inertia.y_axis.y,
+            5 => ws.body_inertia.z_axis.z,
+            _ => mass,
+        }
+    }
+}
+
+fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
+    let on_object = sum_blocks(model, ws);
+    let n = model.chain.joints;
+    let couples = model.free_body().is_some();
+    for finger in 0..2 {
+        let mut beyond = Block::ZERO;
+        let mut beyond_object = Block::ZERO;
+        for i in (0..n).rev() {
+            let k = finger * n + i;
+            let link = &ws.blocks[finger * (n + 1) + i + 1];
+            beyond.add(&link.object);
+            beyond.add(&link.world);
+            let moved = beyond.times(&ws.columns[k]);
+            let (first, row) = ws.hessian.row_mut(k);
+            debug_assert_eq!(first, finger * n, "fingers are separate blocks");
+            let matrix = &ws.finger_matrix[finger * n * n + i * n..];
+            for j in 0..=i {
+                row[j] = matrix[j] + ws.columns[finger * n + j].dot(&moved);
+            }
+            row[i] += model.step.h * model.step.h * model.chain.limit_torque(q[k] + model.step.h * velocity[k]).1;
+            if couples {
+                beyond_object.add(&link.object);
+                let moved = beyond_object.times(&ws.columns[k]);
+                let column = [moved.linear.to_array(), moved.angular.to_array()];
+                for (a, value) in column.iter().flatten().enumerate() {
+                    *ws.hessian.at_mut(2 * n + a, k) = -value;
+                }
+            }
+        }
+    }
+    if let Some(body) = model.free_body() {
+        for a in 0..3 {
+            for b in 0..=a {
+                let mass = if a == b { body.mass } else { 0.0 };
+                *ws.hessian.at_mut(2 * n + a, 2 * n + b) = mass + on_object.linear.col(b)[a];
+                let inertia = ws.body_inertia.col(b)[a];
+                *ws.hessian.at_mut(2 * n + 3 + a, 2 * n + 3 + b) = inertia + on_object.angular.col(b)[a];
+            }
+            for b in 0..3 {
+                *ws.hessian.at_mut(2 * n + 3 + a, 2 * n + b) = on_object.mixed.col(b)[a];
+            }
+        }
+    }
+}
+
+/// Sums contact Hessians per segment; returns the sum that acts on the object.
+fn sum_blocks(model: &Model, ws: &mut Workspace) -> Block {
+    for block in &mut ws.blocks {
+        *block = PerLink {
+            object: Block::ZERO,
+            world: Block::ZERO,
+        };
+    }
+    let mut on_object = Block::ZERO;
+    for contact in &ws.contacts {
+        let hessian = contact.hessian(model.step);
+        match (contact.acting, contact.against) {
+            (Acting::Segment(link), Against::Object) => {
+                ws.blocks[link as usize].object.add_at(&hessian, contact.arm);
+            }
+            (Acting::Segment(link), Against::World) => {
+                ws.blocks[link as usize].world.add_at(&hessian, contact.arm);
+            }
+            (Acting::Object, _) => on_object.add_at(&hessian, contact.arm),
+        }
+    }
+    for block in &ws.blocks {
+        on_object.add(&block.object);
+    }
+    on_object
+}
+
+/// A step is taken whole when the slope at its end has fallen to this share of the slope at its start.
+const ENOUGH_DESCENT: f64 = 0.5;
+/// The slope at which a bracketed search stops, as a share of the slope at the start.
+const FLAT_ENOUGH: f64 = 0.05;
+/// Bisections after which the bracket is narrower than any velocity that matters.
+const MOST_SEARCH_STEPS: u32 = 60;
+
+/// Share of the Newton direction to take, from the derivative along it: the whole, or where the slope vanishes.
+fn line_search(model: &Model, q: &[f64], velocity: &[f64], ws: &Workspace, steps: &mut u32) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let quadratic = dot(&ws.direction, &ws.a_direction);
+    let linear = dot(&ws.direction, &ws.a_velocity) - dot(&ws.direction, &ws.rhs);
+    let h = model.step.h;
+    let mut slope_at = |share: f64| -> f64 {
+        *steps += 1;
+        let along = |c: &Contact| c.gradient(model.step, c.velocity + c.change * share).dot(c.change);
+        let contacts: f64 = ws.contacts.iter().map(along).sum();
+        let limits: f64 = (0..model.joint_count())
+            .map(|k| {
+                let end = q[k] + h * (velocity[k] + share * ws.direction[k]);
+                h * model.chain.limit_torque(end).0 * ws.direction[k]
+            })
+            .sum();
+        linear + share * quadratic + contacts + limits
+    };
+    let start = dot(&ws.direction, &ws.gradient);
+    let end = slope_at(1.0);
+    if end <= ENOUGH_DESCENT * -start || end <= 1e-14 * quadratic {
+        return 1.0;
+    }
+    // Regula falsi (Illinois), with every fourth step a bisection.
+    let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, 1.0, end);
+    let mut last_side = 0;
+    for k in 1..=MOST_SEARCH_STEPS {
+        let secant = (low * at_high - high * at_low) / (at_high - at_low);
+        let inside = secant > low && secant < high;
+        let share = if k % 4 == 0 || !inside {
+            0.5 * (low + high)
+        } else {
+            secant
+        };
+        let slope = slope_at(share);
+        if slope.abs() <= FLAT_ENOUGH * -start {
+            return share;
+        }
+        if slope > 0.0 {
+            (high, at_high) = (share, slope);
+            if last_side == 1 {
+                at_low *= 0.5;
+            }
+            last_side = 1;
+        } else {
+            (low, at_low) = (share, slope);
+            if last_side == -1 {
+                at_high *= 0.5;
+            }
+            last_side = -1;
+        }
+    }
+    low
+}

@@ -1,0 +1,89 @@
+//! What changes during a simulation. All of it can be saved and restored; scratch memory is elsewhere.
+
+use super::model::Model;
+use super::placement::Placement;
+use crate::geometry::Pose;
+use glam::{DQuat, DVec3};
+
+/// State of both fingers, the object, and the skin at every place of contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Joint angles, left finger then right, from palm to tip [rad].
+    pub q: Vec<f64>,
+    /// Joint rates [rad/s], then for a free object its velocity [m/s] and angular velocity [rad/s] in the gripper
+    /// frame.
+    pub velocity: Vec<f64>,
+    /// The object's centre of mass and the axes of its frame, in the gripper frame.
+    pub(super) body: Pose,
+    /// Shear of the skin [m], in the axes of the segment (or of the gripper, for the object on its support).
+    pub(super) shear: Vec<DVec3>,
+    /// Normal impulse in the last step [N s].
+    pub(super) lag: Vec<f64>,
+}
+
+impl State {
+    /// Fingers straight, everything at rest.
+    pub fn new(model: &Model, placement: &Placement) -> Self {
+        let body = match (&model.body, placement.world_from_object) {
+            (Some(body), Some(world_from_object)) => {
+                let gripper_from_object = model.world_from_gripper.inverse() * world_from_object;
+                Pose {
+                    position: gripper_from_object.point(body.centre),
+                    rotation: gripper_from_object.rotation,
+                }
+            }
+            _ => Pose::IDENTITY,
+        };
+        Self {
+            q: vec![0.0; model.joint_count()],
+            velocity: vec![0.0; model.unknowns()],
+            body,
+            shear: vec![DVec3::ZERO; model.sites()],
+            lag: vec![0.0; model.sites()],
+        }
+    }
+
+    /// The object's frame in the world; absent for an empty hand.
+    pub fn world_from_object(&self, model: &Model) -> Option<Pose> {
+        let body = model.body.as_ref()?;
+        let gripper_from_object = Pose {
+            position: self.body.position - self.body.rotation * body.centre,
+            rotation: self.body.rotation,
+        };
+        Some(model.world_from_gripper * gripper_from_object)
+    }
+
+    /// Linear and angular velocity of a free object in the gripper frame [m/s, rad/s]; zero otherwise.
+    pub(super) fn body_velocity(&self, model: &Model) -> (DVec3, DVec3) {
+        match self.velocity.get(model.joint_count()..) {
+            Some([x, y, z, a, b, c]) => (DVec3::new(*x, *y, *z), DVec3::new(*a, *b, *c)),
+            _ => (DVec3::ZERO, DVec3::ZERO),
+        }
+    }
+
+    /// Moves joints and object by one step at the current velocities.
+    pub(super) fn integrate(&mut self, model: &Model) {
+        let h = model.step.h;
+        for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
+            *q += h * rate;
+        }
+        if model.free_body().is_some() {
+            let (linear, angular) = self.body_velocity(model);
+            self.body.position += linear * h;
+            self.body.rotation = (DQuat::from_scaled_axis(angular * h) * self.body.rotation).normalize();
+        }
+    }
+
+    /// The first number that is not finite, named for people; `None` when all is well.
+    pub(super) fn not_finite(&self, model: &Model) -> Option<String> {
+        let n = model.chain.joints;
+        let bad = |values: &[f64]| values.iter().position(|x| !x.is_finite());
+        if let Some(i) = bad(&self.q).or_else(|| bad(&self.velocity[..2 * n])) {
+            let side = if i < n { "left" } else { "right" };
+            return Some(format!("joint {} of the {side} finger", i % n + 1));
+        }
+        let (linear, angular) = self.body_velocity(model);
+        let sound = self.body.is_finite() && linear.is_finite() && angular.is_finite();
+        (!sound).then(|| "the object".to_owned())
+    }
+}

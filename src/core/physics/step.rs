@@ -1,0 +1,161 @@
+//! One step: lay out the fingers, gather what is known, find contacts, minimise, move.
+
+use super::chain::turning;
+use super::contact::Acting;
+use super::detect::{detect, segment_axes};
+use super::model::Model;
+use super::solve::{minimise, segment_velocities};
+use super::state::State;
+use super::workspace::{Spatial, Workspace};
+use glam::{DVec2, DVec3};
+
+/// How a step went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Newton iterations taken.
+    pub newton_iterations: u32,
+    /// Slopes evaluated by the line search.
+    pub line_search_steps: u32,
+    /// True when the minimisation reached its tolerance.
+    pub converged: bool,
+    /// Contacts present, touching or about to.
+    pub contacts: u32,
+    /// The outer friction residual: by how much the lagged slip limits missed the true ones where they mattered,
+    /// as a share of the sum of the true ones. Zero without friction forces.
+    pub friction_residual: f64,
+}
+
+/// A step that must not be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{body} left the range of numbers; the last good state is kept. Try a smaller time step or softer contact")]
+pub struct NotFinite {
+    /// What became non-finite, in words.
+    pub body: String,
+}
+
+/// What drives a step from outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drive {
+    /// Actuation torque on every joint [N m].
+    pub torque: f64,
+    /// Force pulling at each fingertip, left and right, in the gripper frame [N].
+    pub tip_force: [DVec3; 2],
+    /// Force pulling at the object's centre of mass, in the gripper frame [N].
+    pub object_force: DVec3,
+}
+
+/// Advances the state by one step. On failure the state is left as it was
+/// before, but for velocities, which are those that failed.
+pub fn step(model: &Model, state: &mut State, ws: &mut Workspace, drive: &Drive) -> Result<StepReport, NotFinite> {
+    lay_out(model, state, ws);
+    gather_dynamics(model, state, ws, drive);
+    segment_velocities(model, &state.velocity, ws);
+    detect(model, state, ws);
+    let solved = minimise(model, &state.q, &mut state.velocity, ws);
+    if let Some(body) = state.not_finite(model) {
+        return Err(NotFinite { body });
+    }
+    let friction_residual = remember_contacts(model, state, ws);
+    state.integrate(model);
+    match state.not_finite(model) {
+        Some(body) => Err(NotFinite { body }),
+        None => Ok(StepReport {
+            newton_iterations: solved.iterations,
+            line_search_steps: solved.line_search_steps,
+            converged: solved.converged,
+            contacts: ws.contacts.len() as u32,
+            friction_residual,
+        }),
+    }
+}
+
+/// Places of the segments, and the velocity of everything beyond each joint per unit of its rate.
+pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
+    let n = model.chain.joints;
+    ws.reference = if model.body.is_some() {
+        state.body.position
+    } else {
+        DVec3::ZERO
+    };
+    for finger in 0..2 {
+        let plane = model.planes[finger];
+        let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
+        model.chain.bend(&state.q[finger * n..(finger + 1) * n], segments);
+        // Turning "along" towards "inward" is a rotation about along x inward = -sign y.
+        let angular = DVec3::new(0.0, -plane.sign, 0.0);
+        for (i, segment) in segments.iter().skip(1).enumerate() {
+            let joint = plane.point(segment.start, 0.0);
+            let linear = angular.cross(ws.reference - joint);
+            ws.columns[finger * n + i] = Spatial { linear, angular };
+        }
+    }
+}
+
+/// Fills A and r.
+pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, drive: &Drive) {
+    let (n, h) = (model.chain.joints, model.step.h);
+    for finger in 0..2 {
+        let joints = finger * n..(finger + 1) * n;
+        let segments = &ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
+        let matrix = &mut ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
+        let sign = model.planes[finger].sign;
+        let in_plane = |v: DVec3| DVec2::new(sign * v.x, -v.z);
+        let gravity = in_plane(model.gravity);
+        let pull = in_plane(drive.tip_force[finger]);
+        let tip = segments[n].point(model.chain.lengths[n], 0.0);
+        let (q, qd) = (&state.q[joints.clone()], &state.velocity[joints.clone()]);
+        model.chain.inertia(segments, matrix);
+        model
+            .chain
+            .bias(segments, qd, gravity, &mut ws.accelerations, &mut ws.bias);
+        let rhs = &mut ws.rhs[joints];
+        for (i, row) in matrix.chunks_exact(n).enumerate() {
+            let momentum: f64 = row.iter().zip(qd).map(|(a, b)| a * b).sum();
+            let load = drive.torque + turning(tip - segments[i + 1].start, pull);
+            rhs[i] = momentum + h * (load - model.chain.stiffness * q[i] - ws.bias[i]);
+        }
+        for i in 0..n {
+            matrix[i * n + i] += h * model.chain.damping + h * h * model.chain.stiffness;
+        }
+    }
+    if let Some(body) = model.free_body() {
+        let (linear, angular) = state.body_velocity(model);
+        let r = state.body.matrix();
+        ws.body_inertia = r * body.inertia * r.transpose();
+        let spin = ws.body_inertia * angular;
+        let known_linear = (linear + model.gravity * h) * body.mass + drive.object_force * h;
+        let known_angular = spin - angular.cross(spin) * h;
+        ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());
+        ws.rhs[2 * n + 3..].copy_from_slice(&known_angular.to_array());
+    }
+}
+
+/// Friction limits that add up to less than this [N] are too small for their mismatch to matter.
+const FELT_FRICTION: f64 = 0.01;
+
+/// Keeps shear and normal impulse of each contact for the next step; returns the outer friction residual.
+fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace) -> f64 {
+    state.shear.fill(DVec3::ZERO);
+    state.lag.fill(0.0);
+    let (mut mismatch, mut total) = (0.0, 0.0);
+    for contact in &ws.contacts {
+        let site = contact.site as usize;
+        let shear = contact.final_shear(model.step);
+        state.shear[site] = match contact.acting {
+            Acting::Segment(link) => segment_axes_of(model, ws, link).transpose() * shear,
+            Acting::Object => shear,
+        };
+        let v_n = contact.normal.dot(contact.velocity);
+        state.lag[site] = contact.normal_impulse(model.step, v_n).0;
+        let (missed, truth) = contact.lag_mismatch(model.step);
+        mismatch += missed;
+        total += truth;
+    }
+    mismatch / total.max(FELT_FRICTION * model.step.h)
+}
+
+/// Axes of a segment in the gripper frame, as columns: along, across, inward.
+pub(super) fn segment_axes_of(model: &Model, ws: &Workspace, link: u32) -> glam::DMat3 {
+    let plane = &model.planes[link as usize / (model.chain.joints + 1)];
+    segment_axes(plane, &ws.segments[link as usize])
+}

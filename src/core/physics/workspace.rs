@@ -1,0 +1,156 @@
+//! Scratch memory of a step: allocated once, overwritten every step, never saved.
+
+use super::contact::Contact;
+use super::model::Model;
+use super::skyline::Skyline;
+use crate::gripper::SegmentPose;
+use glam::{DMat3, DVec2, DVec3};
+
+/// Velocity of a rigid body: of the point at the reference, and angular.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Spatial {
+    pub(super) linear: DVec3,
+    pub(super) angular: DVec3,
+}
+
+impl Spatial {
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        Self {
+            linear: self.linear * factor,
+            angular: self.angular * factor,
+        }
+    }
+
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        Self {
+            linear: self.linear + other.linear,
+            angular: self.angular + other.angular,
+        }
+    }
+
+    /// Power of a wrench on a body with this velocity.
+    pub(super) fn dot(&self, wrench: &Self) -> f64 {
+        self.linear.dot(wrench.linear) + self.angular.dot(wrench.angular)
+    }
+}
+
+/// A symmetric 6 x 6 block over (linear, angular), as contacts at different arms add up to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    /// Linear by linear.
+    pub(super) linear: DMat3,
+    /// Angular rows, linear columns.
+    pub(super) mixed: DMat3,
+    /// Angular by angular.
+    pub(super) angular: DMat3,
+}
+
+impl Block {
+    pub(super) const ZERO: Self = Self {
+        linear: DMat3::ZERO,
+        mixed: DMat3::ZERO,
+        angular: DMat3::ZERO,
+    };
+
+    /// Adds a contact's 3 x 3 Hessian G at an arm r: J' G J with J = [1, -[r]x].
+    #[inline]
+    pub(super) fn add_at(&mut self, g: &DMat3, arm: DVec3) {
+        let crossed = |m: &DMat3| DMat3::from_cols(arm.cross(m.x_axis), arm.cross(m.y_axis), arm.cross(m.z_axis));
+        let mixed = crossed(g);
+        self.linear += *g;
+        self.mixed += mixed;
+        self.angular += crossed(&mixed.transpose());
+    }
+
+    #[inline]
+    pub(super) fn add(&mut self, other: &Self) {
+        self.linear += other.linear;
+        self.mixed += other.mixed;
+        self.angular += other.angular;
+    }
+
+    #[inline]
+    pub(super) fn times(&self, x: &Spatial) -> Spatial {
+        Spatial {
+            linear: self.linear * x.linear + self.mixed.transpose() * x.angular,
+            angular: self.mixed * x.linear + self.angular * x.angular,
+        }
+    }
+}
+
+/// What contacts ask of one segment: against the object, which couples to it, and against the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PerLink<T> {
+    pub(super) object: T,
+    pub(super) world: T,
+}
+
+/// Scratch memory; see the fields for what each stage leaves.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    // layout
+    /// Segments of both fingers in their planes.
+    pub(super) segments: Vec<SegmentPose>,
+    /// Point about which spatial velocities are taken: the object's centre of mass [m].
+    pub(super) reference: DVec3,
+    /// Velocity of everything beyond a joint per unit of its rate, about the reference.
+    pub(super) columns: Vec<Spatial>,
+    /// Velocity of each segment.
+    pub(super) spatial: Vec<Spatial>,
+    // dynamics
+    pub(super) accelerations: Vec<DVec2>,
+    pub(super) bias: Vec<f64>,
+    /// A = M + h C + h² K of both fingers, one N x N matrix after the other.
+    pub(super) finger_matrix: Vec<f64>,
+    /// Inertia of the object in the gripper frame [kg m²].
+    pub(super) body_inertia: DMat3,
+    /// Momentum and known impulses, r: without contact A v = r.
+    pub(super) rhs: Vec<f64>,
+    // contacts
+    pub(super) contacts: Vec<Contact>,
+    pub(super) wrenches: Vec<PerLink<Spatial>>,
+    pub(super) blocks: Vec<PerLink<Block>>,
+    // Newton
+    pub(super) gradient: Vec<f64>,
+    pub(super) direction: Vec<f64>,
+    pub(super) a_velocity: Vec<f64>,
+    pub(super) a_direction: Vec<f64>,
+    pub(super) hessian: Skyline,
+}
+
+impl Workspace {
+    /// Memory for the largest step the model can take.
+    pub fn new(model: &Model) -> Self {
+        let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
+        let zero = PerLink {
+            object: Spatial::default(),
+            world: Spatial::default(),
+        };
+        let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
+        Self {
+            segments: vec![SegmentPose::default(); links],
+            reference: DVec3::ZERO,
+            columns: vec![Spatial::default(); 2 * n],
+            spatial: vec![Spatial::default(); links],
+            accelerations: vec![DVec2::ZERO; n + 1],
+            bias: vec![0.0; n],
+            finger_matrix: vec![0.0; 2 * n * n],
+            body_inertia: DMat3::ZERO,
+            rhs: vec![0.0; unknowns],
+            contacts: Vec::with_capacity(model.sites()),
+            wrenches: vec![zero; links],
+            blocks: vec![
+                PerLink {
+                    object: Block::ZERO,
+                    world: Block::ZERO
+                };
+                links
+            ],
+            gradient: vec![0.0; unknowns],
+            direction: vec![0.0; unknowns],
+            a_velocity: vec![0.0; unknowns],
+            a_direction: vec![0.0; unknowns],
+            hessian: Skyline::new((0..unknowns).map(first).collect()),
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Scene files. An unknown key is an error that names the nearest key there is: a misspelt `modulus` must not
+//! leave the default in force in silence.
+
+use super::Scene;
+use std::path::{Path, PathBuf};
+
+/// Why a scene was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// The file could not be read.
+    #[error("cannot read the scene \"{path}\": {cause}")]
+    Unreadable {
+        /// The path.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// Not TOML, or a value of the wrong kind.
+    #[error("the scene is not understood: {0}")]
+    Syntax(String),
+    /// A key that no scene has.
+    #[error("the scene has no key \"{key}\"{}", .nearest.as_ref().map_or(String::new(), |n| format!("; did you mean \"{n}\"?")))]
+    UnknownKey {
+        /// The key, with its tables.
+        key: String,
+        /// The known key that looks most like it.
+        nearest: Option<String>,
+    },
+    /// A number outside what is possible.
+    #[error("{key} = {value} is not possible; it must be {wanted}")]
+    OutOfRange {
+        /// The key, with its tables.
+        key: String,
+        /// The value found.
+        value: String,
+        /// What would be accepted.
+        wanted: String,
+    },
+}
+
+/// Scene files larger than this are refused before parsing [bytes].
+const LARGEST_FILE: u64 = 1 << 20;
+
+impl Scene {
+    /// Reads, checks keys, fills in defaults and checks ranges.
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        let written: toml::Table = text.parse().map_err(|e| syntax(&e))?;
+        check_keys(&written, &known_keys(), "")?;
+        let scene: Self = toml::from_str(text).map_err(|e| syntax(&e))?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// Reads a scene file. A relative path of an object file counts from the scene file's folder.
+    pub fn from_file(path: &Path) -> Result<Self, SceneError> {
+        let unreadable = |cause: String| SceneError::Unreadable {
+            path: path.to_owned(),
+            cause,
+        };
+        let size = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?.len();
+        if size > LARGEST_FILE {
+            return Err(unreadable(format!("{size} bytes is too large for a scene")));
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
+        let mut scene = Self::from_toml(&text)?;
+        let beside = path.parent().unwrap_or(Path::new("")).join(&scene.object.source);
+        if beside.is_file()
+            && let Some(found) = beside.to_str()
+        {
+            found.clone_into(&mut scene.object.source);
+        }
+        Ok(scene)
+    }
+
+    /// The whole scene as TOML, every key written out.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a scene holds only tables, numbers and text, which TOML can write")
+    }
+}
+
+fn syntax(error: &toml::de::Error) -> SceneError {
+    SceneError::Syntax(error.to_string().trim_end().to_owned())
+}
+
+/// The default scene as a table: its keys are the keys there are.
+fn known_keys() -> toml::Table {
+    toml::Table::try_from(Scene::default()).expect("a scene is a table")
+}
+
+fn check_keys(written: &toml::Table, known: &toml::Table, prefix: &str) -> Result<(), SceneError> {
+    for (key, value) in written {
+        let Some(template) = known.get(key) else {
+            return Err(SceneError::UnknownKey {
+                key: format!("{prefix}{key}"),
+                nearest: nearest_key(key, known, prefix),
+            });
+        };
+        let inner = format!("{prefix}{key}.");
+        match (value, template) {
+            (toml::Value::Table(written), toml::Value::Table(known)) => check_keys(written, known, &inner)?,
+            (toml::Value::Array(rows), toml::Value::Array(templates)) => {
+                for (row, template) in rows.iter().zip(templates.iter().cycle()) {
+                    if let (toml::Value::Table(row), toml::Value::Table(template)) = (row, template) {
+                        check_keys(row, template, &inner)?;
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The known key most like the unknown one: first beside it, then anywhere in the scene.
+fn nearest_key(key: &str, beside: &toml::Table, prefix: &str) -> Option<String> {
+    let mut candidates: Vec<(String, String)> = beside.keys().map(|k| (k.clone(), format!("{prefix}{k}"))).collect();
+    collect_keys(&known_keys(), "", &mut candidates);
+    let likeness = |name: &str| strsim::jaro_winkler(key, name);
+    candidates
+        .into_iter()
+        .map(|(name, full)| (likeness(&name), full))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        // The first of equals wins, so that a key in the same table is preferred.
+        .reduce(|best, next| if next.0 > best.0 { next } else { best })
+        .map(|(_, full)| full)
+}
+
+fn collect_keys(table: &toml::Table, prefix: &str, into: &mut Vec<(String, String)>) {
+    for (key, value) in table {
+        into.push((key.clone(), format!("{prefix}{key}")));
+        if let toml::Value::Table(inner) = value {
+            collect_keys(inner, &format!("{prefix}{key}."), into);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Accuracy, Auto};
+
+    #[test]
+    fn a_scene_survives_a_round_trip() {
+        let mut scene = Scene::default();
+        scene.object.mass = Auto::Value(0.25);
+        scene.solver.accuracy = Accuracy::Reference;
+        assert_eq!(Scene::from_toml(&scene.to_toml()), Ok(scene));
+        assert_eq!(Scene::from_toml(""), Ok(Scene::default()));
+    }
+
+    #[test]
+    fn a_few_keys_are_enough() {
+        let scene = Scene::from_toml("[object]\nsource = \"ball\"\nmass = 1\n[gripper.finger]\njoints = 20\n");
+        let scene = scene.expect("valid");
+        assert_eq!(
+            (scene.object.source.as_str(), scene.gripper.finger.joints),
+            ("ball", 20)
+        );
+        assert_eq!(scene.object.mass, Auto::Value(1.0));
+    }
+
+    #[test]
+    fn a_misspelt_key_is_named_with_the_nearest() {
+        let message = |text: &str| Scene::from_toml(text).expect_err("unknown").to_string();
+        let text = message("[gripper.pad]\nmodolus = 2e5\n");
+        assert!(
+            text.contains("gripper.pad.modolus") && text.contains("\"gripper.pad.modulus\""),
+            "{text}"
+        );
+        // A key in the wrong table is found where it belongs.
+        assert!(message("[solver]\nopening = 0.1\n").contains("gripper.mount.opening"));
+        assert!(message("[gripper.actuation]\ncurve = [{bar = 0, torqe = 1}]\n").contains("torque"));
+        assert!(message("zzzz = 1\n").contains("no key \"zzzz\""));
+    }
+
+    #[test]
+    fn wrong_kinds_and_broken_text_are_told_apart() {
+        assert!(matches!(Scene::from_toml("[solver\n"), Err(SceneError::Syntax(_))));
+        assert!(matches!(
+            Scene::from_toml("[solver]\naccuracy = \"best\"\n"),
+            Err(SceneError::Syntax(_))
+        ));
+        assert!(matches!(
+            Scene::from_toml("[object]\nmass = \"heavy\"\n"),
+            Err(SceneError::Syntax(_))
+        ));
+        assert!(matches!(
+            Scene::from_toml("[world]\ngravity = nan\n"),
+            Err(SceneError::OutOfRange { .. })
+        ));
+    }
+}

@@ -1,0 +1,212 @@
+//! The scene: everything a user may set, as plain data with defaults. Saved and edited, never changed by a run.
+//!
+//! A scene file is TOML; each table below is a table there, and every key may be left out. See
+//! [`Scene::from_toml`] for reading and [`Scene::to_toml`] for the whole list with its defaults.
+
+mod auto;
+mod check;
+mod file;
+mod timing;
+
+pub use auto::Auto;
+pub use file::SceneError;
+pub use timing::{Clock, Timing};
+
+use crate::gripper::{Gripper, Programme};
+use crate::units::STANDARD_GRAVITY;
+use serde::{Deserialize, Serialize};
+
+/// Everything that defines a grasp.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Scene {
+    /// What is grasped and how it lies.
+    pub object: ObjectSetup,
+    /// What the object rests on.
+    pub support: Support,
+    /// The gripper and where it is held.
+    pub gripper: Gripper,
+    /// Line pressure over time.
+    pub programme: Programme,
+    /// Rates and duration.
+    pub timing: Timing,
+    /// How accurately motion is computed.
+    pub solver: Solver,
+    /// The world around.
+    pub world: World,
+}
+
+/// What is grasped.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ObjectSetup {
+    /// The name of a built-in object, the path of a URDF, OBJ or STL file, or `empty` for an empty hand.
+    pub source: String,
+    /// Held in place instead of resting freely until the fingers move it.
+    pub fixed: bool,
+    /// Fixed-axis roll, pitch, yaw of the object as it is put down [degrees].
+    pub rotation_deg: [f64; 3],
+    /// Shift of the object from the middle of its support [m].
+    pub shift: [f64; 2],
+    /// Mass [kg]; `auto` takes it from the file, or else from volume and density.
+    pub mass: Auto,
+    /// Density used where the file gives no usable mass [kg/m³].
+    pub density: f64,
+    /// Friction coefficient of the surface; `auto` takes the object's own, or 0.6.
+    pub friction: Auto,
+    /// Factor on all lengths in the file; `auto` guesses millimetres or metres and says so.
+    pub scale: Auto,
+    /// Which shape the physics sees.
+    pub collision: CollisionShape,
+}
+
+/// Which shape the physics sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CollisionShape {
+    /// What the file declares for collision; where it declares none, what it shows.
+    #[default]
+    File,
+    /// What the file shows.
+    Visual,
+    /// The convex hull, for meshes that cannot be repaired.
+    Hull,
+}
+
+/// The kinds of support.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SupportKind {
+    /// A slim column on the table, so that the fingers reach around the object.
+    Pedestal,
+    /// The table itself.
+    Table,
+    /// Nothing: the object floats, or falls when free.
+    None,
+}
+
+/// What the object rests on. The table is the plane z = 0 of the world; fingers touch both.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Support {
+    /// Pedestal, table or none.
+    pub kind: SupportKind,
+    /// Height of the pedestal above the table [m].
+    pub height: f64,
+    /// Radius of the pedestal [m].
+    pub radius: f64,
+    /// Friction coefficient; combined with the object's as a geometric mean.
+    pub friction: f64,
+    /// How far a resting object may sink into the support under its own weight [m].
+    pub sink: f64,
+    /// Least stiffness of a contact point [N/m], for light objects that are pressed down.
+    pub stiffness: f64,
+}
+
+/// How accurately motion is computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Solver {
+    /// Named choice of the time step.
+    pub accuracy: Accuracy,
+    /// Newton stops when the scaled gradient falls below this share of the forces at play.
+    pub tolerance: f64,
+    /// Newton iterations after which a step is reported as not converged.
+    pub max_iterations: u32,
+    /// Times the friction limits are brought up to date with the normal forces within a step.
+    pub relag_passes: u32,
+    /// Lattice spacing of baked distances [m]; `auto` chooses by the object's size.
+    pub distance_cell: Auto,
+}
+
+/// Named choices of the time step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Accuracy {
+    /// At most 1/150 s: hold values, quick looks, large data sets.
+    Draft,
+    /// At most 1/300 s.
+    Standard,
+    /// At most 1/9600 s: what the others are measured against.
+    Reference,
+}
+
+impl Accuracy {
+    /// All of them, coarsest first.
+    pub const ALL: [Self; 3] = [Self::Draft, Self::Standard, Self::Reference];
+
+    /// The name used in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Standard => "standard",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// Steps per second that are taken at least.
+    pub fn least_hz(self) -> u32 {
+        match self {
+            Self::Draft => 150,
+            Self::Standard => 300,
+            Self::Reference => 9600,
+        }
+    }
+}
+
+/// The world around.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct World {
+    /// Gravity along -z [m/s²].
+    pub gravity: f64,
+}
+
+impl Default for ObjectSetup {
+    fn default() -> Self {
+        Self {
+            source: "lemon".to_owned(),
+            fixed: false,
+            rotation_deg: [0.0; 3],
+            shift: [0.0; 2],
+            mass: Auto::Auto,
+            density: 500.0, // wood and half-full containers; most graspable things float
+            friction: Auto::Auto,
+            scale: Auto::Auto,
+            collision: CollisionShape::File,
+        }
+    }
+}
+
+impl Default for Support {
+    fn default() -> Self {
+        Self {
+            kind: SupportKind::Pedestal,
+            height: 0.050, // fingertips stay clear of the table at every offset up to 12 mm
+            radius: 0.008, // slimmer than the smallest of the sixteen objects
+            friction: 0.6,
+            sink: 2e-5,
+            stiffness: 1e4,
+        }
+    }
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self {
+            accuracy: Accuracy::Standard,
+            tolerance: 1e-6,
+            max_iterations: 100,
+            relag_passes: 1, // zero leaves the friction cone violated up to tenfold at 10 ms, two cost 20 % more
+            distance_cell: Auto::Auto,
+        }
+    }
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self {
+            gravity: STANDARD_GRAVITY,
+        }
+    }
+}

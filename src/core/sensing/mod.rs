@@ -1,0 +1,103 @@
+//! From raw frames to what sensors would read: curvature and pressure over chosen stretches of the fingers.
+//!
+//! Nothing here is stored. A trial keeps joint angles and taxel forces, so that any layout can be derived later.
+
+mod curvature;
+mod layout;
+mod pressure;
+
+pub use curvature::curvature;
+pub use layout::{CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, Span};
+pub use pressure::{ContactPatch, PressureArea};
+
+use crate::gripper::{BentFinger, Gripper, Side, TaxelGrid};
+use crate::trial::Frame;
+
+/// A layout on a gripper, ready to read frames.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    channels: Vec<Channel>,
+    finger: crate::gripper::Finger,
+    grid: TaxelGrid,
+    area: PressureArea,
+}
+
+impl Sensors {
+    /// Places a layout on a gripper. Pressure is force over the participation area unless said otherwise.
+    pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
+        Ok(Self {
+            channels: layout.channels(gripper)?,
+            finger: gripper.finger.clone(),
+            grid: gripper.taxels(),
+            area,
+        })
+    }
+
+    /// The channels, in the order in which [`Sensors::read`] gives values.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// One value per channel, in the channel's unit; `None` where a pressure is undefined because the contact spans
+    /// no area (only with [`PressureArea::Hull`]).
+    pub fn read(&self, frame: &Frame) -> Vec<Option<f64>> {
+        let bent = Side::BOTH.map(|side| BentFinger::new(&self.finger, frame.joints(side)));
+        self.channels
+            .iter()
+            .map(|channel| match channel.quantity {
+                Quantity::Curvature => Some(curvature(
+                    &bent[channel.side.index()],
+                    frame.joints(channel.side),
+                    &channel.span,
+                )),
+                Quantity::Pressure => self.patch(frame, channel).pressure(self.area),
+                Quantity::Force => Some(self.patch(frame, channel).force()),
+            })
+            .collect()
+    }
+
+    fn patch(&self, frame: &Frame, channel: &Channel) -> ContactPatch {
+        ContactPatch::new(frame, channel.side, &self.grid, &channel.span)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gripper::Phase;
+    use crate::trial::TaxelLoad;
+
+    #[test]
+    fn a_frame_is_read_channel_by_channel() {
+        let gripper = Gripper::default();
+        let layout = SensorLayout::named("C6+F").expect("in the catalogue");
+        let sensors = Sensors::new(&layout, &gripper, PressureArea::Participation).expect("fits");
+        let frame = Frame {
+            sample: 0,
+            t: 0.0,
+            line_bar: 0.5,
+            phase: Phase::Close,
+            q: [vec![0.05; 10], vec![0.0; 10]].concat(),
+            world_from_object: None,
+            // One taxel on the distal half of the right pad.
+            taxels: vec![TaxelLoad {
+                taxel: 160 + 150,
+                normal: 0.2,
+                along: 0.0,
+                across: 0.0,
+            }],
+        };
+        let values = sensors.read(&frame);
+        let value = |name: &str| {
+            let at = sensors.channels().iter().position(|c| c.name() == name).expect(name);
+            values[at].expect("defined")
+        };
+        assert!((value("curvature_left_proximal") - 5.0).abs() < 1e-2);
+        assert_eq!(value("curvature_right_distal"), 0.0);
+        assert_eq!(value("pressure_right_proximal"), 0.0);
+        let area = gripper.taxels().area();
+        assert!((value("pressure_right_distal") - f64::from(0.2f32) / area).abs() < 1e-6);
+        assert!((value("force_right_distal") - 0.2).abs() < 1e-6);
+        assert_eq!(value("force_left_distal"), 0.0);
+    }
+}

@@ -1,0 +1,159 @@
+//! Plain records of a grasp: frames as they are sampled, and the trial they make. Raw quantities only; curvature,
+//! pressure and every sensor layout are derived from them later.
+
+use crate::geometry::Pose;
+use crate::gripper::{Phase, Side};
+use serde::{Deserialize, Serialize};
+
+/// Load on one taxel at one sample, in the axes of its segment: what the finger feels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TaxelLoad {
+    /// Left pad's taxels first, then the right pad's; see [`crate::gripper::TaxelGrid`].
+    pub taxel: u16,
+    /// Force into the pad [N].
+    pub normal: f32,
+    /// Shear force towards the tip [N].
+    pub along: f32,
+    /// Shear force across the finger, along the gripper's y [N].
+    pub across: f32,
+}
+
+/// Everything sampled at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Which sample of the trial, from 0.
+    pub sample: u32,
+    /// Time since the start of the trial [s].
+    pub t: f64,
+    /// Commanded line pressure [bar].
+    pub line_bar: f64,
+    /// What the programme was doing.
+    pub phase: Phase,
+    /// Joint angles, left finger then right, from palm to tip [rad].
+    pub q: Vec<f64>,
+    /// The object's frame in the world; absent for an empty hand.
+    pub world_from_object: Option<Pose>,
+    /// Loaded taxels, in rising order; those not listed carry nothing.
+    pub taxels: Vec<TaxelLoad>,
+}
+
+impl Frame {
+    /// Joint angles of one finger [rad].
+    pub fn joints(&self, side: Side) -> &[f64] {
+        let n = self.q.len() / 2;
+        &self.q[side.index() * n..(side.index() + 1) * n]
+    }
+
+    /// Loads on one pad that has `count` taxels, with indices counted from that pad's first taxel.
+    pub fn loads(&self, side: Side, count: usize) -> impl Iterator<Item = (usize, TaxelLoad)> + '_ {
+        let from = side.index() * count;
+        self.taxels
+            .iter()
+            .map(move |load| (usize::from(load.taxel).wrapping_sub(from), *load))
+            .filter(move |(index, _)| *index < count)
+    }
+
+    /// Sum of the normal forces on one pad [N].
+    pub fn normal_force(&self, side: Side, count: usize) -> f64 {
+        self.loads(side, count).map(|(_, load)| f64::from(load.normal)).sum()
+    }
+}
+
+/// How far a simulated trial can be trusted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Quality {
+    /// False when a number became infinite or NaN; the trial ends before that step.
+    pub finite: bool,
+    /// False when any step missed the solver's tolerance.
+    pub converged: bool,
+    /// Solver steps taken.
+    pub steps: u64,
+    /// Steps that missed the tolerance.
+    pub unconverged_steps: u64,
+    /// Mean Newton iterations per step.
+    pub newton_mean: f64,
+    /// Most Newton iterations in one step.
+    pub newton_max: u32,
+    /// Largest outer friction residual of any step; see [`crate::physics::StepReport`].
+    pub friction_residual: f64,
+    /// Largest torque at any joint that neither springs nor contacts account for at the end of the hold, as a share
+    /// of the actuation torque. Far from zero means the grasp had not come to rest.
+    pub static_residual: f64,
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            finite: true,
+            converged: true,
+            steps: 0,
+            unconverged_steps: 0,
+            newton_mean: 0.0,
+            newton_max: 0,
+            friction_residual: 0.0,
+            static_residual: 0.0,
+        }
+    }
+}
+
+/// What is known of a trial besides its frames.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrialInfo {
+    /// Where it came from: `sim` for a simulated gripper.
+    pub rig: String,
+    /// Name of the object.
+    pub object: String,
+    /// Seed from which the pose was drawn; 0 where the scene's own pose was used.
+    pub seed: u64,
+    /// The whole scene as TOML, every key written out.
+    pub scene: String,
+    /// Where the gripper was held.
+    pub world_from_gripper: Pose,
+    /// How far it can be trusted.
+    pub quality: Quality,
+    /// What was guessed, mended or cut short.
+    pub warnings: Vec<String>,
+    /// Version of the program that made it.
+    pub version: String,
+}
+
+/// One recorded grasp.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// What is known of it.
+    pub info: TrialInfo,
+    /// Its samples, in order.
+    pub frames: Vec<Frame>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loads_are_told_apart_by_side() {
+        let load = |taxel, normal| TaxelLoad {
+            taxel,
+            normal,
+            along: 0.0,
+            across: 0.0,
+        };
+        let frame = Frame {
+            sample: 0,
+            t: 0.0,
+            line_bar: 0.0,
+            phase: Phase::Close,
+            q: vec![1.0, 2.0, 3.0, 4.0],
+            world_from_object: None,
+            taxels: vec![load(3, 1.0), load(9, 2.0), load(10, 4.0), load(19, 8.0)],
+        };
+        assert_eq!(frame.joints(Side::Right), [3.0, 4.0]);
+        let indices: Vec<usize> = frame.loads(Side::Right, 10).map(|(i, _)| i).collect();
+        assert_eq!(indices, [0, 9]);
+        assert_eq!(
+            (frame.normal_force(Side::Left, 10), frame.normal_force(Side::Right, 10)),
+            (3.0, 12.0)
+        );
+    }
+}
