@@ -1,1 +1,3 @@
-//! app
+//! tour
+
+pub mod cli;

@@ -81,7 +81,8 @@ pub fn bake(parts: &[SolidPart], cell: f64) -> Result<DistanceGrid, BakeError> {
         return Err(BakeError::TooFine { nodes: nodes as usize });
     }
     let mut grid = DistanceGrid {
-        origin: box_around.min,
+        // Centred, so that a symmetric solid has a symmetric field.
+        origin: box_around.centre() - 0.5 * cell * (counts - DVec3::ONE),
         cell,
         size: counts.to_array().map(|n| n as usize),
         values: vec![f32::INFINITY; nodes as usize],

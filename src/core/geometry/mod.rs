@@ -3,6 +3,7 @@
 
 mod bake;
 mod circle;
+mod convex;
 mod distance;
 mod hull;
 mod mass;
@@ -16,13 +17,14 @@ mod surface;
 
 pub use bake::{BakeError, SolidPart, bake, choose_cell};
 pub use circle::signed_curvature;
+pub use convex::convex_hull;
 pub use distance::{DistanceField, DistanceGrid};
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};
 pub use mesh_files::{ColouredPart, MeshFileError, read_mesh, write_obj};
 pub use pose::Pose;
-pub use primitive::Primitive;
+pub use primitive::{Primitive, lathe};
 pub use repair::{MeshError, Repaired, repair};
 pub use support_points::support_points;
 pub use surface::{SurfaceMesh, SurfaceVertex};

@@ -88,6 +88,24 @@ impl Primitive {
         }
     }
 
+    /// The same shape with all lengths multiplied.
+    pub fn scaled(&self, factor: f64) -> Self {
+        match *self {
+            Self::Sphere { radius } => Self::Sphere {
+                radius: radius * factor,
+            },
+            Self::Cuboid { half } => Self::Cuboid { half: half * factor },
+            Self::Cylinder { radius, half_length } => Self::Cylinder {
+                radius: radius * factor,
+                half_length: half_length * factor,
+            },
+            Self::Capsule { radius, half_length } => Self::Capsule {
+                radius: radius * factor,
+                half_length: half_length * factor,
+            },
+        }
+    }
+
     /// Axis-aligned bounds [m].
     pub fn bounds(&self) -> Bounds {
         let half = match *self {
@@ -190,7 +208,7 @@ fn arc_profile(radius: f64, half_length: f64) -> Vec<DVec2> {
 }
 
 /// A solid of revolution about z from a profile in (radius, z) that starts and ends on the axis, going up.
-pub(crate) fn lathe(profile: &[DVec2]) -> TriMesh {
+pub fn lathe(profile: &[DVec2]) -> TriMesh {
     const AROUND: u32 = 64;
     let mut mesh = TriMesh::default();
     let mut rings: Vec<Vec<u32>> = Vec::new();

@@ -1,8 +1,10 @@
 //! A simulated grasp in time: steps on a clock of whole ticks, pressure in, frames out.
 
 use super::contact::Acting;
+use super::detect::detect;
 use super::model::Model;
 use super::placement::Placement;
+use super::solve::segment_velocities;
 use super::state::State;
 use super::step::{self, Drive, StepReport, segment_axes_of};
 use super::workspace::{Spatial, Workspace};
@@ -120,6 +122,18 @@ impl Simulation {
         self.totals.unconverged += u64::from(!report.converged);
         self.totals.friction_residual = self.totals.friction_residual.max(report.friction_residual);
         Ok(report)
+    }
+
+    /// Deepest compression of a strand in the state as it is, before any step [m].
+    pub fn starting_overlap(&mut self) -> f64 {
+        step::lay_out(&self.model, &self.state, &mut self.workspace);
+        segment_velocities(&self.model, &self.state.velocity, &mut self.workspace);
+        detect(&self.model, &self.state, &mut self.workspace);
+        let on_finger = |c: &&super::contact::Contact| matches!(c.acting, Acting::Segment(_));
+        let contacts = self.workspace.contacts.iter().filter(on_finger);
+        let deepest = contacts.map(|c| c.compression).fold(0.0, f64::max);
+        self.workspace.contacts.clear();
+        deepest
     }
 
     /// What a rig would sample now.

@@ -51,6 +51,20 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The scene with some keys changed, each written as `gripper.finger.joints=20`.
+    ///
+    /// Text values need no quotes: `object.source=lemon`.
+    pub fn with_settings(&self, settings: &[String]) -> Result<Self, SceneError> {
+        let mut document: toml::Table = self.to_toml().parse().map_err(|e| syntax(&e))?;
+        for setting in settings {
+            let (key, value) = setting
+                .split_once('=')
+                .ok_or_else(|| SceneError::Syntax(format!("\"{setting}\" does not set anything; write KEY=VALUE")))?;
+            set_key(&mut document, key.trim(), parse_value(value.trim()))?;
+        }
+        Self::from_toml(&document.to_string())
+    }
+
     /// Reads a scene file. A relative path of an object file counts from the scene file's folder.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |cause: String| SceneError::Unreadable {
@@ -75,6 +89,56 @@ impl Scene {
     /// The whole scene as TOML, every key written out.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a scene holds only tables, numbers and text, which TOML can write")
+    }
+}
+
+/// A value as TOML reads it, or else the text itself.
+fn parse_value(text: &str) -> toml::Value {
+    let document = format!("x = {text}").parse::<toml::Table>();
+    let value = document.ok().and_then(|mut table| table.remove("x"));
+    value.unwrap_or_else(|| toml::Value::String(text.to_owned()))
+}
+
+/// Sets a dotted key whose tables all exist.
+fn set_key(document: &mut toml::Table, key: &str, value: toml::Value) -> Result<(), SceneError> {
+    let unknown = |prefix: &str, last: &str| {
+        let known = known_keys();
+        let beside = prefix
+            .split_terminator('.')
+            .try_fold(&known, |table, name| table.get(name)?.as_table());
+        let nearest = nearest_key(
+            last,
+            beside.unwrap_or(&known),
+            if beside.is_some() { prefix } else { "" },
+        );
+        SceneError::UnknownKey {
+            key: key.to_owned(),
+            nearest,
+        }
+    };
+    let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
+    let mut table = document;
+    let mut prefix = String::new();
+    for name in tables.split_terminator('.') {
+        let inner = table.get_mut(name).and_then(toml::Value::as_table_mut);
+        table = inner.ok_or_else(|| unknown(&prefix, name))?;
+        prefix.push_str(name);
+        prefix.push('.');
+    }
+    match table.get_mut(last) {
+        // A whole number where a fraction is expected is what people write.
+        Some(slot @ toml::Value::Float(_)) => {
+            *slot = match value {
+                toml::Value::Integer(x) => toml::Value::Float(x as f64),
+                other => other,
+            };
+            Ok(())
+        }
+        Some(slot) => {
+            *slot = value;
+            Ok(())
+        }
+        None => Err(unknown(&prefix, last)),
     }
 }
 
@@ -171,6 +235,31 @@ mod tests {
         assert!(message("[solver]\nopening = 0.1\n").contains("gripper.mount.opening"));
         assert!(message("[gripper.actuation]\ncurve = [{bar = 0, torqe = 1}]\n").contains("torque"));
         assert!(message("zzzz = 1\n").contains("no key \"zzzz\""));
+    }
+
+    #[test]
+    fn settings_change_single_keys() {
+        let set = |settings: &[&str]| {
+            let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
+            Scene::default().with_settings(&settings)
+        };
+        let scene = set(&[
+            "gripper.finger.joints=20",
+            "object.source=ball",
+            "world.gravity = 0",
+            "object.mass=0.1",
+        ]);
+        let scene = scene.expect("valid");
+        assert_eq!(
+            (scene.gripper.finger.joints, scene.object.source.as_str()),
+            (20, "ball")
+        );
+        assert_eq!((scene.world.gravity, scene.object.mass), (0.0, Auto::Value(0.1)));
+        let message = |setting: &str| set(&[setting]).expect_err("refused").to_string();
+        assert!(message("gripper.finger.joint=20").contains("gripper.finger.joints"));
+        assert!(message("gripper.fingr.joints=20").contains("gripper.finger"));
+        assert!(message("nonsense").contains("KEY=VALUE"));
+        assert!(message("gripper.finger.joints=500").contains("between 2 and 80"));
     }
 
     #[test]

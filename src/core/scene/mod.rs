@@ -13,6 +13,7 @@ pub use file::SceneError;
 pub use timing::{Clock, Timing};
 
 use crate::gripper::{Gripper, Programme};
+use crate::objects::{CollisionShape, LoadOptions, ObjectError, ObjectModel, load};
 use crate::units::STANDARD_GRAVITY;
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +35,20 @@ pub struct Scene {
     pub solver: Solver,
     /// The world around.
     pub world: World,
+}
+
+impl Scene {
+    /// Loads what the scene grasps; `None` for an empty hand.
+    pub fn load_object(&self) -> Result<Option<ObjectModel>, ObjectError> {
+        let options = LoadOptions {
+            scale: self.object.scale.value(),
+            mass: self.object.mass.value(),
+            density: self.object.density,
+            collision: self.object.collision,
+            cell: self.solver.distance_cell.value(),
+        };
+        load(&self.object.source, &options)
+    }
 }
 
 /// What is grasped.
@@ -58,19 +73,6 @@ pub struct ObjectSetup {
     pub scale: Auto,
     /// Which shape the physics sees.
     pub collision: CollisionShape,
-}
-
-/// Which shape the physics sees.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CollisionShape {
-    /// What the file declares for collision; where it declares none, what it shows.
-    #[default]
-    File,
-    /// What the file shows.
-    Visual,
-    /// The convex hull, for meshes that cannot be repaired.
-    Hull,
 }
 
 /// The kinds of support.
@@ -170,7 +172,7 @@ impl Default for ObjectSetup {
             rotation_deg: [0.0; 3],
             shift: [0.0; 2],
             mass: Auto::Auto,
-            density: 500.0, // wood and half-full containers; most graspable things float
+            density: LoadOptions::default().density,
             friction: Auto::Auto,
             scale: Auto::Auto,
             collision: CollisionShape::File,

@@ -1,0 +1,167 @@
+//! `palpate grasp`: one grasp, told in a few lines or as JSON, stored, and written as CSV where asked for.
+
+use super::Failure;
+use super::setup::{SceneArguments, open_store};
+use super::terminal::{say, say_json, warn};
+use palpate_core::grasping::{GraspSummary, PoseJitter, grasp, jittered};
+use palpate_core::recording::{TrialId, contacts_path, write_contacts_csv, write_trial_csv};
+use palpate_core::scene::Scene;
+use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
+use palpate_core::units::{mm, three_digits};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate grasp`.
+#[derive(Debug, clap::Args)]
+pub(super) struct GraspArguments {
+    /// A built-in name (lemon, ball, cube ..), a URDF, OBJ or STL file, or `empty`.
+    object: Option<String>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Draw the gripper's pose at random from this seed: up to 5 mm off, turned by up to 25 degrees.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Write the trial as CSV here, and its contacts beside it as .contacts.csv.
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+    /// Sensor layout of the CSV: C1 to C8, each also as C1+F.
+    #[arg(long, value_name = "NAME", default_value = "C1+F")]
+    layout: String,
+    /// Divide force by the convex hull of the contacts, as the paper does, instead of the participation area.
+    #[arg(long)]
+    hull: bool,
+    /// Do not keep the trial in the store.
+    #[arg(long)]
+    no_store: bool,
+    /// Print one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+    /// Print the whole scene as TOML and stop.
+    #[arg(long)]
+    print_scene: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    summary: GraspSummary,
+    seed: u64,
+    accuracy: &'static str,
+    /// CPU time of the simulation alone [ms].
+    cpu_ms: f64,
+    /// CPU time of loading the object [ms].
+    load_cpu_ms: f64,
+    trial_id: Option<TrialId>,
+}
+
+pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let nominal = arguments.scene.scene(arguments.object.as_deref())?;
+    if arguments.print_scene {
+        return say(nominal.to_toml().trim_end());
+    }
+    let layout = SensorLayout::named(&arguments.layout)?;
+    let area = if arguments.hull {
+        PressureArea::Hull
+    } else {
+        PressureArea::Participation
+    };
+    let sensors = Sensors::new(&layout, &nominal.gripper, area)?;
+    let loading = cpu_time::ProcessTime::now();
+    let object = nominal.load_object()?;
+    let load_cpu_ms = loading.elapsed().as_secs_f64() * 1e3;
+    let scene = match arguments.seed {
+        Some(seed) => jittered(&nominal, object.as_ref(), PoseJitter::default(), seed).0,
+        None => nominal,
+    };
+    let seed = arguments.seed.unwrap_or(0);
+    let start = cpu_time::ThreadTime::now();
+    let trial = grasp(&scene, object.as_ref(), seed);
+    let cpu_ms = start.elapsed().as_secs_f64() * 1e3;
+    let trial_id = if arguments.no_store {
+        None
+    } else {
+        Some(open_store(store)?.insert(&trial)?)
+    };
+    if let Some(path) = &arguments.out {
+        write_trial_csv(path, &trial, &scene, &sensors)?;
+        write_contacts_csv(&contacts_path(path), &trial, &scene)?;
+    }
+    let accuracy = scene.solver.accuracy.name();
+    let summary = GraspSummary::new(&trial, &scene);
+    let report = Report {
+        summary,
+        seed,
+        accuracy,
+        cpu_ms,
+        load_cpu_ms,
+        trial_id,
+    };
+    if arguments.json {
+        say_json(&report)?;
+    } else {
+        tell(&report, &scene)?;
+        if let Some(path) = &arguments.out {
+            say(format!(
+                "written       {} and {}",
+                path.display(),
+                contacts_path(path).display()
+            ))?;
+        }
+    }
+    if report.summary.finite {
+        Ok(())
+    } else {
+        Err("the simulation left the range of numbers; see the warnings".into())
+    }
+}
+
+fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
+    let summary = &report.summary;
+    for warning in &summary.warnings {
+        warn(warning);
+    }
+    let duration = scene.timing.duration_s;
+    let held = if scene.object.fixed {
+        "held in place"
+    } else {
+        "resting freely"
+    };
+    say(format!("object        {}, {held}", summary.object))?;
+    match summary.contact_onset_s {
+        Some(onset) => say(format!("first contact {onset:.3} s"))?,
+        None => say("first contact never")?,
+    }
+    if let Some(hold) = &summary.hold {
+        let pair = |name: &str, values: [f64; 2], unit: &str| {
+            let [left, right] = values.map(three_digits);
+            say(format!("{name:<13} {left} left, {right} right [{unit}]"))
+        };
+        pair("hold force", hold.force_n, "N")?;
+        pair("curvature", hold.curvature_per_m, "1/m")?;
+        pair("pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa")?;
+    }
+    if let Some(moved) = summary.object_moved_m {
+        say(format!("object moved  {} mm", three_digits(mm(moved))))?;
+    }
+    let quality = &summary.quality;
+    say(format!(
+        "solver        {} steps, {:.2} Newton iterations each (most {}), {}",
+        quality.steps,
+        quality.newton_mean,
+        quality.newton_max,
+        if summary.converged {
+            "all converged"
+        } else {
+            "not all converged"
+        },
+    ))?;
+    say(format!(
+        "cost          {:.1} ms CPU for {duration} s at accuracy {}",
+        report.cpu_ms, report.accuracy
+    ))?;
+    match report.trial_id {
+        Some(id) => say(format!("stored        trial {id}")),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,58 @@
+//! The arguments that say what is grasped and how, shared by all commands that simulate.
+
+use super::Failure;
+use palpate_core::recording::Store;
+use palpate_core::scene::{Accuracy, Scene};
+use std::path::{Path, PathBuf};
+
+/// What to simulate.
+#[derive(Debug, clap::Args)]
+pub(super) struct SceneArguments {
+    /// A scene file (TOML); every key may be left out. `palpate grasp --print-scene` shows all keys.
+    #[arg(long, value_name = "FILE")]
+    pub(super) scene: Option<PathBuf>,
+    /// How accurately motion is computed: draft, standard or reference.
+    #[arg(long, value_name = "NAME", value_parser = parse_accuracy)]
+    pub(super) accuracy: Option<Accuracy>,
+    /// Hold the object in place instead of letting it rest freely.
+    #[arg(long)]
+    pub(super) fixed: bool,
+    /// Set any key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(super) settings: Vec<String>,
+}
+
+fn parse_accuracy(text: &str) -> Result<Accuracy, String> {
+    let found = Accuracy::ALL.into_iter().find(|a| a.name() == text);
+    found.ok_or_else(|| "choose draft, standard or reference".to_owned())
+}
+
+impl SceneArguments {
+    /// The scene they describe, with another object where one is named.
+    pub(super) fn scene(&self, object: Option<&str>) -> Result<Scene, Failure> {
+        let mut scene = match &self.scene {
+            Some(path) => Scene::from_file(path)?,
+            None => Scene::default(),
+        };
+        if let Some(object) = object {
+            object.clone_into(&mut scene.object.source);
+        }
+        if let Some(accuracy) = self.accuracy {
+            scene.solver.accuracy = accuracy;
+        }
+        scene.object.fixed |= self.fixed;
+        Ok(scene.with_settings(&self.settings)?)
+    }
+}
+
+/// Opens the store the user named, or the default one.
+pub(super) fn open_store(path: Option<&Path>) -> Result<Store, Failure> {
+    let store = match path {
+        Some(path) => Store::open(path)?,
+        None => Store::open(&Store::default_path())?,
+    };
+    for warning in store.warnings() {
+        super::terminal::warn(warning);
+    }
+    Ok(store)
+}

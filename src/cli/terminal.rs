@@ -1,0 +1,64 @@
+//! Talking on the terminal: results to standard output, everything else to standard error.
+
+use super::Failure;
+use std::error::Error;
+use std::io::{ErrorKind, Write};
+
+/// Prints a line of results.
+pub(super) fn say(line: impl std::fmt::Display) -> Result<(), Failure> {
+    writeln!(std::io::stdout(), "{line}")?;
+    Ok(())
+}
+
+/// Prints a value as JSON.
+pub(super) fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    say(serde_json::to_string_pretty(value)?)
+}
+
+/// Prints a warning beside the results.
+pub(super) fn warn(line: &str) {
+    // When standard error is closed there is nobody to tell.
+    let _unheard = writeln!(std::io::stderr(), "warning: {line}");
+}
+
+/// Prints why a command failed.
+pub(super) fn complain(line: &str) {
+    let _unheard = writeln!(std::io::stderr(), "error: {line}");
+}
+
+/// True when output failed because its reader has gone.
+pub(super) fn is_closed_pipe(failure: &(dyn Error + 'static)) -> bool {
+    failure
+        .downcast_ref::<std::io::Error>()
+        .is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
+}
+
+/// Rows of text in columns: the first left-aligned, numbers right-aligned.
+pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> Result<(), Failure> {
+    let width = |column: usize| {
+        let cells = rows.iter().map(|row| row[column].chars().count());
+        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..header.len()).map(width).collect();
+    let numeric = |column: usize| !rows.is_empty() && rows.iter().all(|row| row[column].parse::<f64>().is_ok());
+    let line = |cells: &[&str]| {
+        let padded: Vec<String> = cells
+            .iter()
+            .enumerate()
+            .map(|(i, cell)| {
+                let width = widths[i];
+                if numeric(i) {
+                    format!("{cell:>width$}")
+                } else {
+                    format!("{cell:<width$}")
+                }
+            })
+            .collect();
+        padded.join("  ").trim_end().to_owned()
+    };
+    say(line(header))?;
+    for row in rows {
+        say(line(&row.iter().map(String::as_str).collect::<Vec<_>>()))?;
+    }
+    Ok(())
+}

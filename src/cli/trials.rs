@@ -1,0 +1,238 @@
+//! `palpate trials`: the store from the terminal.
+
+use super::Failure;
+use super::setup::open_store;
+use super::terminal::{say, say_json, table, warn};
+use palpate_core::grasping::GraspSummary;
+use palpate_core::recording::{Store, TrialId, TrialRow, contacts_path, write_contacts_csv, write_trial_csv};
+use palpate_core::scene::Scene;
+use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
+use palpate_core::trial::Trial;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate trials`.
+#[derive(Debug, clap::Args)]
+pub(super) struct TrialsArguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// One line per trial, oldest first.
+    List {
+        /// Only trials of this object.
+        #[arg(long)]
+        object: Option<String>,
+        /// Include deleted trials.
+        #[arg(long)]
+        deleted: bool,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
+    /// What is known of one trial.
+    Show {
+        /// Its number.
+        id: TrialId,
+        /// Print JSON instead of text.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write trials as CSV, two files each.
+    Export {
+        /// Their numbers.
+        #[arg(required = true)]
+        ids: Vec<TrialId>,
+        /// A folder, or for a single trial a file.
+        #[arg(long, value_name = "PATH")]
+        out: PathBuf,
+        /// Sensor layout: C1 to C8, each also as C1+F.
+        #[arg(long, value_name = "NAME", default_value = "C1+F")]
+        layout: String,
+        /// Divide force by the convex hull of the contacts, as the paper does.
+        #[arg(long)]
+        hull: bool,
+    },
+    /// Mark trials as deleted; `restore` takes it back.
+    Delete {
+        /// Their numbers.
+        #[arg(required = true)]
+        ids: Vec<TrialId>,
+    },
+    /// Bring deleted trials back.
+    Restore {
+        /// Their numbers.
+        #[arg(required = true)]
+        ids: Vec<TrialId>,
+    },
+    /// Remove all deleted trials for good.
+    Purge,
+}
+
+pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let mut store = open_store(store)?;
+    match &arguments.what {
+        What::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
+        What::Show { id, json } => show(&store, *id, *json),
+        What::Export { ids, out, layout, hull } => {
+            let area = if *hull {
+                PressureArea::Hull
+            } else {
+                PressureArea::Participation
+            };
+            export(&store, ids, out, &SensorLayout::named(layout)?, area)
+        }
+        What::Delete { ids } => {
+            store.delete(ids)?;
+            say(format!(
+                "deleted {} trial(s); `palpate trials restore` brings them back",
+                ids.len()
+            ))
+        }
+        What::Restore { ids } => {
+            store.restore(ids)?;
+            say(format!("restored {} trial(s)", ids.len()))
+        }
+        What::Purge => say(format!("removed {} trial(s) for good", store.purge()?)),
+    }
+}
+
+fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Result<(), Failure> {
+    let mut rows = store.list(deleted)?;
+    rows.retain(|row| object.is_none_or(|object| row.object == object));
+    if json {
+        return say_json(&rows);
+    }
+    if rows.is_empty() {
+        return say("no trials yet: `palpate grasp lemon` records one");
+    }
+    let cells: Vec<Vec<String>> = rows
+        .iter()
+        .map(|row| {
+            vec![
+                row.id.to_string(),
+                row.object.clone(),
+                row.created.chars().take(19).collect::<String>().replace('T', " "),
+                row.rig.clone(),
+                row.samples.to_string(),
+                row.seed.to_string(),
+                remark(row),
+            ]
+        })
+        .collect();
+    table(
+        &["id", "object", "recorded (UTC)", "from", "samples", "seed", ""],
+        &cells,
+    )
+}
+
+fn remark(row: &TrialRow) -> String {
+    let mut remarks = Vec::new();
+    if row.deleted.is_some() {
+        remarks.push("deleted".to_owned());
+    }
+    if row.state != "complete" {
+        remarks.push("interrupted or still recording".to_owned());
+    }
+    if !row.sound {
+        remarks.push("not sound".to_owned());
+    }
+    if row.warnings > 0 {
+        remarks.push(format!("{} warning(s)", row.warnings));
+    }
+    remarks.join(", ")
+}
+
+/// What `trials show --json` prints.
+#[derive(Serialize)]
+struct Shown {
+    id: TrialId,
+    rig: String,
+    seed: u64,
+    version: String,
+    samples: usize,
+    #[serde(flatten)]
+    summary: GraspSummary,
+    scene: String,
+}
+
+fn scene_of(trial: &Trial) -> Result<Scene, Failure> {
+    Ok(Scene::from_toml(&trial.info.scene)?)
+}
+
+fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
+    let trial = store.load(id)?;
+    let summary = GraspSummary::new(&trial, &scene_of(&trial)?);
+    let shown = Shown {
+        id,
+        rig: trial.info.rig,
+        seed: trial.info.seed,
+        version: trial.info.version,
+        samples: trial.frames.len(),
+        summary,
+        scene: trial.info.scene,
+    };
+    if json {
+        return say_json(&shown);
+    }
+    for warning in &shown.summary.warnings {
+        warn(warning);
+    }
+    say(format!(
+        "trial {id}: {} ({}, seed {})",
+        shown.summary.object, shown.rig, shown.seed
+    ))?;
+    say(format!(
+        "{} samples, recorded by Palpate {}",
+        shown.samples, shown.version
+    ))?;
+    match shown.summary.contact_onset_s {
+        Some(onset) => say(format!("first contact at {onset:.3} s"))?,
+        None => say("no contact")?,
+    }
+    if let Some(hold) = &shown.summary.hold {
+        let [left, right] = hold.force_n;
+        say(format!("hold force {left:.3} N left, {right:.3} N right"))?;
+        let [left, right] = hold.curvature_per_m;
+        say(format!("curvature {left:.2} 1/m left, {right:.2} 1/m right"))?;
+        let [left, right] = hold.pressure_pa.map(|p| p * 1e-3);
+        say(format!("pressure {left:.2} kPa left, {right:.2} kPa right"))?;
+    }
+    say("its scene is in `palpate trials show --json`")
+}
+
+fn export(
+    store: &Store,
+    ids: &[TrialId],
+    out: &Path,
+    layout: &SensorLayout,
+    area: PressureArea,
+) -> Result<(), Failure> {
+    let as_file = out.extension().is_some_and(|e| e == "csv");
+    if as_file && ids.len() > 1 {
+        return Err("several trials need a folder: --out FOLDER".into());
+    }
+    for id in ids {
+        let trial = store.load(*id)?;
+        let scene = scene_of(&trial)?;
+        let sensors = Sensors::new(layout, &scene.gripper, area)?;
+        let path = if as_file {
+            out.to_owned()
+        } else {
+            out.join(format!("trial_{id}_{}.csv", plain_name(&trial.info.object)))
+        };
+        write_trial_csv(&path, &trial, &scene, &sensors)?;
+        write_contacts_csv(&contacts_path(&path), &trial, &scene)?;
+        say(path.display())?;
+    }
+    Ok(())
+}
+
+/// An object's name without anything that a file name should not have.
+fn plain_name(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' })
+        .collect()
+}

@@ -1,0 +1,265 @@
+//! Tools for modelling small things: turned parts, rounded boxes, stickers, ribbons, and paint.
+
+use glam::{DVec2, DVec3};
+use palpate_core::geometry::{ColouredPart, Pose, TriMesh};
+use palpate_core::palette::Rgb;
+use std::f64::consts::{PI, TAU};
+
+/// Parts of an object as they are added, each with a material name.
+#[derive(Default)]
+pub(super) struct Parts(pub(super) Vec<(String, ColouredPart)>);
+
+impl Parts {
+    /// Adds a mesh in one colour. Parts of equal material share its name.
+    pub(super) fn add(&mut self, material: &str, colour: Rgb, mesh: TriMesh) {
+        if let Some((_, part)) = self.0.iter_mut().find(|(name, _)| name == material) {
+            part.mesh.append(&mesh);
+        } else {
+            let part = ColouredPart {
+                mesh,
+                colour: Some(colour),
+            };
+            self.0.push((material.to_owned(), part));
+        }
+    }
+
+    /// Splits a mesh by the material that `paint` chooses for the middle of each triangle.
+    pub(super) fn add_painted(&mut self, mesh: &TriMesh, materials: &[(&str, Rgb)], paint: impl Fn(DVec3) -> usize) {
+        for (index, (name, colour)) in materials.iter().enumerate() {
+            let chosen: Vec<[u32; 3]> = mesh
+                .triangles
+                .iter()
+                .copied()
+                .filter(|t| paint(mesh.corners(*t).iter().sum::<DVec3>() / 3.0) == index)
+                .collect();
+            if !chosen.is_empty() {
+                self.add(name, *colour, compact(mesh, &chosen));
+            }
+        }
+    }
+}
+
+/// Only the points that some triangles use.
+fn compact(mesh: &TriMesh, triangles: &[[u32; 3]]) -> TriMesh {
+    let mut new_index = vec![u32::MAX; mesh.points.len()];
+    let mut out = TriMesh::default();
+    for t in triangles {
+        out.triangles.push(t.map(|i| {
+            if new_index[i as usize] == u32::MAX {
+                new_index[i as usize] = out.points.len() as u32;
+                out.points.push(mesh.points[i as usize]);
+            }
+            new_index[i as usize]
+        }));
+    }
+    out
+}
+
+/// A mesh moved to a place.
+pub(super) fn at(mut mesh: TriMesh, position: DVec3) -> TriMesh {
+    mesh.transform(&Pose::from_position(position));
+    mesh
+}
+
+/// A mesh turned so that its z points along y: lying across the closing direction.
+pub(super) fn lying(mut mesh: TriMesh) -> TriMesh {
+    mesh.transform(&Pose::from_xyz_rpy(DVec3::ZERO, DVec3::new(-0.5 * PI, 0.0, 0.0)));
+    mesh
+}
+
+/// A mesh turned so that its z points along `normal`, then moved.
+pub(super) fn facing(mut mesh: TriMesh, normal: DVec3, position: DVec3) -> TriMesh {
+    mesh.transform(&Pose::new(position, glam::DQuat::from_rotation_arc(DVec3::Z, normal)));
+    mesh
+}
+
+/// A turned profile in millimetres, (radius, height) from the axis at the bottom to the axis at the top.
+pub(super) fn turned(profile_mm: &[(f64, f64)]) -> TriMesh {
+    let profile: Vec<DVec2> = profile_mm.iter().map(|(r, z)| DVec2::new(*r, *z) * 1e-3).collect();
+    palpate_core::geometry::lathe(&profile)
+}
+
+/// A turned profile with every corner rounded by `radius` mm.
+pub(super) fn turned_soft(profile_mm: &[(f64, f64)], radius: f64) -> TriMesh {
+    const STEPS: usize = 5;
+    let p: Vec<DVec2> = profile_mm.iter().map(|(r, z)| DVec2::new(*r, *z)).collect();
+    let mut soft = vec![p[0]];
+    for w in p.windows(3) {
+        let reach = |end: DVec2| (end - w[1]).normalize() * radius.min(0.45 * (end - w[1]).length());
+        let (from, to) = (w[1] + reach(w[0]), w[1] + reach(w[2]));
+        for k in 0..=STEPS {
+            // A quadratic Bezier through the corner's control point is close enough to a fillet.
+            let t = k as f64 / STEPS as f64;
+            soft.push(from.lerp(w[1], t).lerp(w[1].lerp(to, t), t));
+        }
+    }
+    soft.push(p[p.len() - 1]);
+    let pairs: Vec<(f64, f64)> = soft.iter().map(|v| (v.x, v.y)).collect();
+    turned(&pairs)
+}
+
+/// A sphere of radius 1 from a subdivided cube: even triangles, no poles. `n` squares along each edge.
+pub(super) fn cube_sphere(n: u32) -> TriMesh {
+    cube_grid(n, |p| {
+        // The mapping of Everitt, which spreads squares evenly over the sphere.
+        let q = p * p;
+        DVec3::new(
+            p.x * (1.0 - 0.5 * q.y - 0.5 * q.z + q.y * q.z / 3.0).sqrt(),
+            p.y * (1.0 - 0.5 * q.z - 0.5 * q.x + q.z * q.x / 3.0).sqrt(),
+            p.z * (1.0 - 0.5 * q.x - 0.5 * q.y + q.x * q.y / 3.0).sqrt(),
+        )
+    })
+}
+
+/// A box of half edges `half` [m] with edges rounded by `radius` [m].
+pub(super) fn rounded_box(half: DVec3, radius: f64) -> TriMesh {
+    const ARC: u32 = 5;
+    // Per axis: an arc, a flat, an arc. Coordinates in -1..1 outside of 0 belong to the arcs.
+    let n = 2 * ARC + 1;
+    let inner = half - DVec3::splat(radius);
+    let lane = |i: u32| -> (f64, f64) {
+        // (position along the arc in -1..1, side of the flat)
+        let i = f64::from(i);
+        let arc = f64::from(ARC);
+        if i <= arc {
+            (i / arc - 1.0, -1.0)
+        } else {
+            ((i - arc - 1.0) / arc, 1.0)
+        }
+    };
+    grid_on_cube(n, |face, i, j| {
+        let ((u, su), (v, sv)) = (lane(i), lane(j));
+        // Equal steps of angle along the arcs.
+        let tilt = |s: f64| (s * 0.25 * PI).tan();
+        let (normal, side) = face.orient(1.0, tilt(u), tilt(v), su, sv);
+        inner * side + normal.normalize() * radius
+    })
+}
+
+/// One face of a cube: which axis it faces and the two axes in it.
+#[derive(Clone, Copy)]
+struct Face {
+    out: DVec3,
+    u: DVec3,
+    v: DVec3,
+}
+
+impl Face {
+    fn all() -> [Self; 6] {
+        let face = |out: DVec3, u: DVec3| Self {
+            out,
+            u,
+            v: out.cross(u),
+        };
+        [
+            face(DVec3::X, DVec3::Y),
+            face(DVec3::NEG_X, DVec3::Z),
+            face(DVec3::Y, DVec3::Z),
+            face(DVec3::NEG_Y, DVec3::X),
+            face(DVec3::Z, DVec3::X),
+            face(DVec3::NEG_Z, DVec3::Y),
+        ]
+    }
+
+    /// A direction and the corner of the inner box it belongs to.
+    fn orient(&self, out: f64, u: f64, v: f64, side_u: f64, side_v: f64) -> (DVec3, DVec3) {
+        let direction = self.out * out + self.u * u + self.v * v;
+        let side = self.out + self.u * side_u + self.v * side_v;
+        (direction, side)
+    }
+}
+
+fn cube_grid(n: u32, place: impl Fn(DVec3) -> DVec3) -> TriMesh {
+    grid_on_cube(n, |face, i, j| {
+        let at = |k: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
+        place(face.out + face.u * at(i) + face.v * at(j))
+    })
+}
+
+/// Six faces of n x n squares; corners that coincide are joined.
+fn grid_on_cube(n: u32, place: impl Fn(&Face, u32, u32) -> DVec3) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    let mut index_of = std::collections::HashMap::new();
+    for face in Face::all() {
+        let mut index = |i: u32, j: u32| -> u32 {
+            let p = place(&face, i, j);
+            let key = p.to_array().map(|x| (x * 1e9).round() as i64);
+            *index_of.entry(key).or_insert_with(|| {
+                mesh.points.push(p);
+                mesh.points.len() as u32 - 1
+            })
+        };
+        let mut quads = Vec::new();
+        for i in 0..n {
+            for j in 0..n {
+                quads.push([index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)]);
+            }
+        }
+        for [a, b, c, d] in quads {
+            for t in [[a, b, c], [a, c, d]] {
+                if t[0] != t[1] && t[1] != t[2] && t[2] != t[0] {
+                    mesh.triangles.push(t);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+/// A flat rounded rectangle facing z, `half` [m], corners rounded by `radius` [m]; a sheet, for drawing only.
+pub(super) fn sticker(half: DVec2, radius: f64) -> TriMesh {
+    const ARC: u32 = 6;
+    let mut outline = Vec::new();
+    for corner in 0..4u32 {
+        let (sx, sy) = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)][corner as usize];
+        let centre = DVec2::new(sx * (half.x - radius), sy * (half.y - radius));
+        for k in 0..=ARC {
+            let angle = 0.25 * TAU * (f64::from(corner) + f64::from(k) / f64::from(ARC));
+            outline.push(centre + DVec2::from_angle(angle) * radius);
+        }
+    }
+    fan(&outline)
+}
+
+/// A disc facing z [m]; a sheet, for drawing only.
+pub(super) fn disc(radius: f64) -> TriMesh {
+    let outline: Vec<DVec2> = (0..32)
+        .map(|k| DVec2::from_angle(TAU * f64::from(k) / 32.0) * radius)
+        .collect();
+    fan(&outline)
+}
+
+fn fan(outline: &[DVec2]) -> TriMesh {
+    let n = outline.len() as u32;
+    let mut points: Vec<DVec3> = outline.iter().map(|p| p.extend(0.0)).collect();
+    points.push(outline.iter().sum::<DVec2>().extend(0.0) / f64::from(n));
+    TriMesh {
+        points,
+        triangles: (0..n).map(|k| [k, (k + 1) % n, n]).collect(),
+    }
+}
+
+/// A closed ribbon on a ball of radius `radius` [m] along a curve of unit vectors, `width` [m] wide.
+pub(super) fn ribbon(curve: &[DVec3], radius: f64, width: f64) -> TriMesh {
+    let n = curve.len() as u32;
+    let mut mesh = TriMesh::default();
+    for k in 0..curve.len() {
+        let (before, here, after) = (
+            curve[(k + curve.len() - 1) % curve.len()],
+            curve[k],
+            curve[(k + 1) % curve.len()],
+        );
+        let side = here.cross(after - before).normalize() * (0.5 * width / radius);
+        for s in [-1.0, -0.4, 0.4, 1.0] {
+            mesh.points.push((here + side * s).normalize() * radius);
+        }
+    }
+    for k in 0..n {
+        let (a, b) = (4 * k, 4 * ((k + 1) % n));
+        for lane in 0..3 {
+            mesh.triangles.push([a + lane, b + lane, b + lane + 1]);
+            mesh.triangles.push([a + lane, b + lane + 1, a + lane + 1]);
+        }
+    }
+    mesh
+}

@@ -1,0 +1,9 @@
+//! One grasp on any rig: run the programme, keep the frames, say what happened.
+
+mod poses;
+mod run;
+mod summary;
+
+pub use poses::{PoseJitter, jittered};
+pub use run::{GraspRun, grasp, prepare};
+pub use summary::{GraspSummary, HoldSummary};

@@ -1,0 +1,134 @@
+//! Where the files of an object come from, and what a reference inside one of them means.
+
+use std::path::{Component, Path, PathBuf};
+
+/// Files beyond this size are not read [bytes].
+const LARGEST_FILE: u64 = 256 << 20;
+
+/// Extensions that a URDF or OBJ may refer to; nothing else is ever opened on its behalf.
+const READABLE: [&str; 3] = ["obj", "stl", "mtl"];
+
+/// Reads a file on behalf of the user: regular files of bearable size only.
+pub(super) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    if metadata.len() > LARGEST_FILE {
+        let mib = metadata.len() >> 20;
+        return Err(std::io::Error::other(format!(
+            "{mib} MiB is too large; the limit is {} MiB",
+            LARGEST_FILE >> 20
+        )));
+    }
+    std::fs::read(path)
+}
+
+/// Reads a file that another file refers to: only meshes and their materials.
+pub(super) fn read_referenced(path: &Path) -> std::io::Result<Vec<u8>> {
+    let extension = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    if READABLE.contains(&extension.as_str()) {
+        read_file(path)
+    } else {
+        Err(std::io::Error::other(
+            "only .obj, .stl and .mtl files are read on behalf of an object",
+        ))
+    }
+}
+
+/// Places where a mesh reference of a URDF in `folder` may lie, in the order in which they are tried.
+///
+/// - `package://NAME/rest`, `model://NAME/rest`: `rest` under any folder above that is called NAME or holds one called
+///   NAME, under the entries of ROS_PACKAGE_PATH, then under the URDF's own folders
+/// - `file:///path`, absolute and relative paths: as they are, relative ones from the URDF's folder
+pub(super) fn candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
+    let reference = reference.trim();
+    if let Some(path) = reference.strip_prefix("file://") {
+        return vec![folder.join(path)];
+    }
+    let in_package = ["package://", "model://"]
+        .iter()
+        .find_map(|scheme| reference.strip_prefix(scheme));
+    let Some(in_package) = in_package else {
+        return vec![folder.join(reference)];
+    };
+    let (package, rest) = in_package.split_once('/').unwrap_or(("", in_package));
+    let mut found = Vec::new();
+    let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    for above in absolute.ancestors() {
+        if above.file_name().is_some_and(|name| name == package) {
+            found.push(above.join(rest));
+        }
+        found.push(above.join(package).join(rest));
+    }
+    if let Some(paths) = std::env::var_os("ROS_PACKAGE_PATH") {
+        for root in std::env::split_paths(&paths) {
+            if root.file_name().is_some_and(|name| name == package) {
+                found.push(root.join(rest));
+            }
+            found.push(root.join(package).join(rest));
+        }
+    }
+    // Objects copied out of their package keep its layout beside them, or one level up.
+    found.extend(absolute.ancestors().take(2).map(|above| above.join(rest)));
+    found
+}
+
+/// A path without `.` and `..`, as text that names a file inside a tree of embedded files; `None` if it leaves it.
+pub(super) fn inside(path: &Path) -> Option<String> {
+    let mut parts: Vec<&str> = Vec::new();
+    for component in path.components() {
+        match component {
+            Component::Normal(part) => parts.push(part.to_str()?),
+            Component::CurDir => {}
+            Component::ParentDir => {
+                parts.pop()?;
+            }
+            Component::RootDir | Component::Prefix(_) => return None,
+        }
+    }
+    Some(parts.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packages_are_sought_upwards() {
+        let found = candidates(
+            "package://mug_description/meshes/mug.stl",
+            Path::new("/ws/src/mug_description/urdf"),
+        );
+        assert!(found.contains(&PathBuf::from("/ws/src/mug_description/meshes/mug.stl")));
+        assert_eq!(
+            candidates("../meshes/a.obj", Path::new("/x/urdf")),
+            [PathBuf::from("/x/urdf/../meshes/a.obj")]
+        );
+        assert_eq!(
+            candidates("file:///m/a.obj", Path::new("/x")),
+            [PathBuf::from("/m/a.obj")]
+        );
+    }
+
+    #[test]
+    fn only_meshes_are_read_for_others() {
+        assert!(read_referenced(Path::new("/etc/passwd")).is_err());
+        assert!(read_file(Path::new("/dev/zero")).is_err());
+        assert!(read_file(Path::new("/")).is_err());
+    }
+
+    #[test]
+    fn embedded_paths_stay_inside() {
+        assert_eq!(
+            inside(Path::new("lemon/./x/../lemon.obj")).as_deref(),
+            Some("lemon/lemon.obj")
+        );
+        assert_eq!(inside(Path::new("lemon/../../etc/passwd")), None);
+        assert_eq!(inside(Path::new("/etc/passwd")), None);
+    }
+}

@@ -1,0 +1,9 @@
+//! Trials on disk: an SQLite store that survives kills and shares itself between programs, and CSV for everyone else.
+
+mod blob;
+mod csv_export;
+mod store;
+
+pub use blob::{BlobError, decode_frames, encode_frames};
+pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_trial_csv};
+pub use store::{Store, StoreError, TrialId, TrialRow};

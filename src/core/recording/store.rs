@@ -1,0 +1,704 @@
+//! The SQLite store. A write-ahead log, so that a kill at any moment loses at most the chunk being written and never
+//! harms another trial, and so that several programs can work on one store.
+//!
+//! ```text
+//! trials   one row each: what is known of a trial; `state` is 'recording' until its last chunk is in
+//! chunks   its frames, about a second each, as described in `blob`
+//! ```
+//!
+//! Deleting marks; purging removes. Chunks are only ever added.
+
+use super::blob::{BlobError, decode_frames, encode_frames};
+use crate::geometry::Pose;
+use crate::trial::{Frame, Quality, Trial, TrialInfo};
+use rusqlite::{Connection, ErrorCode, OptionalExtension, Transaction, TransactionBehavior, params};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Names a trial within its store.
+pub type TrialId = i64;
+
+/// "Palp" in ASCII, in the header of the SQLite file.
+const APPLICATION_ID: i32 = 0x5061_6c70;
+/// Version of the tables below. A store from a newer program is refused, an older one is brought up to date.
+const SCHEMA_VERSION: i32 = 1;
+/// How long to wait for another program that is writing.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Samples per chunk when a whole trial is stored at once: about a second.
+const FRAMES_PER_CHUNK: usize = 75;
+
+const TABLES: &str = "
+    CREATE TABLE trials (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
+        created TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
+        state TEXT NOT NULL DEFAULT 'recording' CHECK (state IN ('recording', 'complete')),
+        rig TEXT NOT NULL,
+        object TEXT NOT NULL,
+        seed INTEGER NOT NULL,
+        scene TEXT NOT NULL,
+        world_from_gripper TEXT NOT NULL,
+        quality TEXT NOT NULL,
+        warnings TEXT NOT NULL,
+        version TEXT NOT NULL,
+        samples INTEGER NOT NULL DEFAULT 0,
+        deleted TEXT
+    );
+    CREATE TABLE chunks (
+        trial INTEGER NOT NULL REFERENCES trials (id) ON DELETE CASCADE,
+        number INTEGER NOT NULL,
+        frames BLOB NOT NULL,
+        PRIMARY KEY (trial, number)
+    ) WITHOUT ROWID;
+    CREATE INDEX trials_by_object ON trials (object);
+";
+
+/// Why the store cannot do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The folder cannot be made.
+    #[error("cannot make the folder \"{path}\" for the store: {cause}", path = path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// SQLite cannot open the file.
+    #[error("cannot open the store \"{path}\": {cause}", path = path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite says.
+        cause: String,
+    },
+    /// A file of another program, or no database at all.
+    #[error("\"{path}\" is not a store of Palpate's; choose another file with --store", path = path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Written by a newer program.
+    #[error(
+        "\"{path}\" was written by a newer Palpate (store version {found}, this program knows {SCHEMA_VERSION}); \
+         update Palpate",
+        path = path.display()
+    )]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i32,
+    },
+    /// Another program has kept the store locked.
+    #[error("the store is busy: another program has been writing to it for {} s; try again", PATIENCE.as_secs())]
+    Busy,
+    /// No space is left.
+    #[error("the disk is full: the trial was not stored. Free some space and record again; earlier trials are safe")]
+    DiskFull,
+    /// The file cannot be written.
+    #[error("the store \"{path}\" cannot be written: it or its folder is read-only", path = path.display())]
+    ReadOnly {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No such trial.
+    #[error("there is no trial {id} in the store{hint}")]
+    NoTrial {
+        /// The number asked for.
+        id: TrialId,
+        /// Where it might be.
+        hint: &'static str,
+    },
+    /// A trial whose frames cannot be read.
+    #[error("trial {id} is damaged in its part {chunk}: {cause}")]
+    Damaged {
+        /// The trial.
+        id: TrialId,
+        /// Which chunk.
+        chunk: i64,
+        /// What is wrong with it.
+        cause: BlobError,
+    },
+    /// A trial whose description cannot be read.
+    #[error("the description of trial {id} is damaged: {cause}")]
+    BadInfo {
+        /// The trial.
+        id: TrialId,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// Anything else SQLite reports.
+    #[error("the store \"{path}\" reports: {cause}", path = path.display())]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite says.
+        cause: String,
+    },
+}
+
+/// A trial as lists show it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrialRow {
+    /// Its number.
+    pub id: TrialId,
+    /// When it began, UTC.
+    pub created: String,
+    /// `recording`, or `complete`.
+    pub state: String,
+    /// Where it came from.
+    pub rig: String,
+    /// Name of the object.
+    pub object: String,
+    /// Seed of the pose.
+    pub seed: i64,
+    /// Samples stored.
+    pub samples: i64,
+    /// Whether it stayed finite and converged.
+    pub sound: bool,
+    /// How many warnings it carries.
+    pub warnings: usize,
+    /// When it was deleted, if it was.
+    pub deleted: Option<String>,
+}
+
+/// An open store.
+#[derive(Debug)]
+pub struct Store {
+    connection: Connection,
+    path: PathBuf,
+    warnings: Vec<String>,
+}
+
+impl Store {
+    /// Where the store lies when nobody says otherwise: the platform's folder for application data.
+    pub fn default_path() -> PathBuf {
+        match directories::ProjectDirs::from("", "", "palpate") {
+            Some(folders) => folders.data_dir().join("trials.sqlite"),
+            None => PathBuf::from("palpate-trials.sqlite"),
+        }
+    }
+
+    /// Opens a store, making it and its folder where they do not exist.
+    pub fn open(path: &Path) -> Result<Self, StoreError> {
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(|e| StoreError::Folder {
+                path: folder.to_owned(),
+                cause: e.to_string(),
+            })?;
+        }
+        let connection = Connection::open(path).map_err(|e| StoreError::Open {
+            path: path.to_owned(),
+            cause: plain(&e),
+        })?;
+        let mut store = Self {
+            connection,
+            path: path.to_owned(),
+            warnings: Vec::new(),
+        };
+        store.prepare()?;
+        Ok(store)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is not as it should be about the store, in sentences.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn prepare(&mut self) -> Result<(), StoreError> {
+        let path = self.path.clone();
+        let fault = |e: rusqlite::Error| fault(&path, &e);
+        self.connection.busy_timeout(PATIENCE).map_err(fault)?;
+        self.check_identity()?;
+        // The log lives in shared memory, which network file systems do not have.
+        let mode = if on_network_file_system(&self.path) {
+            self.warnings.push(format!(
+                "\"{}\" lies on a network file system: write-ahead logging is off, so keep to one program at a time",
+                self.path.display()
+            ));
+            "DELETE"
+        } else {
+            "WAL"
+        };
+        self.connection
+            .pragma_update(None, "journal_mode", mode)
+            .map_err(fault)?;
+        self.connection
+            .pragma_update(None, "synchronous", "NORMAL")
+            .map_err(fault)?;
+        self.connection
+            .pragma_update(None, "foreign_keys", true)
+            .map_err(fault)?;
+        let transaction = self.write()?;
+        let version: i32 = transaction
+            .pragma_query_value(None, "user_version", |row| row.get(0))
+            .map_err(fault)?;
+        if version == 0 {
+            transaction.execute_batch(TABLES).map_err(fault)?;
+            transaction
+                .pragma_update(None, "application_id", APPLICATION_ID)
+                .map_err(fault)?;
+            transaction
+                .pragma_update(None, "user_version", SCHEMA_VERSION)
+                .map_err(fault)?;
+        }
+        transaction.commit().map_err(fault)
+    }
+
+    /// Refuses files of other programs and of newer versions, before anything is written.
+    fn check_identity(&self) -> Result<(), StoreError> {
+        let read = |pragma: &str| {
+            self.connection
+                .pragma_query_value(None, pragma, |row| row.get::<_, i32>(0))
+                .map_err(|e| self.fault(&e))
+        };
+        let (application, version) = (read("application_id")?, read("user_version")?);
+        let tables: i64 = self
+            .connection
+            .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
+            .map_err(|e| self.fault(&e))?;
+        if application != APPLICATION_ID && tables > 0 {
+            return Err(StoreError::Foreign {
+                path: self.path.clone(),
+            });
+        }
+        if version > SCHEMA_VERSION {
+            return Err(StoreError::Newer {
+                path: self.path.clone(),
+                found: version,
+            });
+        }
+        Ok(())
+    }
+
+    fn fault(&self, error: &rusqlite::Error) -> StoreError {
+        fault(&self.path, error)
+    }
+
+    /// A transaction that takes the write lock at once, so that it cannot fail half-way for want of it.
+    fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
+        let path = self.path.clone();
+        self.connection
+            .transaction_with_behavior(TransactionBehavior::Immediate)
+            .map_err(|e| fault(&path, &e))
+    }
+
+    /// Begins a trial; frames follow with [`Store::append`].
+    pub fn begin(&mut self, info: &TrialInfo) -> Result<TrialId, StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        let id = insert_info(&transaction, info).map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        Ok(id)
+    }
+
+    /// Adds frames to a trial that is being recorded; once this returns, a kill cannot lose them.
+    pub fn append(&mut self, id: TrialId, frames: &[Frame]) -> Result<(), StoreError> {
+        if frames.is_empty() {
+            return Ok(());
+        }
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        insert_chunk(&transaction, id, frames).map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))
+    }
+
+    /// Ends a trial: its quality and warnings are now known.
+    pub fn finish(&mut self, id: TrialId, quality: &Quality, warnings: &[String]) -> Result<(), StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        set_complete(&transaction, id, quality, warnings).map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))
+    }
+
+    /// Stores a whole trial, all or nothing.
+    pub fn insert(&mut self, trial: &Trial) -> Result<TrialId, StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        let stored = (|| {
+            let id = insert_info(&transaction, &trial.info)?;
+            for frames in trial.frames.chunks(FRAMES_PER_CHUNK) {
+                insert_chunk(&transaction, id, frames)?;
+            }
+            set_complete(&transaction, id, &trial.info.quality, &trial.info.warnings)?;
+            Ok(id)
+        })();
+        let id = stored.map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        Ok(id)
+    }
+
+    /// All trials, oldest first; deleted ones only when asked for.
+    pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
+        let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted FROM trials \
+                   WHERE ?1 OR deleted IS NULL ORDER BY id";
+        let rows = self.connection.prepare(sql).and_then(|mut statement| {
+            statement
+                .query_map([with_deleted], |row| {
+                    let quality: Quality = json_or_default(&row.get::<_, String>(7)?);
+                    let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
+                    Ok(TrialRow {
+                        id: row.get(0)?,
+                        created: row.get(1)?,
+                        state: row.get(2)?,
+                        rig: row.get(3)?,
+                        object: row.get(4)?,
+                        seed: row.get(5)?,
+                        samples: row.get(6)?,
+                        sound: quality.finite && quality.converged,
+                        warnings: warnings.len(),
+                        deleted: row.get(9)?,
+                    })
+                })?
+                .collect()
+        });
+        rows.map_err(|e| self.fault(&e))
+    }
+
+    /// One trial with its frames.
+    pub fn load(&self, id: TrialId) -> Result<Trial, StoreError> {
+        Ok(Trial {
+            info: self.load_info(id)?,
+            frames: self.load_frames(id)?,
+        })
+    }
+
+    fn load_info(&self, id: TrialId) -> Result<TrialInfo, StoreError> {
+        let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version FROM trials \
+                   WHERE id = ?1 AND deleted IS NULL";
+        type Columns = (String, String, i64, String, [String; 3], String);
+        let found: Option<Columns> = self
+            .connection
+            .query_row(sql, [id], |row| {
+                let texts = [row.get(4)?, row.get(5)?, row.get(6)?];
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, texts, row.get(7)?))
+            })
+            .optional()
+            .map_err(|e| self.fault(&e))?;
+        let Some((rig, object, seed, scene, [pose, quality, warnings], version)) = found else {
+            return Err(self.no_trial(id));
+        };
+        let bad = |e: serde_json::Error| StoreError::BadInfo {
+            id,
+            cause: e.to_string(),
+        };
+        Ok(TrialInfo {
+            rig,
+            object,
+            seed: seed.cast_unsigned(),
+            scene,
+            world_from_gripper: serde_json::from_str::<Pose>(&pose).map_err(bad)?,
+            quality: serde_json::from_str(&quality).map_err(bad)?,
+            warnings: serde_json::from_str(&warnings).map_err(bad)?,
+            version,
+        })
+    }
+
+    fn load_frames(&self, id: TrialId) -> Result<Vec<Frame>, StoreError> {
+        let sql = "SELECT number, frames FROM chunks WHERE trial = ?1 ORDER BY number";
+        let chunks: Vec<(i64, Vec<u8>)> = self
+            .connection
+            .prepare(sql)
+            .and_then(|mut statement| {
+                statement
+                    .query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?
+                    .collect()
+            })
+            .map_err(|e| self.fault(&e))?;
+        let mut frames = Vec::new();
+        for (chunk, bytes) in chunks {
+            frames.extend(decode_frames(&bytes).map_err(|cause| StoreError::Damaged { id, chunk, cause })?);
+        }
+        Ok(frames)
+    }
+
+    fn no_trial(&self, id: TrialId) -> StoreError {
+        let sql = "SELECT count(*) FROM trials WHERE id = ?1";
+        let deleted = self
+            .connection
+            .query_row(sql, [id], |row| row.get::<_, i64>(0))
+            .is_ok_and(|n| n > 0);
+        let hint = if deleted {
+            ": it was deleted; `palpate trials restore` brings it back"
+        } else {
+            ""
+        };
+        StoreError::NoTrial { id, hint }
+    }
+
+    /// Marks trials as deleted, all or none of them. They can be restored until they are purged.
+    pub fn delete(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
+        let sql = "UPDATE trials SET deleted = strftime('%Y-%m-%dT%H:%M:%fZ', 'now') WHERE id = ?1 AND deleted IS NULL";
+        self.change_each(ids, sql)
+    }
+
+    /// Takes deletions back, all or none of them.
+    pub fn restore(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
+        self.change_each(
+            ids,
+            "UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL",
+        )
+    }
+
+    fn change_each(&mut self, ids: &[TrialId], sql: &str) -> Result<(), StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        let mut missing = None;
+        for id in ids {
+            let changed = transaction.execute(sql, [id]).map_err(|e| fault(&path, &e))?;
+            if changed == 0 {
+                missing = Some(*id);
+                break;
+            }
+        }
+        if let Some(id) = missing {
+            transaction.rollback().map_err(|e| fault(&path, &e))?;
+            return Err(self.no_trial(id));
+        }
+        transaction.commit().map_err(|e| fault(&path, &e))
+    }
+
+    /// Removes all trials marked as deleted for good; returns how many.
+    pub fn purge(&mut self) -> Result<usize, StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        let removed = transaction
+            .execute("DELETE FROM trials WHERE deleted IS NOT NULL", [])
+            .map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        Ok(removed)
+    }
+}
+
+fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<TrialId> {
+    transaction.execute(
+        "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        params![
+            info.rig,
+            info.object,
+            info.seed.cast_signed(),
+            info.scene,
+            json(&info.world_from_gripper),
+            json(&info.quality),
+            json(&info.warnings),
+            info.version,
+        ],
+    )?;
+    Ok(transaction.last_insert_rowid())
+}
+
+/// JSON of the few types that are stored as text.
+fn json<T: Serialize + ?Sized>(value: &T) -> String {
+    serde_json::to_string(value).expect("plain structs with text keys always have a JSON form")
+}
+
+fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) -> rusqlite::Result<()> {
+    transaction.execute(
+        "INSERT INTO chunks (trial, number, frames) \
+         VALUES (?1, (SELECT coalesce(max(number), -1) + 1 FROM chunks WHERE trial = ?1), ?2)",
+        params![id, encode_frames(frames)],
+    )?;
+    transaction.execute(
+        "UPDATE trials SET samples = samples + ?2 WHERE id = ?1",
+        params![id, frames.len() as i64],
+    )?;
+    Ok(())
+}
+
+fn set_complete(
+    transaction: &Transaction<'_>,
+    id: TrialId,
+    quality: &Quality,
+    warnings: &[String],
+) -> rusqlite::Result<()> {
+    transaction.execute(
+        "UPDATE trials SET state = 'complete', quality = ?2, warnings = ?3 WHERE id = ?1",
+        params![id, json(quality), json(warnings)],
+    )?;
+    Ok(())
+}
+
+fn json_or_default<T: Default + serde::de::DeserializeOwned>(text: &str) -> T {
+    serde_json::from_str(text).unwrap_or_default()
+}
+
+/// SQLite's faults in the words of this program.
+fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
+    match error.sqlite_error_code() {
+        Some(ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => StoreError::Busy,
+        Some(ErrorCode::DiskFull) => StoreError::DiskFull,
+        Some(ErrorCode::ReadOnly) => StoreError::ReadOnly { path: path.to_owned() },
+        _ => StoreError::Sqlite {
+            path: path.to_owned(),
+            cause: plain(error),
+        },
+    }
+}
+
+fn plain(error: &rusqlite::Error) -> String {
+    match error {
+        rusqlite::Error::SqliteFailure(_, Some(message)) => message.clone(),
+        other => other.to_string(),
+    }
+}
+
+/// True where the file's mount is a network file system, as far as the system tells (Linux).
+fn on_network_file_system(path: &Path) -> bool {
+    const NETWORK: [&str; 9] = [
+        "nfs",
+        "nfs4",
+        "cifs",
+        "smb3",
+        "smbfs",
+        "fuse.sshfs",
+        "afs",
+        "lustre",
+        "beegfs",
+    ];
+    let Ok(mounts) = std::fs::read_to_string("/proc/self/mounts") else {
+        return false;
+    };
+    let absolute = path
+        .parent()
+        .and_then(|p| p.canonicalize().ok())
+        .unwrap_or_else(|| path.to_owned());
+    mounts
+        .lines()
+        .filter_map(|line| {
+            let mut fields = line.split(' ').skip(1);
+            Some((fields.next()?.replace("\\040", " "), fields.next()?))
+        })
+        .filter(|(point, _)| absolute.starts_with(point))
+        // The deepest mount point that holds the file; of equals the last one mounted.
+        .max_by_key(|(point, _)| point.len())
+        .is_some_and(|(_, kind)| NETWORK.contains(&kind))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Primitive;
+    use crate::grasping::grasp;
+    use crate::objects::ObjectModel;
+    use crate::scene::Scene;
+
+    fn trial(seed: u64) -> Trial {
+        let mut scene = Scene::default();
+        scene.timing.duration_s = 1.2;
+        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+        grasp(&scene, Some(&ball), seed)
+    }
+
+    fn folder() -> tempfile::TempDir {
+        tempfile::tempdir().expect("a temporary folder")
+    }
+
+    #[test]
+    fn a_trial_survives_storing() -> Result<(), StoreError> {
+        let folder = folder();
+        let mut store = Store::open(&folder.path().join("new/trials.sqlite"))?;
+        let trial = trial(u64::MAX);
+        let id = store.insert(&trial)?;
+        assert_eq!(store.load(id)?, trial);
+        let rows = store.list(false)?;
+        assert_eq!(
+            (rows.len(), rows[0].samples, rows[0].state.as_str()),
+            (1, 90, "complete")
+        );
+        Ok(())
+    }
+
+    #[test]
+    fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
+        let folder = folder();
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+        let trial = trial(1);
+        let id = store.begin(&trial.info)?;
+        for frames in trial.frames.chunks(7) {
+            store.append(id, frames)?;
+        }
+        assert_eq!(store.list(false)?[0].state, "recording");
+        store.finish(id, &trial.info.quality, &trial.info.warnings)?;
+        assert_eq!(store.load(id)?, trial);
+        Ok(())
+    }
+
+    #[test]
+    fn two_programs_share_a_store() -> Result<(), StoreError> {
+        let folder = folder();
+        let path = folder.path().join("trials.sqlite");
+        let mut first = Store::open(&path)?;
+        let mut second = Store::open(&path)?;
+        let trial = trial(2);
+        std::thread::scope(|scope| {
+            for store in [&mut first, &mut second] {
+                scope.spawn(|| {
+                    for _ in 0..20 {
+                        store.insert(&trial).expect("waits for its turn");
+                    }
+                });
+            }
+        });
+        assert_eq!(first.list(false)?.len(), 40);
+        assert_eq!(second.load(40)?, trial);
+        Ok(())
+    }
+
+    #[test]
+    fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
+        let folder = folder();
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+        let (a, b) = (store.insert(&trial(3))?, store.insert(&trial(4))?);
+        assert!(matches!(
+            store.delete(&[a, 99]),
+            Err(StoreError::NoTrial { id: 99, .. })
+        ));
+        assert_eq!(store.list(false)?.len(), 2, "all or none");
+        store.delete(&[a])?;
+        assert_eq!(store.list(false)?.len(), 1);
+        let message = store.load(a).expect_err("deleted").to_string();
+        assert!(message.contains("restore"), "{message}");
+        store.restore(&[a])?;
+        assert_eq!(store.load(a)?.info.seed, 3);
+        store.delete(&[b])?;
+        assert_eq!(store.purge()?, 1);
+        assert_eq!(store.list(true)?.len(), 1);
+        Ok(())
+    }
+
+    #[test]
+    fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = folder();
+        let text = folder.path().join("notes.txt");
+        std::fs::write(
+            &text,
+            "no database at all, but long enough to be looked at as one would be".repeat(20),
+        )?;
+        assert!(matches!(Store::open(&text), Err(StoreError::Foreign { .. })));
+
+        let other = folder.path().join("other.sqlite");
+        Connection::open(&other)?.execute_batch("CREATE TABLE mine (x)")?;
+        assert!(matches!(Store::open(&other), Err(StoreError::Foreign { .. })));
+
+        let newer = folder.path().join("newer.sqlite");
+        Store::open(&newer)?;
+        Connection::open(&newer)?.pragma_update(None, "user_version", 99)?;
+        assert!(matches!(Store::open(&newer), Err(StoreError::Newer { found: 99, .. })));
+
+        let damaged = folder.path().join("damaged.sqlite");
+        let id = Store::open(&damaged)?.insert(&trial(5))?;
+        Connection::open(&damaged)?.execute("UPDATE chunks SET frames = x'00' WHERE number = 1", [])?;
+        let error = Store::open(&damaged)?.load(id).expect_err("damaged");
+        assert!(matches!(error, StoreError::Damaged { chunk: 1, .. }));
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! The simulated gripper. Stepped without a thread it gives identical frames for identical scenes.
+
+use super::{Event, Rig, RigError};
+use crate::gripper::Phase;
+use crate::objects::ObjectModel;
+use crate::physics::{Placement, Simulation};
+use crate::scene::Scene;
+use crate::trial::{Frame, Quality};
+use glam::DVec3;
+
+/// A simulation on its clock.
+#[derive(Clone, Debug)]
+pub struct SimRig {
+    simulation: Simulation,
+    /// The actuation tick that has been asked for, so that it is asked for once.
+    asked: Option<u32>,
+    phase: Phase,
+    static_residual: Option<f64>,
+}
+
+impl SimRig {
+    /// A scene at rest, and where everything was put.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
+        let (simulation, placement) = Simulation::new(scene, object);
+        let rig = Self {
+            simulation,
+            asked: None,
+            phase: Phase::Close,
+            static_residual: None,
+        };
+        (rig, placement)
+    }
+
+    /// The state before the first step, as a frame: what a picture of the start shows.
+    pub fn first_look(&self) -> Frame {
+        self.simulation.frame()
+    }
+
+    /// How deep the open fingers stand inside the object or its support before the first step [m].
+    pub fn starting_overlap(&mut self) -> f64 {
+        self.simulation.starting_overlap()
+    }
+
+    /// Pulls at the object [N, world axes] from now on.
+    pub fn pull_object(&mut self, force: DVec3) {
+        self.simulation.pull_object(force);
+    }
+}
+
+impl Rig for SimRig {
+    fn name(&self) -> &'static str {
+        "sim"
+    }
+
+    fn next_event(&mut self) -> Result<Event, RigError> {
+        let clock = self.simulation.clock();
+        loop {
+            let tick = self.simulation.tick();
+            if tick >= clock.total_ticks() {
+                return Ok(Event::Finished);
+            }
+            let actuation_tick = (tick / u64::from(clock.ticks_per_actuation)) as u32;
+            if tick.is_multiple_of(u64::from(clock.ticks_per_actuation)) && self.asked != Some(actuation_tick) {
+                self.asked = Some(actuation_tick);
+                return Ok(Event::ActuationDue { tick: actuation_tick });
+            }
+            self.simulation.advance()?;
+            if self.simulation.tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
+                return Ok(Event::Sampled(self.simulation.frame()));
+            }
+        }
+    }
+
+    fn command(&mut self, bar: f64, phase: Phase) {
+        if self.phase == Phase::Hold && phase == Phase::Release {
+            self.static_residual = Some(self.simulation.quality().static_residual);
+        }
+        self.phase = phase;
+        self.simulation.command(bar, phase);
+    }
+
+    fn quality(&self) -> Quality {
+        let mut quality = self.simulation.quality();
+        if let Some(at_hold) = self.static_residual {
+            quality.static_residual = at_hold;
+        }
+        quality
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_and_actuation_interleave_on_the_clock() {
+        let mut scene = Scene::default();
+        scene.timing.duration_s = 0.4;
+        let (mut rig, _) = SimRig::new(&scene, None);
+        let (mut ticks, mut samples) = (Vec::new(), Vec::new());
+        loop {
+            match rig.next_event().expect("finite") {
+                Event::ActuationDue { tick } => {
+                    ticks.push(tick);
+                    let (bar, phase) = scene.programme.command(tick);
+                    rig.command(bar, phase);
+                }
+                Event::Sampled(frame) => samples.push((frame.sample, frame.t)),
+                Event::Finished => break,
+            }
+        }
+        assert_eq!(ticks, [0, 1, 2, 3]);
+        assert_eq!(samples.len(), 30);
+        assert_eq!(samples[0].0, 0);
+        assert!((samples[0].1 - 1.0 / 75.0).abs() < 1e-15 && (samples[29].1 - 0.4).abs() < 1e-15);
+    }
+}
