@@ -57,19 +57,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
             ]
         })
         .collect();
-    let header = [
-        "scene",
-        "accuracy",
-        "step ms",
-        "CPU ms",
-        "us/step",
-        "Newton",
-        "most",
-        "missed",
-        "x real time",
-    ];
+    let header = ["scene", "accuracy", "step ms", "CPU ms", "us/step", "Newton", "most", "missed", "x real time"];
     table(&header, &cells)?;
-    say(format!(
-        "one 4 s grasp each; median of {runs} runs, CPU time of one thread"
-    ))
+    say(format!("one 4 s grasp each; median of {runs} runs, CPU time of one thread"))
 }

@@ -61,11 +61,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         return say(nominal.to_toml().trim_end());
     }
     let layout = SensorLayout::named(&arguments.layout)?;
-    let area = if arguments.hull {
-        PressureArea::Hull
-    } else {
-        PressureArea::Participation
-    };
+    let area = if arguments.hull { PressureArea::Hull } else { PressureArea::Participation };
     let sensors = Sensors::new(&layout, &nominal.gripper, area)?;
     let loading = cpu_time::ProcessTime::now();
     let object = nominal.load_object()?;
@@ -78,35 +74,20 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     let start = cpu_time::ThreadTime::now();
     let trial = grasp(&scene, object.as_ref(), seed);
     let cpu_ms = start.elapsed().as_secs_f64() * 1e3;
-    let trial_id = if arguments.no_store {
-        None
-    } else {
-        Some(open_store(store)?.insert(&trial)?)
-    };
+    let trial_id = if arguments.no_store { None } else { Some(open_store(store)?.insert(&trial)?) };
     if let Some(path) = &arguments.out {
         write_trial_csv(path, &trial, &scene, &sensors)?;
         write_contacts_csv(&contacts_path(path), &trial, &scene)?;
     }
     let accuracy = scene.solver.accuracy.name();
     let summary = GraspSummary::new(&trial, &scene);
-    let report = Report {
-        summary,
-        seed,
-        accuracy,
-        cpu_ms,
-        load_cpu_ms,
-        trial_id,
-    };
+    let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, trial_id };
     if arguments.json {
         say_json(&report)?;
     } else {
         tell(&report, &scene)?;
         if let Some(path) = &arguments.out {
-            say(format!(
-                "written       {} and {}",
-                path.display(),
-                contacts_path(path).display()
-            ))?;
+            say(format!("written       {} and {}", path.display(), contacts_path(path).display()))?;
         }
     }
     if report.summary.finite {
@@ -122,11 +103,7 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
         warn(warning);
     }
     let duration = scene.timing.duration_s;
-    let held = if scene.object.fixed {
-        "held in place"
-    } else {
-        "resting freely"
-    };
+    let held = if scene.object.fixed { "held in place" } else { "resting freely" };
     say(format!("object        {}, {held}", summary.object))?;
     match summary.contact_onset_s {
         Some(onset) => say(format!("first contact {onset:.3} s"))?,
@@ -150,16 +127,9 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
         quality.steps,
         quality.newton_mean,
         quality.newton_max,
-        if summary.converged {
-            "all converged"
-        } else {
-            "not all converged"
-        },
+        if summary.converged { "all converged" } else { "not all converged" },
     ))?;
-    say(format!(
-        "cost          {:.1} ms CPU for {duration} s at accuracy {}",
-        report.cpu_ms, report.accuracy
-    ))?;
+    say(format!("cost          {:.1} ms CPU for {duration} s at accuracy {}", report.cpu_ms, report.accuracy))?;
     match report.trial_id {
         Some(id) => say(format!("stored        trial {id}")),
         None => Ok(()),

@@ -3,6 +3,7 @@
 mod bench;
 mod grasp;
 mod setup;
+mod snapshot;
 mod terminal;
 mod trials;
 mod workshop;
@@ -34,6 +35,8 @@ struct Arguments {
 enum Command {
     /// Grasp an object once, print what happened, store the trial.
     Grasp(grasp::GraspArguments),
+    /// Draw a scene or a stored trial into a PNG file, without a window.
+    Snapshot(snapshot::SnapshotArguments),
     /// List, show, export, delete and restore recorded trials.
     Trials(trials::TrialsArguments),
     /// Measure what things cost on this machine, in CPU time.
@@ -49,6 +52,7 @@ pub fn run() -> ExitCode {
     let store = arguments.store.as_deref();
     let outcome = match arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(&grasp, store),
+        Some(Command::Snapshot(snapshot)) => snapshot::run(&snapshot, store),
         Some(Command::Trials(trials)) => trials::run(&trials, store),
         Some(Command::Bench(bench)) => bench::run(&bench),
         Some(Command::Workshop(workshop)) => workshop::run(&workshop),

@@ -28,9 +28,7 @@ pub(super) fn complain(line: &str) {
 
 /// True when output failed because its reader has gone.
 pub(super) fn is_closed_pipe(failure: &(dyn Error + 'static)) -> bool {
-    failure
-        .downcast_ref::<std::io::Error>()
-        .is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
+    failure.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
 }
 
 /// Rows of text in columns: the first left-aligned, numbers right-aligned.
@@ -47,11 +45,7 @@ pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> Result<(), Failure
             .enumerate()
             .map(|(i, cell)| {
                 let width = widths[i];
-                if numeric(i) {
-                    format!("{cell:>width$}")
-                } else {
-                    format!("{cell:<width$}")
-                }
+                if numeric(i) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             })
             .collect();
         padded.join("  ").trim_end().to_owned()

@@ -77,19 +77,12 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         What::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
         What::Show { id, json } => show(&store, *id, *json),
         What::Export { ids, out, layout, hull } => {
-            let area = if *hull {
-                PressureArea::Hull
-            } else {
-                PressureArea::Participation
-            };
+            let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             export(&store, ids, out, &SensorLayout::named(layout)?, area)
         }
         What::Delete { ids } => {
             store.delete(ids)?;
-            say(format!(
-                "deleted {} trial(s); `palpate trials restore` brings them back",
-                ids.len()
-            ))
+            say(format!("deleted {} trial(s); `palpate trials restore` brings them back", ids.len()))
         }
         What::Restore { ids } => {
             store.restore(ids)?;
@@ -122,10 +115,7 @@ fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Resul
             ]
         })
         .collect();
-    table(
-        &["id", "object", "recorded (UTC)", "from", "samples", "seed", ""],
-        &cells,
-    )
+    table(&["id", "object", "recorded (UTC)", "from", "samples", "seed", ""], &cells)
 }
 
 fn remark(row: &TrialRow) -> String {
@@ -180,14 +170,8 @@ fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
     for warning in &shown.summary.warnings {
         warn(warning);
     }
-    say(format!(
-        "trial {id}: {} ({}, seed {})",
-        shown.summary.object, shown.rig, shown.seed
-    ))?;
-    say(format!(
-        "{} samples, recorded by Palpate {}",
-        shown.samples, shown.version
-    ))?;
+    say(format!("trial {id}: {} ({}, seed {})", shown.summary.object, shown.rig, shown.seed))?;
+    say(format!("{} samples, recorded by Palpate {}", shown.samples, shown.version))?;
     match shown.summary.contact_onset_s {
         Some(onset) => say(format!("first contact at {onset:.3} s"))?,
         None => say("no contact")?,
@@ -232,7 +216,5 @@ fn export(
 
 /// An object's name without anything that a file name should not have.
 fn plain_name(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' })
-        .collect()
+    name.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect()
 }

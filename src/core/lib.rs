@@ -1,11 +1,13 @@
 //! core (tour comes here)
 
+pub mod drawing;
 pub mod geometry;
 pub mod grasping;
 pub mod gripper;
 pub mod objects;
 pub mod palette;
 pub mod physics;
+pub mod picture;
 pub mod recording;
 pub mod rig;
 pub mod scene;

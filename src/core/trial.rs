@@ -133,12 +133,7 @@ mod tests {
 
     #[test]
     fn loads_are_told_apart_by_side() {
-        let load = |taxel, normal| TaxelLoad {
-            taxel,
-            normal,
-            along: 0.0,
-            across: 0.0,
-        };
+        let load = |taxel, normal| TaxelLoad { taxel, normal, along: 0.0, across: 0.0 };
         let frame = Frame {
             sample: 0,
             t: 0.0,
@@ -151,9 +146,6 @@ mod tests {
         assert_eq!(frame.joints(Side::Right), [3.0, 4.0]);
         let indices: Vec<usize> = frame.loads(Side::Right, 10).map(|(i, _)| i).collect();
         assert_eq!(indices, [0, 9]);
-        assert_eq!(
-            (frame.normal_force(Side::Left, 10), frame.normal_force(Side::Right, 10)),
-            (3.0, 12.0)
-        );
+        assert_eq!((frame.normal_force(Side::Left, 10), frame.normal_force(Side::Right, 10)), (3.0, 12.0));
     }
 }

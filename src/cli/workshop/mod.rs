@@ -75,21 +75,18 @@ fn files_of(thing: &Thing) -> Vec<MadeFile> {
         (format!("{name}/facts.toml"), facts_of(thing)),
     ];
     if let Body::Mesh(mesh) = &thing.body {
-        let part = ColouredPart {
-            mesh: mesh.clone(),
-            colour: None,
-        };
+        let part = ColouredPart { mesh: mesh.clone(), colour: None };
         let title = format!("{}: what is touched", thing.title);
         let (obj, _) = write_obj(&title, &format!("{name}.mtl"), &[("body", part)]);
         // The collision mesh has no look of its own.
-        let plain: String = obj
-            .lines()
-            .filter(|l| !l.starts_with("mtllib") && !l.starts_with("usemtl"))
-            .fold(String::new(), |mut text, line| {
+        let plain: String = obj.lines().filter(|l| !l.starts_with("mtllib") && !l.starts_with("usemtl")).fold(
+            String::new(),
+            |mut text, line| {
                 text.push_str(line);
                 text.push('\n');
                 text
-            });
+            },
+        );
         files.push((format!("{name}/{name}_collision.obj"), plain));
     }
     files
@@ -105,10 +102,7 @@ fn facts_of(thing: &Thing) -> String {
         ShapeClass::Cylindrical => "cylindrical",
         ShapeClass::Spherical => "spherical",
     };
-    format!(
-        "title = \"{}\"\nsize = \"{size}\"\nshape = \"{shape}\"\nfriction = {}\n",
-        thing.title, thing.friction
-    )
+    format!("title = \"{}\"\nsize = \"{size}\"\nshape = \"{shape}\"\nfriction = {}\n", thing.title, thing.friction)
 }
 
 fn urdf_of(thing: &Thing) -> String {
@@ -119,11 +113,7 @@ fn urdf_of(thing: &Thing) -> String {
     let i = mass.inertia;
     let term = |value: f64| {
         // Products of inertia of symmetric bodies are rounding noise.
-        if value.abs() < 1e-4 * i.x_axis.x {
-            "0".to_owned()
-        } else {
-            format!("{value:.4e}")
-        }
+        if value.abs() < 1e-4 * i.x_axis.x { "0".to_owned() } else { format!("{value:.4e}") }
     };
     // Writing to a String cannot fail.
     let _infallible = writeln!(

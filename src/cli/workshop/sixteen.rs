@@ -1,9 +1,9 @@
 //! The sixteen, one function each. Millimetres in the text, metres in the meshes.
 
-use super::tools::{Parts, at, cube_sphere, disc, facing, lying, ribbon, rounded_box, sticker, turned, turned_soft};
+use super::tools::{Parts, at, disc, facing, lying, ribbon, sticker, turned, turned_soft};
 use super::{Body, Thing};
 use glam::{DVec2, DVec3};
-use palpate_core::geometry::{Pose, Primitive, TriMesh};
+use palpate_core::geometry::{Pose, Primitive, TriMesh, cube_sphere, rounded_box};
 use palpate_core::objects::{ShapeClass, SizeClass};
 use palpate_core::palette::Rgb;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -41,21 +41,12 @@ fn block(x: f64, y: f64, z: f64) -> Body {
 }
 
 fn sphere(radius_mm: f64) -> Body {
-    Body::Primitives(vec![(
-        Primitive::Sphere {
-            radius: radius_mm * 1e-3,
-        },
-        [0.0; 3],
-        [0.0; 3],
-    )])
+    Body::Primitives(vec![(Primitive::Sphere { radius: radius_mm * 1e-3 }, [0.0; 3], [0.0; 3])])
 }
 
 /// A cylinder lying along y: its middle at y, its radius and length [mm].
 fn lying_cylinder(y: f64, radius: f64, length: f64) -> (Primitive, [f64; 3], [f64; 3]) {
-    let shape = Primitive::Cylinder {
-        radius: radius * 1e-3,
-        half_length: 0.5e-3 * length,
-    };
+    let shape = Primitive::Cylinder { radius: radius * 1e-3, half_length: 0.5e-3 * length };
     (shape, [0.0, y * 1e-3, 0.0], [-FRAC_PI_2, 0.0, 0.0])
 }
 
@@ -69,9 +60,7 @@ fn ball() -> Thing {
     let mut look = Parts::default();
     let mesh = scaled(cube_sphere(24), 20.0, 20.0, 20.0);
     look.add("rubber", Rgb(206, 58, 52), mesh);
-    let circle: Vec<DVec3> = (0..96)
-        .map(|k| DVec2::from_angle(TAU * f64::from(k) / 96.0).extend(0.0))
-        .collect();
+    let circle: Vec<DVec3> = (0..96).map(|k| DVec2::from_angle(TAU * f64::from(k) / 96.0).extend(0.0)).collect();
     look.add("band", Rgb(240, 236, 228), ribbon(&circle, 0.02002, 0.007));
     Thing {
         name: "ball",
@@ -117,32 +106,16 @@ fn bigball() -> Thing {
 /// A cardboard box, 80 x 50 x 40 mm, taped shut.
 fn cardboard_box() -> Thing {
     let mut look = Parts::default();
-    look.add(
-        "cardboard",
-        Rgb(190, 146, 98),
-        rounded_box(mm(25.0, 40.0, 20.0), 0.0008),
-    );
+    look.add("cardboard", Rgb(190, 146, 98), rounded_box(mm(25.0, 40.0, 20.0), 0.0008));
     let tape = Rgb(222, 199, 158);
     let lift = 0.05;
-    look.add(
-        "tape",
-        tape,
-        at(sticker(DVec2::new(0.0075, 0.0396), 0.0001), mm(0.0, 0.0, 20.0 + lift)),
-    );
+    look.add("tape", tape, at(sticker(DVec2::new(0.0075, 0.0396), 0.0001), mm(0.0, 0.0, 20.0 + lift)));
     for side in [-1.0, 1.0] {
         let flap = sticker(DVec2::new(0.0075, 0.006), 0.0001);
-        look.add(
-            "tape",
-            tape,
-            facing(flap, DVec3::Y * side, mm(0.0, side * (40.0 + lift), 14.0)),
-        );
+        look.add("tape", tape, facing(flap, DVec3::Y * side, mm(0.0, side * (40.0 + lift), 14.0)));
         // The gap between the flaps shows on both sides of the tape.
         let label = sticker(DVec2::new(0.0105, 0.014), 0.001);
-        look.add(
-            "label",
-            Rgb(238, 236, 230),
-            facing(label, DVec3::X * side, mm(side * (25.0 + lift), 6.0, 0.0)),
-        );
+        look.add("label", Rgb(238, 236, 230), facing(label, DVec3::X * side, mm(side * (25.0 + lift), 6.0, 0.0)));
         for line in 0..3 {
             let bar = sticker(DVec2::new(0.0007, 0.009), 0.0003);
             let z = 5.0 - 4.0 * f64::from(line);
@@ -165,10 +138,7 @@ fn cardboard_box() -> Thing {
 /// An emergency-stop button, 40 mm across, 28 mm high.
 fn button() -> Thing {
     let mut look = Parts::default();
-    let base = turned_soft(
-        &[(0.0, -14.0), (20.0, -14.0), (20.0, 0.0), (13.0, 2.0), (0.0, 2.0)],
-        1.4,
-    );
+    let base = turned_soft(&[(0.0, -14.0), (20.0, -14.0), (20.0, 0.0), (13.0, 2.0), (0.0, 2.0)], 1.4);
     look.add("housing", Rgb(238, 190, 44), base);
     let neck = turned(&[(0.0, 1.5), (12.0, 1.5), (12.0, 5.0), (0.0, 5.0)]);
     look.add("neck", Rgb(58, 60, 64), neck);
@@ -208,18 +178,8 @@ fn smallbutton() -> Thing {
     look.add("bezel", Rgb(62, 66, 72), bezel);
     let cap = turned_soft(&[(0.0, 1.0), (7.6, 1.0), (7.6, 5.0), (5.0, 6.0), (0.0, 6.0)], 1.2);
     look.add("cap", Rgb(46, 150, 92), cap);
-    let silhouette = turned_soft(
-        &[
-            (0.0, -6.0),
-            (10.0, -6.0),
-            (10.0, 0.5),
-            (8.0, 1.5),
-            (7.6, 5.0),
-            (5.0, 6.0),
-            (0.0, 6.0),
-        ],
-        0.7,
-    );
+    let silhouette =
+        turned_soft(&[(0.0, -6.0), (10.0, -6.0), (10.0, 0.5), (8.0, 1.5), (7.6, 5.0), (5.0, 6.0), (0.0, 6.0)], 0.7);
     Thing {
         name: "smallbutton",
         title: "Push button",
@@ -265,17 +225,9 @@ fn case() -> Thing {
         seam.triangles.push([a, b + 1, a + 1]);
     }
     look.add("seam", Rgb(120, 122, 124), seam);
-    look.add(
-        "light",
-        Rgb(64, 176, 98),
-        facing(disc(0.0009), DVec3::X, mm(23.05, 0.0, -1.5)),
-    );
+    look.add("light", Rgb(64, 176, 98), facing(disc(0.0009), DVec3::X, mm(23.05, 0.0, -1.5)));
     let hinge = sticker(DVec2::new(0.0012, 0.009), 0.0006);
-    look.add(
-        "hinge",
-        Rgb(172, 174, 176),
-        facing(hinge, DVec3::NEG_X, mm(-23.05, 0.0, 3.6)),
-    );
+    look.add("hinge", Rgb(172, 174, 176), facing(hinge, DVec3::NEG_X, mm(-23.05, 0.0, 3.6)));
     Thing {
         name: "case",
         title: "Earphone case",
@@ -316,11 +268,7 @@ fn cube() -> Thing {
         (DVec3::NEG_Z, "yellow", Rgb(240, 208, 62)),
     ];
     for (out, name, colour) in faces {
-        let (u, v) = if out.z.abs() > 0.5 {
-            (DVec3::X, DVec3::Y)
-        } else {
-            (DVec3::Z, out.cross(DVec3::Z))
-        };
+        let (u, v) = if out.z.abs() > 0.5 { (DVec3::X, DVec3::Y) } else { (DVec3::Z, out.cross(DVec3::Z)) };
         for i in -1..=1 {
             for j in -1..=1 {
                 let place = out * 0.02255 + (u * f64::from(i) + v * f64::from(j)) * 0.0147;
@@ -364,10 +312,7 @@ fn cylinder() -> Thing {
     look.add("stripe", Rgb(240, 232, 210), stripe(-9.0, 9.0));
     look.add("line", Rgb(214, 142, 48), stripe(12.0, 14.0));
     look.add("line", Rgb(214, 142, 48), stripe(-14.0, -12.0));
-    let shape = Primitive::Cylinder {
-        radius: 0.0175,
-        half_length: 0.030,
-    };
+    let shape = Primitive::Cylinder { radius: 0.0175, half_length: 0.030 };
     Thing {
         name: "cylinder",
         title: "Tin",
@@ -381,11 +326,8 @@ fn cylinder() -> Thing {
 }
 
 /// Tones of pale wood: light, middle, dark.
-const WOOD: [(&str, Rgb); 3] = [
-    ("wood light", Rgb(226, 194, 146)),
-    ("wood", Rgb(214, 178, 128)),
-    ("wood dark", Rgb(200, 160, 110)),
-];
+const WOOD: [(&str, Rgb); 3] =
+    [("wood light", Rgb(226, 194, 146)), ("wood", Rgb(214, 178, 128)), ("wood dark", Rgb(200, 160, 110))];
 
 /// A sheet of wood grain facing z, `half` [m]: strips along y whose borders waver, in tones that alternate.
 fn add_grain(look: &mut Parts, half: DVec2, seed: f64, place: impl Fn(TriMesh) -> TriMesh) {
@@ -470,8 +412,7 @@ fn growth_ring(radius: f64, half: DVec2) -> TriMesh {
         if quad.iter().all(|p| p.abs().cmple(half).all()) {
             let from = mesh.points.len() as u32;
             mesh.points.extend(quad.map(|p| p.extend(0.0)));
-            mesh.triangles
-                .extend([[from, from + 1, from + 2], [from, from + 2, from + 3]]);
+            mesh.triangles.extend([[from, from + 1, from + 2], [from, from + 2, from + 3]]);
         }
     }
     mesh
@@ -481,31 +422,11 @@ fn growth_ring(radius: f64, half: DVec2) -> TriMesh {
 fn labello() -> Thing {
     let mut look = Parts::default();
     let part = |profile: &[(f64, f64)]| lying(turned_soft(profile, 0.9));
-    look.add(
-        "body",
-        Rgb(28, 66, 140),
-        part(&[(0.0, -34.0), (8.4, -34.0), (8.4, 6.0), (0.0, 6.0)]),
-    );
-    look.add(
-        "foot",
-        Rgb(232, 234, 238),
-        part(&[(0.0, -34.0), (9.0, -34.0), (9.0, -29.5), (0.0, -29.5)]),
-    );
-    look.add(
-        "band",
-        Rgb(232, 234, 238),
-        part(&[(0.0, 4.0), (8.9, 4.0), (8.9, 7.0), (0.0, 7.0)]),
-    );
-    look.add(
-        "cap",
-        Rgb(38, 86, 172),
-        part(&[(0.0, 7.0), (9.0, 7.0), (9.0, 34.0), (0.0, 34.0)]),
-    );
-    look.add(
-        "line",
-        Rgb(120, 176, 226),
-        lying(turned(&[(0.0, -14.0), (8.46, -14.0), (8.46, -10.0), (0.0, -10.0)])),
-    );
+    look.add("body", Rgb(28, 66, 140), part(&[(0.0, -32.0), (8.4, -32.0), (8.4, 6.0), (0.0, 6.0)]));
+    look.add("foot", Rgb(232, 234, 238), part(&[(0.0, -34.0), (9.0, -34.0), (9.0, -29.5), (0.0, -29.5)]));
+    look.add("band", Rgb(232, 234, 238), part(&[(0.0, 4.0), (8.9, 4.0), (8.9, 7.0), (0.0, 7.0)]));
+    look.add("cap", Rgb(38, 86, 172), part(&[(0.0, 7.0), (9.0, 7.0), (9.0, 34.0), (0.0, 34.0)]));
+    look.add("line", Rgb(120, 176, 226), lying(turned(&[(0.0, -14.0), (8.46, -14.0), (8.46, -10.0), (0.0, -10.0)])));
     Thing {
         name: "labello",
         title: "Lip balm",
@@ -534,11 +455,7 @@ fn lemon() -> Thing {
     closed.push((0.0, profile[profile.len() - 1].1));
     let skin = lying(turned(&closed));
     let mut look = Parts::default();
-    let materials = [
-        ("skin", Rgb(242, 206, 46)),
-        ("tip", Rgb(196, 190, 62)),
-        ("stem", Rgb(118, 122, 54)),
-    ];
+    let materials = [("skin", Rgb(242, 206, 46)), ("tip", Rgb(196, 190, 62)), ("stem", Rgb(118, 122, 54))];
     look.add_painted(&skin, &materials, |p| {
         let radius = DVec2::new(p.x, p.z).length();
         match p.y {
@@ -586,11 +503,7 @@ fn parallelepiped() -> Thing {
     look.add("paint", Rgb(42, 138, 140), rounded_box(mm(15.0, 30.0, 15.0), 0.0015));
     for side in [-1.0, 1.0] {
         let end = sticker(DVec2::splat(0.0132), 0.0012);
-        look.add(
-            "wood",
-            Rgb(218, 184, 134),
-            facing(end, DVec3::Y * side, mm(0.0, side * 30.04, 0.0)),
-        );
+        look.add("wood", Rgb(218, 184, 134), facing(end, DVec3::Y * side, mm(0.0, side * 30.04, 0.0)));
         for (radius, dark) in [(0.0095, 204u8), (0.0060, 196), (0.0028, 186)] {
             let place = mm(2.0, side * (30.05 + 0.02 * f64::from(205 - dark)), -1.5);
             let name = format!("ring {dark}");
@@ -617,14 +530,7 @@ fn parallelepiped() -> Thing {
 fn smallcube() -> Thing {
     let mut look = Parts::default();
     look.add("ivory", Rgb(240, 236, 224), rounded_box(mm(10.0, 10.0, 10.0), 0.0020));
-    let faces = [
-        (DVec3::Z, 1),
-        (DVec3::NEG_Z, 6),
-        (DVec3::X, 2),
-        (DVec3::NEG_X, 5),
-        (DVec3::Y, 3),
-        (DVec3::NEG_Y, 4),
-    ];
+    let faces = [(DVec3::Z, 1), (DVec3::NEG_Z, 6), (DVec3::X, 2), (DVec3::NEG_X, 5), (DVec3::Y, 3), (DVec3::NEG_Y, 4)];
     for (out, pips) in faces {
         let u = if out.z.abs() > 0.5 { DVec3::X } else { DVec3::Z };
         let v = out.cross(u);
@@ -634,14 +540,7 @@ fn smallcube() -> Thing {
             3 => &[(-1.0, -1.0), (0.0, 0.0), (1.0, 1.0)],
             4 => &[(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)],
             5 => &[(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 0.0)],
-            _ => &[
-                (-1.0, -1.0),
-                (-1.0, 1.0),
-                (1.0, -1.0),
-                (1.0, 1.0),
-                (-1.0, 0.0),
-                (1.0, 0.0),
-            ],
+            _ => &[(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 0.0), (1.0, 0.0)],
         };
         for (a, b) in places {
             let place = out * 0.01004 + (u * *a + v * *b) * 0.0047;
@@ -664,36 +563,12 @@ fn smallcube() -> Thing {
 fn syringe() -> Thing {
     let mut look = Parts::default();
     let part = |profile: &[(f64, f64)]| lying(turned_soft(profile, 0.6));
-    look.add(
-        "barrel",
-        Rgb(206, 222, 230),
-        part(&[(0.0, -34.0), (6.8, -34.0), (6.8, 18.0), (0.0, 18.0)]),
-    );
-    look.add(
-        "flange",
-        Rgb(190, 208, 218),
-        part(&[(0.0, 17.0), (8.0, 17.0), (8.0, 19.4), (0.0, 19.4)]),
-    );
-    look.add(
-        "rod",
-        Rgb(238, 240, 242),
-        part(&[(0.0, 19.0), (3.6, 19.0), (3.6, 45.5), (0.0, 45.5)]),
-    );
-    look.add(
-        "thumb",
-        Rgb(238, 240, 242),
-        part(&[(0.0, 45.0), (7.6, 45.0), (7.6, 47.5), (0.0, 47.5)]),
-    );
-    look.add(
-        "shoulder",
-        Rgb(190, 208, 218),
-        part(&[(0.0, -37.0), (2.6, -37.0), (6.8, -33.5), (0.0, -33.5)]),
-    );
-    look.add(
-        "cap",
-        Rgb(226, 112, 40),
-        part(&[(0.0, -47.5), (1.6, -47.5), (2.9, -36.5), (0.0, -36.5)]),
-    );
+    look.add("barrel", Rgb(206, 222, 230), part(&[(0.0, -34.0), (6.8, -34.0), (6.8, 18.0), (0.0, 18.0)]));
+    look.add("flange", Rgb(190, 208, 218), part(&[(0.0, 17.0), (8.0, 17.0), (8.0, 19.4), (0.0, 19.4)]));
+    look.add("rod", Rgb(238, 240, 242), part(&[(0.0, 19.0), (3.6, 19.0), (3.6, 45.5), (0.0, 45.5)]));
+    look.add("thumb", Rgb(238, 240, 242), part(&[(0.0, 45.0), (7.6, 45.0), (7.6, 47.5), (0.0, 47.5)]));
+    look.add("shoulder", Rgb(190, 208, 218), part(&[(0.0, -37.0), (2.6, -37.0), (6.8, -33.5), (0.0, -33.5)]));
+    look.add("cap", Rgb(226, 112, 40), part(&[(0.0, -47.5), (1.6, -47.5), (2.9, -36.5), (0.0, -36.5)]));
     let band = |from: f64, to: f64| lying(turned(&[(0.0, from), (6.86, from), (6.86, to), (0.0, to)]));
     look.add("seal", Rgb(64, 68, 74), band(-8.0, -3.5));
     for k in 0..7 {
@@ -737,19 +612,11 @@ fn tomato() -> Thing {
         p.z = (p.z - lift) * 0.052 / bounds.size().z;
     }
     look.add("flesh", Rgb(204, 46, 34), flesh.clone());
-    let top = flesh
-        .points
-        .iter()
-        .filter(|p| p.truncate().length() < 0.003)
-        .map(|p| p.z)
-        .fold(0.0, f64::max);
+    let top = flesh.points.iter().filter(|p| p.truncate().length() < 0.003).map(|p| p.z).fold(0.0, f64::max);
     for k in 0..5 {
         look.add("calyx", Rgb(72, 122, 52), sepal(TAU * f64::from(k) / 5.0 + 0.3, top));
     }
-    let stem = at(
-        turned(&[(0.0, -1.0), (1.9, -1.0), (1.4, 3.2), (1.7, 4.0), (0.0, 4.0)]),
-        DVec3::Z * top,
-    );
+    let stem = at(turned(&[(0.0, -1.0), (1.9, -1.0), (1.4, 3.2), (1.7, 4.0), (0.0, 4.0)]), DVec3::Z * top);
     look.add("stem", Rgb(86, 118, 56), stem);
     Thing {
         name: "tomato",

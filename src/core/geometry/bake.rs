@@ -62,9 +62,7 @@ const STRIDE: usize = 4;
 /// 160 cells along the longest.
 pub fn choose_cell(bounds: &Bounds) -> f64 {
     let size = bounds.size();
-    (0.75e-3f64)
-        .min(size.min_element() / 6.0)
-        .max(size.max_element() / 160.0)
+    (0.75e-3f64).min(size.min_element() / 6.0).max(size.max_element() / 160.0)
 }
 
 /// Samples the union of some solids with lattice spacing `cell` [m].
@@ -158,11 +156,7 @@ impl CoarseLattice {
             .into_par_iter()
             .map(|n| distance(grid.node([n / (ny * nz), n / nz % ny, n % nz].map(|i| i * STRIDE))))
             .collect();
-        Self {
-            cell: grid.cell,
-            size,
-            values,
-        }
+        Self { cell: grid.cell, size, values }
     }
 
     /// The distance at the nearest coarse node and how far off it can be here (distances are 1-Lipschitz).
@@ -178,13 +172,8 @@ impl CoarseLattice {
 
 /// Whether each node lies inside, by majority of the winding numbers along x, y and z.
 fn inside_by_winding(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<bool> {
-    let votes: Vec<Vec<bool>> = [0, 1, 2]
-        .into_par_iter()
-        .map(|axis| inside_along(grid, mesh, axis))
-        .collect();
-    (0..grid.values.len())
-        .map(|n| votes.iter().filter(|vote| vote[n]).count() >= 2)
-        .collect()
+    let votes: Vec<Vec<bool>> = [0, 1, 2].into_par_iter().map(|axis| inside_along(grid, mesh, axis)).collect();
+    (0..grid.values.len()).map(|n| votes.iter().filter(|vote| vote[n]).count() >= 2).collect()
 }
 
 /// Lines are shifted off the lattice by these shares of a cell, so that they do not run along edges of meshes
@@ -280,27 +269,18 @@ mod tests {
 
     #[test]
     fn overlapping_parts_are_one_solid() {
-        let slab = Primitive::Cuboid {
-            half: DVec3::new(0.02, 0.01, 0.01),
-        };
+        let slab = Primitive::Cuboid { half: DVec3::new(0.02, 0.01, 0.01) };
         let shift = |x: f64| Pose::from_position(DVec3::new(x, 0.0, 0.0));
         let mut soup = slab.tessellate();
         soup.transform(&shift(-0.01));
         let mut other = slab.tessellate();
         other.transform(&shift(0.01));
         soup.append(&other);
-        let whole = Primitive::Cuboid {
-            half: DVec3::new(0.03, 0.01, 0.01),
-        };
+        let whole = Primitive::Cuboid { half: DVec3::new(0.03, 0.01, 0.01) };
         let as_one_mesh = bake(&[SolidPart::Mesh(soup)], 0.5e-3).expect("bakes");
-        let as_parts = bake(
-            &[
-                SolidPart::Primitive(slab, shift(-0.01)),
-                SolidPart::Primitive(slab, shift(0.01)),
-            ],
-            0.5e-3,
-        )
-        .expect("bakes");
+        let as_parts =
+            bake(&[SolidPart::Primitive(slab, shift(-0.01)), SolidPart::Primitive(slab, shift(0.01))], 0.5e-3)
+                .expect("bakes");
         for grid in [as_one_mesh, as_parts] {
             let field = DistanceField::Grid(Arc::new(grid));
             for x in [-0.035, -0.029, 0.031] {
@@ -335,10 +315,7 @@ mod tests {
     fn absurd_requests_are_refused() {
         assert_eq!(bake(&[], 1e-3).err(), Some(BakeError::NothingSolid));
         let ball = SolidPart::Primitive(Primitive::Sphere { radius: 0.05 }, Pose::IDENTITY);
-        assert!(matches!(
-            bake(std::slice::from_ref(&ball), 1e-6),
-            Err(BakeError::TooFine { .. })
-        ));
+        assert!(matches!(bake(std::slice::from_ref(&ball), 1e-6), Err(BakeError::TooFine { .. })));
         assert!(bake(&[ball], f64::NAN).is_err());
     }
 }

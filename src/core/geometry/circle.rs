@@ -55,9 +55,7 @@ fn lie_on_a_line(points: &[DVec2], scale: f64) -> bool {
         return false;
     };
     let chord = *last - *first;
-    points
-        .iter()
-        .all(|p| (*p - *first).perp_dot(chord).abs() <= COLLINEAR * scale * chord.length())
+    points.iter().all(|p| (*p - *first).perp_dot(chord).abs() <= COLLINEAR * scale * chord.length())
         && chord.length() > COLLINEAR * scale
 }
 
@@ -128,9 +126,7 @@ mod tests {
     fn straight_is_exactly_zero_in_every_direction() {
         for k in 0..32 {
             let along = DVec2::from_angle(k as f64 * 0.2);
-            let points: Vec<_> = (0..10)
-                .map(|i| DVec2::new(0.3, 0.1) + along * (i as f64 * 0.01))
-                .collect();
+            let points: Vec<_> = (0..10).map(|i| DVec2::new(0.3, 0.1) + along * (i as f64 * 0.01)).collect();
             assert_eq!(signed_curvature(&points), Some(0.0), "direction {k}");
         }
     }
@@ -145,11 +141,7 @@ mod tests {
     fn noise_of_a_tenth_of_a_millimetre_reads_almost_straight() {
         // A fixed pattern of +-0.1 mm across a straight 90 mm row of ten joints.
         let noise = [1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0];
-        let points: Vec<_> = noise
-            .iter()
-            .enumerate()
-            .map(|(i, n)| DVec2::new(i as f64 * 0.01, n * 1e-4))
-            .collect();
+        let points: Vec<_> = noise.iter().enumerate().map(|(i, n)| DVec2::new(i as f64 * 0.01, n * 1e-4)).collect();
         assert!(signed_curvature(&points).expect("ten points").abs() < 0.2);
     }
 }

@@ -14,16 +14,10 @@ pub fn convex_hull(points: &[DVec3]) -> Result<TriMesh, MeshError> {
     if points.len() < 4 || size.min_element() <= 1e-6 * size.max_element() {
         return Err(MeshError::NoVolume);
     }
-    let unit: Vec<Vec3> = points
-        .iter()
-        .map(|p| ((*p - bounds.centre()) / size.max_element()).as_vec3())
-        .collect();
+    let unit: Vec<Vec3> = points.iter().map(|p| ((*p - bounds.centre()) / size.max_element()).as_vec3()).collect();
     match parry3d::transformation::try_convex_hull(&unit) {
         Ok((points, triangles)) => Ok(TriMesh {
-            points: points
-                .iter()
-                .map(|p| bounds.centre() + p.as_dvec3() * size.max_element())
-                .collect(),
+            points: points.iter().map(|p| bounds.centre() + p.as_dvec3() * size.max_element()).collect(),
             triangles,
         }),
         Err(error) => {
@@ -39,9 +33,8 @@ mod tests {
 
     #[test]
     fn the_hull_of_a_cube_with_points_inside() {
-        let points: Vec<DVec3> = (0..27u32)
-            .map(|i| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) * 0.01)
-            .collect();
+        let points: Vec<DVec3> =
+            (0..27u32).map(|i| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) * 0.01).collect();
         let hull = convex_hull(&points).expect("a volume");
         assert!((hull.signed_volume() - 8e-6).abs() < 1e-11);
         assert_eq!(convex_hull(&points[..9]).err(), Some(MeshError::NoVolume));

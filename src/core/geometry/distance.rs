@@ -21,10 +21,7 @@ pub enum DistanceField {
 impl DistanceField {
     /// A primitive placed in the solid's frame.
     pub fn primitive(shape: Primitive, solid_from_shape: &Pose) -> Self {
-        Self::Primitive {
-            shape,
-            shape_from_solid: solid_from_shape.inverse(),
-        }
+        Self::Primitive { shape, shape_from_solid: solid_from_shape.inverse() }
     }
 
     /// Signed distance [m]. Near the surface it is the distance; farther away it may be a lower bound, which is
@@ -32,10 +29,7 @@ impl DistanceField {
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
         match self {
-            Self::Primitive {
-                shape,
-                shape_from_solid,
-            } => shape.distance(shape_from_solid.point(p)),
+            Self::Primitive { shape, shape_from_solid } => shape.distance(shape_from_solid.point(p)),
             Self::Grid(grid) => grid.distance(p),
         }
     }
@@ -44,10 +38,9 @@ impl DistanceField {
     #[inline]
     pub fn normal(&self, p: DVec3) -> DVec3 {
         match self {
-            Self::Primitive {
-                shape,
-                shape_from_solid,
-            } => shape_from_solid.rotation.inverse() * shape.gradient(shape_from_solid.point(p)),
+            Self::Primitive { shape, shape_from_solid } => {
+                shape_from_solid.rotation.inverse() * shape.gradient(shape_from_solid.point(p))
+            }
             Self::Grid(grid) => grid.normal(p),
         }
     }
@@ -55,10 +48,7 @@ impl DistanceField {
     /// Radius [m] of a ball about `centre` that holds the solid.
     pub fn radius_about(&self, centre: DVec3) -> f64 {
         let (bounds, place) = match self {
-            Self::Primitive {
-                shape,
-                shape_from_solid,
-            } => (shape.bounds(), *shape_from_solid),
+            Self::Primitive { shape, shape_from_solid } => (shape.bounds(), *shape_from_solid),
             Self::Grid(grid) => (grid.solid, Pose::IDENTITY),
         };
         let c = place.point(centre);
@@ -113,11 +103,7 @@ impl DistanceGrid {
         let at_z = |base: usize| lerp(c[base], c[base + 1], t.z);
         let x = lerp(at_z(4) - at_z(0), at_z(6) - at_z(2), t.y);
         let y = lerp(at_z(2) - at_z(0), at_z(6) - at_z(4), t.x);
-        let z = lerp(
-            lerp(along_z(0), along_z(2), t.y),
-            lerp(along_z(4), along_z(6), t.y),
-            t.x,
-        );
+        let z = lerp(lerp(along_z(0), along_z(2), t.y), lerp(along_z(4), along_z(6), t.y), t.x);
         DVec3::new(x, y, z).normalize_or(DVec3::Z)
     }
 
@@ -136,19 +122,7 @@ impl DistanceGrid {
         let sheet = row * self.size[1];
         let base = i * sheet + j * row + k;
         let at = |offset: usize| f64::from(self.values[base + offset]);
-        Some((
-            [
-                at(0),
-                at(1),
-                at(row),
-                at(row + 1),
-                at(sheet),
-                at(sheet + 1),
-                at(sheet + row),
-                at(sheet + row + 1),
-            ],
-            t,
-        ))
+        Some(([at(0), at(1), at(row), at(row + 1), at(sheet), at(sheet + 1), at(sheet + row), at(sheet + row + 1)], t))
     }
 }
 

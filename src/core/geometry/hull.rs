@@ -36,9 +36,8 @@ mod tests {
     #[test]
     fn the_contact_patch_of_a_cube() {
         // A 20 mm cube face seen by taxels inside and on its rim.
-        let mut points: Vec<DVec2> = (0..5)
-            .flat_map(|i| (0..5).map(move |j| DVec2::new(0.005 * i as f64, 0.005 * j as f64)))
-            .collect();
+        let mut points: Vec<DVec2> =
+            (0..5).flat_map(|i| (0..5).map(move |j| DVec2::new(0.005 * i as f64, 0.005 * j as f64))).collect();
         assert!((convex_hull_area(&mut points) - 4e-4).abs() < 1e-18);
     }
 

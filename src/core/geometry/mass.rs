@@ -16,29 +16,17 @@ pub struct MassProperties {
 
 impl MassProperties {
     /// A body of no mass.
-    pub const ZERO: Self = Self {
-        mass: 0.0,
-        centre: DVec3::ZERO,
-        inertia: DMat3::ZERO,
-    };
+    pub const ZERO: Self = Self { mass: 0.0, centre: DVec3::ZERO, inertia: DMat3::ZERO };
 
     /// The same body with another mass of the same distribution.
     pub fn with_mass(self, mass: f64) -> Self {
-        Self {
-            mass,
-            centre: self.centre,
-            inertia: self.inertia * (mass / self.mass),
-        }
+        Self { mass, centre: self.centre, inertia: self.inertia * (mass / self.mass) }
     }
 
     /// The same body seen from an outer frame.
     pub fn seen_from(&self, outer_from_body: &Pose) -> Self {
         let r = outer_from_body.matrix();
-        Self {
-            mass: self.mass,
-            centre: outer_from_body.point(self.centre),
-            inertia: r * self.inertia * r.transpose(),
-        }
+        Self { mass: self.mass, centre: outer_from_body.point(self.centre), inertia: r * self.inertia * r.transpose() }
     }
 
     /// Two bodies welded together (parallel-axis theorem).
@@ -54,11 +42,7 @@ impl MassProperties {
                 DMat3::from_diagonal(DVec3::splat(r.length_squared())) - DMat3::from_cols(r * r.x, r * r.y, r * r.z);
             body.inertia + steiner * body.mass
         };
-        Self {
-            mass,
-            centre,
-            inertia: about(self) + about(other),
-        }
+        Self { mass, centre, inertia: about(self) + about(other) }
     }
 
     /// True for what a real body can have: positive finite mass, an inertia that is symmetric, positive and
@@ -92,11 +76,7 @@ pub fn mass_properties(mesh: &TriMesh, density: f64) -> MassProperties {
     if size <= 0.0 || !size.is_finite() {
         return MassProperties::ZERO;
     }
-    let points: Vec<Vec3> = mesh
-        .points
-        .iter()
-        .map(|p| ((*p - bounds.centre()) / size).as_vec3())
-        .collect();
+    let points: Vec<Vec3> = mesh.points.iter().map(|p| ((*p - bounds.centre()) / size).as_vec3()).collect();
     let unit = parry3d::mass_properties::MassProperties::from_trimesh(1.0, &points, &mesh.triangles);
     let inertia = unit.reconstruct_inertia_matrix().as_dmat3();
     let symmetric = (inertia + inertia.transpose()) * 0.5;
@@ -122,18 +102,12 @@ mod tests {
         let want = Primitive::Cuboid { half }.mass_properties();
         assert!((got.mass / (800.0 * want.mass) - 1.0).abs() < 1e-5);
         assert!(got.centre.abs_diff_eq(shift.position, 1e-7));
-        assert!(
-            got.inertia
-                .abs_diff_eq(want.inertia * 800.0, 1e-5 * 800.0 * want.inertia.x_axis.x)
-        );
+        assert!(got.inertia.abs_diff_eq(want.inertia * 800.0, 1e-5 * 800.0 * want.inertia.x_axis.x));
     }
 
     #[test]
     fn two_halves_weld_to_the_whole() {
-        let half = Primitive::Cuboid {
-            half: DVec3::new(0.5, 1.0, 1.0),
-        }
-        .mass_properties();
+        let half = Primitive::Cuboid { half: DVec3::new(0.5, 1.0, 1.0) }.mass_properties();
         let at = |x: f64| half.seen_from(&Pose::from_position(DVec3::new(x, 0.0, 0.0)));
         let whole = at(-0.5).welded_to(&at(0.5));
         let cube = Primitive::Cuboid { half: DVec3::ONE }.mass_properties();
@@ -146,28 +120,10 @@ mod tests {
         let sound = Primitive::Sphere { radius: 1.0 }.mass_properties();
         assert!(sound.is_physical());
         assert!(!MassProperties { mass: 0.0, ..sound }.is_physical());
-        assert!(
-            !MassProperties {
-                mass: f64::NAN,
-                ..sound
-            }
-            .is_physical()
-        );
+        assert!(!MassProperties { mass: f64::NAN, ..sound }.is_physical());
         // The moments (1, 1, 3) break the triangle inequality.
         let impossible = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 3.0));
-        assert!(
-            !MassProperties {
-                inertia: impossible,
-                ..sound
-            }
-            .is_physical()
-        );
-        assert!(
-            !MassProperties {
-                inertia: DMat3::ZERO,
-                ..sound
-            }
-            .is_physical()
-        );
+        assert!(!MassProperties { inertia: impossible, ..sound }.is_physical());
+        assert!(!MassProperties { inertia: DMat3::ZERO, ..sound }.is_physical());
     }
 }

@@ -25,11 +25,7 @@ impl TriMesh {
 
     /// The share of some of the triangles in [`TriMesh::signed_volume`] [m³].
     pub(super) fn signed_volume_of(&self, triangles: &[[u32; 3]]) -> f64 {
-        let six_volumes: f64 = triangles
-            .iter()
-            .map(|t| self.corners(*t))
-            .map(|[a, b, c]| a.dot(b.cross(c)))
-            .sum();
+        let six_volumes: f64 = triangles.iter().map(|t| self.corners(*t)).map(|[a, b, c]| a.dot(b.cross(c))).sum();
         six_volumes / 6.0
     }
 
@@ -61,8 +57,7 @@ impl TriMesh {
     pub fn append(&mut self, other: &Self) {
         let offset = self.points.len() as u32;
         self.points.extend_from_slice(&other.points);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
     }
 }
 
@@ -77,33 +72,21 @@ pub struct Bounds {
 
 impl Bounds {
     /// The box that holds nothing: it grows to the first point added.
-    pub const EMPTY: Self = Self {
-        min: DVec3::INFINITY,
-        max: DVec3::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     /// The smallest box around some points.
     pub fn of(points: impl Iterator<Item = DVec3>) -> Self {
-        points.fold(Self::EMPTY, |b, p| Self {
-            min: b.min.min(p),
-            max: b.max.max(p),
-        })
+        points.fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
 
     /// The smallest box around two boxes.
     pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// The box grown by a margin on every side [m].
     pub fn grown(self, margin: f64) -> Self {
-        Self {
-            min: self.min - DVec3::splat(margin),
-            max: self.max + DVec3::splat(margin),
-        }
+        Self { min: self.min - DVec3::splat(margin), max: self.max + DVec3::splat(margin) }
     }
 
     /// Edge lengths [m]; zero for the empty box.
@@ -129,10 +112,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_box_still_faces_outward() {
-        let mut mesh = Primitive::Cuboid {
-            half: DVec3::splat(0.5),
-        }
-        .tessellate();
+        let mut mesh = Primitive::Cuboid { half: DVec3::splat(0.5) }.tessellate();
         assert!((mesh.signed_volume() - 1.0).abs() < 1e-12);
         mesh.scale(DVec3::new(-2.0, 1.0, 1.0));
         assert!((mesh.signed_volume() - 2.0).abs() < 1e-12);
@@ -140,10 +120,7 @@ mod tests {
 
     #[test]
     fn distance_to_a_box() {
-        let unit = Bounds {
-            min: DVec3::ZERO,
-            max: DVec3::ONE,
-        };
+        let unit = Bounds { min: DVec3::ZERO, max: DVec3::ONE };
         assert_eq!(unit.distance(DVec3::new(0.5, 0.2, 0.9)), 0.0);
         assert_eq!(unit.distance(DVec3::new(4.0, 5.0, 1.0)), 5.0);
     }

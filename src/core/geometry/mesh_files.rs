@@ -64,35 +64,22 @@ pub fn read_mesh(
     name: &str,
     read: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
 ) -> Result<Vec<ColouredPart>, MeshFileError> {
-    let extension = Path::new(name)
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = Path::new(name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if extension != "obj" && extension != "stl" {
         return Err(MeshFileError::Unsupported {
             name: name.to_owned(),
-            kind: if extension.is_empty() {
-                "typeless".to_owned()
-            } else {
-                format!(".{extension}")
-            },
+            kind: if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") },
         });
     }
-    let bytes = read(name).map_err(|cause| MeshFileError::Unreadable {
-        name: name.to_owned(),
-        cause: cause.to_string(),
-    })?;
+    let bytes =
+        read(name).map_err(|cause| MeshFileError::Unreadable { name: name.to_owned(), cause: cause.to_string() })?;
     if bytes.len() > LARGEST_FILE {
         return Err(too_large(name, bytes.len() >> 20, "MiB", LARGEST_FILE >> 20));
     }
     let parts = if extension == "obj" {
         parse_obj(name, &bytes, read)?
     } else {
-        vec![ColouredPart {
-            mesh: parse_stl(name, bytes)?,
-            colour: None,
-        }]
+        vec![ColouredPart { mesh: parse_stl(name, bytes)?, colour: None }]
     };
     let triangles: usize = parts.iter().map(|p| p.mesh.triangles.len()).sum();
     if triangles > MOST_TRIANGLES {
@@ -102,17 +89,11 @@ pub fn read_mesh(
 }
 
 fn too_large(name: &str, found: usize, unit: &str, limit: usize) -> MeshFileError {
-    MeshFileError::TooLarge {
-        name: name.to_owned(),
-        what: format!("{found} {unit}, the limit is {limit}"),
-    }
+    MeshFileError::TooLarge { name: name.to_owned(), what: format!("{found} {unit}, the limit is {limit}") }
 }
 
 fn damaged(name: &str, cause: &dyn std::fmt::Display) -> MeshFileError {
-    MeshFileError::Damaged {
-        name: name.to_owned(),
-        cause: cause.to_string(),
-    }
+    MeshFileError::Damaged { name: name.to_owned(), cause: cause.to_string() }
 }
 
 fn parse_obj(
@@ -120,12 +101,7 @@ fn parse_obj(
     bytes: &[u8],
     read: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
 ) -> Result<Vec<ColouredPart>, MeshFileError> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        single_index: false,
-    };
+    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let folder = Path::new(name).parent().unwrap_or(Path::new(""));
     let load_materials = |file: &Path| {
         let path = folder.join(file);
@@ -148,19 +124,10 @@ fn parse_obj(
         if !mesh.indices.len().is_multiple_of(3) || !mesh.positions.len().is_multiple_of(3) {
             return Err(damaged(name, &"a face has fewer than three corners"));
         }
-        let colour = mesh
-            .material_id
-            .and_then(|id| materials.get(id))
-            .and_then(|m| m.diffuse);
+        let colour = mesh.material_id.and_then(|id| materials.get(id)).and_then(|m| m.diffuse);
         Ok(ColouredPart {
             mesh: TriMesh {
-                points: mesh
-                    .positions
-                    .as_chunks::<3>()
-                    .0
-                    .iter()
-                    .map(|p| DVec3::from_array(p.map(f64::from)))
-                    .collect(),
+                points: mesh.positions.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect(),
                 triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
             },
             colour: colour.map(Rgb::from_unit),
@@ -172,9 +139,7 @@ fn parse_obj(
 fn parse_stl(name: &str, bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
     // A binary file announces its count; believe it only when the bytes are there.
     let looks_like_text = bytes.trim_ascii_start().starts_with(b"solid");
-    let announced = bytes
-        .get(80..84)
-        .map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
+    let announced = bytes.get(80..84).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
     let expected = announced.map(|n| 84 + 50 * n);
     if !looks_like_text && expected.is_none_or(|expected| expected > bytes.len()) {
         let cause = match announced {
@@ -186,11 +151,7 @@ fn parse_stl(name: &str, bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
     let mut reader = Cursor::new(bytes);
     let mesh = stl_io::read_stl(&mut reader).map_err(|e| damaged(name, &e))?;
     Ok(TriMesh {
-        points: mesh
-            .vertices
-            .iter()
-            .map(|v| DVec3::from_array(<[f32; 3]>::from(*v).map(f64::from)))
-            .collect(),
+        points: mesh.vertices.iter().map(|v| DVec3::from_array(<[f32; 3]>::from(*v).map(f64::from))).collect(),
         triangles: mesh.faces.iter().map(|f| f.vertices.map(|i| i as u32)).collect(),
     })
 }
@@ -236,22 +197,14 @@ mod tests {
     fn in_memory(files: Vec<(&'static str, Vec<u8>)>) -> impl Fn(&str) -> std::io::Result<Vec<u8>> {
         move |path| {
             let found = files.iter().find(|(name, _)| *name == path);
-            found
-                .map(|(_, bytes)| bytes.clone())
-                .ok_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound))
+            found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound))
         }
     }
 
     #[test]
     fn obj_and_materials_survive_a_round_trip() {
-        let mesh = Primitive::Cuboid {
-            half: DVec3::new(0.01, 0.02, 0.03),
-        }
-        .tessellate();
-        let part = ColouredPart {
-            mesh: mesh.clone(),
-            colour: Some(Rgb(255, 51, 0)),
-        };
+        let mesh = Primitive::Cuboid { half: DVec3::new(0.01, 0.02, 0.03) }.tessellate();
+        let part = ColouredPart { mesh: mesh.clone(), colour: Some(Rgb(255, 51, 0)) };
         let (obj, mtl) = write_obj("cube", "cube.mtl", &[("red", part)]);
         let read = in_memory(vec![("d/cube.obj", obj.into_bytes()), ("d/cube.mtl", mtl.into_bytes())]);
         let parts = read_mesh("d/cube.obj", &read).expect("what we wrote");

@@ -21,42 +21,27 @@ impl Default for Pose {
 
 impl Pose {
     /// The pose that changes nothing.
-    pub const IDENTITY: Self = Self {
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-    };
+    pub const IDENTITY: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
 
     /// A pose from its two parts; the rotation is normalised.
     pub fn new(position: DVec3, rotation: DQuat) -> Self {
-        Self {
-            position,
-            rotation: rotation.normalize(),
-        }
+        Self { position, rotation: rotation.normalize() }
     }
 
     /// A translation [m].
     pub fn from_position(position: DVec3) -> Self {
-        Self {
-            position,
-            rotation: DQuat::IDENTITY,
-        }
+        Self { position, rotation: DQuat::IDENTITY }
     }
 
     /// URDF's convention: fixed-axis roll, pitch, yaw [rad], i.e. R = Rz(yaw) Ry(pitch) Rx(roll).
     pub fn from_xyz_rpy(xyz: DVec3, rpy: DVec3) -> Self {
-        Self::new(
-            xyz,
-            DQuat::from_rotation_z(rpy.z) * DQuat::from_rotation_y(rpy.y) * DQuat::from_rotation_x(rpy.x),
-        )
+        Self::new(xyz, DQuat::from_rotation_z(rpy.z) * DQuat::from_rotation_y(rpy.y) * DQuat::from_rotation_x(rpy.x))
     }
 
     /// The transform the other way round.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
-        Self {
-            position: rotation * -self.position,
-            rotation,
-        }
+        Self { position: rotation * -self.position, rotation }
     }
 
     /// Takes a point from the inner frame to the outer one.
@@ -83,10 +68,7 @@ impl Pose {
 impl std::ops::Mul for Pose {
     type Output = Self;
     fn mul(self, inner: Self) -> Self {
-        Self {
-            position: self.point(inner.position),
-            rotation: self.rotation * inner.rotation,
-        }
+        Self { position: self.point(inner.position), rotation: self.rotation * inner.rotation }
     }
 }
 

@@ -62,11 +62,7 @@ impl Primitive {
             Self::Cuboid { half } => {
                 let beyond = p.abs() - half;
                 let outside = beyond.max(DVec3::ZERO);
-                let direction = if outside != DVec3::ZERO {
-                    outside.normalize()
-                } else {
-                    axis_of_largest(beyond)
-                };
+                let direction = if outside != DVec3::ZERO { outside.normalize() } else { axis_of_largest(beyond) };
                 direction.copysign(p)
             }
             Self::Cylinder { radius, half_length } => {
@@ -91,18 +87,14 @@ impl Primitive {
     /// The same shape with all lengths multiplied.
     pub fn scaled(&self, factor: f64) -> Self {
         match *self {
-            Self::Sphere { radius } => Self::Sphere {
-                radius: radius * factor,
-            },
+            Self::Sphere { radius } => Self::Sphere { radius: radius * factor },
             Self::Cuboid { half } => Self::Cuboid { half: half * factor },
-            Self::Cylinder { radius, half_length } => Self::Cylinder {
-                radius: radius * factor,
-                half_length: half_length * factor,
-            },
-            Self::Capsule { radius, half_length } => Self::Capsule {
-                radius: radius * factor,
-                half_length: half_length * factor,
-            },
+            Self::Cylinder { radius, half_length } => {
+                Self::Cylinder { radius: radius * factor, half_length: half_length * factor }
+            }
+            Self::Capsule { radius, half_length } => {
+                Self::Capsule { radius: radius * factor, half_length: half_length * factor }
+            }
         }
     }
 
@@ -145,11 +137,7 @@ impl Primitive {
                 (cylinder + ball, moments)
             }
         };
-        MassProperties {
-            mass: volume,
-            centre: DVec3::ZERO,
-            inertia: DMat3::from_diagonal(moments),
-        }
+        MassProperties { mass: volume, centre: DVec3::ZERO, inertia: DMat3::from_diagonal(moments) }
     }
 
     /// A closed mesh of the surface, fine enough to be drawn smoothly.
@@ -191,10 +179,7 @@ fn arc_profile(radius: f64, half_length: f64) -> Vec<DVec2> {
     for half in [-1.0, 1.0] {
         for i in 0..=STEPS {
             let angle = 0.25 * TAU * (i as f64 / STEPS as f64 - if half < 0.0 { 1.0 } else { 0.0 });
-            profile.push(DVec2::new(
-                radius * angle.cos(),
-                radius * angle.sin() + half * half_length,
-            ));
+            profile.push(DVec2::new(radius * angle.cos(), radius * angle.sin() + half * half_length));
         }
     }
     profile.dedup_by(|a, b| a.distance_squared(*b) < 1e-24);
@@ -240,17 +225,8 @@ pub fn lathe(profile: &[DVec2]) -> TriMesh {
 }
 
 fn cuboid_mesh(half: DVec3) -> TriMesh {
-    let points = (0..8)
-        .map(|i| half * DVec3::new(sign_bit(i, 0), sign_bit(i, 1), sign_bit(i, 2)))
-        .collect();
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
+    let points = (0..8).map(|i| half * DVec3::new(sign_bit(i, 0), sign_bit(i, 1), sign_bit(i, 2))).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     TriMesh { points, triangles }
 }
@@ -266,17 +242,9 @@ mod tests {
 
     const ALL: [Primitive; 4] = [
         Primitive::Sphere { radius: 0.02 },
-        Primitive::Cuboid {
-            half: DVec3::new(0.04, 0.025, 0.02),
-        },
-        Primitive::Cylinder {
-            radius: 0.0175,
-            half_length: 0.03,
-        },
-        Primitive::Capsule {
-            radius: 0.01,
-            half_length: 0.02,
-        },
+        Primitive::Cuboid { half: DVec3::new(0.04, 0.025, 0.02) },
+        Primitive::Cylinder { radius: 0.0175, half_length: 0.03 },
+        Primitive::Capsule { radius: 0.01, half_length: 0.02 },
     ];
 
     #[test]

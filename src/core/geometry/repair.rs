@@ -118,11 +118,7 @@ fn weld(mesh: &TriMesh, tolerance: f64, notes: &mut Vec<String>) -> TriMesh {
             })
         })
         .collect();
-    welded.triangles = mesh
-        .triangles
-        .iter()
-        .map(|t| t.map(|i| new_index[i as usize]))
-        .collect();
+    welded.triangles = mesh.triangles.iter().map(|t| t.map(|i| new_index[i as usize])).collect();
     let fused = mesh.points.len() - welded.points.len();
     if fused > 0 {
         notes.push(format!("{fused} coinciding corners were joined"));
@@ -195,10 +191,8 @@ fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<(), MeshError> 
             continue;
         }
         let piece = spread_orientation(seed, &neighbours, &mut flip)?;
-        let oriented: Vec<[u32; 3]> = piece
-            .iter()
-            .map(|i| oriented_triangle(mesh.triangles[*i], flip[*i] == Some(true)))
-            .collect();
+        let oriented: Vec<[u32; 3]> =
+            piece.iter().map(|i| oriented_triangle(mesh.triangles[*i], flip[*i] == Some(true))).collect();
         let inside_out = mesh.signed_volume_of(&oriented) < 0.0;
         for (i, t) in piece.iter().zip(oriented) {
             let t = oriented_triangle(t, inside_out);
@@ -246,18 +240,11 @@ fn spread_orientation(
 /// Closes narrow holes with a fan about their middle; refuses wide ones.
 fn fill_holes(mesh: &mut TriMesh, widest_allowed: f64, notes: &mut Vec<String>) -> Result<(), MeshError> {
     let loops = boundary_loops(&mesh.triangles)?;
-    let width = |hole: &[u32]| {
-        super::Bounds::of(hole.iter().map(|i| mesh.points[*i as usize]))
-            .size()
-            .length()
-    };
+    let width = |hole: &[u32]| super::Bounds::of(hole.iter().map(|i| mesh.points[*i as usize])).size().length();
     let widest = loops.iter().map(|hole| width(hole)).fold(0.0, f64::max);
     let wide = loops.iter().filter(|hole| width(hole) > widest_allowed).count();
     if wide > 0 {
-        return Err(MeshError::Open {
-            holes: wide,
-            widest_mm: widest * 1e3,
-        });
+        return Err(MeshError::Open { holes: wide, widest_mm: widest * 1e3 });
     }
     for hole in &loops {
         let middle = hole.iter().map(|i| mesh.points[*i as usize]).sum::<DVec3>() / hole.len() as f64;
@@ -310,10 +297,7 @@ mod tests {
     use crate::geometry::Primitive;
 
     fn cube() -> TriMesh {
-        Primitive::Cuboid {
-            half: DVec3::splat(0.5),
-        }
-        .tessellate()
+        Primitive::Cuboid { half: DVec3::splat(0.5) }.tessellate()
     }
 
     #[test]
@@ -381,10 +365,7 @@ mod tests {
         assert_eq!(repair(&dangling).err(), Some(MeshError::BadIndex { index: 2 }));
         // A sheet seen from both sides cancels itself.
         let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
-        let sheet = TriMesh {
-            points,
-            triangles: vec![[0, 1, 2], [0, 2, 1]],
-        };
+        let sheet = TriMesh { points, triangles: vec![[0, 1, 2], [0, 2, 1]] };
         assert_eq!(repair(&sheet).err(), Some(MeshError::Empty));
         let mut flat = cube();
         flat.scale(DVec3::new(1.0, 1.0, 0.0));
@@ -398,11 +379,7 @@ mod tests {
         for k in 0..5 {
             let around = f64::from(k) * std::f64::consts::TAU / 5.0;
             let (sin, cos) = around.sin_cos();
-            let half = DVec3::new(
-                cos * (0.5 * around).cos(),
-                sin * (0.5 * around).cos(),
-                (0.5 * around).sin(),
-            ) * 0.2;
+            let half = DVec3::new(cos * (0.5 * around).cos(), sin * (0.5 * around).cos(), (0.5 * around).sin()) * 0.2;
             let middle = DVec3::new(cos, sin, 0.0);
             points.extend([middle - half, middle + half]);
         }
@@ -412,9 +389,6 @@ mod tests {
             let (c, d) = if k == 4 { (1, 0) } else { (2 * k + 2, 2 * k + 3) };
             triangles.extend([[a, c, d], [a, d, b]]);
         }
-        assert_eq!(
-            repair(&TriMesh { points, triangles }).err(),
-            Some(MeshError::NotOrientable)
-        );
+        assert_eq!(repair(&TriMesh { points, triangles }).err(), Some(MeshError::NotOrientable));
     }
 }

@@ -17,10 +17,8 @@ const COVER_SPACING: f64 = 2.5e-3;
 /// Extreme corners in many directions (all corners of a box, both rims of a cylinder), then points that cover the
 /// rest of the surface evenly.
 pub fn support_points(mesh: &TriMesh) -> Vec<DVec3> {
-    let mut chosen: Vec<usize> = (0..DIRECTIONS)
-        .map(spiral_direction)
-        .filter_map(|d| farthest_along(&mesh.points, d))
-        .collect();
+    let mut chosen: Vec<usize> =
+        (0..DIRECTIONS).map(spiral_direction).filter_map(|d| farthest_along(&mesh.points, d)).collect();
     chosen.sort_unstable();
     chosen.dedup();
     let corners: Vec<DVec3> = chosen.into_iter().map(|i| mesh.points[i]).collect();
@@ -40,11 +38,7 @@ pub fn support_points(mesh: &TriMesh) -> Vec<DVec3> {
 }
 
 fn area(mesh: &TriMesh) -> f64 {
-    mesh.triangles
-        .iter()
-        .map(|t| mesh.corners(*t))
-        .map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length())
-        .sum()
+    mesh.triangles.iter().map(|t| mesh.corners(*t)).map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
 }
 
 /// Points of a triangle no farther apart than `spacing`, corners included; at most some thousands.
@@ -68,11 +62,7 @@ struct Cover {
 
 impl Cover {
     fn new(spacing: f64) -> Self {
-        Self {
-            spacing,
-            points: Vec::new(),
-            by_cell: HashMap::new(),
-        }
+        Self { spacing, points: Vec::new(), by_cell: HashMap::new() }
     }
 
     fn cell(&self, p: DVec3) -> [i64; 3] {
@@ -90,10 +80,9 @@ impl Cover {
         (-1..=1).all(|di| {
             (-1..=1).all(|dj| {
                 (-1..=1).all(|dk| {
-                    self.by_cell.get(&[i + di, j + dj, k + dk]).is_none_or(|near| {
-                        near.iter()
-                            .all(|n| self.points[*n as usize].distance(p) >= self.spacing)
-                    })
+                    self.by_cell
+                        .get(&[i + di, j + dj, k + dk])
+                        .is_none_or(|near| near.iter().all(|n| self.points[*n as usize].distance(p) >= self.spacing))
                 })
             })
         })
@@ -120,9 +109,7 @@ mod tests {
 
     #[test]
     fn a_box_keeps_its_corners_and_its_faces_are_covered() {
-        let shape = Primitive::Cuboid {
-            half: DVec3::new(0.04, 0.02, 0.01),
-        };
+        let shape = Primitive::Cuboid { half: DVec3::new(0.04, 0.02, 0.01) };
         let mesh = shape.tessellate();
         let points = support_points(&mesh);
         assert_eq!(points[..8], mesh.points);

@@ -61,11 +61,7 @@ impl SurfaceMesh {
 
 /// Area-weighted face normals; zero for a sliver.
 fn face_normals(mesh: &TriMesh) -> Vec<DVec3> {
-    mesh.triangles
-        .iter()
-        .map(|t| mesh.corners(*t))
-        .map(|[a, b, c]| (b - a).cross(c - a))
-        .collect()
+    mesh.triangles.iter().map(|t| mesh.corners(*t)).map(|[a, b, c]| (b - a).cross(c - a)).collect()
 }
 
 /// Corners at one place count as one, whatever their index: files repeat corners along seams.
@@ -78,10 +74,7 @@ fn faces_by_place(mesh: &TriMesh) -> HashMap<[u32; 3], Vec<usize>> {
     let mut faces: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
     for (face, t) in mesh.triangles.iter().enumerate() {
         for corner in t {
-            faces
-                .entry(place_key(mesh.points[*corner as usize]))
-                .or_default()
-                .push(face);
+            faces.entry(place_key(mesh.points[*corner as usize])).or_default().push(face);
         }
     }
     faces

@@ -17,10 +17,7 @@ pub struct PoseJitter {
 
 impl Default for PoseJitter {
     fn default() -> Self {
-        Self {
-            shift: 0.005,
-            yaw_deg: 25.0,
-        }
+        Self { shift: 0.005, yaw_deg: 25.0 }
     }
 }
 
@@ -67,23 +64,12 @@ mod tests {
     #[test]
     fn colliding_poses_are_drawn_again() {
         // 80 mm between pads that are 84 mm apart: most shifts collide.
-        let slab = Primitive::Cuboid {
-            half: DVec3::new(0.040, 0.02, 0.02),
-        };
+        let slab = Primitive::Cuboid { half: DVec3::new(0.040, 0.02, 0.02) };
         let object = ObjectModel::from_primitive("slab", slab, 500.0, 0.5);
-        let jitter = PoseJitter {
-            shift: 0.008,
-            yaw_deg: 0.0,
-        };
+        let jitter = PoseJitter { shift: 0.008, yaw_deg: 0.0 };
         let (scene, rejected) = jittered(&Scene::default(), Some(&object), jitter, 3);
-        assert!(
-            scene.gripper.mount.offset[0].abs() < 0.0021 + 1e-9,
-            "{:?}",
-            scene.gripper.mount.offset
-        );
-        let total: u32 = (0..20)
-            .map(|seed| jittered(&Scene::default(), Some(&object), jitter, seed).1)
-            .sum();
+        assert!(scene.gripper.mount.offset[0].abs() < 0.0021 + 1e-9, "{:?}", scene.gripper.mount.offset);
+        let total: u32 = (0..20).map(|seed| jittered(&Scene::default(), Some(&object), jitter, seed).1).sum();
         assert!(total > 20 && rejected < MOST_DRAWS, "{total}");
     }
 }

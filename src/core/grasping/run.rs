@@ -49,9 +49,7 @@ fn programme_warnings(scene: &Scene) -> Vec<String> {
     let needed = f64::from(scene.programme.total_ticks()) / f64::from(scene.timing.actuation_hz);
     if needed > scene.timing.duration_s + 1e-9 {
         let lasts = scene.timing.duration_s;
-        warnings.push(format!(
-            "the programme takes {needed:.1} s but the trial ends after {lasts:.1} s"
-        ));
+        warnings.push(format!("the programme takes {needed:.1} s but the trial ends after {lasts:.1} s"));
     }
     let actuation = &scene.gripper.actuation;
     let programme = &scene.programme;
@@ -63,9 +61,7 @@ fn programme_warnings(scene: &Scene) -> Vec<String> {
         let nearest = actuation.nearest_command(bar);
         if (nearest - bar).abs() > 1e-9 {
             let step = actuation.step_bar;
-            warnings.push(format!(
-                "programme.{key} = {bar} is not a multiple of the control box's {step} bar"
-            ));
+            warnings.push(format!("programme.{key} = {bar} is not a multiple of the control box's {step} bar"));
         }
     }
     warnings
@@ -74,13 +70,7 @@ fn programme_warnings(scene: &Scene) -> Vec<String> {
 impl<R: Rig> GraspRun<R> {
     /// A grasp about to begin.
     pub fn new(rig: R, programme: Programme, info: TrialInfo) -> Self {
-        Self {
-            rig,
-            programme,
-            info,
-            frames: Vec::new(),
-            finished: false,
-        }
+        Self { rig, programme, info, frames: Vec::new(), finished: false }
     }
 
     /// What is known of the trial so far.
@@ -130,19 +120,14 @@ impl<R: Rig> GraspRun<R> {
         let quality = &self.info.quality;
         if !quality.converged {
             let (missed, steps) = (quality.unconverged_steps, quality.steps);
-            self.info
-                .warnings
-                .push(format!("{missed} of {steps} steps missed the solver's tolerance"));
+            self.info.warnings.push(format!("{missed} of {steps} steps missed the solver's tolerance"));
         }
         if let Some(t) = fingers_cross(scene, &self.frames) {
             let text =
                 format!("the fingers pass through each other from {t:.2} s: contact between them is not simulated");
             self.info.warnings.push(text);
         }
-        Trial {
-            info: self.info,
-            frames: self.frames,
-        }
+        Trial { info: self.info, frames: self.frames }
     }
 }
 
@@ -195,13 +180,7 @@ mod tests {
         let trial = grasp(&Scene::default(), Some(&ball()), 0);
         assert_eq!(trial.frames.len(), 300);
         assert!(trial.info.warnings.is_empty(), "{:?}", trial.info.warnings);
-        let Quality {
-            finite,
-            converged,
-            steps,
-            static_residual,
-            ..
-        } = trial.info.quality;
+        let Quality { finite, converged, steps, static_residual, .. } = trial.info.quality;
         assert!(finite && converged && steps == 1200);
         assert!(static_residual < 1e-3, "{static_residual}");
     }
@@ -210,11 +189,7 @@ mod tests {
     fn an_empty_hand_says_that_its_fingers_cross() {
         let trial = grasp(&Scene::default(), None, 0);
         assert_eq!(trial.info.object, "empty");
-        assert!(
-            trial.info.warnings.iter().any(|w| w.contains("pass through")),
-            "{:?}",
-            trial.info.warnings
-        );
+        assert!(trial.info.warnings.iter().any(|w| w.contains("pass through")), "{:?}", trial.info.warnings);
     }
 
     #[test]
@@ -222,11 +197,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.gripper.mount.offset = [0.03, 0.0, 0.0];
         let run = prepare(&scene, Some(&ball()), 0);
-        assert!(
-            run.info().warnings.iter().any(|w| w.contains("start")),
-            "{:?}",
-            run.info().warnings
-        );
+        assert!(run.info().warnings.iter().any(|w| w.contains("start")), "{:?}", run.info().warnings);
     }
 
     #[test]

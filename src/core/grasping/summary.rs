@@ -81,9 +81,7 @@ impl HoldSummary {
                 curvature(&crate::gripper::BentFinger::new(&gripper.finger, q), q, &Span::WHOLE)
             }),
             pressure_pa: mean(&|frame, side| {
-                patch(frame, side)
-                    .pressure(PressureArea::Participation)
-                    .unwrap_or_default()
+                patch(frame, side).pressure(PressureArea::Participation).unwrap_or_default()
             }),
         })
     }

@@ -27,15 +27,8 @@ impl Default for Actuation {
     fn default() -> Self {
         // 0.06 N m at 1 bar bends the default finger by 0.143 rad per joint, 82 degrees in all, which is what
         // SoMo's calibrated finger does.
-        let point = |bar: f64| TorquePoint {
-            bar,
-            torque: 0.06 * bar,
-        };
-        Self {
-            curve: vec![point(0.0), point(1.5)],
-            max_bar: 1.5,
-            step_bar: 0.05,
-        }
+        let point = |bar: f64| TorquePoint { bar, torque: 0.06 * bar };
+        Self { curve: vec![point(0.0), point(1.5)], max_bar: 1.5, step_bar: 0.05 }
     }
 }
 
@@ -58,10 +51,7 @@ impl Actuation {
     /// The nearest command that the control box can give [bar].
     pub fn nearest_command(&self, bar: f64) -> f64 {
         // Count whole steps, so that 0.05 added twenty times is 1.
-        (bar / self.step_bar)
-            .round()
-            .clamp(0.0, (self.max_bar / self.step_bar).floor())
-            * self.step_bar
+        (bar / self.step_bar).round().clamp(0.0, (self.max_bar / self.step_bar).floor()) * self.step_bar
     }
 }
 
@@ -76,14 +66,7 @@ mod tests {
             curve: curve.iter().map(|&(bar, torque)| TorquePoint { bar, torque }).collect(),
             ..Actuation::default()
         };
-        for (bar, want) in [
-            (0.0, 0.0),
-            (0.25, 0.005),
-            (0.5, 0.01),
-            (0.75, 0.03),
-            (1.0, 0.05),
-            (1.5, 0.09),
-        ] {
+        for (bar, want) in [(0.0, 0.0), (0.25, 0.005), (0.5, 0.01), (0.75, 0.03), (1.0, 0.05), (1.5, 0.09)] {
             assert!((actuation.torque(bar) - want).abs() < 1e-15, "{bar}");
         }
     }

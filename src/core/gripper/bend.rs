@@ -48,10 +48,7 @@ pub fn bend(lengths: &[f64], q: &[f64], segments: &mut [SegmentPose]) -> DVec2 {
             angle += q[j - 1];
         }
         let (sin, cos) = angle.sin_cos();
-        *segment = SegmentPose {
-            start,
-            along: DVec2::new(sin, cos),
-        };
+        *segment = SegmentPose { start, along: DVec2::new(sin, cos) };
         start += segment.along * *length;
     }
     start
@@ -107,10 +104,7 @@ pub struct FingerPlane {
 impl FingerPlane {
     /// The plane of a finger that stands `half_gap` [m] from the middle.
     pub fn new(side: Side, half_gap: f64) -> Self {
-        Self {
-            sign: side.closing_sign(),
-            half_gap,
-        }
+        Self { sign: side.closing_sign(), half_gap }
     }
 
     /// A point of the plane, shifted `across` the finger along y [m].
@@ -132,11 +126,7 @@ mod tests {
 
     #[test]
     fn a_quarter_turn_in_the_middle() {
-        let finger = Finger {
-            joints: 2,
-            length: 0.1,
-            ..Finger::default()
-        };
+        let finger = Finger { joints: 2, length: 0.1, ..Finger::default() };
         let bent = BentFinger::new(&finger, &[std::f64::consts::FRAC_PI_2, 0.0]);
         // 25 mm down, then 75 mm inward.
         assert!(bent.tip.abs_diff_eq(DVec2::new(0.075, 0.025), 1e-15));

@@ -84,10 +84,7 @@ mod tests {
     #[test]
     fn segments_add_up_to_the_finger() {
         for joints in [2, 3, 10, 80] {
-            let finger = Finger {
-                joints,
-                ..Finger::default()
-            };
+            let finger = Finger { joints, ..Finger::default() };
             let total: f64 = finger.segment_lengths().sum();
             assert_eq!(finger.segment_lengths().count(), joints + 1);
             assert!((total - finger.length).abs() < 1e-15);

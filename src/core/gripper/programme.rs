@@ -42,12 +42,7 @@ pub struct Programme {
 
 impl Default for Programme {
     fn default() -> Self {
-        Self {
-            peak_bar: 1.0,
-            close_bar_per_tick: 0.05,
-            hold_ticks: 10,
-            release_bar_per_tick: 0.10,
-        }
+        Self { peak_bar: 1.0, close_bar_per_tick: 0.05, hold_ticks: 10, release_bar_per_tick: 0.10 }
     }
 }
 
@@ -61,9 +56,7 @@ impl Programme {
     /// Actuation ticks until the pressure is back at zero.
     pub fn total_ticks(&self) -> u32 {
         let release = (self.peak_bar / self.release_bar_per_tick - 1e-9).ceil().max(0.0) as u32;
-        self.close_ticks()
-            .saturating_add(self.hold_ticks)
-            .saturating_add(release)
+        self.close_ticks().saturating_add(self.hold_ticks).saturating_add(release)
     }
 
     /// Commanded pressure [bar] during actuation tick `tick` (the first is 0), and the phase it belongs to.
@@ -103,10 +96,7 @@ mod tests {
 
     #[test]
     fn a_hold_without_end_never_releases() {
-        let programme = Programme {
-            hold_ticks: u32::MAX,
-            ..Programme::default()
-        };
+        let programme = Programme { hold_ticks: u32::MAX, ..Programme::default() };
         assert_eq!(programme.command(1_000_000), (1.0, Phase::Hold));
     }
 }

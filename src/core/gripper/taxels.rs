@@ -18,13 +18,7 @@ pub struct TaxelGrid {
 impl TaxelGrid {
     /// The grid of a finger's pad.
     pub fn new(finger: &Finger, pad: &Pad) -> Self {
-        Self {
-            rows: pad.rows,
-            columns: pad.columns,
-            length: finger.length,
-            width: finger.width,
-            pad: pad.clone(),
-        }
+        Self { rows: pad.rows, columns: pad.columns, length: finger.length, width: finger.width, pad: pad.clone() }
     }
 
     /// Taxels on one pad.
@@ -70,9 +64,7 @@ impl TaxelGrid {
 
     /// How far a steady normal force [N] pushes a taxel in [m].
     pub fn compression(&self, taxel: usize, force: f64) -> f64 {
-        self.pad
-            .law
-            .compression(self.stiffness(taxel), self.height(taxel), force)
+        self.pad.law.compression(self.stiffness(taxel), self.height(taxel), force)
     }
 
     /// The rigid segment that carries a taxel when the finger has `joints` joints.
@@ -111,10 +103,7 @@ mod tests {
                 let j = grid.segment(taxel, joints) as f64;
                 let arc = grid.arc(taxel);
                 let from = ((j - 0.5) * l).max(0.0);
-                assert!(
-                    arc >= from - 1e-12 && arc <= (j + 0.5) * l + 1e-12,
-                    "N = {joints}, taxel {taxel}"
-                );
+                assert!(arc >= from - 1e-12 && arc <= (j + 0.5) * l + 1e-12, "N = {joints}, taxel {taxel}");
             }
         }
         // Two rows on the rigid base half of the default finger.

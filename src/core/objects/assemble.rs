@@ -71,10 +71,7 @@ impl Blueprint {
                 for part in parts {
                     let mut mesh = part.mesh.clone();
                     mesh.transform(place);
-                    self.visual.push(ColouredPart {
-                        mesh,
-                        colour: colour.or(part.colour),
-                    });
+                    self.visual.push(ColouredPart { mesh, colour: colour.or(part.colour) });
                 }
                 self.visual_solids.push(SolidPart::Mesh(joined(parts, place)));
             }
@@ -95,11 +92,7 @@ impl Blueprint {
             CollisionShape::File if !self.collision.is_empty() => std::mem::take(&mut self.collision),
             CollisionShape::File | CollisionShape::Visual => std::mem::take(&mut self.visual_solids),
             CollisionShape::Hull => {
-                let all = if self.collision.is_empty() {
-                    &self.visual_solids
-                } else {
-                    &self.collision
-                };
+                let all = if self.collision.is_empty() { &self.visual_solids } else { &self.collision };
                 vec![SolidPart::Mesh(hull_of(all, &self.name)?)]
             }
         };
@@ -120,10 +113,9 @@ impl Blueprint {
             [SolidPart::Primitive(shape, place)] => DistanceField::primitive(*shape, place),
             _ => {
                 let grid = bake(&solids, options.cell.unwrap_or_else(|| choose_cell(&bounds)));
-                DistanceField::Grid(Arc::new(grid.map_err(|cause| ObjectError::Bake {
-                    name: self.name.clone(),
-                    cause,
-                })?))
+                DistanceField::Grid(Arc::new(
+                    grid.map_err(|cause| ObjectError::Bake { name: self.name.clone(), cause })?,
+                ))
             }
         };
         let surface = if self.visual.is_empty() {
@@ -154,10 +146,7 @@ impl Blueprint {
             Ok(())
         } else {
             let cause = "a mesh holds numbers that are not finite".to_owned();
-            Err(ObjectError::Malformed {
-                name: self.name.clone(),
-                cause,
-            })
+            Err(ObjectError::Malformed { name: self.name.clone(), cause })
         }
     }
 
@@ -166,12 +155,7 @@ impl Blueprint {
         if let Some(scale) = options.scale {
             return scale;
         }
-        let size = solids
-            .iter()
-            .map(SolidPart::bounds)
-            .fold(Bounds::EMPTY, Bounds::union)
-            .size()
-            .max_element();
+        let size = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union).size().max_element();
         let (scale, guess) = if size > LARGEST_PLAUSIBLE {
             (1e-3, "millimetres taken for metres")
         } else if size > 0.0 && size < SMALLEST_PLAUSIBLE {
@@ -190,17 +174,11 @@ impl Blueprint {
     fn check_size(&mut self, bounds: &Bounds) -> Result<(), ObjectError> {
         let size = bounds.size();
         if size.max_element() > LARGEST_POSSIBLE || size.max_element() < 1e-5 || !size.is_finite() {
-            return Err(ObjectError::Size {
-                name: self.name.clone(),
-                metres: size.max_element(),
-            });
+            return Err(ObjectError::Size { name: self.name.clone(), metres: size.max_element() });
         }
         if size.max_element() > LARGEST_GRASPABLE {
             let cm = size.max_element() * 100.0;
-            self.warnings.push(format!(
-                "\"{}\" is {cm:.0} cm across, far larger than the gripper",
-                self.name
-            ));
+            self.warnings.push(format!("\"{}\" is {cm:.0} cm across, far larger than the gripper", self.name));
         }
         Ok(())
     }
@@ -208,15 +186,11 @@ impl Blueprint {
     fn repair_meshes(&mut self, solids: &mut [SolidPart]) -> Result<(), ObjectError> {
         for solid in solids {
             if let SolidPart::Mesh(mesh) = solid {
-                let repaired = repair(mesh).map_err(|cause| ObjectError::Unsound {
-                    name: self.name.clone(),
-                    cause,
-                })?;
+                let repaired = repair(mesh).map_err(|cause| ObjectError::Unsound { name: self.name.clone(), cause })?;
                 *mesh = repaired.mesh;
                 // Joining corners is what every STL needs; the rest is worth a word.
                 let notable = repaired.notes.into_iter().filter(|note| !note.contains("coinciding"));
-                self.warnings
-                    .extend(notable.map(|note| format!("mesh of \"{}\": {note}", self.name)));
+                self.warnings.extend(notable.map(|note| format!("mesh of \"{}\": {note}", self.name)));
             }
         }
         Ok(())
@@ -238,23 +212,13 @@ impl Blueprint {
             .inertials
             .iter()
             .filter_map(|inertial| inertial.declared)
-            .map(|m| MassProperties {
-                mass: m.mass,
-                centre: m.centre * scale,
-                inertia: m.inertia * (scale * scale),
-            })
+            .map(|m| MassProperties { mass: m.mass, centre: m.centre * scale, inertia: m.inertia * (scale * scale) })
             .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
-        let missing: Vec<&str> = self
-            .inertials
-            .iter()
-            .filter(|i| i.declared.is_none())
-            .map(|i| i.link.as_str())
-            .collect();
+        let missing: Vec<&str> =
+            self.inertials.iter().filter(|i| i.declared.is_none()).map(|i| i.link.as_str()).collect();
         let mut chosen = if declared.mass > 0.0 && !missing.is_empty() {
             let links = missing.join("\", \"");
-            self.warnings.push(format!(
-                "link \"{links}\" has no usable mass; it is counted as weightless"
-            ));
+            self.warnings.push(format!("link \"{links}\" has no usable mass; it is counted as weightless"));
             declared
         } else if declared.mass > 0.0 {
             declared
@@ -349,8 +313,5 @@ fn resting_of(solids: &[SolidPart]) -> Resting {
 
 fn hull_of(solids: &[SolidPart], name: &str) -> Result<TriMesh, ObjectError> {
     let points: Vec<glam::DVec3> = solids.iter().flat_map(|solid| mesh_of(solid).points).collect();
-    crate::geometry::convex_hull(&points).map_err(|cause| ObjectError::Unsound {
-        name: name.to_owned(),
-        cause,
-    })
+    crate::geometry::convex_hull(&points).map_err(|cause| ObjectError::Unsound { name: name.to_owned(), cause })
 }

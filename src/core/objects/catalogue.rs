@@ -29,10 +29,7 @@ pub struct BuiltIn {
 impl BuiltIn {
     /// Size and shape class.
     pub fn class(&self) -> ObjectClass {
-        ObjectClass {
-            size: self.size,
-            shape: self.shape,
-        }
+        ObjectClass { size: self.size, shape: self.shape }
     }
 }
 

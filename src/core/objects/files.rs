@@ -16,27 +16,18 @@ pub(super) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     }
     if metadata.len() > LARGEST_FILE {
         let mib = metadata.len() >> 20;
-        return Err(std::io::Error::other(format!(
-            "{mib} MiB is too large; the limit is {} MiB",
-            LARGEST_FILE >> 20
-        )));
+        return Err(std::io::Error::other(format!("{mib} MiB is too large; the limit is {} MiB", LARGEST_FILE >> 20)));
     }
     std::fs::read(path)
 }
 
 /// Reads a file that another file refers to: only meshes and their materials.
 pub(super) fn read_referenced(path: &Path) -> std::io::Result<Vec<u8>> {
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if READABLE.contains(&extension.as_str()) {
         read_file(path)
     } else {
-        Err(std::io::Error::other(
-            "only .obj, .stl and .mtl files are read on behalf of an object",
-        ))
+        Err(std::io::Error::other("only .obj, .stl and .mtl files are read on behalf of an object"))
     }
 }
 
@@ -50,9 +41,7 @@ pub(super) fn candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
     if let Some(path) = reference.strip_prefix("file://") {
         return vec![folder.join(path)];
     }
-    let in_package = ["package://", "model://"]
-        .iter()
-        .find_map(|scheme| reference.strip_prefix(scheme));
+    let in_package = ["package://", "model://"].iter().find_map(|scheme| reference.strip_prefix(scheme));
     let Some(in_package) = in_package else {
         return vec![folder.join(reference)];
     };
@@ -100,19 +89,10 @@ mod tests {
 
     #[test]
     fn packages_are_sought_upwards() {
-        let found = candidates(
-            "package://mug_description/meshes/mug.stl",
-            Path::new("/ws/src/mug_description/urdf"),
-        );
+        let found = candidates("package://mug_description/meshes/mug.stl", Path::new("/ws/src/mug_description/urdf"));
         assert!(found.contains(&PathBuf::from("/ws/src/mug_description/meshes/mug.stl")));
-        assert_eq!(
-            candidates("../meshes/a.obj", Path::new("/x/urdf")),
-            [PathBuf::from("/x/urdf/../meshes/a.obj")]
-        );
-        assert_eq!(
-            candidates("file:///m/a.obj", Path::new("/x")),
-            [PathBuf::from("/m/a.obj")]
-        );
+        assert_eq!(candidates("../meshes/a.obj", Path::new("/x/urdf")), [PathBuf::from("/x/urdf/../meshes/a.obj")]);
+        assert_eq!(candidates("file:///m/a.obj", Path::new("/x")), [PathBuf::from("/m/a.obj")]);
     }
 
     #[test]
@@ -124,10 +104,7 @@ mod tests {
 
     #[test]
     fn embedded_paths_stay_inside() {
-        assert_eq!(
-            inside(Path::new("lemon/./x/../lemon.obj")).as_deref(),
-            Some("lemon/lemon.obj")
-        );
+        assert_eq!(inside(Path::new("lemon/./x/../lemon.obj")).as_deref(), Some("lemon/lemon.obj"));
         assert_eq!(inside(Path::new("lemon/../../etc/passwd")), None);
         assert_eq!(inside(Path::new("/etc/passwd")), None);
     }

@@ -63,11 +63,7 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
         return Ok(Some(object));
     }
     let path = Path::new(source);
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "urdf" | "xml" => load_urdf(path, options).map(Some),
         "obj" | "stl" => load_mesh(path, options).map(Some),
@@ -77,15 +73,8 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
 
 fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
     if path.exists() || !extension.is_empty() {
-        let kind = if extension.is_empty() {
-            "typeless".to_owned()
-        } else {
-            format!(".{extension}")
-        };
-        return ObjectError::Unsupported {
-            name: source.to_owned(),
-            kind,
-        };
+        let kind = if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") };
+        return ObjectError::Unsupported { name: source.to_owned(), kind };
     }
     let names = || catalogue().iter().map(|b| b.name.as_str());
     let nearest = names()
@@ -105,8 +94,7 @@ fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem()
-        .map_or_else(|| "object".to_owned(), |s| s.to_string_lossy().into_owned())
+    path.file_stem().map_or_else(|| "object".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
 fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
@@ -131,11 +119,9 @@ fn load_urdf(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectEr
                 name: reference.to_owned(),
                 cause: match places.first() {
                     Some(first) if places.len() == 1 => format!("there is no file {}", first.display()),
-                    Some(first) => format!(
-                        "it is neither at {} nor at {} other places",
-                        first.display(),
-                        places.len() - 1
-                    ),
+                    Some(first) => {
+                        format!("it is neither at {} nor at {} other places", first.display(), places.len() - 1)
+                    }
                     None => "the reference is empty".to_owned(),
                 },
             }),
@@ -153,8 +139,5 @@ fn load_mesh(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectEr
 }
 
 fn unreadable(path: &Path, cause: &std::io::Error) -> ObjectError {
-    ObjectError::Unreadable {
-        path: path.to_owned(),
-        cause: cause.to_string(),
-    }
+    ObjectError::Unreadable { path: path.to_owned(), cause: cause.to_string() }
 }

@@ -52,23 +52,12 @@ pub struct Resting(pub Vec<RestingBall>);
 impl Resting {
     /// Resting on corners [m].
     pub fn on_corners(corners: &[DVec3]) -> Self {
-        Self(
-            corners
-                .iter()
-                .map(|p| RestingBall {
-                    centre: *p,
-                    radius: 0.0,
-                })
-                .collect(),
-        )
+        Self(corners.iter().map(|p| RestingBall { centre: *p, radius: 0.0 }).collect())
     }
 
     /// A primitive placed in the object's frame.
     pub fn on_primitive(shape: &Primitive, object_from_shape: &Pose) -> Self {
-        let ball = |z: f64, radius: f64| RestingBall {
-            centre: object_from_shape.point(DVec3::Z * z),
-            radius,
-        };
+        let ball = |z: f64, radius: f64| RestingBall { centre: object_from_shape.point(DVec3::Z * z), radius };
         match *shape {
             Primitive::Sphere { radius } => Self(vec![ball(0.0, radius)]),
             Primitive::Capsule { radius, half_length } => Self(evenly(half_length).map(|z| ball(z, radius)).collect()),
@@ -93,10 +82,7 @@ impl Resting {
 
     /// How far the object reaches along a unit direction of its own frame [m].
     pub fn reach(&self, direction: DVec3) -> f64 {
-        self.0
-            .iter()
-            .map(|ball| ball.centre.dot(direction) + ball.radius)
-            .fold(f64::NEG_INFINITY, f64::max)
+        self.0.iter().map(|ball| ball.centre.dot(direction) + ball.radius).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 

@@ -14,22 +14,13 @@ pub(super) type MeshReader<'a> = &'a dyn Fn(&str) -> Result<Vec<ColouredPart>, M
 
 /// Parses the bytes of a URDF.
 pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Result<Blueprint, ObjectError> {
-    let malformed = |cause: String| ObjectError::Malformed {
-        name: name.to_owned(),
-        cause,
-    };
+    let malformed = |cause: String| ObjectError::Malformed { name: name.to_owned(), cause };
     let clean = urdf_text::clean(bytes).map_err(malformed)?;
     let robot = urdf_rs::read_from_string(&clean.text).map_err(|e| malformed(e.to_string()))?;
-    let mut blueprint = Blueprint {
-        warnings: clean.warnings,
-        ..Blueprint::new(name)
-    };
+    let mut blueprint = Blueprint { warnings: clean.warnings, ..Blueprint::new(name) };
     let poses = link_poses(&robot, &mut blueprint.warnings).map_err(malformed)?;
-    let colours: HashMap<&str, Rgb> = robot
-        .materials
-        .iter()
-        .filter_map(|m| Some((m.name.as_str(), colour_of(m)?)))
-        .collect();
+    let colours: HashMap<&str, Rgb> =
+        robot.materials.iter().filter_map(|m| Some((m.name.as_str(), colour_of(m)?))).collect();
     for link in &robot.links {
         let Some(root_from_link) = poses.get(link.name.as_str()) else {
             continue;
@@ -54,10 +45,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
         let has_shape = !(link.visual.is_empty() && link.collision.is_empty());
         if has_shape || link.inertial.mass.value != 0.0 {
             let declared = inertial_of(link, root_from_link).map_err(malformed)?;
-            blueprint.inertials.push(Inertial {
-                link: link.name.clone(),
-                declared,
-            });
+            blueprint.inertials.push(Inertial { link: link.name.clone(), declared });
         }
     }
     Ok(blueprint)
@@ -70,26 +58,16 @@ fn link_poses<'a>(robot: &'a urdf_rs::Robot, warnings: &mut Vec<String>) -> Resu
     for joint in &robot.joints {
         for end in [&joint.parent.link, &joint.child.link] {
             if !known(end) {
-                return Err(format!(
-                    "joint \"{}\" refers to a link \"{end}\" that does not exist",
-                    joint.name
-                ));
+                return Err(format!("joint \"{}\" refers to a link \"{end}\" that does not exist", joint.name));
             }
         }
         if let Some(other) = parent_of.insert(&joint.child.link, joint) {
             let child = &joint.child.link;
-            return Err(format!(
-                "link \"{child}\" hangs from two joints, \"{}\" and \"{}\"",
-                other.name, joint.name
-            ));
+            return Err(format!("link \"{child}\" hangs from two joints, \"{}\" and \"{}\"", other.name, joint.name));
         }
     }
-    let roots: Vec<&str> = robot
-        .links
-        .iter()
-        .map(|l| l.name.as_str())
-        .filter(|name| !parent_of.contains_key(name))
-        .collect();
+    let roots: Vec<&str> =
+        robot.links.iter().map(|l| l.name.as_str()).filter(|name| !parent_of.contains_key(name)).collect();
     let Some(root) = roots.first() else {
         return Err(if robot.links.is_empty() {
             "it has no links".to_owned()
@@ -98,9 +76,7 @@ fn link_poses<'a>(robot: &'a urdf_rs::Robot, warnings: &mut Vec<String>) -> Resu
         });
     };
     for other in &roots[1..] {
-        warnings.push(format!(
-            "link \"{other}\" is not joined to \"{root}\"; it is kept where it is"
-        ));
+        warnings.push(format!("link \"{other}\" is not joined to \"{root}\"; it is kept where it is"));
     }
     let mut poses: HashMap<&str, Pose> = roots.iter().map(|name| (*name, Pose::IDENTITY)).collect();
     for link in &robot.links {
@@ -134,10 +110,7 @@ fn pose_of(origin: &urdf_rs::Pose, owner: &str) -> Result<Pose, String> {
 }
 
 fn colour_of(material: &urdf_rs::Material) -> Option<Rgb> {
-    material
-        .color
-        .as_ref()
-        .map(|c| Rgb::from_unit([c.rgba[0], c.rgba[1], c.rgba[2]].map(|x| x as f32)))
+    material.color.as_ref().map(|c| Rgb::from_unit([c.rgba[0], c.rgba[1], c.rgba[2]].map(|x| x as f32)))
 }
 
 fn shape_of(geometry: &urdf_rs::Geometry, link: &str, read_mesh: MeshReader<'_>) -> Result<ShapeSource, ObjectError> {
@@ -146,40 +119,27 @@ fn shape_of(geometry: &urdf_rs::Geometry, link: &str, read_mesh: MeshReader<'_>)
             Ok(value)
         } else {
             let cause = format!("{what} = {value} is not a positive length");
-            Err(ObjectError::BadShape {
-                link: link.to_owned(),
-                cause,
-            })
+            Err(ObjectError::BadShape { link: link.to_owned(), cause })
         }
     };
     let primitive = match geometry {
         urdf_rs::Geometry::Box { size } => {
-            let half = DVec3::new(
-                positive(size[0], "size")?,
-                positive(size[1], "size")?,
-                positive(size[2], "size")?,
-            );
+            let half = DVec3::new(positive(size[0], "size")?, positive(size[1], "size")?, positive(size[2], "size")?);
             Primitive::Cuboid { half: 0.5 * half }
         }
         urdf_rs::Geometry::Cylinder { radius, length } => Primitive::Cylinder {
             radius: positive(*radius, "radius")?,
             half_length: 0.5 * positive(*length, "length")?,
         },
-        urdf_rs::Geometry::Capsule { radius, length } => Primitive::Capsule {
-            radius: positive(*radius, "radius")?,
-            half_length: 0.5 * positive(*length, "length")?,
-        },
-        urdf_rs::Geometry::Sphere { radius } => Primitive::Sphere {
-            radius: positive(*radius, "radius")?,
-        },
+        urdf_rs::Geometry::Capsule { radius, length } => {
+            Primitive::Capsule { radius: positive(*radius, "radius")?, half_length: 0.5 * positive(*length, "length")? }
+        }
+        urdf_rs::Geometry::Sphere { radius } => Primitive::Sphere { radius: positive(*radius, "radius")? },
         urdf_rs::Geometry::Mesh { filename, scale } => {
             let factors = scale.map_or(DVec3::ONE, |s| DVec3::from_array(*s));
             if !factors.is_finite() || factors.min_element() == 0.0 || factors.abs().max_element() > 1e9 {
                 let cause = format!("the mesh scale {factors} is not usable");
-                return Err(ObjectError::BadShape {
-                    link: link.to_owned(),
-                    cause,
-                });
+                return Err(ObjectError::BadShape { link: link.to_owned(), cause });
             }
             let mut parts = read_mesh(filename).map_err(|cause| ObjectError::Mesh { cause })?;
             for part in &mut parts {

@@ -29,10 +29,7 @@ struct Element {
 
 impl Element {
     fn attribute(&self, name: &str) -> Option<&str> {
-        self.attributes
-            .iter()
-            .find(|(key, _)| key == name)
-            .map(|(_, value)| value.as_str())
+        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
     fn set(&mut self, name: &str, value: String) {
@@ -150,11 +147,7 @@ fn element(start: &BytesStart<'_>) -> Result<Element, String> {
             attributes.push((key, value));
         }
     }
-    Ok(Element {
-        name,
-        attributes,
-        children: Vec::new(),
-    })
+    Ok(Element { name, attributes, children: Vec::new() })
 }
 
 fn clean_robot(robot: &mut Element, warnings: &mut Vec<String>) {
@@ -204,15 +197,9 @@ fn clean_link(link: &mut Element, warnings: &mut Vec<String>) {
 
 fn clean_inertial(inertial: &mut Element) {
     inertial.keep_first_of_each(&["origin", "mass", "inertia"]);
-    for (part, keys) in [
-        ("mass", &["value"][..]),
-        ("inertia", &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]),
-    ] {
+    for (part, keys) in [("mass", &["value"][..]), ("inertia", &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"])] {
         if inertial.child(part).is_none() {
-            inertial.children.push(Element {
-                name: part.to_owned(),
-                ..Element::default()
-            });
+            inertial.children.push(Element { name: part.to_owned(), ..Element::default() });
         }
         for element in inertial.children.iter_mut().filter(|e| e.name == part) {
             for key in keys {
@@ -244,15 +231,8 @@ fn clean_shape(shape: &mut Element, link: &str, warnings: &mut Vec<String>) {
 
 fn clean_geometry(geometry: &mut Element, link: &str, warnings: &mut Vec<String>) {
     const KNOWN: [&str; 5] = ["box", "cylinder", "sphere", "capsule", "mesh"];
-    if let Some(unknown) = geometry
-        .children
-        .iter()
-        .find(|child| !KNOWN.contains(&child.name.as_str()))
-    {
-        warnings.push(format!(
-            "link \"{link}\": the shape <{}> is not known and was left out",
-            unknown.name
-        ));
+    if let Some(unknown) = geometry.children.iter().find(|child| !KNOWN.contains(&child.name.as_str())) {
+        warnings.push(format!("link \"{link}\": the shape <{}> is not known and was left out", unknown.name));
     }
     geometry.keep_children(&KNOWN);
     geometry.children.truncate(1);
@@ -303,9 +283,7 @@ fn clean_joint(joint: &mut Element, warnings: &mut Vec<String>) {
     let name = joint.attribute("name").unwrap_or_default().to_owned();
     let kind = joint.attribute("type").unwrap_or("fixed").to_owned();
     if kind != "fixed" {
-        warnings.push(format!(
-            "joint \"{name}\" is {kind}; it was welded at its zero position"
-        ));
+        warnings.push(format!("joint \"{name}\" is {kind}; it was welded at its zero position"));
     }
     joint.attributes.retain(|(key, _)| key == "name");
     joint.set("type", "fixed".to_owned());
@@ -315,10 +293,7 @@ fn clean_joint(joint: &mut Element, warnings: &mut Vec<String>) {
 
 /// Numbers separated by single blanks, whatever separated them before.
 fn spaced(text: &str) -> String {
-    let parts: Vec<&str> = text
-        .split([',', ';', ' ', '\t', '\n', '\r'])
-        .filter(|s| !s.is_empty())
-        .collect();
+    let parts: Vec<&str> = text.split([',', ';', ' ', '\t', '\n', '\r']).filter(|s| !s.is_empty()).collect();
     parts.join(" ")
 }
 

@@ -42,11 +42,7 @@ impl ChainModel {
         let lengths: Vec<f64> = finger.segment_lengths().collect();
         let thickness = finger.back + pad.thickness;
         let masses: Vec<f64> = lengths.iter().map(|l| finger.mass * l / finger.length).collect();
-        let inertias = masses
-            .iter()
-            .zip(&lengths)
-            .map(|(m, l)| m * (l * l + thickness * thickness) / 12.0)
-            .collect();
+        let inertias = masses.iter().zip(&lengths).map(|(m, l)| m * (l * l + thickness * thickness) / 12.0).collect();
         Self {
             joints: finger.joints,
             stiffness: finger.joint_stiffness(),
@@ -122,11 +118,7 @@ impl ChainModel {
     #[inline]
     pub(super) fn limit_torque(&self, q: f64) -> (f64, f64) {
         let beyond = q.abs() - self.angle_limit;
-        if beyond <= 0.0 {
-            (0.0, 0.0)
-        } else {
-            (self.limit_stiffness * beyond * q.signum(), self.limit_stiffness)
-        }
+        if beyond <= 0.0 { (0.0, 0.0) } else { (self.limit_stiffness * beyond * q.signum(), self.limit_stiffness) }
     }
 }
 
@@ -141,13 +133,7 @@ mod tests {
     use super::*;
 
     fn chain(joints: usize) -> ChainModel {
-        ChainModel::new(
-            &Finger {
-                joints,
-                ..Finger::default()
-            },
-            &Pad::default(),
-        )
+        ChainModel::new(&Finger { joints, ..Finger::default() }, &Pad::default())
     }
 
     /// Kinetic energy straight from segment velocities.
@@ -174,10 +160,8 @@ mod tests {
         model.bend(&q, &mut segments);
         let mut m = vec![0.0; 49];
         model.inertia(&segments, &mut m);
-        let quadratic: f64 = (0..7)
-            .flat_map(|i| (0..7).map(move |j| (i, j)))
-            .map(|(i, j)| 0.5 * qd[i] * m[i * 7 + j] * qd[j])
-            .sum();
+        let quadratic: f64 =
+            (0..7).flat_map(|i| (0..7).map(move |j| (i, j))).map(|(i, j)| 0.5 * qd[i] * m[i * 7 + j] * qd[j]).sum();
         let direct = kinetic_energy(&model, &q, &qd);
         assert!((quadratic / direct - 1.0).abs() < 1e-12);
     }
@@ -211,11 +195,7 @@ mod tests {
             };
             let slope = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
             let want = (ahead[i] - behind[i]) / (2.0 * step) - slope;
-            assert!(
-                (bias[i] - want).abs() < 1e-9,
-                "joint {i}: {} instead of {want}",
-                bias[i]
-            );
+            assert!((bias[i] - want).abs() < 1e-9, "joint {i}: {} instead of {want}", bias[i]);
         }
     }
 
@@ -225,22 +205,10 @@ mod tests {
         let mut segments = vec![SegmentPose::default(); 11];
         model.bend(&[0.0; 10], &mut segments);
         let (mut accelerations, mut bias) = (vec![DVec2::ZERO; 11], vec![0.0; 10]);
-        model.bias(
-            &segments,
-            &[0.0; 10],
-            DVec2::new(0.0, 9.81),
-            &mut accelerations,
-            &mut bias,
-        );
+        model.bias(&segments, &[0.0; 10], DVec2::new(0.0, 9.81), &mut accelerations, &mut bias);
         assert!(bias.iter().all(|b| b.abs() < 1e-18));
         // Held out level by gravity across it, the first joint carries the weight of 95 mm at its middle.
-        model.bias(
-            &segments,
-            &[0.0; 10],
-            DVec2::new(9.81, 0.0),
-            &mut accelerations,
-            &mut bias,
-        );
+        model.bias(&segments, &[0.0; 10], DVec2::new(9.81, 0.0), &mut accelerations, &mut bias);
         let want = -0.95 * 0.030 * 9.81 * 0.5 * 0.095;
         assert!((bias[0] / want - 1.0).abs() < 1e-12);
     }

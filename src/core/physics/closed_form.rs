@@ -51,18 +51,12 @@ impl Run {
 }
 
 fn torque(torque: f64) -> Drive {
-    Drive {
-        torque,
-        ..Drive::default()
-    }
+    Drive { torque, ..Drive::default() }
 }
 
 /// A force inward on the left tip only [N].
 fn tip_force(force: f64) -> Drive {
-    Drive {
-        tip_force: [DVec3::X * force, DVec3::ZERO],
-        ..Drive::default()
-    }
+    Drive { tip_force: [DVec3::X * force, DVec3::ZERO], ..Drive::default() }
 }
 
 #[test]
@@ -87,10 +81,7 @@ fn a_tip_force_tends_to_the_elastica_at_second_order() {
                 scene.gripper.finger.curvature_limit = 1e4;
                 let finger = scene.gripper.finger.clone();
                 let mut run = Run::new(&scene, None, 0.02);
-                run.steps(
-                    1500,
-                    &tip_force(load * finger.bending_stiffness / finger.length.powi(2)),
-                );
+                run.steps(1500, &tip_force(load * finger.bending_stiffness / finger.length.powi(2)));
                 let (x, y) = run.tip();
                 (x / finger.length - across).hypot(y / finger.length - ahead)
             })
@@ -183,9 +174,7 @@ fn free_motion_converges_at_first_order_in_h() {
         run.tip().0
     };
     let reference = tip_at(2e-5);
-    let errors: Vec<f64> = [0.01, 0.005, 0.0025, 0.00125]
-        .map(|h| (tip_at(h) - reference).abs())
-        .into();
+    let errors: Vec<f64> = [0.01, 0.005, 0.0025, 0.00125].map(|h| (tip_at(h) - reference).abs()).into();
     for pair in errors.windows(2) {
         assert!((1.6..2.4).contains(&(pair[0] / pair[1])), "first order: {errors:?}");
     }
@@ -208,12 +197,7 @@ fn a_ball_on_a_thin_linear_pad_is_a_winkler_foundation() {
     let mut run = Run::new(&scene, Some(&ball), 1e-3);
     lay_out(&run.model, &run.state, &mut run.ws);
     detect(&run.model, &run.state, &mut run.ws);
-    let force: f64 = run
-        .ws
-        .contacts
-        .iter()
-        .map(|c| c.force(run.model.step).0 * -c.normal.x)
-        .sum();
+    let force: f64 = run.ws.contacts.iter().map(|c| c.force(run.model.step).0 * -c.normal.x).sum();
     let pad = &scene.gripper.pad;
     let want = std::f64::consts::PI * radius * pad.modulus * depth * depth / pad.thickness;
     assert!((force / want - 1.0).abs() < 0.02, "{force} instead of {want}");
@@ -260,19 +244,8 @@ fn a_passive_gripper_gains_no_energy() {
 fn a_mirrored_scene_stays_mirrored() {
     let shapes = [
         (Primitive::Sphere { radius: 0.02 }, [0.0; 3]),
-        (
-            Primitive::Cuboid {
-                half: DVec3::splat(0.0225),
-            },
-            [0.0; 3],
-        ),
-        (
-            Primitive::Cylinder {
-                radius: 0.0175,
-                half_length: 0.03,
-            },
-            [0.0; 3],
-        ),
+        (Primitive::Cuboid { half: DVec3::splat(0.0225) }, [0.0; 3]),
+        (Primitive::Cylinder { radius: 0.0175, half_length: 0.03 }, [0.0; 3]),
     ];
     for (shape, rotation_deg) in shapes {
         for fixed in [true, false] {
@@ -303,10 +276,7 @@ fn stiff_joints_bend_as_little_as_they_should() {
             run.steps(2000, &torque(0.05));
             let want = 0.05 / run.model.chain.stiffness;
             for q in &run.state.q {
-                assert!(
-                    (q / want - 1.0).abs() < 1e-3,
-                    "x {factor}, h = {h}: {q} instead of {want}"
-                );
+                assert!((q / want - 1.0).abs() < 1e-3, "x {factor}, h = {h}: {q} instead of {want}");
             }
         }
     }
@@ -324,14 +294,8 @@ fn joint_limits_hold_against_any_pressure() {
 fn a_free_object_in_flight_keeps_its_momentum() {
     let mut scene = bare(10);
     scene.gripper.mount.opening = 0.5;
-    let brick = ObjectModel::from_primitive(
-        "brick",
-        Primitive::Cuboid {
-            half: DVec3::new(0.03, 0.015, 0.006),
-        },
-        800.0,
-        0.5,
-    );
+    let brick =
+        ObjectModel::from_primitive("brick", Primitive::Cuboid { half: DVec3::new(0.03, 0.015, 0.006) }, 800.0, 0.5);
     let mut run = Run::new(&scene, Some(&brick), 1e-3);
     run.state.velocity[20..].copy_from_slice(&[0.01, 0.0, 0.02, 3.0, 0.1, 0.2]);
     let spin = |run: &Run| {
@@ -343,10 +307,7 @@ fn a_free_object_in_flight_keeps_its_momentum() {
     run.steps(2000, &Drive::default());
     let after = spin(&run);
     assert!(after.0.abs_diff_eq(before.0, 1e-12));
-    assert!(
-        (after.1 - before.1).length() < 0.02 * before.1.length(),
-        "{before:?} {after:?}"
-    );
+    assert!((after.1 - before.1).length() < 0.02 * before.1.length(), "{before:?} {after:?}");
 }
 
 #[test]
@@ -354,23 +315,14 @@ fn a_resting_object_sinks_as_far_as_the_scene_allows() {
     for mass in [1e-4, 0.05, 100.0] {
         let mut scene = Scene::default();
         scene.object.mass = Auto::Value(mass);
-        let mut cube = ObjectModel::from_primitive(
-            "cube",
-            Primitive::Cuboid {
-                half: DVec3::splat(0.0225),
-            },
-            500.0,
-            0.5,
-        );
+        let mut cube =
+            ObjectModel::from_primitive("cube", Primitive::Cuboid { half: DVec3::splat(0.0225) }, 500.0, 0.5);
         cube.mass = cube.mass.with_mass(mass);
         let mut run = Run::new(&scene, Some(&cube), 1.0 / 300.0);
         let start = run.state.body.position;
         run.steps(3000, &Drive::default());
         let sunk = start.z - run.state.body.position.z;
-        assert!(
-            (0.0..=1.1 * scene.support.sink).contains(&sunk),
-            "{mass} kg sank {sunk} m"
-        );
+        assert!((0.0..=1.1 * scene.support.sink).contains(&sunk), "{mass} kg sank {sunk} m");
         let creep = (run.state.body.position - start).truncate().length();
         assert!(creep < 1e-9, "{mass} kg crept {creep} m");
         let carried: f64 = run.ws.contacts.iter().map(|c| c.force(run.model.step).0).sum();
@@ -403,12 +355,7 @@ fn strong_friction_stays_in_its_cone() {
         for k in 0..900 {
             run.steps(1, &torque(1e-4 * f64::from(k.min(600))));
             let (mut used, mut allowed) = (0.0, 0.0);
-            for c in run
-                .ws
-                .contacts
-                .iter()
-                .filter(|c| c.acting != Acting::Object && c.against == Against::Object)
-            {
+            for c in run.ws.contacts.iter().filter(|c| c.acting != Acting::Object && c.against == Against::Object) {
                 let (normal, tangential) = c.force(run.model.step);
                 used += tangential.length();
                 allowed += c.mu * normal;
@@ -424,36 +371,10 @@ fn strong_friction_stays_in_its_cone() {
 #[test]
 fn thin_things_are_not_crossed() {
     let thin = [
-        (
-            "plate",
-            Primitive::Cuboid {
-                half: DVec3::new(0.0005, 0.02, 0.03),
-            },
-            [0.0; 3],
-        ),
-        (
-            "card edge-on",
-            Primitive::Cuboid {
-                half: DVec3::new(0.02, 0.0005, 0.03),
-            },
-            [0.0; 3],
-        ),
-        (
-            "needle across",
-            Primitive::Cylinder {
-                radius: 0.0005,
-                half_length: 0.03,
-            },
-            [90.0, 0.0, 0.0],
-        ),
-        (
-            "needle along",
-            Primitive::Cylinder {
-                radius: 0.0005,
-                half_length: 0.03,
-            },
-            [0.0; 3],
-        ),
+        ("plate", Primitive::Cuboid { half: DVec3::new(0.0005, 0.02, 0.03) }, [0.0; 3]),
+        ("card edge-on", Primitive::Cuboid { half: DVec3::new(0.02, 0.0005, 0.03) }, [0.0; 3]),
+        ("needle across", Primitive::Cylinder { radius: 0.0005, half_length: 0.03 }, [90.0, 0.0, 0.0]),
+        ("needle along", Primitive::Cylinder { radius: 0.0005, half_length: 0.03 }, [0.0; 3]),
     ];
     for (name, shape, rotation_deg) in thin {
         for h in [1.0 / 150.0, 1.0 / 300.0] {
@@ -471,15 +392,9 @@ fn thin_things_are_not_crossed() {
             }
             assert!(touched, "{name} was never felt at h = {h}");
             let deepest = run.ws.contacts.iter().map(|c| c.compression).fold(0.0, f64::max);
-            assert!(
-                deepest < scene.gripper.pad.thickness,
-                "{name}: {deepest} m deep at h = {h}"
-            );
+            assert!(deepest < scene.gripper.pad.thickness, "{name}: {deepest} m deep at h = {h}");
             let (across, _) = run.tip();
-            assert!(
-                across < run.model.planes[0].half_gap + 0.002,
-                "{name} was crossed at h = {h}"
-            );
+            assert!(across < run.model.planes[0].half_gap + 0.002, "{name} was crossed at h = {h}");
         }
     }
 }
@@ -499,10 +414,7 @@ fn an_object_born_inside_a_finger_leaves_gently() {
         fastest = fastest.max(run.state.body_velocity(&run.model).0.length());
     }
     let bound = (2.0 * start / ball.mass.mass).sqrt();
-    assert!(
-        fastest > 0.01 && fastest < bound,
-        "{fastest} m/s, the stored energy allows {bound}"
-    );
+    assert!(fastest > 0.01 && fastest < bound, "{fastest} m/s, the stored energy allows {bound}");
 }
 
 #[test]

@@ -104,11 +104,7 @@ impl Contact {
             let e = self.shear + (velocity - self.normal * v_n) * step.h;
             let pull = e * (step.h * self.shear_stiffness());
             let size = pull.length();
-            gradient += if size <= self.limit {
-                pull
-            } else {
-                pull * (self.limit / size)
-            };
+            gradient += if size <= self.limit { pull } else { pull * (self.limit / size) };
         }
         gradient
     }
@@ -135,11 +131,7 @@ impl Contact {
         }
         let column =
             |k: DVec3, n_k: f64, slip_k: f64| k * all + n * ((along_normal - all) * n_k) - slip * (radial * slip_k);
-        DMat3::from_cols(
-            column(DVec3::X, n.x, slip.x),
-            column(DVec3::Y, n.y, slip.y),
-            column(DVec3::Z, n.z, slip.z),
-        )
+        DMat3::from_cols(column(DVec3::X, n.x, slip.x), column(DVec3::Y, n.y, slip.y), column(DVec3::Z, n.z, slip.z))
     }
 
     /// Stiffness of the skin in shear, k_t [N/m].
@@ -168,11 +160,7 @@ impl Contact {
         let v_n = self.normal.dot(self.velocity);
         let e = self.shear + (self.velocity - self.normal * v_n) * step.h;
         let impulse = step.h * self.shear_stiffness() * e.length();
-        if impulse > self.limit {
-            e * (self.limit / impulse)
-        } else {
-            e
-        }
+        if impulse > self.limit { e * (self.limit / impulse) } else { e }
     }
 
     /// By how much the lagged slip limit missed the true one where it mattered [N s], and the true one.
@@ -181,11 +169,7 @@ impl Contact {
         let truth = self.mu * gamma;
         let used = self.force(step).1.length() * step.h;
         let slips = used >= self.limit * (1.0 - 1e-9);
-        let mismatch = if slips {
-            (used - truth).abs()
-        } else {
-            (used - truth).max(0.0)
-        };
+        let mismatch = if slips { (used - truth).abs() } else { (used - truth).max(0.0) };
         (mismatch, truth)
     }
 }
@@ -194,10 +178,7 @@ impl Contact {
 mod tests {
     use super::*;
 
-    const STEP: ContactStep = ContactStep {
-        h: 1.0 / 300.0,
-        dissipation: 2.0,
-    };
+    const STEP: ContactStep = ContactStep { h: 1.0 / 300.0, dissipation: 2.0 };
 
     fn contact() -> Contact {
         Contact {
@@ -227,11 +208,7 @@ mod tests {
             (DVec3::new(1.0, 0.0, 1.0), 1e-5),
             (DVec3::new(0.02, 0.03, -0.05), 0.0),
         ] {
-            let mut c = Contact {
-                limit,
-                velocity,
-                ..contact()
-            };
+            let mut c = Contact { limit, velocity, ..contact() };
             let step = 1e-6;
             for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
                 let slope = (c.gradient(STEP, velocity + axis * step) - c.gradient(STEP, velocity - axis * step))
@@ -245,11 +222,7 @@ mod tests {
 
     #[test]
     fn friction_stays_within_its_limit_and_opposes_slip() {
-        let c = Contact {
-            limit: 1e-5,
-            velocity: DVec3::new(0.0, 0.5, 0.0),
-            ..contact()
-        };
+        let c = Contact { limit: 1e-5, velocity: DVec3::new(0.0, 0.5, 0.0), ..contact() };
         let (_, tangential) = c.force(STEP);
         assert!((tangential.length() * STEP.h / c.limit - 1.0).abs() < 1e-12);
         assert!(tangential.y < 0.0);
@@ -259,10 +232,7 @@ mod tests {
 
     #[test]
     fn a_contact_never_pulls() {
-        let c = Contact {
-            velocity: DVec3::new(3.0, 0.0, 3.0),
-            ..contact()
-        };
+        let c = Contact { velocity: DVec3::new(3.0, 0.0, 3.0), ..contact() };
         assert_eq!(c.force(STEP).0, 0.0);
     }
 }

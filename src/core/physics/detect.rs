@@ -55,22 +55,9 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
             if near_object.is_none() && !near_world {
                 continue;
             }
-            let near = Near {
-                object: near_object.map(|o| (o, against_object)),
-                world: near_world.then_some(against_world),
-            };
-            detect_segment(
-                model,
-                state,
-                workspace,
-                &near,
-                Place {
-                    finger,
-                    segment_index: j,
-                    link,
-                    segment,
-                },
-            );
+            let near =
+                Near { object: near_object.map(|o| (o, against_object)), world: near_world.then_some(against_world) };
+            detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment });
         }
     }
     if let Some(body) = model.free_body()
@@ -147,11 +134,7 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
 
 /// Axes in which a pad's shear is remembered: along the segment, across it, inward. Columns, in the gripper frame.
 pub(super) fn segment_axes(plane: &FingerPlane, segment: &SegmentPose) -> DMat3 {
-    DMat3::from_cols(
-        plane.direction(segment.along),
-        DVec3::Y,
-        plane.direction(segment.inward()),
-    )
+    DMat3::from_cols(plane.direction(segment.along), DVec3::Y, plane.direction(segment.inward()))
 }
 
 /// The object where it is now.
@@ -163,11 +146,7 @@ struct Solid<'a> {
 
 impl<'a> Solid<'a> {
     fn new(body: &'a Body, state: &State) -> Self {
-        Self {
-            body,
-            object_from_gripper: state.body.matrix().transpose(),
-            centre: state.body.position,
-        }
+        Self { body, object_from_gripper: state.body.matrix().transpose(), centre: state.body.position }
     }
 
     #[inline]
@@ -179,11 +158,7 @@ impl<'a> Solid<'a> {
     #[inline]
     fn distance(&self, p: DVec3) -> f64 {
         let to_ball = (p - self.centre).length() - self.body.radius;
-        if to_ball > self.body.radius {
-            to_ball
-        } else {
-            self.body.field.distance(self.local(p))
-        }
+        if to_ball > self.body.radius { to_ball } else { self.body.field.distance(self.local(p)) }
     }
 }
 
@@ -257,20 +232,12 @@ impl Ray {
         if cosine < FROM_BEHIND && t == 0.0 {
             // The foot has come through a thin body: keep pushing back the way it came.
             let compression = self.rest - gap;
-            return Some(Hit {
-                compression,
-                normal: -axis,
-                point: foot,
-            });
+            return Some(Hit { compression, normal: -axis, point: foot });
         }
         // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
         let compression = (self.rest - t) * cosine - gap;
         let point = centre - surface_normal * (self.radius + gap);
-        (compression > -margin).then_some(Hit {
-            compression,
-            normal: surface_normal,
-            point,
-        })
+        (compression > -margin).then_some(Hit { compression, normal: surface_normal, point })
     }
 }
 

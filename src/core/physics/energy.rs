@@ -39,9 +39,7 @@ pub(super) fn mechanical_energy(model: &Model, state: &State) -> f64 {
         energy -= body.mass * model.gravity.dot(state.body.position);
     }
     for contact in &ws.contacts {
-        let skin = contact
-            .law
-            .energy(contact.stiffness, contact.height, contact.compression);
+        let skin = contact.law.energy(contact.stiffness, contact.height, contact.compression);
         energy += skin + 0.5 * contact.shear_stiffness() * contact.shear.length_squared();
     }
     energy

@@ -36,10 +36,8 @@ impl Environment {
     pub(super) fn new(support: &Support, world_from_gripper: &Pose) -> Self {
         let gripper_from_world = world_from_gripper.inverse();
         let up = gripper_from_world.direction(DVec3::Z);
-        let table = (support.kind != SupportKind::None).then(|| Plane {
-            up,
-            offset: gripper_from_world.position.dot(up),
-        });
+        let table =
+            (support.kind != SupportKind::None).then(|| Plane { up, offset: gripper_from_world.position.dot(up) });
         let pedestal = (support.kind == SupportKind::Pedestal).then(|| {
             let half_length = 0.5 * support.height;
             let gripper_from_shape = gripper_from_world * Pose::from_position(DVec3::Z * half_length);
@@ -49,20 +47,12 @@ impl Environment {
                 gripper_from_world.point(DVec3::new(r * cos, r * sin, support.height))
             });
             Pedestal {
-                shape: Primitive::Cylinder {
-                    radius: support.radius,
-                    half_length,
-                },
+                shape: Primitive::Cylinder { radius: support.radius, half_length },
                 shape_from_gripper: gripper_from_shape.inverse(),
                 rim: rim.collect(),
             }
         });
-        Self {
-            table,
-            top: if pedestal.is_some() { support.height } else { 0.0 },
-            pedestal,
-            gripper_from_world,
-        }
+        Self { table, top: if pedestal.is_some() { support.height } else { 0.0 }, pedestal, gripper_from_world }
     }
 
     /// True when there is nothing to touch.

@@ -80,18 +80,12 @@ impl Model {
             support_friction: (surface_friction(object) * scene.support.friction).sqrt(),
         });
         Self {
-            step: ContactStep {
-                h,
-                dissipation: gripper.pad.dissipation,
-            },
+            step: ContactStep { h, dissipation: gripper.pad.dissipation },
             chain: ChainModel::new(&gripper.finger, &gripper.pad),
             planes: Side::BOTH.map(|side| gripper.plane(side)),
             strands: Strands::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
             pad_law: gripper.pad.law,
-            pad_friction: PadFriction {
-                on_object,
-                on_world: (gripper.pad.friction * scene.support.friction).sqrt(),
-            },
+            pad_friction: PadFriction { on_object, on_world: (gripper.pad.friction * scene.support.friction).sqrt() },
             body,
             environment: Environment::new(&scene.support, &placement.world_from_gripper),
             gravity: placement.world_from_gripper.inverse().direction(gravity_world),

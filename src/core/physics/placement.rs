@@ -51,15 +51,9 @@ impl Placement {
             warnings.push("the gripper was raised to keep its fingertips off the table".to_owned());
         }
         let [x, y, z] = mount.offset;
-        let world_from_gripper = Pose::new(
-            DVec3::new(x, y, palm + z),
-            DQuat::from_rotation_z(mount.yaw_deg.to_radians()),
-        );
-        Self {
-            world_from_gripper,
-            world_from_object,
-            warnings,
-        }
+        let world_from_gripper =
+            Pose::new(DVec3::new(x, y, palm + z), DQuat::from_rotation_z(mount.yaw_deg.to_radians()));
+        Self { world_from_gripper, world_from_object, warnings }
     }
 }
 
@@ -72,13 +66,7 @@ fn put_down(scene: &Scene, object: &ObjectModel, surface: f64) -> (Pose, f64) {
     let centre = turned.point(object.mass.centre);
     let [x, y] = scene.object.shift;
     let position = DVec3::new(x - centre.x, y - centre.y, surface + below);
-    (
-        Pose {
-            position,
-            rotation: turned.rotation,
-        },
-        below + above,
-    )
+    (Pose { position, rotation: turned.rotation }, below + above)
 }
 
 #[cfg(test)]
@@ -91,10 +79,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.object.rotation_deg = [90.0, 0.0, 0.0];
         scene.gripper.mount.offset = [0.001, 0.002, 0.003];
-        let shape = Primitive::Cylinder {
-            radius: 0.015,
-            half_length: 0.03,
-        };
+        let shape = Primitive::Cylinder { radius: 0.015, half_length: 0.03 };
         let object = ObjectModel::from_primitive("roll", shape, 500.0, 0.5);
         let placed = Placement::new(&scene, Some(&object));
         let pose = placed.world_from_object.expect("an object");
@@ -107,27 +92,15 @@ mod tests {
 
     #[test]
     fn tall_and_low_things_get_room_and_a_warning() {
-        let tall = ObjectModel::from_primitive(
-            "post",
-            Primitive::Cuboid {
-                half: DVec3::new(0.01, 0.01, 0.1),
-            },
-            500.0,
-            0.5,
-        );
+        let tall =
+            ObjectModel::from_primitive("post", Primitive::Cuboid { half: DVec3::new(0.01, 0.01, 0.1) }, 500.0, 0.5);
         let placed = Placement::new(&Scene::default(), Some(&tall));
         assert!(placed.world_from_gripper.position.z > Scene::default().support.height + 0.2);
         assert_eq!(placed.warnings.len(), 1);
         let mut scene = Scene::default();
         scene.support.kind = SupportKind::Table;
-        let flat = ObjectModel::from_primitive(
-            "tile",
-            Primitive::Cuboid {
-                half: DVec3::new(0.02, 0.02, 0.003),
-            },
-            500.0,
-            0.5,
-        );
+        let flat =
+            ObjectModel::from_primitive("tile", Primitive::Cuboid { half: DVec3::new(0.02, 0.02, 0.003) }, 500.0, 0.5);
         let placed = Placement::new(&scene, Some(&flat));
         assert!(placed.world_from_gripper.position.z >= scene.gripper.finger.length);
         assert_eq!(placed.warnings.len(), 1);

@@ -106,16 +106,9 @@ impl Simulation {
 
     /// Takes one step.
     pub fn advance(&mut self) -> Result<StepReport, SimulationError> {
-        let drive = Drive {
-            torque: self.actuation.torque(self.line_bar),
-            ..self.pulls
-        };
-        let report =
-            step::step(&self.model, &mut self.state, &mut self.workspace, &drive).map_err(|cause| SimulationError {
-                tick: self.tick,
-                seconds: self.clock.seconds(self.tick),
-                cause,
-            })?;
+        let drive = Drive { torque: self.actuation.torque(self.line_bar), ..self.pulls };
+        let report = step::step(&self.model, &mut self.state, &mut self.workspace, &drive)
+            .map_err(|cause| SimulationError { tick: self.tick, seconds: self.clock.seconds(self.tick), cause })?;
         self.tick += 1;
         self.totals.newton += u64::from(report.newton_iterations);
         self.totals.newton_max = self.totals.newton_max.max(report.newton_iterations);
@@ -176,10 +169,7 @@ impl Simulation {
             let Acting::Segment(link) = contact.acting else {
                 continue;
             };
-            let (side, strand) = (
-                contact.site as usize / strands.all.len(),
-                contact.site as usize % strands.all.len(),
-            );
+            let (side, strand) = (contact.site as usize / strands.all.len(), contact.site as usize % strands.all.len());
             let (normal, tangential) = contact.force(self.model.step);
             if strand >= strands.on_pad || normal <= 0.0 {
                 continue;
@@ -210,10 +200,7 @@ impl Simulation {
                 (Acting::Segment(_), super::contact::Against::Object) => -on_acting,
                 (Acting::Segment(_), super::contact::Against::World) => continue,
             };
-            total = total.plus(&Spatial {
-                linear: on_object,
-                angular: contact.arm.cross(on_object),
-            });
+            total = total.plus(&Spatial { linear: on_object, angular: contact.arm.cross(on_object) });
         }
         (total.linear, total.angular)
     }
@@ -258,10 +245,7 @@ impl Simulation {
                     Acting::Segment(link) if beyond_joint(link as usize, k, n) => {
                         let (normal, tangential) = contact.force(model.step);
                         let linear = contact.normal * normal + tangential;
-                        Some(ws.columns[k].dot(&Spatial {
-                            linear,
-                            angular: contact.arm.cross(linear),
-                        }))
+                        Some(ws.columns[k].dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
                     }
                     _ => None,
                 })

@@ -15,11 +15,7 @@ pub(super) struct Skyline {
 impl Skyline {
     pub(super) fn new(first: Vec<usize>) -> Self {
         let size = first.len();
-        Self {
-            size,
-            values: vec![0.0; size * size],
-            first,
-        }
+        Self { size, values: vec![0.0; size * size], first }
     }
 
     /// The stored part of row `i`: columns `first..=i`, and where it begins.
@@ -46,11 +42,8 @@ impl Skyline {
                 let row_j = &self.values[j * self.size + from..j * self.size + j];
                 let dot: f64 = row_i.iter().zip(row_j).map(|(a, b)| a * b).sum();
                 let rest = self.values[i * self.size + j] - dot;
-                self.values[i * self.size + j] = if i == j {
-                    rest.max(LEAST_PIVOT).sqrt()
-                } else {
-                    rest / self.values[j * self.size + j]
-                };
+                self.values[i * self.size + j] =
+                    if i == j { rest.max(LEAST_PIVOT).sqrt() } else { rest / self.values[j * self.size + j] };
             }
         }
     }

@@ -105,10 +105,7 @@ fn multiply_by_a(model: &Model, ws: &mut Workspace, x: &[f64], which: Product) {
 
 fn object_part(x: &[f64], from: usize) -> Spatial {
     match x.get(from..from + 6) {
-        Some([a, b, c, d, e, f]) => Spatial {
-            linear: DVec3::new(*a, *b, *c),
-            angular: DVec3::new(*d, *e, *f),
-        },
+        Some([a, b, c, d, e, f]) => Spatial { linear: DVec3::new(*a, *b, *c), angular: DVec3::new(*d, *e, *f) },
         _ => Spatial::default(),
     }
 }
@@ -161,17 +158,11 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
     let n = model.chain.joints;
     let mut on_object = Spatial::default();
     for wrench in &mut ws.wrenches {
-        *wrench = PerLink {
-            object: Spatial::default(),
-            world: Spatial::default(),
-        };
+        *wrench = PerLink { object: Spatial::default(), world: Spatial::default() };
     }
     for contact in &ws.contacts {
         let linear = contact.gradient(model.step, contact.velocity);
-        let wrench = Spatial {
-            linear,
-            angular: contact.arm.cross(linear),
-        };
+        let wrench = Spatial { linear, angular: contact.arm.cross(linear) };
         match (contact.acting, contact.against) {
             (Acting::Segment(link), Against::Object) => {
                 let sum = &mut ws.wrenches[link as usize].object;
@@ -217,10 +208,7 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
         momentum += ws.a_velocity[k] * ws.a_velocity[k] * weight;
         known += ws.rhs[k] * ws.rhs[k] * weight;
     }
-    Size {
-        gradient: gradient.sqrt(),
-        forces: contact_size.max(momentum).max(known).sqrt(),
-    }
+    Size { gradient: gradient.sqrt(), forces: contact_size.max(momentum).max(known).sqrt() }
 }
 
 /// Diagonal entry of A.
@@ -289,10 +277,7 @@ fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) 
 /// Sums contact Hessians per segment; returns the sum that acts on the object.
 fn sum_blocks(model: &Model, ws: &mut Workspace) -> Block {
     for block in &mut ws.blocks {
-        *block = PerLink {
-            object: Block::ZERO,
-            world: Block::ZERO,
-        };
+        *block = PerLink { object: Block::ZERO, world: Block::ZERO };
     }
     let mut on_object = Block::ZERO;
     for contact in &ws.contacts {
@@ -349,11 +334,7 @@ fn line_search(model: &Model, q: &[f64], velocity: &[f64], ws: &Workspace, steps
     for k in 1..=MOST_SEARCH_STEPS {
         let secant = (low * at_high - high * at_low) / (at_high - at_low);
         let inside = secant > low && secant < high;
-        let share = if k % 4 == 0 || !inside {
-            0.5 * (low + high)
-        } else {
-            secant
-        };
+        let share = if k % 4 == 0 || !inside { 0.5 * (low + high) } else { secant };
         let slope = slope_at(share);
         if slope.abs() <= FLAT_ENOUGH * -start {
             return share;

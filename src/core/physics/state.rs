@@ -27,10 +27,7 @@ impl State {
         let body = match (&model.body, placement.world_from_object) {
             (Some(body), Some(world_from_object)) => {
                 let gripper_from_object = model.world_from_gripper.inverse() * world_from_object;
-                Pose {
-                    position: gripper_from_object.point(body.centre),
-                    rotation: gripper_from_object.rotation,
-                }
+                Pose { position: gripper_from_object.point(body.centre), rotation: gripper_from_object.rotation }
             }
             _ => Pose::IDENTITY,
         };
@@ -46,10 +43,8 @@ impl State {
     /// The object's frame in the world; absent for an empty hand.
     pub fn world_from_object(&self, model: &Model) -> Option<Pose> {
         let body = model.body.as_ref()?;
-        let gripper_from_object = Pose {
-            position: self.body.position - self.body.rotation * body.centre,
-            rotation: self.body.rotation,
-        };
+        let gripper_from_object =
+            Pose { position: self.body.position - self.body.rotation * body.centre, rotation: self.body.rotation };
         Some(model.world_from_gripper * gripper_from_object)
     }
 

@@ -72,11 +72,7 @@ pub fn step(model: &Model, state: &mut State, ws: &mut Workspace, drive: &Drive)
 /// Places of the segments, and the velocity of everything beyond each joint per unit of its rate.
 pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
     let n = model.chain.joints;
-    ws.reference = if model.body.is_some() {
-        state.body.position
-    } else {
-        DVec3::ZERO
-    };
+    ws.reference = if model.body.is_some() { state.body.position } else { DVec3::ZERO };
     for finger in 0..2 {
         let plane = model.planes[finger];
         let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
@@ -105,9 +101,7 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
         let tip = segments[n].point(model.chain.lengths[n], 0.0);
         let (q, qd) = (&state.q[joints.clone()], &state.velocity[joints.clone()]);
         model.chain.inertia(segments, matrix);
-        model
-            .chain
-            .bias(segments, qd, gravity, &mut ws.accelerations, &mut ws.bias);
+        model.chain.bias(segments, qd, gravity, &mut ws.accelerations, &mut ws.bias);
         let rhs = &mut ws.rhs[joints];
         for (i, row) in matrix.chunks_exact(n).enumerate() {
             let momentum: f64 = row.iter().zip(qd).map(|(a, b)| a * b).sum();

@@ -23,11 +23,7 @@ impl Strand {
     /// Foot and axis in the finger plane.
     #[inline]
     pub(super) fn ray(&self, segment: &SegmentPose) -> (DVec2, DVec2) {
-        let axis = if self.points_ahead {
-            segment.along
-        } else {
-            segment.inward()
-        };
+        let axis = if self.points_ahead { segment.along } else { segment.inward() };
         (segment.point(self.foot.x, self.foot.y), axis)
     }
 }
@@ -81,11 +77,7 @@ impl Strands {
         let depth = pad.thickness.max(finger.back);
         let reach = (0..lengths.len())
             .map(|j| {
-                let along = if j == last {
-                    pad.thickness.max(0.5 * lengths[j])
-                } else {
-                    0.5 * lengths[j]
-                };
+                let along = if j == last { pad.thickness.max(0.5 * lengths[j]) } else { 0.5 * lengths[j] };
                 (along * along + depth * depth + half_width * half_width).sqrt()
             })
             .collect();
@@ -131,10 +123,7 @@ mod tests {
     fn every_taxel_has_a_strand_at_its_place() {
         let (finger, pad) = (Finger::default(), Pad::default());
         for joints in [2, 7, 10, 80] {
-            let finger = Finger {
-                joints,
-                ..finger.clone()
-            };
+            let finger = Finger { joints, ..finger.clone() };
             let grid = TaxelGrid::new(&finger, &pad);
             let strands = Strands::new(&finger, &pad, &grid);
             assert_eq!(strands.on_pad, grid.count());
@@ -144,10 +133,7 @@ mod tests {
             for (j, segment) in segments.iter().enumerate() {
                 for k in strands.of_segment(j).filter(|k| *k < strands.on_pad) {
                     let (foot, axis) = strands.all[k].ray(segment);
-                    assert!(
-                        (foot.y - grid.arc(k)).abs() < 1e-12 && axis == DVec2::X,
-                        "N = {joints}, {k}"
-                    );
+                    assert!((foot.y - grid.arc(k)).abs() < 1e-12 && axis == DVec2::X, "N = {joints}, {k}");
                 }
             }
         }

@@ -15,17 +15,11 @@ pub(super) struct Spatial {
 
 impl Spatial {
     pub(super) fn scaled(&self, factor: f64) -> Self {
-        Self {
-            linear: self.linear * factor,
-            angular: self.angular * factor,
-        }
+        Self { linear: self.linear * factor, angular: self.angular * factor }
     }
 
     pub(super) fn plus(&self, other: &Self) -> Self {
-        Self {
-            linear: self.linear + other.linear,
-            angular: self.angular + other.angular,
-        }
+        Self { linear: self.linear + other.linear, angular: self.angular + other.angular }
     }
 
     /// Power of a wrench on a body with this velocity.
@@ -46,11 +40,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub(super) const ZERO: Self = Self {
-        linear: DMat3::ZERO,
-        mixed: DMat3::ZERO,
-        angular: DMat3::ZERO,
-    };
+    pub(super) const ZERO: Self = Self { linear: DMat3::ZERO, mixed: DMat3::ZERO, angular: DMat3::ZERO };
 
     /// Adds a contact's 3 x 3 Hessian G at an arm r: J' G J with J = [1, -[r]x].
     #[inline]
@@ -122,10 +112,7 @@ impl Workspace {
     /// Memory for the largest step the model can take.
     pub fn new(model: &Model) -> Self {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
-        let zero = PerLink {
-            object: Spatial::default(),
-            world: Spatial::default(),
-        };
+        let zero = PerLink { object: Spatial::default(), world: Spatial::default() };
         let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {
             segments: vec![SegmentPose::default(); links],
@@ -139,13 +126,7 @@ impl Workspace {
             rhs: vec![0.0; unknowns],
             contacts: Vec::with_capacity(model.sites()),
             wrenches: vec![zero; links],
-            blocks: vec![
-                PerLink {
-                    object: Block::ZERO,
-                    world: Block::ZERO
-                };
-                links
-            ],
+            blocks: vec![PerLink { object: Block::ZERO, world: Block::ZERO }; links],
             gradient: vec![0.0; unknowns],
             direction: vec![0.0; unknowns],
             a_velocity: vec![0.0; unknowns],

@@ -98,11 +98,7 @@ pub fn decode_frames(bytes: &[u8]) -> Result<Vec<Frame>, BlobError> {
         reader.frame = index;
         frames.push(reader.frame(joints, has_object == 1)?);
     }
-    if reader.at == bytes.len() {
-        Ok(frames)
-    } else {
-        Err(BlobError::BadValue { frame: count })
-    }
+    if reader.at == bytes.len() { Ok(frames) } else { Err(BlobError::BadValue { frame: count }) }
 }
 
 fn phase_code(phase: Phase) -> u8 {
@@ -122,10 +118,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], BlobError> {
         let end = self.at + N;
-        let slice = self
-            .bytes
-            .get(self.at..end)
-            .ok_or(BlobError::CutShort { frame: self.frame })?;
+        let slice = self.bytes.get(self.at..end).ok_or(BlobError::CutShort { frame: self.frame })?;
         self.at = end;
         let mut array = [0; N];
         array.copy_from_slice(slice);
@@ -169,15 +162,7 @@ impl Reader<'_> {
                 across: self.small_number()?,
             });
         }
-        Ok(Frame {
-            sample,
-            t,
-            line_bar,
-            phase,
-            q,
-            world_from_object,
-            taxels,
-        })
+        Ok(Frame { sample, t, line_bar, phase, q, world_from_object, taxels })
     }
 
     fn pose(&mut self) -> Result<Pose, BlobError> {

@@ -93,18 +93,13 @@ fn write_file(
         let mut out = csv::Writer::from_writer(file);
         fill(&mut out)?;
         out.flush()?;
-        out.into_inner()
-            .map_err(|e| std::io::Error::other(e.to_string()))?
-            .flush()?;
+        out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.flush()?;
         std::fs::rename(&unfinished, path)
     })();
     written.map_err(|cause| {
         // The remains are of no use; that they may not be removable either adds nothing to the message.
         let _gone = std::fs::remove_file(&unfinished);
-        CsvError::Write {
-            path: path.to_owned(),
-            cause: cause.to_string(),
-        }
+        CsvError::Write { path: path.to_owned(), cause: cause.to_string() }
     })
 }
 
@@ -115,17 +110,8 @@ fn number(x: f64) -> String {
 
 fn header(scene: &Scene, sensors: &Sensors, trial: &Trial) -> Vec<String> {
     let mut names = vec!["t_s".to_owned(), "line_pressure [bar]".to_owned(), "phase".to_owned()];
-    names.extend(
-        sensors
-            .channels()
-            .iter()
-            .map(|c| format!("{} [{}]", c.name(), c.quantity.unit())),
-    );
-    let joints = || {
-        Side::BOTH
-            .into_iter()
-            .flat_map(|side| (1..=scene.gripper.finger.joints).map(move |j| (side, j)))
-    };
+    names.extend(sensors.channels().iter().map(|c| format!("{} [{}]", c.name(), c.quantity.unit())));
+    let joints = || Side::BOTH.into_iter().flat_map(|side| (1..=scene.gripper.finger.joints).map(move |j| (side, j)));
     names.extend(joints().map(|(side, j)| format!("q_{}_{j} [rad]", side.name())));
     for (side, j) in joints() {
         names.extend(["x", "y", "z"].map(|axis| format!("joint_{}_{j}_{axis} [m]", side.name())));
@@ -140,19 +126,12 @@ fn header(scene: &Scene, sensors: &Sensors, trial: &Trial) -> Vec<String> {
 fn row(frame: &Frame, trial: &Trial, scene: &Scene, sensors: &Sensors) -> Vec<String> {
     let mut fields = vec![number(frame.t), number(frame.line_bar), frame.phase.name().to_owned()];
     // An undefined pressure is an empty field.
-    fields.extend(
-        sensors
-            .read(frame)
-            .into_iter()
-            .map(|v| v.map(number).unwrap_or_default()),
-    );
+    fields.extend(sensors.read(frame).into_iter().map(|v| v.map(number).unwrap_or_default()));
     fields.extend(frame.q.iter().copied().map(number));
     for side in Side::BOTH {
         let plane = scene.gripper.plane(side);
         let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
-        let places = bent
-            .joints()
-            .map(|p| trial.info.world_from_gripper.point(plane.point(p, 0.0)));
+        let places = bent.joints().map(|p| trial.info.world_from_gripper.point(plane.point(p, 0.0)));
         fields.extend(places.flat_map(|p| p.to_array().map(number)));
     }
     if let Some(pose) = frame.world_from_object {
@@ -186,12 +165,7 @@ mod tests {
         let mut reader = csv::Reader::from_path(&path).expect("opens");
         let header = reader.headers().expect("has one").clone();
         assert_eq!(&header[0], "t_s");
-        let column = |name: &str| {
-            header
-                .iter()
-                .position(|h| h == name)
-                .unwrap_or_else(|| panic!("no {name}"))
-        };
+        let column = |name: &str| header.iter().position(|h| h == name).unwrap_or_else(|| panic!("no {name}"));
         let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().expect("even rows");
         assert_eq!(rows.len(), 150);
         // The first joint of the left finger never moves: 5 mm below the palm, half the opening and the pad away.
@@ -203,15 +177,8 @@ mod tests {
         assert!((at("object_z [m]") - 0.07).abs() < 0.02);
 
         let mut contacts = csv::Reader::from_path(contacts_path(&path)).expect("opens");
-        let first = contacts
-            .records()
-            .next()
-            .expect("the ball was touched")
-            .expect("even rows");
+        let first = contacts.records().next().expect("the ball was touched").expect("even rows");
         let height: f64 = first[6].parse().expect("a number");
-        assert!(
-            (height - 0.07).abs() < 0.02,
-            "contact at the height of the ball: {height}"
-        );
+        assert!((height - 0.07).abs() < 0.02, "contact at the height of the ball: {height}");
     }
 }

@@ -184,20 +184,12 @@ impl Store {
     /// Opens a store, making it and its folder where they do not exist.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).map_err(|e| StoreError::Folder {
-                path: folder.to_owned(),
-                cause: e.to_string(),
-            })?;
+            std::fs::create_dir_all(folder)
+                .map_err(|e| StoreError::Folder { path: folder.to_owned(), cause: e.to_string() })?;
         }
-        let connection = Connection::open(path).map_err(|e| StoreError::Open {
-            path: path.to_owned(),
-            cause: plain(&e),
-        })?;
-        let mut store = Self {
-            connection,
-            path: path.to_owned(),
-            warnings: Vec::new(),
-        };
+        let connection =
+            Connection::open(path).map_err(|e| StoreError::Open { path: path.to_owned(), cause: plain(&e) })?;
+        let mut store = Self { connection, path: path.to_owned(), warnings: Vec::new() };
         store.prepare()?;
         Ok(store)
     }
@@ -227,27 +219,15 @@ impl Store {
         } else {
             "WAL"
         };
-        self.connection
-            .pragma_update(None, "journal_mode", mode)
-            .map_err(fault)?;
-        self.connection
-            .pragma_update(None, "synchronous", "NORMAL")
-            .map_err(fault)?;
-        self.connection
-            .pragma_update(None, "foreign_keys", true)
-            .map_err(fault)?;
+        self.connection.pragma_update(None, "journal_mode", mode).map_err(fault)?;
+        self.connection.pragma_update(None, "synchronous", "NORMAL").map_err(fault)?;
+        self.connection.pragma_update(None, "foreign_keys", true).map_err(fault)?;
         let transaction = self.write()?;
-        let version: i32 = transaction
-            .pragma_query_value(None, "user_version", |row| row.get(0))
-            .map_err(fault)?;
+        let version: i32 = transaction.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fault)?;
         if version == 0 {
             transaction.execute_batch(TABLES).map_err(fault)?;
-            transaction
-                .pragma_update(None, "application_id", APPLICATION_ID)
-                .map_err(fault)?;
-            transaction
-                .pragma_update(None, "user_version", SCHEMA_VERSION)
-                .map_err(fault)?;
+            transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(fault)?;
+            transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
         }
         transaction.commit().map_err(fault)
     }
@@ -255,9 +235,7 @@ impl Store {
     /// Refuses files of other programs and of newer versions, before anything is written.
     fn check_identity(&self) -> Result<(), StoreError> {
         let read = |pragma: &str| {
-            self.connection
-                .pragma_query_value(None, pragma, |row| row.get::<_, i32>(0))
-                .map_err(|e| self.fault(&e))
+            self.connection.pragma_query_value(None, pragma, |row| row.get::<_, i32>(0)).map_err(|e| self.fault(&e))
         };
         let (application, version) = (read("application_id")?, read("user_version")?);
         let tables: i64 = self
@@ -265,15 +243,10 @@ impl Store {
             .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
             .map_err(|e| self.fault(&e))?;
         if application != APPLICATION_ID && tables > 0 {
-            return Err(StoreError::Foreign {
-                path: self.path.clone(),
-            });
+            return Err(StoreError::Foreign { path: self.path.clone() });
         }
         if version > SCHEMA_VERSION {
-            return Err(StoreError::Newer {
-                path: self.path.clone(),
-                found: version,
-            });
+            return Err(StoreError::Newer { path: self.path.clone(), found: version });
         }
         Ok(())
     }
@@ -285,9 +258,7 @@ impl Store {
     /// A transaction that takes the write lock at once, so that it cannot fail half-way for want of it.
     fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
         let path = self.path.clone();
-        self.connection
-            .transaction_with_behavior(TransactionBehavior::Immediate)
-            .map_err(|e| fault(&path, &e))
+        self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(|e| fault(&path, &e))
     }
 
     /// Begins a trial; frames follow with [`Store::append`].
@@ -364,10 +335,7 @@ impl Store {
 
     /// One trial with its frames.
     pub fn load(&self, id: TrialId) -> Result<Trial, StoreError> {
-        Ok(Trial {
-            info: self.load_info(id)?,
-            frames: self.load_frames(id)?,
-        })
+        Ok(Trial { info: self.load_info(id)?, frames: self.load_frames(id)? })
     }
 
     fn load_info(&self, id: TrialId) -> Result<TrialInfo, StoreError> {
@@ -385,10 +353,7 @@ impl Store {
         let Some((rig, object, seed, scene, [pose, quality, warnings], version)) = found else {
             return Err(self.no_trial(id));
         };
-        let bad = |e: serde_json::Error| StoreError::BadInfo {
-            id,
-            cause: e.to_string(),
-        };
+        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
         Ok(TrialInfo {
             rig,
             object,
@@ -406,11 +371,7 @@ impl Store {
         let chunks: Vec<(i64, Vec<u8>)> = self
             .connection
             .prepare(sql)
-            .and_then(|mut statement| {
-                statement
-                    .query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?
-                    .collect()
-            })
+            .and_then(|mut statement| statement.query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?.collect())
             .map_err(|e| self.fault(&e))?;
         let mut frames = Vec::new();
         for (chunk, bytes) in chunks {
@@ -421,15 +382,8 @@ impl Store {
 
     fn no_trial(&self, id: TrialId) -> StoreError {
         let sql = "SELECT count(*) FROM trials WHERE id = ?1";
-        let deleted = self
-            .connection
-            .query_row(sql, [id], |row| row.get::<_, i64>(0))
-            .is_ok_and(|n| n > 0);
-        let hint = if deleted {
-            ": it was deleted; `palpate trials restore` brings it back"
-        } else {
-            ""
-        };
+        let deleted = self.connection.query_row(sql, [id], |row| row.get::<_, i64>(0)).is_ok_and(|n| n > 0);
+        let hint = if deleted { ": it was deleted; `palpate trials restore` brings it back" } else { "" };
         StoreError::NoTrial { id, hint }
     }
 
@@ -441,10 +395,7 @@ impl Store {
 
     /// Takes deletions back, all or none of them.
     pub fn restore(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
-        self.change_each(
-            ids,
-            "UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL",
-        )
+        self.change_each(ids, "UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL")
     }
 
     fn change_each(&mut self, ids: &[TrialId], sql: &str) -> Result<(), StoreError> {
@@ -469,9 +420,8 @@ impl Store {
     pub fn purge(&mut self) -> Result<usize, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
-        let removed = transaction
-            .execute("DELETE FROM trials WHERE deleted IS NOT NULL", [])
-            .map_err(|e| fault(&path, &e))?;
+        let removed =
+            transaction.execute("DELETE FROM trials WHERE deleted IS NOT NULL", []).map_err(|e| fault(&path, &e))?;
         transaction.commit().map_err(|e| fault(&path, &e))?;
         Ok(removed)
     }
@@ -506,10 +456,7 @@ fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) ->
          VALUES (?1, (SELECT coalesce(max(number), -1) + 1 FROM chunks WHERE trial = ?1), ?2)",
         params![id, encode_frames(frames)],
     )?;
-    transaction.execute(
-        "UPDATE trials SET samples = samples + ?2 WHERE id = ?1",
-        params![id, frames.len() as i64],
-    )?;
+    transaction.execute("UPDATE trials SET samples = samples + ?2 WHERE id = ?1", params![id, frames.len() as i64])?;
     Ok(())
 }
 
@@ -537,10 +484,7 @@ fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
         Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => StoreError::Busy,
         Some(ErrorCode::DiskFull) => StoreError::DiskFull,
         Some(ErrorCode::ReadOnly) => StoreError::ReadOnly { path: path.to_owned() },
-        _ => StoreError::Sqlite {
-            path: path.to_owned(),
-            cause: plain(error),
-        },
+        _ => StoreError::Sqlite { path: path.to_owned(), cause: plain(error) },
     }
 }
 
@@ -553,24 +497,11 @@ fn plain(error: &rusqlite::Error) -> String {
 
 /// True where the file's mount is a network file system, as far as the system tells (Linux).
 fn on_network_file_system(path: &Path) -> bool {
-    const NETWORK: [&str; 9] = [
-        "nfs",
-        "nfs4",
-        "cifs",
-        "smb3",
-        "smbfs",
-        "fuse.sshfs",
-        "afs",
-        "lustre",
-        "beegfs",
-    ];
+    const NETWORK: [&str; 9] = ["nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "afs", "lustre", "beegfs"];
     let Ok(mounts) = std::fs::read_to_string("/proc/self/mounts") else {
         return false;
     };
-    let absolute = path
-        .parent()
-        .and_then(|p| p.canonicalize().ok())
-        .unwrap_or_else(|| path.to_owned());
+    let absolute = path.parent().and_then(|p| p.canonicalize().ok()).unwrap_or_else(|| path.to_owned());
     mounts
         .lines()
         .filter_map(|line| {
@@ -610,10 +541,7 @@ mod tests {
         let id = store.insert(&trial)?;
         assert_eq!(store.load(id)?, trial);
         let rows = store.list(false)?;
-        assert_eq!(
-            (rows.len(), rows[0].samples, rows[0].state.as_str()),
-            (1, 90, "complete")
-        );
+        assert_eq!((rows.len(), rows[0].samples, rows[0].state.as_str()), (1, 90, "complete"));
         Ok(())
     }
 
@@ -658,10 +586,7 @@ mod tests {
         let folder = folder();
         let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
         let (a, b) = (store.insert(&trial(3))?, store.insert(&trial(4))?);
-        assert!(matches!(
-            store.delete(&[a, 99]),
-            Err(StoreError::NoTrial { id: 99, .. })
-        ));
+        assert!(matches!(store.delete(&[a, 99]), Err(StoreError::NoTrial { id: 99, .. })));
         assert_eq!(store.list(false)?.len(), 2, "all or none");
         store.delete(&[a])?;
         assert_eq!(store.list(false)?.len(), 1);
@@ -679,10 +604,7 @@ mod tests {
     fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
         let text = folder.path().join("notes.txt");
-        std::fs::write(
-            &text,
-            "no database at all, but long enough to be looked at as one would be".repeat(20),
-        )?;
+        std::fs::write(&text, "no database at all, but long enough to be looked at as one would be".repeat(20))?;
         assert!(matches!(Store::open(&text), Err(StoreError::Foreign { .. })));
 
         let other = folder.path().join("other.sqlite");

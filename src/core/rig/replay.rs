@@ -14,10 +14,7 @@ pub struct ReplayRig {
 impl ReplayRig {
     /// A rig that will sample what the trial holds.
     pub fn new(trial: Trial) -> Self {
-        Self {
-            frames: trial.frames.into_iter(),
-            quality: trial.info.quality,
-        }
+        Self { frames: trial.frames.into_iter(), quality: trial.info.quality }
     }
 }
 

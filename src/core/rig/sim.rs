@@ -22,12 +22,7 @@ impl SimRig {
     /// A scene at rest, and where everything was put.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
         let (simulation, placement) = Simulation::new(scene, object);
-        let rig = Self {
-            simulation,
-            asked: None,
-            phase: Phase::Close,
-            static_residual: None,
-        };
+        let rig = Self { simulation, asked: None, phase: Phase::Close, static_residual: None };
         (rig, placement)
     }
 

@@ -36,11 +36,7 @@ impl Ranges {
     }
 
     fn refuse(&mut self, key: &str, value: &dyn std::fmt::Display, wanted: String) {
-        self.fault.get_or_insert(SceneError::OutOfRange {
-            key: key.to_owned(),
-            value: value.to_string(),
-            wanted,
-        });
+        self.fault.get_or_insert(SceneError::OutOfRange { key: key.to_owned(), value: value.to_string(), wanted });
     }
 }
 
@@ -90,11 +86,7 @@ impl Scene {
         ranges.number("gripper.finger.width", finger.width, 1e-3..=1.0);
         ranges.number("gripper.finger.back", finger.back, 0.0..=1.0);
         let joints = small_count(finger.joints);
-        ranges.count(
-            "gripper.finger.joints",
-            joints,
-            Finger::FEWEST_JOINTS..=Finger::MOST_JOINTS,
-        );
+        ranges.count("gripper.finger.joints", joints, Finger::FEWEST_JOINTS..=Finger::MOST_JOINTS);
         ranges.number("gripper.finger.mass", finger.mass, 1e-6..=100.0);
         ranges.number("gripper.finger.bending_stiffness", finger.bending_stiffness, 1e-9..=1e6);
         ranges.number("gripper.finger.damping_time", finger.damping_time, 0.0..=100.0);
@@ -113,11 +105,7 @@ impl Scene {
     fn check_programme(&self, ranges: &mut Ranges) {
         let actuation = &self.gripper.actuation;
         ranges.number("gripper.actuation.max_bar", actuation.max_bar, 1e-3..=100.0);
-        ranges.number(
-            "gripper.actuation.step_bar",
-            actuation.step_bar,
-            1e-6..=actuation.max_bar,
-        );
+        ranges.number("gripper.actuation.step_bar", actuation.step_bar, 1e-6..=actuation.max_bar);
         let points = small_count(actuation.curve.len());
         ranges.count("gripper.actuation.curve (its number of points)", points, 2..=1000);
         for point in &actuation.curve {
@@ -125,24 +113,12 @@ impl Scene {
             ranges.number("gripper.actuation.curve.torque", point.torque, -1e4..=1e4);
         }
         if let Some(pair) = actuation.curve.windows(2).find(|pair| pair[1].bar <= pair[0].bar) {
-            ranges.refuse(
-                "gripper.actuation.curve.bar",
-                &pair[1].bar,
-                "rising from point to point".to_owned(),
-            );
+            ranges.refuse("gripper.actuation.curve.bar", &pair[1].bar, "rising from point to point".to_owned());
         }
         let programme = &self.programme;
         ranges.number("programme.peak_bar", programme.peak_bar, 0.0..=actuation.max_bar);
-        ranges.number(
-            "programme.close_bar_per_tick",
-            programme.close_bar_per_tick,
-            1e-6..=actuation.max_bar,
-        );
-        ranges.number(
-            "programme.release_bar_per_tick",
-            programme.release_bar_per_tick,
-            1e-6..=actuation.max_bar,
-        );
+        ranges.number("programme.close_bar_per_tick", programme.close_bar_per_tick, 1e-6..=actuation.max_bar);
+        ranges.number("programme.release_bar_per_tick", programme.release_bar_per_tick, 1e-6..=actuation.max_bar);
     }
 
     fn check_timing_and_solver(&self, ranges: &mut Ranges) {
@@ -153,11 +129,7 @@ impl Scene {
         ranges.number("timing.duration_s", timing.duration_s, shortest..=3600.0);
         if timing.common_hz() > u64::from(FASTEST_COMMON_HZ) {
             let rates = format!("{} and timing.actuation_hz = {}", timing.sample_hz, timing.actuation_hz);
-            ranges.refuse(
-                "timing.sample_hz",
-                &rates,
-                format!("rates that meet below {FASTEST_COMMON_HZ} Hz"),
-            );
+            ranges.refuse("timing.sample_hz", &rates, format!("rates that meet below {FASTEST_COMMON_HZ} Hz"));
         }
         let solver = &self.solver;
         ranges.number("solver.tolerance", solver.tolerance, 1e-14..=1e-2);
@@ -165,11 +137,7 @@ impl Scene {
         ranges.count("solver.relag_passes", solver.relag_passes, 0..=100);
         ranges.auto("solver.distance_cell", solver.distance_cell, 1e-6..=0.1);
         if ranges.fault.is_none() && timing.clock(solver.accuracy).total_ticks() > MOST_TICKS {
-            ranges.refuse(
-                "timing.duration_s",
-                &timing.duration_s,
-                format!("a trial of at most {MOST_TICKS} steps"),
-            );
+            ranges.refuse("timing.duration_s", &timing.duration_s, format!("a trial of at most {MOST_TICKS} steps"));
         }
     }
 }

@@ -67,10 +67,7 @@ impl Scene {
 
     /// Reads a scene file. A relative path of an object file counts from the scene file's folder.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
-        let unreadable = |cause: String| SceneError::Unreadable {
-            path: path.to_owned(),
-            cause,
-        };
+        let unreadable = |cause: String| SceneError::Unreadable { path: path.to_owned(), cause };
         let size = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?.len();
         if size > LARGEST_FILE {
             return Err(unreadable(format!("{size} bytes is too large for a scene")));
@@ -103,18 +100,9 @@ fn parse_value(text: &str) -> toml::Value {
 fn set_key(document: &mut toml::Table, key: &str, value: toml::Value) -> Result<(), SceneError> {
     let unknown = |prefix: &str, last: &str| {
         let known = known_keys();
-        let beside = prefix
-            .split_terminator('.')
-            .try_fold(&known, |table, name| table.get(name)?.as_table());
-        let nearest = nearest_key(
-            last,
-            beside.unwrap_or(&known),
-            if beside.is_some() { prefix } else { "" },
-        );
-        SceneError::UnknownKey {
-            key: key.to_owned(),
-            nearest,
-        }
+        let beside = prefix.split_terminator('.').try_fold(&known, |table, name| table.get(name)?.as_table());
+        let nearest = nearest_key(last, beside.unwrap_or(&known), if beside.is_some() { prefix } else { "" });
+        SceneError::UnknownKey { key: key.to_owned(), nearest }
     };
     let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
     let mut table = document;
@@ -216,10 +204,7 @@ mod tests {
     fn a_few_keys_are_enough() {
         let scene = Scene::from_toml("[object]\nsource = \"ball\"\nmass = 1\n[gripper.finger]\njoints = 20\n");
         let scene = scene.expect("valid");
-        assert_eq!(
-            (scene.object.source.as_str(), scene.gripper.finger.joints),
-            ("ball", 20)
-        );
+        assert_eq!((scene.object.source.as_str(), scene.gripper.finger.joints), ("ball", 20));
         assert_eq!(scene.object.mass, Auto::Value(1.0));
     }
 
@@ -227,10 +212,7 @@ mod tests {
     fn a_misspelt_key_is_named_with_the_nearest() {
         let message = |text: &str| Scene::from_toml(text).expect_err("unknown").to_string();
         let text = message("[gripper.pad]\nmodolus = 2e5\n");
-        assert!(
-            text.contains("gripper.pad.modolus") && text.contains("\"gripper.pad.modulus\""),
-            "{text}"
-        );
+        assert!(text.contains("gripper.pad.modolus") && text.contains("\"gripper.pad.modulus\""), "{text}");
         // A key in the wrong table is found where it belongs.
         assert!(message("[solver]\nopening = 0.1\n").contains("gripper.mount.opening"));
         assert!(message("[gripper.actuation]\ncurve = [{bar = 0, torqe = 1}]\n").contains("torque"));
@@ -243,17 +225,9 @@ mod tests {
             let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
             Scene::default().with_settings(&settings)
         };
-        let scene = set(&[
-            "gripper.finger.joints=20",
-            "object.source=ball",
-            "world.gravity = 0",
-            "object.mass=0.1",
-        ]);
+        let scene = set(&["gripper.finger.joints=20", "object.source=ball", "world.gravity = 0", "object.mass=0.1"]);
         let scene = scene.expect("valid");
-        assert_eq!(
-            (scene.gripper.finger.joints, scene.object.source.as_str()),
-            (20, "ball")
-        );
+        assert_eq!((scene.gripper.finger.joints, scene.object.source.as_str()), (20, "ball"));
         assert_eq!((scene.world.gravity, scene.object.mass), (0.0, Auto::Value(0.1)));
         let message = |setting: &str| set(&[setting]).expect_err("refused").to_string();
         assert!(message("gripper.finger.joint=20").contains("gripper.finger.joints"));
@@ -265,17 +239,8 @@ mod tests {
     #[test]
     fn wrong_kinds_and_broken_text_are_told_apart() {
         assert!(matches!(Scene::from_toml("[solver\n"), Err(SceneError::Syntax(_))));
-        assert!(matches!(
-            Scene::from_toml("[solver]\naccuracy = \"best\"\n"),
-            Err(SceneError::Syntax(_))
-        ));
-        assert!(matches!(
-            Scene::from_toml("[object]\nmass = \"heavy\"\n"),
-            Err(SceneError::Syntax(_))
-        ));
-        assert!(matches!(
-            Scene::from_toml("[world]\ngravity = nan\n"),
-            Err(SceneError::OutOfRange { .. })
-        ));
+        assert!(matches!(Scene::from_toml("[solver]\naccuracy = \"best\"\n"), Err(SceneError::Syntax(_))));
+        assert!(matches!(Scene::from_toml("[object]\nmass = \"heavy\"\n"), Err(SceneError::Syntax(_))));
+        assert!(matches!(Scene::from_toml("[world]\ngravity = nan\n"), Err(SceneError::OutOfRange { .. })));
     }
 }

@@ -207,8 +207,6 @@ impl Default for Solver {
 
 impl Default for World {
     fn default() -> Self {
-        Self {
-            gravity: STANDARD_GRAVITY,
-        }
+        Self { gravity: STANDARD_GRAVITY }
     }
 }

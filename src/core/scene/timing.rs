@@ -18,11 +18,7 @@ pub struct Timing {
 
 impl Default for Timing {
     fn default() -> Self {
-        Self {
-            sample_hz: 75,
-            actuation_hz: 10,
-            duration_s: 4.0,
-        }
+        Self { sample_hz: 75, actuation_hz: 10, duration_s: 4.0 }
     }
 }
 
@@ -96,14 +92,7 @@ mod tests {
         let timing = Timing::default();
         assert_eq!(timing.common_hz(), 150);
         let clock = timing.clock(Accuracy::Standard);
-        assert_eq!(
-            (
-                clock.ticks_per_second,
-                clock.ticks_per_sample,
-                clock.ticks_per_actuation
-            ),
-            (300, 4, 30)
-        );
+        assert_eq!((clock.ticks_per_second, clock.ticks_per_sample, clock.ticks_per_actuation), (300, 4, 30));
         assert_eq!((clock.samples, clock.total_ticks()), (300, 1200));
         assert_eq!(timing.clock(Accuracy::Draft).ticks_per_second, 150);
         assert_eq!(timing.clock(Accuracy::Reference).ticks_per_second, 9600);
@@ -111,20 +100,9 @@ mod tests {
 
     #[test]
     fn other_rates_still_meet() {
-        let timing = Timing {
-            sample_hz: 50,
-            actuation_hz: 20,
-            duration_s: 1.5,
-        };
+        let timing = Timing { sample_hz: 50, actuation_hz: 20, duration_s: 1.5 };
         let clock = timing.clock(Accuracy::Standard);
-        assert_eq!(
-            (
-                clock.ticks_per_second,
-                clock.ticks_per_sample,
-                clock.ticks_per_actuation
-            ),
-            (300, 6, 15)
-        );
+        assert_eq!((clock.ticks_per_second, clock.ticks_per_sample, clock.ticks_per_actuation), (300, 6, 15));
         assert_eq!(clock.samples, 75);
     }
 }

@@ -15,12 +15,8 @@ pub fn curvature(bent: &BentFinger, q: &[f64], span: &Span) -> f64 {
     let segment = length / q.len() as f64;
     let inside = |i: usize| span.holds((i as f64 + 0.5) * segment / length);
     // Written along, then inward, so that bending inward turns left.
-    let points: Vec<DVec2> = bent
-        .joints()
-        .enumerate()
-        .filter(|(i, _)| inside(*i))
-        .map(|(_, p)| DVec2::new(p.y, p.x))
-        .collect();
+    let points: Vec<DVec2> =
+        bent.joints().enumerate().filter(|(i, _)| inside(*i)).map(|(_, p)| DVec2::new(p.y, p.x)).collect();
     signed_curvature(&points).unwrap_or_else(|| {
         let turned: f64 = q.iter().enumerate().filter(|(i, _)| inside(*i)).map(|(_, q)| q).sum();
         turned / (span.share() * length)
@@ -33,10 +29,7 @@ mod tests {
     use crate::gripper::Finger;
 
     fn read(joints: usize, q: &[f64], span: &Span) -> f64 {
-        let finger = Finger {
-            joints,
-            ..Finger::default()
-        };
+        let finger = Finger { joints, ..Finger::default() };
         curvature(&BentFinger::new(&finger, q), q, span)
     }
 

@@ -26,11 +26,7 @@ impl Span {
     pub const DISTAL: Self = Self::fixed("distal", 0.5, 1.0);
 
     const fn fixed(name: &'static str, from: f64, to: f64) -> Self {
-        Self {
-            from,
-            to,
-            name: Cow::Borrowed(name),
-        }
+        Self { from, to, name: Cow::Borrowed(name) }
     }
 
     /// True when the stretch holds a point at a share of the finger's length; its end belongs to the next stretch.
@@ -87,12 +83,7 @@ pub struct SensorLayout {
 }
 
 const fn row(name: &'static str, curvature: CurvatureSplit, pressure: PressureSplit) -> SensorLayout {
-    SensorLayout {
-        name,
-        curvature,
-        pressure,
-        force: false,
-    }
+    SensorLayout { name, curvature, pressure, force: false }
 }
 
 /// All layouts; adding one is adding a row.
@@ -194,10 +185,7 @@ impl SensorLayout {
             None => (upper.as_str(), false),
         };
         match CATALOGUE.iter().find(|layout| layout.name == base) {
-            Some(layout) => Ok(Self {
-                force,
-                ..layout.clone()
-            }),
+            Some(layout) => Ok(Self { force, ..layout.clone() }),
             None => Err(LayoutError::Unknown { name: name.to_owned() }),
         }
     }
@@ -213,20 +201,12 @@ impl SensorLayout {
         let grid = gripper.taxels();
         let covered = |span: &Span| (0..grid.rows).any(|r| span.holds((r as f64 + 0.5) / grid.rows as f64));
         if !pressure.iter().all(covered) {
-            return Err(LayoutError::EmptySpan {
-                layout: self.full_name(),
-                sensors: pressure.len(),
-                rows: grid.rows,
-            });
+            return Err(LayoutError::EmptySpan { layout: self.full_name(), sensors: pressure.len(), rows: grid.rows });
         }
         let mut channels = Vec::new();
         let mut add = |quantity: Quantity, spans: &[Span]| {
             for side in Side::BOTH {
-                channels.extend(spans.iter().map(|span| Channel {
-                    quantity,
-                    side,
-                    span: span.clone(),
-                }));
+                channels.extend(spans.iter().map(|span| Channel { quantity, side, span: span.clone() }));
             }
         };
         add(Quantity::Curvature, &self.curvature_spans());
@@ -278,10 +258,7 @@ mod tests {
         for (layout, want) in CATALOGUE.iter().zip(per_finger) {
             let channels = layout.channels(&gripper).expect("fits");
             assert_eq!(channels.len(), 2 * want, "{}", layout.name);
-            let with_force = SensorLayout {
-                force: true,
-                ..layout.clone()
-            };
+            let with_force = SensorLayout { force: true, ..layout.clone() };
             let forces = channels.iter().filter(|c| c.quantity == Quantity::Pressure).count();
             assert_eq!(with_force.channels(&gripper).expect("fits").len(), 2 * want + forces);
             let mut names: Vec<String> = channels.iter().map(Channel::name).collect();
@@ -299,12 +276,7 @@ mod tests {
                 let spans = layout.pressure_spans(joints);
                 for row in 0..40 {
                     let share = (f64::from(row) + 0.5) / 40.0;
-                    assert_eq!(
-                        spans.iter().filter(|s| s.holds(share)).count(),
-                        1,
-                        "{} row {row}",
-                        layout.name
-                    );
+                    assert_eq!(spans.iter().filter(|s| s.holds(share)).count(), 1, "{} row {row}", layout.name);
                 }
             }
         }
@@ -314,10 +286,7 @@ mod tests {
     fn too_fine_and_unknown_layouts_are_refused() {
         let mut gripper = Gripper::default();
         gripper.finger.joints = 80;
-        assert!(matches!(
-            CATALOGUE[3].channels(&gripper),
-            Err(LayoutError::EmptySpan { sensors: 80, .. })
-        ));
+        assert!(matches!(CATALOGUE[3].channels(&gripper), Err(LayoutError::EmptySpan { sensors: 80, .. })));
         assert!(SensorLayout::named("C9").is_err());
         assert!(SensorLayout::named("c1+f").is_ok_and(|layout| layout.force));
     }

@@ -25,12 +25,7 @@ pub struct Sensors {
 impl Sensors {
     /// Places a layout on a gripper. Pressure is force over the participation area unless said otherwise.
     pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
-        Ok(Self {
-            channels: layout.channels(gripper)?,
-            finger: gripper.finger.clone(),
-            grid: gripper.taxels(),
-            area,
-        })
+        Ok(Self { channels: layout.channels(gripper)?, finger: gripper.finger.clone(), grid: gripper.taxels(), area })
     }
 
     /// The channels, in the order in which [`Sensors::read`] gives values.
@@ -45,11 +40,9 @@ impl Sensors {
         self.channels
             .iter()
             .map(|channel| match channel.quantity {
-                Quantity::Curvature => Some(curvature(
-                    &bent[channel.side.index()],
-                    frame.joints(channel.side),
-                    &channel.span,
-                )),
+                Quantity::Curvature => {
+                    Some(curvature(&bent[channel.side.index()], frame.joints(channel.side), &channel.span))
+                }
                 Quantity::Pressure => self.patch(frame, channel).pressure(self.area),
                 Quantity::Force => Some(self.patch(frame, channel).force()),
             })
@@ -80,12 +73,7 @@ mod tests {
             q: [vec![0.05; 10], vec![0.0; 10]].concat(),
             world_from_object: None,
             // One taxel on the distal half of the right pad.
-            taxels: vec![TaxelLoad {
-                taxel: 160 + 150,
-                normal: 0.2,
-                along: 0.0,
-                across: 0.0,
-            }],
+            taxels: vec![TaxelLoad { taxel: 160 + 150, normal: 0.2, along: 0.0, across: 0.0 }],
         };
         let values = sensors.read(&frame);
         let value = |name: &str| {

@@ -58,11 +58,7 @@ impl ContactPatch {
 
     /// Participation area [m²]; zero without load.
     pub fn participation_area(&self) -> f64 {
-        if self.force > 0.0 {
-            self.force * self.force / self.sum_of_squares_over_area
-        } else {
-            0.0
-        }
+        if self.force > 0.0 { self.force * self.force / self.sum_of_squares_over_area } else { 0.0 }
     }
 
     /// Area of the convex hull of the loaded taxels' middles on the unrolled pad [m²].
@@ -100,12 +96,7 @@ mod tests {
             world_from_object: None,
             taxels: loads
                 .iter()
-                .map(|&(taxel, normal)| TaxelLoad {
-                    taxel: taxel as u16,
-                    normal,
-                    along: 0.0,
-                    across: 0.0,
-                })
+                .map(|&(taxel, normal)| TaxelLoad { taxel: taxel as u16, normal, along: 0.0, across: 0.0 })
                 .collect(),
         };
         (ContactPatch::new(&frame, Side::Left, &grid, &Span::WHOLE), grid)

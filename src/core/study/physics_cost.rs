@@ -46,19 +46,11 @@ pub struct CostRow {
 
 /// The scenes: closed-form distances fixed and free, a union of primitives, and a baked mesh.
 pub fn bench_scenes() -> Result<Vec<BenchScene>, ObjectError> {
-    let primitive = |name, shape, fixed| BenchScene {
-        name,
-        object: ObjectModel::from_primitive(name, shape, 400.0, 0.6),
-        fixed,
-    };
+    let primitive =
+        |name, shape, fixed| BenchScene { name, object: ObjectModel::from_primitive(name, shape, 400.0, 0.6), fixed };
     let sphere = Primitive::Sphere { radius: 0.025 };
-    let cuboid = Primitive::Cuboid {
-        half: DVec3::splat(0.020),
-    };
-    let cylinder = Primitive::Cylinder {
-        radius: 0.0175,
-        half_length: 0.030,
-    };
+    let cuboid = Primitive::Cuboid { half: DVec3::splat(0.020) };
+    let cylinder = Primitive::Cylinder { radius: 0.0175, half_length: 0.030 };
     let mut scenes = vec![
         primitive("sphere_fixed", sphere, true),
         primitive("sphere_free", sphere, false),
@@ -70,11 +62,7 @@ pub fn bench_scenes() -> Result<Vec<BenchScene>, ObjectError> {
         let mut scene = Scene::default();
         source.clone_into(&mut scene.object.source);
         if let Some(object) = scene.load_object()? {
-            scenes.push(BenchScene {
-                name,
-                object,
-                fixed: false,
-            });
+            scenes.push(BenchScene { name, object, fixed: false });
         }
     }
     Ok(scenes)

@@ -1,0 +1,128 @@
+//! `palpate snapshot`: a picture of a scene at some time, or of a stored trial, without a window.
+
+use super::Failure;
+use super::setup::{SceneArguments, open_store};
+use super::terminal::say;
+use glam::Vec2;
+use palpate_core::drawing::{Camera, StandardView};
+use palpate_core::grasping::prepare;
+use palpate_core::palette::Theme;
+use palpate_core::picture::{PictureView, Stage};
+use palpate_core::recording::TrialId;
+use palpate_core::scene::Scene;
+use palpate_core::trial::Frame;
+use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate snapshot`.
+#[derive(Debug, clap::Args)]
+pub(super) struct SnapshotArguments {
+    /// A built-in name, a URDF, OBJ or STL file, or `empty`; without it the scene's own object.
+    object: Option<String>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Draw this stored trial instead of simulating.
+    #[arg(long, value_name = "ID", conflicts_with_all = ["object", "scene"])]
+    trial: Option<TrialId>,
+    /// The moment to draw, in seconds from the start.
+    #[arg(long, value_name = "SECONDS", default_value_t = 2.9)]
+    at: f64,
+    /// From where: home, front, back, left, right, top or bottom.
+    #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
+    view: StandardView,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
+    size: [u32; 2],
+    /// dark or light.
+    #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
+    theme: Theme,
+    /// Leave out force arrows.
+    #[arg(long)]
+    no_forces: bool,
+    /// Leave out axis gizmo, scale bar and legend.
+    #[arg(long)]
+    bare: bool,
+    /// Where the picture goes.
+    #[arg(long, value_name = "FILE.png")]
+    out: PathBuf,
+}
+
+fn parse_view(text: &str) -> Result<StandardView, String> {
+    let found = StandardView::ALL.into_iter().find(|view| view.name() == text);
+    found.ok_or_else(|| "choose home, front, back, left, right, top or bottom".to_owned())
+}
+
+fn parse_theme(text: &str) -> Result<Theme, String> {
+    Theme::ALL.into_iter().find(|theme| theme.name() == text).ok_or_else(|| "choose dark or light".to_owned())
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let parsed = || {
+        let (width, height) = text.split_once('x')?;
+        Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?])
+    };
+    match parsed() {
+        Some(size) if size.iter().all(|s| (16..=2048).contains(s)) => Ok(size),
+        _ => Err("write WIDTHxHEIGHT, each from 16 to 2048, as in 1280x800".to_owned()),
+    }
+}
+
+pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let (stage, frame, badge) = match arguments.trial {
+        Some(id) => stored(arguments, store, id)?,
+        None => simulated(arguments)?,
+    };
+    let view = PictureView {
+        camera: Camera::default().turned_to(arguments.view),
+        theme: arguments.theme,
+        size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
+        forces: !arguments.no_forces,
+        furniture: !arguments.bare,
+        badge: Some(badge).filter(|_| !arguments.bare),
+        ..PictureView::default()
+    };
+    let (centre, radius) = stage.bounds();
+    let view = PictureView { camera: view.camera.framing(centre, radius), ..view };
+    draw(&stage, &frame, &view, arguments.size, &arguments.out)?;
+    say(arguments.out.display())
+}
+
+/// Draws a frame off-screen and writes it.
+pub(super) fn draw(
+    stage: &Stage,
+    frame: &Frame,
+    view: &PictureView,
+    size: [u32; 2],
+    out: &Path,
+) -> Result<(), Failure> {
+    let gpu = Gpu::headless(DriverChoice::Any)?;
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+    Picture::draw(&gpu, &mut renderer, &stage.draw(frame, view), size, 1.0)?.save(out)?;
+    Ok(())
+}
+
+/// Simulates up to the moment asked for.
+fn simulated(arguments: &SnapshotArguments) -> Result<(Stage, Frame, String), Failure> {
+    let scene = arguments.scene.scene(arguments.object.as_deref())?;
+    let object = scene.load_object()?;
+    let mut run = prepare(&scene, object.as_ref(), 0);
+    let stage = Stage::new(&scene, object.as_ref(), run.info().world_from_gripper);
+    let mut frame = run.rig_mut().first_look();
+    while frame.t < arguments.at {
+        match run.next_frame() {
+            Some(next) => frame = next.clone(),
+            None => break,
+        }
+    }
+    Ok((stage, frame, "SIMULATED".to_owned()))
+}
+
+fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> Result<(Stage, Frame, String), Failure> {
+    let trial = open_store(store)?.load(id)?;
+    let scene = Scene::from_toml(&trial.info.scene)?;
+    let object = scene.load_object()?;
+    let stage = Stage::new(&scene, object.as_ref(), trial.info.world_from_gripper);
+    let frame = trial.frames.iter().rfind(|f| f.t <= arguments.at).or(trial.frames.first());
+    let frame = frame.cloned().ok_or_else(|| format!("trial {id} holds no samples"))?;
+    Ok((stage, frame, format!("TRIAL {id}, {}", if trial.info.rig == "sim" { "SIMULATED" } else { "RECORDED" })))
+}

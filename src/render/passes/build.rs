@@ -1,0 +1,216 @@
+//! Building pipelines with what all passes have in common.
+
+use super::PassSetup;
+use crate::targets::{COLOUR, DEPTH, SAMPLES};
+use wgpu::{BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPipeline, ShaderModule, VertexBufferLayout};
+
+/// How a pipeline treats depth.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Depth {
+    /// In front of what is there, and remembered.
+    Solid,
+    /// In front of what is there, but transparent to what comes later.
+    Veil,
+    /// Behind what is there: what is hidden, shown faintly.
+    Hidden,
+    /// Regardless of depth.
+    OnTop,
+}
+
+/// A pipeline that draws into the picture.
+pub(super) struct PictureShape<'a> {
+    pub(super) label: &'a str,
+    pub(super) shader: &'a ShaderModule,
+    pub(super) fragment: &'a str,
+    pub(super) buffers: &'a [Option<VertexBufferLayout<'a>>],
+    pub(super) groups: &'a [&'a BindGroupLayout],
+    pub(super) topology: wgpu::PrimitiveTopology,
+    pub(super) depth: Depth,
+    pub(super) blends: bool,
+}
+
+pub(super) fn module(device: &Device, label: &str, source: &str) -> ShaderModule {
+    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    })
+}
+
+pub(super) fn picture_pipeline(setup: &PassSetup<'_>, shape: &PictureShape<'_>) -> RenderPipeline {
+    let groups: Vec<Option<&BindGroupLayout>> =
+        std::iter::once(&setup.frame.lit_layout).chain(shape.groups.iter().copied()).map(Some).collect();
+    let layout = setup.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(shape.label),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    let (write, compare) = match shape.depth {
+        Depth::Solid => (true, wgpu::CompareFunction::Less),
+        Depth::Veil => (false, wgpu::CompareFunction::Less),
+        Depth::Hidden => (false, wgpu::CompareFunction::GreaterEqual),
+        Depth::OnTop => (false, wgpu::CompareFunction::Always),
+    };
+    setup.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(shape.label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: shape.shader,
+            entry_point: Some("vertex"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: shape.buffers,
+        },
+        primitive: wgpu::PrimitiveState { topology: shape.topology, ..Default::default() },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(write),
+            depth_compare: Some(compare),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module: shape.shader,
+            entry_point: Some(shape.fragment),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: COLOUR,
+                blend: shape.blends.then_some(wgpu::BlendState::ALPHA_BLENDING),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// A pipeline that draws depth alone, seen from the light; its vertex entry is `vertex_shadow`.
+pub(super) fn shadow_pipeline(
+    setup: &PassSetup<'_>,
+    label: &str,
+    shader: &ShaderModule,
+    buffers: &[Option<VertexBufferLayout<'_>>],
+    groups: &[&BindGroupLayout],
+) -> RenderPipeline {
+    let groups: Vec<Option<&BindGroupLayout>> =
+        std::iter::once(&setup.frame.shadow_layout).chain(groups.iter().copied()).map(Some).collect();
+    let layout = setup.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    setup.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: shader,
+            entry_point: Some("vertex_shadow"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers,
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: None,
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// A layout of one uniform for both stages.
+pub(super) fn uniform_layout(device: &Device, label: &str) -> BindGroupLayout {
+    device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &[uniform_entry(0)] })
+}
+
+pub(super) fn uniform_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    }
+}
+
+/// A texture whose texels are read one by one, unfiltered.
+pub(super) fn texel_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty: wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+        count: None,
+    }
+}
+
+/// A buffer with contents that do not change.
+pub(super) fn fixed_buffer(device: &Device, queue: &Queue, label: &str, usage: BufferUsages, bytes: &[u8]) -> Buffer {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: padded(bytes.len()),
+        usage: usage | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    write_padded(queue, &buffer, bytes);
+    buffer
+}
+
+/// A buffer that is written anew for every picture and grows when it must.
+#[derive(Debug)]
+pub(super) struct StreamBuffer {
+    label: &'static str,
+    usage: BufferUsages,
+    buffer: Option<Buffer>,
+}
+
+impl StreamBuffer {
+    pub(super) fn new(label: &'static str, usage: BufferUsages) -> Self {
+        Self { label, usage, buffer: None }
+    }
+
+    pub(super) fn write(&mut self, device: &Device, queue: &Queue, bytes: &[u8]) {
+        let wanted = padded(bytes.len());
+        if self.buffer.as_ref().is_none_or(|b| b.size() < wanted) {
+            self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(self.label),
+                size: wanted.next_power_of_two(),
+                usage: self.usage | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        if let Some(buffer) = &self.buffer {
+            write_padded(queue, buffer, bytes);
+        }
+    }
+
+    pub(super) fn get(&self) -> Option<&Buffer> {
+        self.buffer.as_ref()
+    }
+}
+
+/// Copies have whole words and buffers are never empty.
+fn padded(len: usize) -> u64 {
+    (len.max(4)).next_multiple_of(4) as u64
+}
+
+fn write_padded(queue: &Queue, buffer: &Buffer, bytes: &[u8]) {
+    let whole = bytes.len() / 4 * 4;
+    queue.write_buffer(buffer, 0, &bytes[..whole]);
+    if whole < bytes.len() {
+        let mut last = [0; 4];
+        last[..bytes.len() - whole].copy_from_slice(&bytes[whole..]);
+        queue.write_buffer(buffer, whole as u64, &last);
+    }
+}

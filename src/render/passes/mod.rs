@@ -1,0 +1,45 @@
+//! One file for each kind of thing that is drawn, beside the shader of the same name. Adding one is adding a file, its
+//! shader, and a line in [`ALL`].
+
+mod arrow;
+mod backdrop;
+mod build;
+mod ground;
+mod overlay;
+mod skin;
+mod solid;
+
+use super::frame::FrameBindings;
+use palpate_core::drawing::DrawList;
+use wgpu::{Device, Queue, RenderPass};
+
+/// What a pass is made from.
+pub(crate) struct PassSetup<'a> {
+    pub(crate) device: &'a Device,
+    pub(crate) queue: &'a Queue,
+    pub(crate) frame: &'a FrameBindings,
+}
+
+/// What a pass reads before each picture.
+pub(crate) struct Prepare<'a> {
+    pub(crate) device: &'a Device,
+    pub(crate) queue: &'a Queue,
+    pub(crate) list: &'a DrawList,
+    pub(crate) pixels_per_point: f32,
+}
+
+/// Draws one kind of thing. Bind group 0 is the frame's and is set already.
+pub(crate) trait Pass: Send + Sync {
+    /// Uploads what the list holds of this kind.
+    fn prepare(&mut self, prepare: &Prepare<'_>);
+
+    /// Draws into the shadow map, where this kind casts a shadow.
+    fn draw_shadow(&self, _pass: &mut RenderPass<'_>) {}
+
+    /// Draws into the picture.
+    fn draw(&self, pass: &mut RenderPass<'_>);
+}
+
+/// All passes in the order in which they are drawn.
+pub(crate) const ALL: [fn(&PassSetup<'_>) -> Box<dyn Pass>; 6] =
+    [backdrop::make, ground::make, solid::make, skin::make, arrow::make, overlay::make];

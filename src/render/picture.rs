@@ -1,0 +1,99 @@
+//! Pictures without a window: draw a list, read the pixels back, write a PNG.
+
+use super::{Gpu, Renderer};
+use palpate_core::drawing::DrawList;
+use std::path::{Path, PathBuf};
+
+/// Pixels, sRGB with opacity, row by row from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Width [pixels].
+    pub width: u32,
+    /// Height [pixels].
+    pub height: u32,
+    /// Four bytes per pixel.
+    pub rgba: Vec<u8>,
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The device failed while drawing.
+    #[error("the picture could not be read back from the graphics driver: {cause}")]
+    Device {
+        /// What the driver says.
+        cause: String,
+    },
+    /// The file could not be written.
+    #[error("cannot write the picture \"{path}\": {cause}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+}
+
+impl Picture {
+    /// Draws a list off-screen, `size` pixels at `pixels_per_point`.
+    pub fn draw(
+        gpu: &Gpu,
+        renderer: &mut Renderer,
+        list: &DrawList,
+        size: [u32; 2],
+        pixels_per_point: f32,
+    ) -> Result<Self, PictureError> {
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        renderer.render(&gpu.device, &gpu.queue, &mut encoder, list, size, pixels_per_point);
+        let fault = |cause: &dyn std::fmt::Display| PictureError::Device { cause: cause.to_string() };
+        let (texture, [width, height]) = renderer.picture_texture().ok_or_else(|| fault(&"nothing was drawn"))?;
+        // Rows of a copy start at multiples of 256 bytes.
+        let row = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: u64::from(row) * u64::from(height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row),
+                    rows_per_image: Some(height),
+                },
+            },
+            texture.size(),
+        );
+        gpu.queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.slice(..).map_async(wgpu::MapMode::Read, move |outcome| {
+            // The receiver waits below; it is gone only if this function has returned with an error.
+            let _received = sender.send(outcome);
+        });
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| fault(&e))?;
+        match receiver.recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(fault(&error)),
+            Err(error) => return Err(fault(&error)),
+        }
+        let mapped = buffer.slice(..).get_mapped_range().map_err(|e| fault(&e))?;
+        let rgba = mapped.chunks_exact(row as usize).flat_map(|r| &r[..width as usize * 4]).copied().collect();
+        Ok(Self { width, height, rgba })
+    }
+
+    /// Writes a PNG file, making its folder where it does not exist.
+    pub fn save(&self, path: &Path) -> Result<(), PictureError> {
+        let written = (|| -> Result<(), Box<dyn std::error::Error>> {
+            if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+                std::fs::create_dir_all(folder)?;
+            }
+            let format = image::ImageFormat::Png;
+            image::save_buffer_with_format(path, &self.rgba, self.width, self.height, image::ColorType::Rgba8, format)?;
+            Ok(())
+        })();
+        written.map_err(|cause| PictureError::Write { path: path.to_owned(), cause: cause.to_string() })
+    }
+}
