@@ -15,3 +15,4 @@ pub mod sensing;
 pub mod study;
 pub mod trial;
 pub mod units;
+pub mod workers;

@@ -195,7 +195,7 @@ mod tests {
     fn frames_survive_a_round_trip() {
         let frames = frames();
         assert!(frames.iter().any(|f| !f.taxels.is_empty()));
-        assert_eq!(decode_frames(&encode_frames(&frames)), Ok(frames));
+        assert!(decode_frames(&encode_frames(&frames)) == Ok(frames));
         assert_eq!(decode_frames(&encode_frames(&[])), Ok(vec![]));
     }
 

@@ -38,16 +38,20 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Loads what the scene grasps; `None` for an empty hand.
-    pub fn load_object(&self) -> Result<Option<ObjectModel>, ObjectError> {
-        let options = LoadOptions {
+    /// How the object's file is to be read.
+    pub fn load_options(&self) -> LoadOptions {
+        LoadOptions {
             scale: self.object.scale.value(),
             mass: self.object.mass.value(),
             density: self.object.density,
             collision: self.object.collision,
             cell: self.solver.distance_cell.value(),
-        };
-        load(&self.object.source, &options)
+        }
+    }
+
+    /// Loads what the scene grasps; `None` for an empty hand.
+    pub fn load_object(&self) -> Result<Option<ObjectModel>, ObjectError> {
+        load(&self.object.source, &self.load_options())
     }
 }
 

@@ -1,0 +1,23 @@
+//! Named threads around rigs and stores: commands in, snapshots and notices out. Nothing here knows a window; whoever
+//! shows the results hands over a `wake` function.
+//!
+//! ```text
+//!  UI                         "sim"                          "recorder"
+//!  Command ----bounded--->    runs the grasp, keeps pace     
+//!  <--newest Snapshot-----    publishes                      writes the store
+//!  <--every TraceRow------    derives         frames ----->  a chunk each second
+//!  <--Notice--------------                    <------------  Notice
+//! ```
+//!
+//! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
+//! their order and none is lost.
+
+mod latest;
+mod recorder;
+mod sim;
+
+pub use latest::Latest;
+pub use recorder::{Recorder, RecorderNotice};
+pub use sim::{
+    Command, FinishedGrasp, Notice, ObjectCard, SimWorker, SimWorkerSetup, Snapshot, Status, TraceRow, Wake,
+};

@@ -1,0 +1,195 @@
+//! The recorder: a thread that writes frames into the store about once a second, so that neither a slow disk nor
+//! another program's lock holds up the grasp, and a kill loses at most the last second.
+
+use crate::recording::{Store, StoreError, TrialId};
+use crate::trial::{Frame, Quality, TrialInfo};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+/// Frames that are gathered before they are written.
+const CHUNK: usize = 75;
+
+/// What the recorder tells.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RecorderNotice {
+    /// A trial is complete in the store.
+    Stored(TrialId),
+    /// A trial could not be stored; the sentence says why and what to try.
+    Failed(String),
+}
+
+enum Message {
+    Begin(Box<TrialInfo>),
+    Frame(Box<Frame>),
+    Finish(Box<Quality>, Vec<String>),
+    Discard,
+}
+
+/// A handle on the recorder's thread. Dropping it writes what has been handed over and waits for that.
+#[derive(Debug)]
+pub struct Recorder {
+    messages: Option<Sender<Message>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Recorder {
+    /// Starts the thread. The store is opened when the first trial begins; `tell` is called from the thread.
+    pub fn start(store: PathBuf, tell: impl Fn(RecorderNotice) + Send + 'static) -> std::io::Result<Self> {
+        let (messages, inbox) = channel();
+        let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || {
+            Writer { path: store, store: None, trial: None, waiting: Vec::new(), tell: Box::new(tell) }.work(&inbox);
+        })?;
+        Ok(Self { messages: Some(messages), thread: Some(thread) })
+    }
+
+    fn send(&self, message: Message) {
+        if let Some(messages) = &self.messages {
+            // A recorder that has failed has said so; frames after that have nowhere to go.
+            let _gone = messages.send(message);
+        }
+    }
+
+    /// Begins a trial.
+    pub fn begin(&self, info: &TrialInfo) {
+        self.send(Message::Begin(Box::new(info.clone())));
+    }
+
+    /// Hands over the next frame of the trial.
+    pub fn frame(&self, frame: &Frame) {
+        self.send(Message::Frame(Box::new(frame.clone())));
+    }
+
+    /// Ends the trial.
+    pub fn finish(&self, quality: &Quality, warnings: &[String]) {
+        self.send(Message::Finish(Box::new(quality.clone()), warnings.to_vec()));
+    }
+
+    /// Gives the trial up: it is marked as deleted.
+    pub fn discard(&self) {
+        self.send(Message::Discard);
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.messages = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic in the thread has printed itself; there is nobody left to tell here.
+            let _ended = thread.join();
+        }
+    }
+}
+
+struct Writer {
+    path: PathBuf,
+    store: Option<Store>,
+    trial: Option<TrialId>,
+    waiting: Vec<Frame>,
+    tell: Box<dyn Fn(RecorderNotice) + Send>,
+}
+
+impl Writer {
+    fn work(mut self, inbox: &Receiver<Message>) {
+        while let Ok(message) = inbox.recv() {
+            if let Err(error) = self.take(message) {
+                self.trial = None;
+                self.waiting.clear();
+                (self.tell)(RecorderNotice::Failed(error.to_string()));
+            }
+        }
+    }
+
+    fn take(&mut self, message: Message) -> Result<(), StoreError> {
+        match message {
+            Message::Begin(info) => {
+                self.waiting.clear();
+                self.trial = None;
+                self.trial = Some(self.store()?.begin(&info)?);
+            }
+            Message::Frame(frame) => {
+                if self.trial.is_some() {
+                    self.waiting.push(*frame);
+                }
+                if self.waiting.len() >= CHUNK {
+                    self.write_waiting()?;
+                }
+            }
+            Message::Finish(quality, warnings) => {
+                self.write_waiting()?;
+                if let Some(id) = self.trial.take() {
+                    self.store()?.finish(id, &quality, &warnings)?;
+                    (self.tell)(RecorderNotice::Stored(id));
+                }
+            }
+            Message::Discard => {
+                self.waiting.clear();
+                if let Some(id) = self.trial.take() {
+                    self.store()?.delete(&[id])?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn write_waiting(&mut self) -> Result<(), StoreError> {
+        let waiting = std::mem::take(&mut self.waiting);
+        match self.trial {
+            Some(id) => self.store()?.append(id, &waiting),
+            None => Ok(()),
+        }
+    }
+
+    fn store(&mut self) -> Result<&mut Store, StoreError> {
+        match &mut self.store {
+            Some(store) => Ok(store),
+            empty @ None => Ok(empty.insert(Store::open(&self.path)?)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::grasp;
+    use crate::scene::Scene;
+
+    #[test]
+    fn what_is_handed_over_is_stored_and_discards_vanish() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("trials.sqlite");
+        let (told, notices) = channel();
+        let recorder = Recorder::start(path.clone(), move |notice| told.send(notice).expect("heard")).expect("starts");
+        let trial = grasp(&Scene::default(), None, 3);
+        for keep in [true, false] {
+            recorder.begin(&trial.info);
+            trial.frames.iter().for_each(|frame| recorder.frame(frame));
+            if keep {
+                recorder.finish(&trial.info.quality, &trial.info.warnings);
+            } else {
+                recorder.discard();
+            }
+        }
+        drop(recorder);
+        let RecorderNotice::Stored(id) = notices.recv().expect("a notice") else { panic!("stored") };
+        let store = Store::open(&path).expect("opens");
+        assert!(store.load(id).expect("whole") == trial);
+        assert_eq!((store.list(false).expect("lists").len(), store.list(true).expect("lists").len()), (1, 2));
+    }
+
+    #[test]
+    fn a_store_that_cannot_be_opened_is_reported_once_per_trial() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("notes.txt");
+        std::fs::write(&path, "not a store".repeat(100)).expect("writes");
+        let (told, notices) = channel();
+        let recorder = Recorder::start(path, move |notice| told.send(notice).expect("heard")).expect("starts");
+        let trial = grasp(&Scene::default(), None, 0);
+        recorder.begin(&trial.info);
+        trial.frames.iter().for_each(|frame| recorder.frame(frame));
+        recorder.finish(&trial.info.quality, &[]);
+        drop(recorder);
+        let all: Vec<RecorderNotice> = notices.try_iter().collect();
+        assert!(matches!(&all[..], [RecorderNotice::Failed(text)] if text.contains("not a store")), "{all:?}");
+    }
+}
