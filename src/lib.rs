@@ -1,3 +1,4 @@
 //! tour
 
+pub mod app;
 pub mod cli;

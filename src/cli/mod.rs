@@ -1,6 +1,7 @@
 //! The command line: every headless command, and the door to the window. Exit codes: 0 done, 1 failed, 2 wrong use.
 
 mod bench;
+mod demo;
 mod grasp;
 mod setup;
 mod snapshot;
@@ -8,8 +9,11 @@ mod terminal;
 mod trials;
 mod workshop;
 
+use crate::app::{WindowOptions, open_window};
 use clap::{Parser, Subcommand};
-use std::path::PathBuf;
+use palpate_core::recording::Store;
+use palpate_core::scene::Scene;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// What went wrong, in a sentence for the user.
@@ -35,6 +39,8 @@ struct Arguments {
 enum Command {
     /// Grasp an object once, print what happened, store the trial.
     Grasp(grasp::GraspArguments),
+    /// Grasp an object in a few random poses, tell the story, write pictures; needs no display.
+    Demo(demo::DemoArguments),
     /// Draw a scene or a stored trial into a PNG file, without a window.
     Snapshot(snapshot::SnapshotArguments),
     /// List, show, export, delete and restore recorded trials.
@@ -46,17 +52,32 @@ enum Command {
     Workshop(workshop::WorkshopArguments),
 }
 
+/// Opens the window on an object.
+fn window(object: Option<&str>, store: Option<&Path>) -> Result<(), Failure> {
+    let mut scene = Scene::default();
+    if let Some(object) = object {
+        if object.to_ascii_lowercase().ends_with(".toml") {
+            scene = Scene::from_file(Path::new(object))?;
+        } else {
+            object.clone_into(&mut scene.object.source);
+        }
+    }
+    let store = store.map_or_else(Store::default_path, Path::to_owned);
+    Ok(open_window(WindowOptions { scene, store })?)
+}
+
 /// Runs the program as its arguments ask.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let store = arguments.store.as_deref();
     let outcome = match arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(&grasp, store),
+        Some(Command::Demo(demo)) => demo::run(&demo, store),
         Some(Command::Snapshot(snapshot)) => snapshot::run(&snapshot, store),
         Some(Command::Trials(trials)) => trials::run(&trials, store),
         Some(Command::Bench(bench)) => bench::run(&bench),
         Some(Command::Workshop(workshop)) => workshop::run(&workshop),
-        None => Err("the window is not built yet".into()),
+        None => window(arguments.object.as_deref(), store),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

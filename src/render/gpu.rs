@@ -46,16 +46,13 @@ pub struct Gpu {
 impl Gpu {
     /// Finds a device for drawing off-screen.
     pub fn headless(choice: DriverChoice) -> Result<Self, GpuError> {
-        let backends = match choice {
-            DriverChoice::Any => Backends::from_env().unwrap_or(Backends::PRIMARY | Backends::GL),
-            DriverChoice::OpenGl => Backends::GL,
+        // OpenGL is looked for only where nothing better is found: looking for it makes libraries talk on the terminal.
+        let rounds = match (choice, Backends::from_env()) {
+            (DriverChoice::OpenGl, _) => vec![Backends::GL],
+            (DriverChoice::Any, Some(named)) => vec![named],
+            (DriverChoice::Any, None) => vec![Backends::PRIMARY, Backends::GL],
         };
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = backends;
-        let instance = Instance::new(descriptor);
-        let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
-        adapters.sort_by_key(|adapter| preference(&adapter.get_info()));
-        let adapter = adapters.into_iter().next().ok_or(GpuError::NoDriver)?;
+        let adapter = rounds.into_iter().find_map(best_adapter).ok_or(GpuError::NoDriver)?;
         Self::from_adapter(&adapter)
     }
 
@@ -72,21 +69,28 @@ impl Gpu {
     }
 }
 
+fn best_adapter(backends: Backends) -> Option<Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = backends;
+    let instance = Instance::new(descriptor);
+    let adapters = pollster::block_on(instance.enumerate_adapters(backends));
+    adapters.into_iter().min_by_key(|adapter| preference(&adapter.get_info()))
+}
+
 /// WebGL2's limits, but pictures as large as the adapter can make them.
 pub fn wanted_limits(adapter: &Adapter) -> Limits {
     Limits::downlevel_webgl2_defaults().using_resolution(adapter.limits())
 }
 
-/// Lower is better: hardware first, and Vulkan, Metal or DirectX before OpenGL.
-fn preference(info: &AdapterInfo) -> (u8, u8) {
-    let hardware = match info.device_type {
+/// Lower is better: hardware first.
+fn preference(info: &AdapterInfo) -> u8 {
+    match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
         wgpu::DeviceType::VirtualGpu => 2,
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
-    };
-    (hardware, u8::from(info.backend == wgpu::Backend::Gl))
+    }
 }
 
 /// A driver in a few words: its name, its interface, and whether it draws in software.
@@ -96,5 +100,6 @@ pub fn describe_adapter(info: &AdapterInfo) -> String {
     } else {
         ""
     };
-    format!("{} ({}{software})", info.name, info.backend)
+    let name = info.name.split(" (").next().unwrap_or(&info.name);
+    format!("{name} ({}{software})", info.backend)
 }

@@ -24,6 +24,12 @@ pub enum PictureError {
         /// What the driver says.
         cause: String,
     },
+    /// The bytes are no picture.
+    #[error("these bytes are not a PNG picture: {cause}")]
+    Decode {
+        /// What is wrong.
+        cause: String,
+    },
     /// The file could not be written.
     #[error("cannot write the picture \"{path}\": {cause}", path = path.display())]
     Write {
@@ -82,6 +88,13 @@ impl Picture {
         let mapped = buffer.slice(..).get_mapped_range().map_err(|e| fault(&e))?;
         let rgba = mapped.chunks_exact(row as usize).flat_map(|r| &r[..width as usize * 4]).copied().collect();
         Ok(Self { width, height, rgba })
+    }
+
+    /// Decodes a PNG file's bytes.
+    pub fn from_png(bytes: &[u8]) -> Result<Self, PictureError> {
+        let decoded = image::load_from_memory_with_format(bytes, image::ImageFormat::Png);
+        let pixels = decoded.map_err(|e| PictureError::Decode { cause: e.to_string() })?.into_rgba8();
+        Ok(Self { width: pixels.width(), height: pixels.height(), rgba: pixels.into_raw() })
     }
 
     /// Writes a PNG file, making its folder where it does not exist.

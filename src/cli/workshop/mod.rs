@@ -5,6 +5,7 @@
 //! Objects lie as they are put down: z up, their long side along y, so that the fingers close across it along x.
 
 mod sixteen;
+mod thumbnails;
 mod tools;
 
 use super::Failure;
@@ -45,9 +46,16 @@ pub(super) struct WorkshopArguments {
     /// The folder that gets one folder per object.
     #[arg(long, value_name = "FOLDER", default_value = "assets/objects")]
     out: PathBuf,
+    /// Draw the thumbnails of the objects that this program was built with, instead of the objects.
+    #[arg(long)]
+    thumbnails: bool,
 }
 
 pub(super) fn run(arguments: &WorkshopArguments) -> Result<(), Failure> {
+    if arguments.thumbnails {
+        let count = thumbnails::draw_all(&arguments.out)?;
+        return say(format!("{count} thumbnails in {}", arguments.out.display()));
+    }
     let files = make_all();
     for (path, text) in &files {
         let path = arguments.out.join(path);
@@ -207,6 +215,6 @@ mod tests {
         for object in std::fs::read_dir(folder).unwrap() {
             on_disk += std::fs::read_dir(object.unwrap().path()).unwrap().count();
         }
-        assert_eq!(on_disk, files.len());
+        assert_eq!(on_disk, files.len() + 16, "the made files, and a thumbnail each");
     }
 }

@@ -55,6 +55,11 @@ fn facts_of(folder: &Path) -> Option<BuiltIn> {
     }
 }
 
+/// A small picture of a built-in object (PNG).
+pub fn thumbnail(name: &str) -> Option<&'static [u8]> {
+    Some(FOLDERS.get_file(Path::new(name).join("thumbnail.png"))?.contents())
+}
+
 /// A file of a built-in object, by a path relative to `assets/objects`.
 pub(super) fn read_embedded(path: &Path) -> std::io::Result<Vec<u8>> {
     inside(path)

@@ -8,7 +8,7 @@ mod model;
 mod urdf;
 mod urdf_text;
 
-pub use catalogue::{BuiltIn, catalogue};
+pub use catalogue::{BuiltIn, catalogue, thumbnail};
 pub use load::{CollisionShape, EMPTY, LoadOptions, load};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
 

@@ -40,6 +40,9 @@ pub(crate) trait Pass: Send + Sync {
     fn draw(&self, pass: &mut RenderPass<'_>);
 }
 
+/// Makes a pass.
+pub(crate) type MakePass = fn(&PassSetup<'_>) -> Box<dyn Pass>;
+
 /// All passes in the order in which they are drawn.
-pub(crate) const ALL: [fn(&PassSetup<'_>) -> Box<dyn Pass>; 6] =
+pub(crate) const ALL: [MakePass; 6] =
     [backdrop::make, ground::make, solid::make, skin::make, arrow::make, overlay::make];

@@ -1,0 +1,64 @@
+//! What panels ask for. Nothing in a panel changes anything: it pushes an action, and the workbench applies it.
+
+use palpate_core::drawing::Camera;
+use palpate_core::palette::Theme;
+use palpate_core::scene::Scene;
+use palpate_core::workers::Command;
+use std::path::PathBuf;
+
+/// A wish of the user's.
+#[derive(Clone, Debug)]
+pub enum Action {
+    /// Tell the simulation something.
+    Simulation(Command),
+    /// Grasp this scene.
+    SetScene(Box<Scene>),
+    /// Grasp this object: a built-in name or a file.
+    OpenObject(String),
+    /// Ask for a file to open.
+    PickFile,
+    /// Write the scene into a file.
+    SaveScene,
+    /// Look from here.
+    SetCamera(Camera),
+    /// Show the whole gripper.
+    FrameAll,
+    /// Dark or light.
+    SetTheme(Theme),
+    /// Force arrows on or off.
+    SetForces(bool),
+    /// The stretch of time that all plots show [s]; `None` for the whole grasp.
+    SetTimeWindow(Option<[f64; 2]>),
+    /// The key sheet on or off.
+    ShowKeys(bool),
+    /// Write the 3-D view into a PNG file.
+    SavePicture,
+    /// Put all panels back.
+    ResetLayout,
+    /// Something to tell the user.
+    Tell(Message),
+}
+
+/// A message to the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Message {
+    /// Good to know.
+    Info(String),
+    /// Deserves a look.
+    Warning(String),
+    /// Something failed.
+    Error(String),
+}
+
+/// What a file dialog or a background job has come back with.
+#[derive(Clone, Debug)]
+pub(super) enum Answer {
+    /// Open this file.
+    Open(PathBuf),
+    /// Write the scene here.
+    SaveScene(PathBuf),
+    /// Write the picture here.
+    SavePicture(PathBuf),
+    /// Tell the user.
+    Tell(Message),
+}

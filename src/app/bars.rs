@@ -1,0 +1,164 @@
+//! The bar above the panels (what this is, where data come from) and the bar below (time).
+
+use super::actions::Action;
+use super::icons::{self, Icon};
+use super::panels::PanelContext;
+use super::theme::{colour, veil};
+use egui::{Align, Layout, RichText, Ui};
+use palpate_core::palette::Theme;
+use palpate_core::workers::{Command, Status};
+
+/// Speeds that can be chosen, as multiples of real time.
+pub(super) const SPEEDS: [f64; 8] = [1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+
+/// A speed as people write it: ¼× is 0.25×.
+pub(super) fn speed_text(speed: f64) -> String {
+    if speed >= 1.0 || (speed * 100.0).fract() == 0.0 {
+        format!("{speed}×")
+    } else {
+        format!("1/{}×", (1.0 / speed).round())
+    }
+}
+
+pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let colours = context.view.theme.colours();
+    ui.horizontal_centered(|ui| {
+        ui.label(RichText::new("Palpate").heading().strong());
+        badge(ui, "SIMULATED", veil(colours.accent, 0.22), colour(colours.text));
+        if let Some(object) = context.snapshot.and_then(|s| s.object.as_deref()) {
+            ui.label(&object.title);
+        }
+        if let Some(snapshot) = context.snapshot {
+            let status = &snapshot.status;
+            ui.weak(format!("grasp {} of {}", status.grasp_of_round.max(1), status.grasps));
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.button("?").on_hover_text("Keys (F1)").clicked() {
+                actions.push(Action::ShowKeys(!context.view.keys_shown));
+            }
+            let (icon, other) = match context.view.theme {
+                Theme::Dark => (Icon::Sun, Theme::Light),
+                Theme::Light => (Icon::Moon, Theme::Dark),
+            };
+            if icons::button(ui, icon, "Theme", &format!("Change to the {} theme", other.name())).clicked() {
+                actions.push(Action::SetTheme(other));
+            }
+            if ui.button("Reset layout").on_hover_text("Put all panels back").clicked() {
+                actions.push(Action::ResetLayout);
+            }
+            if let Some(driver) = context.driver.filter(|_| ui.available_width() > 240.0) {
+                let quiet = RichText::new(driver).small().color(colour(colours.quiet_text));
+                ui.add(egui::Label::new(quiet).truncate());
+            }
+        });
+    });
+}
+
+fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
+    egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(7, 2)).show(ui, |ui| {
+        ui.label(RichText::new(text).small().color(ink));
+    });
+}
+
+pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
+    let t = context.snapshot.map_or(0.0, |s| s.frame.t);
+    ui.horizontal_centered(|ui| {
+        transport(ui, &status, actions);
+        ui.separator();
+        speeds(ui, &status, actions);
+        ui.separator();
+        recording(ui, &status, actions);
+        ui.separator();
+        progress(ui, context, &status, t);
+    });
+}
+
+fn transport(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
+    let mut button = |icon: Icon, name: &str, hint: &str, command: Command| {
+        if icons::button(ui, icon, name, hint).clicked() {
+            actions.push(Action::Simulation(command));
+        }
+    };
+    button(Icon::Reset, "Reset", "Back to the start (Backspace)", Command::Reset);
+    if status.playing {
+        button(Icon::Pause, "Pause", "Stand still (Space)", Command::Pause);
+    } else {
+        let hint = if status.finished { "Grasp again (Space)" } else { "Go on (Space)" };
+        button(Icon::Play, "Play", hint, Command::Play);
+    }
+    button(Icon::Step, "Step", "One sample further (Ctrl+→)", Command::Step);
+}
+
+fn speeds(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
+    let combo = egui::ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_text(status.target_speed));
+    let shown = combo.show_ui(ui, |ui| {
+        for speed in SPEEDS {
+            if ui.selectable_label(status.target_speed == speed, speed_text(speed)).clicked() {
+                actions.push(Action::Simulation(Command::SetSpeed(speed)));
+            }
+        }
+    });
+    shown.response.on_hover_text("Wanted speed (- and =)");
+    let actual = if status.playing && status.actual_speed > 0.0 {
+        format!("{:.2}×", status.actual_speed)
+    } else {
+        "–".to_owned()
+    };
+    ui.add_sized([46.0, 20.0], egui::Label::new(RichText::new(actual).monospace()))
+        .on_hover_text("Actual speed, as a multiple of real time");
+}
+
+fn recording(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
+    let mut on = status.recording;
+    if ui.checkbox(&mut on, "Record").on_hover_text("Keep every finished grasp in the store").changed() {
+        actions.push(Action::Simulation(Command::SetRecording(on)));
+    }
+    let mut grasps = status.grasps.max(1);
+    let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
+    if ui.add(drag).on_hover_text("Grasps before it stops; all but the first in random poses").changed() {
+        actions.push(Action::Simulation(Command::SetGrasps(grasps)));
+    }
+}
+
+/// Time and line pressure as one strip.
+fn progress(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, t: f64) {
+    let colours = context.view.theme.colours();
+    let duration = status.duration.max(1e-9);
+    ui.label(RichText::new(format!("{t:5.2} / {:.2} s", status.duration)).monospace());
+    if ui.available_width() < 60.0 {
+        return;
+    }
+    let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width() - 6.0, 16.0), egui::Sense::hover());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, "Time in the grasp"));
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 3.0, colour(colours.raised));
+    // Line pressure as the height of the filled part: closing, hold and release can be seen at a glance.
+    if let Some(trace) = context.traces.current() {
+        let top = context.scene.programme.peak_bar.max(1e-9);
+        let place = |k: usize| {
+            let x = rect.left() + rect.width() * (trace.t[k] / duration) as f32;
+            let y = rect.bottom() - rect.height() * (trace.line_bar[k] / top).clamp(0.0, 1.0) as f32;
+            egui::pos2(x, y)
+        };
+        let fill = veil(palpate_core::palette::Trace::Line.colour(context.view.theme), 0.45);
+        for k in 1..trace.t.len() {
+            let (a, b) = (place(k - 1), place(k));
+            let column = egui::Rect::from_min_max(egui::pos2(a.x, b.y.min(a.y)), egui::pos2(b.x, rect.bottom()));
+            painter.rect_filled(column, 0.0, fill);
+        }
+    }
+    let x = rect.left() + rect.width() * (t / duration).clamp(0.0, 1.0) as f32;
+    painter.vline(x, rect.y_range(), egui::Stroke::new(2.0, colour(colours.accent)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speeds_are_written_as_people_do() {
+        let texts: Vec<String> = SPEEDS.iter().map(|s| speed_text(*s)).collect();
+        assert_eq!(texts, ["1/16×", "1/8×", "0.25×", "0.5×", "1×", "2×", "4×", "8×"]);
+    }
+}

@@ -1,0 +1,127 @@
+//! Keys: one list, from which both the behaviour and the sheet of keys are made. Off while a text field has focus.
+
+use super::actions::Action;
+use super::bars::SPEEDS;
+use super::panels::PanelContext;
+use egui::{Key, KeyboardShortcut, Modifiers};
+use palpate_core::drawing::{Camera, StandardView};
+use palpate_core::workers::Command;
+
+/// A key, what it does, and how.
+pub(super) struct Binding {
+    pub(super) shortcut: KeyboardShortcut,
+    pub(super) does: &'static str,
+    act: fn(&PanelContext<'_>) -> Option<Action>,
+}
+
+const fn key(
+    modifiers: Modifiers,
+    key: Key,
+    does: &'static str,
+    act: fn(&PanelContext<'_>) -> Option<Action>,
+) -> Binding {
+    Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, act }
+}
+
+/// All keys. Those with more modifiers come first, so that they win.
+pub(super) const ALL: [Binding; 18] = [
+    key(Modifiers::NONE, Key::Space, "play or pause", |c| {
+        let playing = c.snapshot?.status.playing;
+        Some(Action::Simulation(if playing { Command::Pause } else { Command::Play }))
+    }),
+    key(Modifiers::COMMAND, Key::ArrowRight, "one sample further", |_| Some(Action::Simulation(Command::Step))),
+    key(Modifiers::NONE, Key::Backspace, "back to the start", |_| Some(Action::Simulation(Command::Reset))),
+    key(Modifiers::NONE, Key::Minus, "slower", |c| next_speed(c, -1)),
+    key(Modifiers::NONE, Key::Equals, "faster", |c| next_speed(c, 1)),
+    key(Modifiers::COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(Action::PickFile)),
+    key(Modifiers::COMMAND, Key::S, "save the scene", |_| Some(Action::SaveScene)),
+    key(Modifiers::COMMAND, Key::P, "save a picture of the 3-D view", |_| Some(Action::SavePicture)),
+    key(Modifiers::SHIFT, Key::Z, "show everything", |_| Some(Action::FrameAll)),
+    key(Modifiers::NONE, Key::Z, "show the object", |c| Some(Action::SetCamera(object_framed(c)?))),
+    key(Modifiers::NONE, Key::F, "force arrows", |c| Some(Action::SetForces(!c.view.forces))),
+    key(Modifiers::ALT, Key::Num1, "front view", |c| turned(c, StandardView::Front)),
+    key(Modifiers::ALT, Key::Num3, "right view", |c| turned(c, StandardView::Right)),
+    key(Modifiers::ALT, Key::Num7, "top view", |c| turned(c, StandardView::Top)),
+    key(Modifiers::ALT, Key::Num5, "parallel projection", |c| {
+        Some(Action::SetCamera(Camera { parallel: !c.view.camera.parallel, ..c.view.camera }))
+    }),
+    key(Modifiers::NONE, Key::F1, "this sheet", |c| Some(Action::ShowKeys(!c.view.keys_shown))),
+    key(Modifiers::NONE, Key::Escape, "close this sheet", |c| c.view.keys_shown.then_some(Action::ShowKeys(false))),
+    key(Modifiers::NONE, Key::F11, "full screen", |_| None),
+];
+
+fn next_speed(context: &PanelContext<'_>, by: isize) -> Option<Action> {
+    let now = context.snapshot?.status.target_speed;
+    let nearest = (0..SPEEDS.len()).min_by(|a, b| (SPEEDS[*a] - now).abs().total_cmp(&(SPEEDS[*b] - now).abs()))?;
+    let next = nearest.saturating_add_signed(by).min(SPEEDS.len() - 1);
+    Some(Action::Simulation(Command::SetSpeed(SPEEDS[next])))
+}
+
+fn turned(context: &PanelContext<'_>, view: StandardView) -> Option<Action> {
+    Some(Action::SetCamera(context.view.camera.turned_to(view)))
+}
+
+fn object_framed(context: &PanelContext<'_>) -> Option<Camera> {
+    let snapshot = context.snapshot?;
+    let place = snapshot.frame.world_from_object?.position.as_vec3();
+    let radius = snapshot.object.as_ref()?.size.length() as f32;
+    Some(context.view.camera.framing(place, 0.6 * radius.max(0.02)))
+}
+
+/// Actions for the keys pressed in this frame.
+pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Action> {
+    if ctx.text_edit_focused() {
+        return Vec::new();
+    }
+    if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F11)) {
+        let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
+        ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
+    }
+    ALL.iter()
+        .filter(|binding| ctx.input_mut(|i| i.consume_shortcut(&binding.shortcut)))
+        .filter_map(|binding| (binding.act)(context))
+        .collect()
+}
+
+/// The sheet of keys and of what the mouse does.
+pub(super) fn sheet(ctx: &egui::Context, shown: bool, actions: &mut Vec<Action>) {
+    let mut open = shown;
+    egui::Window::new("Keys").open(&mut open).collapsible(false).resizable(false).default_width(330.0).show(
+        ctx,
+        |ui| {
+            egui::Grid::new("keys").num_columns(2).spacing([22.0, 4.0]).show(ui, |ui| {
+                for binding in &ALL {
+                    ui.monospace(ctx.format_shortcut(&binding.shortcut));
+                    ui.label(binding.does);
+                    ui.end_row();
+                }
+                for (how, does) in [
+                    ("drag", "turn the view"),
+                    ("right drag", "shift the view"),
+                    ("wheel", "zoom the view; in a plot, time"),
+                    ("double click", "show everything"),
+                    ("Ctrl+drag", "pull at the object"),
+                ] {
+                    ui.monospace(how);
+                    ui.label(does);
+                    ui.end_row();
+                }
+            });
+        },
+    );
+    if shown && !open {
+        actions.push(Action::ShowKeys(false));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_does_two_things() {
+        for (k, a) in ALL.iter().enumerate() {
+            assert!(ALL[k + 1..].iter().all(|b| a.shortcut != b.shortcut), "{}", a.does);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! This grasp in numbers: what is in the hand, what the sensors read now, and what the last grasp came to.
+
+use super::PanelContext;
+use super::objects::class_words;
+use crate::app::actions::Action;
+use egui::{Grid, RichText, ScrollArea, Ui};
+use palpate_core::gripper::Side;
+use palpate_core::sensing::Quantity;
+use palpate_core::units::{mm, three_digits};
+use palpate_core::workers::{FinishedGrasp, ObjectCard, Snapshot};
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Action>) {
+    let Some(snapshot) = context.snapshot else {
+        ui.weak("Waiting for the first grasp ..");
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        match &snapshot.object {
+            Some(object) => object_ui(ui, object),
+            None => {
+                ui.strong("Empty hand");
+            }
+        }
+        ui.add_space(6.0);
+        readings_ui(ui, context, snapshot);
+        ui.add_space(6.0);
+        match &snapshot.last {
+            Some(last) => last_ui(ui, last),
+            None => {
+                ui.weak("What the grasp came to stands here when it is over.");
+            }
+        }
+    });
+}
+
+fn object_ui(ui: &mut Ui, object: &ObjectCard) {
+    ui.strong(&object.title);
+    let size = object.size.to_array().map(|side| format!("{:.0}", mm(side)));
+    let grams = three_digits(object.mass * 1e3);
+    let text = format!("{} mm, {grams} g, friction {:.2}", size.join(" × "), object.friction);
+    ui.weak(text);
+    if let Some(class) = object.class {
+        ui.weak(class_words(class));
+    }
+}
+
+/// The newest values of the channels, left and right.
+fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
+    let newest = |quantity: Quantity, side: Side| -> Option<f64> {
+        let trace = context.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
+        let index = snapshot.channels.iter().position(|c| c.quantity == quantity && c.side == side)?;
+        trace.channels.get(index)?.last().map(|value| f64::from(*value))
+    };
+    ui.spacing_mut().interact_size.y = 18.0;
+    Grid::new("readings").num_columns(3).spacing([14.0, 3.0]).show(ui, |ui| {
+        ui.weak("now");
+        ui.weak("left");
+        ui.weak("right");
+        ui.end_row();
+        for (name, quantity, factor) in [
+            ("curvature, 1/m", Quantity::Curvature, 1.0),
+            ("pressure, kPa", Quantity::Pressure, 1e-3),
+            ("force, N", Quantity::Force, 1.0),
+        ] {
+            ui.label(name);
+            for side in Side::BOTH {
+                // A fixed width keeps the columns still while digits change.
+                let text = newest(quantity, side).map_or("–".to_owned(), |v| three_digits(v * factor));
+                ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(text).monospace()));
+            }
+            ui.end_row();
+        }
+        ui.label("line, bar");
+        let line = RichText::new(format!("{:.2}", snapshot.frame.line_bar)).monospace();
+        ui.add_sized([52.0, 18.0], egui::Label::new(line));
+        ui.weak(snapshot.frame.phase.name());
+        ui.end_row();
+    });
+}
+
+fn last_ui(ui: &mut Ui, last: &FinishedGrasp) {
+    let summary = &last.summary;
+    ui.weak(format!("grasp {} came to", last.grasp));
+    Grid::new("summary").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
+        let mut line = |name: &str, value: String| {
+            ui.label(name);
+            ui.label(RichText::new(value).monospace());
+            ui.end_row();
+        };
+        let onset = summary.contact_onset_s.map_or("never".to_owned(), |t| format!("{t:.2} s"));
+        line("first contact", onset);
+        if let Some(hold) = &summary.hold {
+            let pair = |values: [f64; 2], unit: &str| {
+                let [left, right] = values.map(three_digits);
+                format!("{left} | {right} {unit}")
+            };
+            line("hold force", pair(hold.force_n, "N"));
+            line("hold curvature", pair(hold.curvature_per_m, "1/m"));
+            line("hold pressure", pair(hold.pressure_pa.map(|p| p * 1e-3), "kPa"));
+        }
+        if let Some(moved) = summary.object_moved_m {
+            line("object moved", format!("{} mm", three_digits(mm(moved))));
+        }
+        let quality = &summary.quality;
+        line("solver", format!("{:.2} Newton/step", quality.newton_mean));
+        line(
+            "converged",
+            if summary.converged { "every step".to_owned() } else { format!("not {}", quality.unconverged_steps) },
+        );
+    });
+}

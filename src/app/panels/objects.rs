@@ -1,0 +1,117 @@
+//! What can be grasped: the sixteen, an empty hand, and any file.
+
+use super::PanelContext;
+use crate::app::actions::Action;
+use crate::app::theme::colour;
+use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
+use palpate_core::objects::{BuiltIn, EMPTY, ObjectClass, ShapeClass, SizeClass, catalogue};
+
+/// Side of a thumbnail [points].
+const THUMBNAIL: f32 = 40.0;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    open_row(ui, actions);
+    ui.add_space(2.0);
+    let chosen = context.scene.object.source.as_str();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for path in &context.view.recent {
+            let name = std::path::Path::new(path).file_name().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
+            if row(ui, context, chosen == path, None, name, path).clicked() {
+                actions.push(Action::OpenObject(path.clone()));
+            }
+        }
+        for built_in in catalogue() {
+            let texture = context.thumbnails.get(&built_in.name);
+            let clicked =
+                row(ui, context, chosen == built_in.name, texture, &built_in.title, &words(built_in)).clicked();
+            if clicked {
+                actions.push(Action::OpenObject(built_in.name.clone()));
+            }
+        }
+        if row(ui, context, chosen == EMPTY, None, "Empty hand", "nothing to grasp").clicked() {
+            actions.push(Action::OpenObject(EMPTY.to_owned()));
+        }
+    });
+}
+
+/// The button and the field for files.
+fn open_row(ui: &mut Ui, actions: &mut Vec<Action>) {
+    let open = ui.add_sized([ui.available_width(), 28.0], egui::Button::new("Open URDF, OBJ, STL .."));
+    if open.on_hover_text("Ctrl+O, or drop a file anywhere on the window").clicked() {
+        actions.push(Action::PickFile);
+    }
+    let id = ui.scope_id().with("path");
+    let mut path = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    let field = egui::TextEdit::singleline(&mut path).hint_text(".. or paste a path").desired_width(f32::INFINITY);
+    let response = ui.add(field);
+    if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
+        actions.push(Action::OpenObject(path.trim().trim_matches(['"', '\'']).to_owned()));
+        path.clear();
+    }
+    ui.data_mut(|data| data.insert_temp(id, path));
+}
+
+fn words(built_in: &BuiltIn) -> String {
+    class_words(built_in.class())
+}
+
+/// Size and shape in two words.
+pub(super) fn class_words(class: ObjectClass) -> String {
+    let size = match class.size {
+        SizeClass::Tiny => "tiny",
+        SizeClass::Large => "large",
+    };
+    let shape = match class.shape {
+        ShapeClass::Cubic => "cubic",
+        ShapeClass::Cylindrical => "cylindrical",
+        ShapeClass::Spherical => "spherical",
+    };
+    format!("{size}, {shape}")
+}
+
+/// A row to click: picture, title, and a quiet line below.
+fn row(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    chosen: bool,
+    texture: Option<&egui::TextureHandle>,
+    title: &str,
+    below: &str,
+) -> egui::Response {
+    let colours = context.view.theme.colours();
+    let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width(), THUMBNAIL + 6.0), Sense::click());
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, title));
+    if chosen || response.hovered() || response.has_focus() {
+        let share = if chosen { 0.30 } else { 0.10 };
+        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
+    }
+    let mut inside = ui.new_child(
+        egui::UiBuilder::new()
+            .max_rect(rect.shrink2(egui::vec2(4.0, 3.0)))
+            .layout(Layout::left_to_right(Align::Center)),
+    );
+    inside.set_clip_rect(rect.intersect(ui.clip_rect()));
+    match texture {
+        Some(texture) => {
+            inside
+                .add(egui::Image::new(texture).fit_to_exact_size(egui::vec2(THUMBNAIL, THUMBNAIL)).corner_radius(4.0));
+        }
+        None => {
+            let (place, _) = inside.allocate_exact_size(egui::vec2(THUMBNAIL, THUMBNAIL), Sense::hover());
+            inside.painter().rect_stroke(
+                place.shrink(6.0),
+                4.0,
+                egui::Stroke::new(1.5, colour(colours.border)),
+                egui::StrokeKind::Inside,
+            );
+        }
+    }
+    inside.vertical(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        ui.add_space(4.0);
+        ui.add(egui::Label::new(title).truncate().selectable(false));
+        let quiet = RichText::new(below).small().color(colour(colours.quiet_text));
+        ui.add(egui::Label::new(quiet).truncate().selectable(false));
+    });
+    response
+}

@@ -1,0 +1,189 @@
+//! The scene's main settings. Each change begins the grasp anew; everything else can be set in a scene file.
+
+use super::PanelContext;
+use crate::app::actions::Action;
+use egui::{CollapsingHeader, ComboBox, DragValue, Grid, ScrollArea, Ui};
+use palpate_core::gripper::{Finger, PadLaw};
+use palpate_core::scene::{Accuracy, Auto, Scene, SupportKind};
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let mut scene = context.scene.clone();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        section(ui, "Object", true, |ui| object_ui(ui, &mut scene, context));
+        section(ui, "Gripper pose", true, |ui| pose_ui(ui, &mut scene));
+        section(ui, "Programme", true, |ui| programme_ui(ui, &mut scene));
+        section(ui, "Accuracy", false, |ui| solver_ui(ui, &mut scene));
+        section(ui, "Finger", false, |ui| finger_ui(ui, &mut scene));
+        section(ui, "Pad", false, |ui| pad_ui(ui, &mut scene));
+        section(ui, "Support", false, |ui| support_ui(ui, &mut scene));
+        ui.add_space(4.0);
+        ui.horizontal_wrapped(|ui| {
+            if ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)").clicked() {
+                actions.push(Action::SaveScene);
+            }
+            if ui.button("Defaults").on_hover_text("All settings back, the same object").clicked() {
+                let source = std::mem::take(&mut scene.object.source);
+                scene = Scene::default();
+                scene.object.source = source;
+            }
+        });
+    });
+    if scene != *context.scene {
+        actions.push(Action::SetScene(Box::new(scene)));
+    }
+}
+
+fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(title).default_open(open).show(ui, |ui| {
+        Grid::new(title).num_columns(2).spacing([10.0, 5.0]).show(ui, contents);
+    });
+}
+
+/// A number in another unit than the scene holds it in.
+struct Number<'a> {
+    name: &'a str,
+    unit: &'a str,
+    /// Shown value per stored value.
+    factor: f64,
+    range: [f64; 2],
+    speed: f64,
+}
+
+impl Number<'_> {
+    fn ui(&self, ui: &mut Ui, value: &mut f64) {
+        let label = ui.label(self.name);
+        let mut shown = *value * self.factor;
+        let drag = DragValue::new(&mut shown)
+            .range(self.range[0]..=self.range[1])
+            .speed(self.speed)
+            .max_decimals(3)
+            .suffix(format!("\u{2009}{}", self.unit));
+        if ui.add(drag).labelled_by(label.id).changed() {
+            *value = shown / self.factor;
+        }
+        ui.end_row();
+    }
+}
+
+fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
+    let label = ui.label(name);
+    let shown = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
+    ComboBox::from_id_salt(name)
+        .selected_text(shown)
+        .show_ui(ui, |ui| {
+            for (each, text) in all {
+                ui.selectable_value(value, *each, *text);
+            }
+        })
+        .response
+        .labelled_by(label.id);
+    ui.end_row();
+}
+
+/// A number that may be left to Palpate.
+fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
+    ui.label(number.name);
+    ui.horizontal(|ui| {
+        let mut own = value.value().is_some();
+        if ui.checkbox(&mut own, "").on_hover_text("Set it, instead of taking the object's own").changed() {
+            *value = if own { Auto::Value(known) } else { Auto::Auto };
+        }
+        let mut shown = value.value().unwrap_or(known) * number.factor;
+        let drag = DragValue::new(&mut shown)
+            .range(number.range[0]..=number.range[1])
+            .speed(number.speed)
+            .max_decimals(3)
+            .suffix(format!("\u{2009}{}", number.unit));
+        if ui.add_enabled(own, drag).changed() {
+            *value = Auto::Value(shown / number.factor);
+        }
+    });
+    ui.end_row();
+}
+
+fn object_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>) {
+    let object = &mut scene.object;
+    choice(ui, "held", &mut object.fixed, &[(false, "resting freely"), (true, "fixed in place")]);
+    let card = context.snapshot.and_then(|s| s.object.as_deref());
+    let mass = Number { name: "mass", unit: "g", factor: 1e3, range: [0.1, 5000.0], speed: 0.5 };
+    automatic(ui, &mass, &mut object.mass, card.map_or(0.05, |c| c.mass));
+    let friction = Number { name: "friction", unit: "", factor: 1.0, range: [0.0, 5.0], speed: 0.01 };
+    automatic(ui, &friction, &mut object.friction, card.map_or(0.6, |c| c.friction));
+    for (axis, name) in ["roll", "pitch", "yaw"].into_iter().enumerate() {
+        Number { name, unit: "°", factor: 1.0, range: [-180.0, 180.0], speed: 0.5 }
+            .ui(ui, &mut object.rotation_deg[axis]);
+    }
+}
+
+fn pose_ui(ui: &mut Ui, scene: &mut Scene) {
+    let mount = &mut scene.gripper.mount;
+    for (axis, name) in ["x offset", "y offset", "z offset"].into_iter().enumerate() {
+        Number { name, unit: "mm", factor: 1e3, range: [-60.0, 60.0], speed: 0.1 }.ui(ui, &mut mount.offset[axis]);
+    }
+    Number { name: "yaw", unit: "°", factor: 1.0, range: [-180.0, 180.0], speed: 0.5 }.ui(ui, &mut mount.yaw_deg);
+    Number { name: "grasp depth", unit: "mm", factor: 1e3, range: [20.0, 150.0], speed: 0.2 }
+        .ui(ui, &mut mount.grasp_depth);
+    Number { name: "opening", unit: "mm", factor: 1e3, range: [10.0, 200.0], speed: 0.2 }.ui(ui, &mut mount.opening);
+}
+
+fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
+    let max = scene.gripper.actuation.max_bar;
+    let step = scene.gripper.actuation.step_bar;
+    let programme = &mut scene.programme;
+    Number { name: "peak", unit: "bar", factor: 1.0, range: [0.0, max], speed: 0.01 }.ui(ui, &mut programme.peak_bar);
+    Number { name: "close per tick", unit: "bar", factor: 1.0, range: [step, max], speed: 0.005 }
+        .ui(ui, &mut programme.close_bar_per_tick);
+    let label = ui.label("hold");
+    let ticks = DragValue::new(&mut programme.hold_ticks).range(0..=600).suffix(" ticks");
+    ui.add(ticks).labelled_by(label.id);
+    ui.end_row();
+    Number { name: "release per tick", unit: "bar", factor: 1.0, range: [step, max], speed: 0.005 }
+        .ui(ui, &mut programme.release_bar_per_tick);
+    Number { name: "trial", unit: "s", factor: 1.0, range: [0.1, 60.0], speed: 0.02 }
+        .ui(ui, &mut scene.timing.duration_s);
+}
+
+fn solver_ui(ui: &mut Ui, scene: &mut Scene) {
+    let names = [
+        (Accuracy::Draft, "draft, 1/150 s"),
+        (Accuracy::Standard, "standard, 1/300 s"),
+        (Accuracy::Reference, "reference, 1/9600 s"),
+    ];
+    choice(ui, "time step", &mut scene.solver.accuracy, &names);
+    let label = ui.label("sampling");
+    ui.add(DragValue::new(&mut scene.timing.sample_hz).range(1..=1000).suffix("\u{2009}Hz")).labelled_by(label.id);
+    ui.end_row();
+}
+
+fn finger_ui(ui: &mut Ui, scene: &mut Scene) {
+    let finger = &mut scene.gripper.finger;
+    let label = ui.label("joints");
+    let range = Finger::FEWEST_JOINTS as usize..=Finger::MOST_JOINTS as usize;
+    ui.add(DragValue::new(&mut finger.joints).range(range).speed(0.1)).labelled_by(label.id);
+    ui.end_row();
+    Number { name: "length", unit: "mm", factor: 1e3, range: [20.0, 300.0], speed: 0.2 }.ui(ui, &mut finger.length);
+    Number { name: "stiffness EI", unit: "N·cm²", factor: 1e4, range: [0.1, 10_000.0], speed: 0.2 }
+        .ui(ui, &mut finger.bending_stiffness);
+    Number { name: "mass", unit: "g", factor: 1e3, range: [0.1, 500.0], speed: 0.2 }.ui(ui, &mut finger.mass);
+    Number { name: "relaxation", unit: "ms", factor: 1e3, range: [0.0, 1000.0], speed: 0.5 }
+        .ui(ui, &mut finger.damping_time);
+}
+
+fn pad_ui(ui: &mut Ui, scene: &mut Scene) {
+    let pad = &mut scene.gripper.pad;
+    choice(ui, "law", &mut pad.law, &[(PadLaw::NeoHookean, "neo-Hookean"), (PadLaw::Linear, "linear")]);
+    Number { name: "modulus", unit: "kPa", factor: 1e-3, range: [1.0, 10_000.0], speed: 1.0 }.ui(ui, &mut pad.modulus);
+    Number { name: "friction", unit: "", factor: 1.0, range: [0.0, 5.0], speed: 0.01 }.ui(ui, &mut pad.friction);
+    Number { name: "thickness", unit: "mm", factor: 1e3, range: [1.0, 30.0], speed: 0.05 }.ui(ui, &mut pad.thickness);
+}
+
+fn support_ui(ui: &mut Ui, scene: &mut Scene) {
+    let kinds = [(SupportKind::Pedestal, "pedestal"), (SupportKind::Table, "table"), (SupportKind::None, "none")];
+    choice(ui, "stands on", &mut scene.support.kind, &kinds);
+    Number { name: "height", unit: "mm", factor: 1e3, range: [0.0, 300.0], speed: 0.2 }
+        .ui(ui, &mut scene.support.height);
+    Number { name: "radius", unit: "mm", factor: 1e3, range: [1.0, 100.0], speed: 0.05 }
+        .ui(ui, &mut scene.support.radius);
+    Number { name: "gravity", unit: "m/s²", factor: 1.0, range: [0.0, 30.0], speed: 0.02 }
+        .ui(ui, &mut scene.world.gravity);
+}

@@ -1,0 +1,132 @@
+//! The 3-D view: drag turns, the right or middle button shifts, the wheel zooms, a double click shows everything,
+//! Ctrl and drag pulls at the object.
+
+use super::PanelContext;
+use crate::app::actions::Action;
+use crate::app::theme::colour;
+use crate::app::viewport::{Key, Paint};
+use egui::{PointerButton, Rect, Sense, Ui};
+use glam::{DVec3, Vec2};
+use palpate_core::drawing::{Camera, StandardView};
+use palpate_core::picture::PictureView;
+use palpate_core::workers::{Command, Snapshot};
+
+/// Force of a pull across the height of the picture [N].
+const PULL: f64 = 3.0;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let rect = ui.available_rect_before_wrap();
+    let response = ui.allocate_rect(rect, Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3-D view"));
+    let Some(snapshot) = context.snapshot else {
+        message(ui, rect, context, "Loading the object ..");
+        return;
+    };
+    if context.driver.is_none() {
+        message(ui, rect, context, "The 3-D view needs a graphics driver; plots and trials work without.");
+        return;
+    }
+    steer(ui, &response, context, actions);
+    paint(ui, rect, context, snapshot);
+    buttons(ui, rect, context, actions);
+    if let Some(loading) = &snapshot.status.loading {
+        let text = format!("Loading {loading} ..");
+        ui.painter().text(
+            rect.center_top() + egui::vec2(0.0, 30.0),
+            egui::Align2::CENTER_CENTER,
+            text,
+            egui::FontId::proportional(14.0),
+            colour(context.view.theme.colours().text),
+        );
+    }
+}
+
+fn message(ui: &Ui, rect: Rect, context: &PanelContext<'_>, text: &str) {
+    let ink = colour(context.view.theme.colours().quiet_text);
+    let font = egui::FontId::proportional(15.0);
+    ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, text, font, ink);
+}
+
+/// What the mouse does to the camera and to the object.
+fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let height = response.rect.height().max(1.0);
+    let moved = response.drag_delta() / height;
+    let drag = Vec2::new(moved.x, moved.y);
+    let camera = context.view.camera;
+    let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
+    if response.drag_stopped() {
+        actions.push(Action::Simulation(Command::Pull(DVec3::ZERO)));
+    }
+    if response.dragged_by(PointerButton::Primary) && ctrl {
+        actions.push(Action::Simulation(Command::Pull(pull(response, &camera, height))));
+    } else if response.dragged_by(PointerButton::Primary) && !shift {
+        actions.push(Action::SetCamera(camera.orbited(drag)));
+    } else if response.dragged() && drag != Vec2::ZERO {
+        actions.push(Action::SetCamera(camera.panned(drag)));
+    }
+    if response.hovered() {
+        let wheel = ui.input(|i| i.smooth_scroll_delta().y + 60.0 * i.zoom_delta().ln());
+        if wheel != 0.0 {
+            actions.push(Action::SetCamera(camera.zoomed((-wheel * 0.0025).exp())));
+        }
+    }
+    if response.double_clicked() {
+        actions.push(Action::FrameAll);
+    }
+}
+
+/// A force in the plane of the picture, in proportion to how far the mouse has been dragged.
+fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
+    let Some(total) = response.total_drag_delta() else { return DVec3::ZERO };
+    let [right, up, _] = camera.axes();
+    let along = (right * total.x - up * total.y) / height;
+    along.as_dvec3() * PULL
+}
+
+fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
+    let pixels_per_point = ui.ctx().pixels_per_point();
+    let picture = PictureView {
+        camera: context.view.camera,
+        theme: context.view.theme,
+        size: Vec2::new(rect.width(), rect.height()),
+        forces: context.view.forces,
+        ..PictureView::default()
+    };
+    let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
+    let key = Key { grasp: snapshot.grasp, sample: snapshot.frame.t, view: picture.clone(), pixels, pixels_per_point };
+    let list = snapshot.stage.draw(&snapshot.frame, &picture);
+    ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
+}
+
+/// Standard views and switches, in the upper left corner of the picture.
+fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    if rect.width() < 560.0 || rect.height() < 160.0 {
+        return;
+    }
+    let place = Rect::from_min_size(rect.min + egui::vec2(12.0, 12.0), egui::vec2(340.0, 26.0));
+    let layout = egui::Layout::left_to_right(egui::Align::Center);
+    let mut bar = ui.new_child(egui::UiBuilder::new().max_rect(place).layout(layout));
+    bar.spacing_mut().item_spacing.x = 4.0;
+    let camera = context.view.camera;
+    for (view, name, key) in [
+        (StandardView::Home, "Home", "double click, Shift+Z"),
+        (StandardView::Front, "Front", "Alt+1"),
+        (StandardView::Right, "Right", "Alt+3"),
+        (StandardView::Top, "Top", "Alt+7"),
+    ] {
+        if bar.small_button(name).on_hover_text(format!("Look from here ({key})")).clicked() {
+            actions.push(Action::SetCamera(camera.turned_to(view)));
+            if view == StandardView::Home {
+                actions.push(Action::FrameAll);
+            }
+        }
+    }
+    let parallel = bar.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
+    if parallel.clicked() {
+        actions.push(Action::SetCamera(Camera { parallel: !camera.parallel, ..camera }));
+    }
+    let forces = bar.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
+    if forces.clicked() {
+        actions.push(Action::SetForces(!context.view.forces));
+    }
+}

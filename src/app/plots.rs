@@ -1,0 +1,232 @@
+//! Plots of traces over time. All plots show one stretch of time; the mouse moves it for all of them: drag to shift,
+//! wheel to zoom about the pointer, double click for the whole grasp.
+
+use super::actions::Action;
+use super::panels::PanelContext;
+use super::theme::{colour, veil};
+use super::traces::GraspTrace;
+use egui::{Color32, Ui};
+use egui_plot::{GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine};
+use palpate_core::palette::Trace;
+use palpate_core::units::three_digits;
+
+/// Takes the value of one row out of a trace; `None` where it is undefined.
+pub(super) type TraceValue = Box<dyn Fn(&GraspTrace, usize) -> Option<f64>>;
+
+/// One curve of a plot.
+pub(super) struct Curve {
+    /// Its name in the legend.
+    pub(super) name: String,
+    /// What it shows, for its colour.
+    pub(super) trace: Trace,
+    /// Dashed for the right finger.
+    pub(super) dashed: bool,
+    /// Takes its values out of a trace.
+    pub(super) values: TraceValue,
+}
+
+/// A plot of some curves.
+pub(super) struct TimePlot<'a> {
+    /// Name for egui and for screen readers.
+    pub(super) id: &'a str,
+    /// Unit of the values, shown at the axis.
+    pub(super) unit: &'a str,
+    /// The curves.
+    pub(super) curves: Vec<Curve>,
+    /// The least range of values shown, so that noise does not fill a plot.
+    pub(super) least: [f64; 2],
+}
+
+/// Faintness of the grasps before the current one.
+const EARLIER: f32 = 0.28;
+/// Narrowest stretch of time that can be shown [s].
+const NARROWEST: f64 = 0.05;
+
+pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>, plot: &TimePlot<'_>) {
+    let duration = context.snapshot.map_or(4.0, |s| s.status.duration);
+    let [from, to] = context.view.time_window.unwrap_or([0.0, duration]);
+    let theme = context.view.theme;
+    let [low, high] = value_range(context, plot, [from, to]);
+    let unit = plot.unit;
+    let show_legend = ui.available_width() > 260.0 && ui.available_height() > 70.0;
+    let mut widget = Plot::new(plot.id)
+        .allow_zoom(false)
+        .allow_drag(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_double_click_reset(false)
+        .allow_axis_zoom_drag(false)
+        .show_background(false)
+        .y_axis_min_width(44.0)
+        .y_axis_label(unit)
+        .grid_color(colour(theme.colours().border))
+        .grid_spacing(12.0..=60.0)
+        .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
+        .x_axis_formatter(|mark: GridMark, _| format!("{}\u{2009}s", plain(mark.value)))
+        .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
+        .set_margin_fraction(egui::Vec2::ZERO);
+    if show_legend {
+        let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
+        widget = widget.legend(legend.position(egui_plot::Corner::LeftTop));
+    }
+    let response = widget.show(ui, |plot_ui| {
+        plot_ui.set_plot_bounds_x(from..=to);
+        plot_ui.set_plot_bounds_y(low..=high);
+        add_hold(plot_ui, context, high);
+        for trace in context.traces.earlier() {
+            add_curves(plot_ui, trace, plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0, false);
+        }
+        if let Some(trace) = context.traces.current() {
+            add_curves(plot_ui, trace, plot, |c| colour(c.trace.colour(theme)), 1.8, true);
+            if let Some(now) = trace.t.last() {
+                plot_ui.vline(VLine::new("", *now).color(veil(theme.colours().quiet_text, 0.5)).width(1.0));
+            }
+        }
+        let bounds = plot_ui.plot_bounds();
+        TimeDrag {
+            pointer: plot_ui.pointer_coordinate().map(|p: PlotPoint| p.x),
+            dragged: f64::from(plot_ui.pointer_coordinate_drag_delta().x),
+            width: bounds.width(),
+        }
+    });
+    response
+        .response
+        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, format!("{} over time", plot.id)));
+    if let Some(window) = moved_window(ui, &response.response, &response.inner, [from, to], duration) {
+        actions.push(Action::SetTimeWindow(window));
+    }
+}
+
+struct TimeDrag {
+    pointer: Option<f64>,
+    dragged: f64,
+    width: f64,
+}
+
+/// The new time window where the mouse asks for one.
+fn moved_window(
+    ui: &Ui,
+    response: &egui::Response,
+    drag: &TimeDrag,
+    [from, to]: [f64; 2],
+    duration: f64,
+) -> Option<Option<[f64; 2]>> {
+    if response.double_clicked() {
+        return Some(None);
+    }
+    let shifted = |by: f64| {
+        let by = by.clamp(-from, (duration - to).max(-from));
+        Some(Some([from + by, to + by]))
+    };
+    if response.dragged() && drag.dragged != 0.0 {
+        return shifted(-drag.dragged);
+    }
+    let wheel = ui.input(|i| i.smooth_scroll_delta().y);
+    if response.hovered() && wheel != 0.0 {
+        let about = drag.pointer?.clamp(from, to);
+        let factor = (-f64::from(wheel) * 0.004).exp().max(NARROWEST / drag.width);
+        let window = [about - (about - from) * factor, about + (to - about) * factor];
+        let whole = window[0] <= 0.0 && window[1] >= duration;
+        return Some((!whole).then_some([window[0].max(0.0), window[1].min(duration)]));
+    }
+    None
+}
+
+/// A number at an axis, without trailing zeros.
+fn plain(value: f64) -> String {
+    let text = three_digits(value);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// Shades the hold, so that it can be told from closing and release.
+fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, top: f64) {
+    let Some(snapshot) = context.snapshot else { return };
+    let programme = &snapshot.scene.programme;
+    let tick = 1.0 / f64::from(snapshot.scene.timing.actuation_hz.max(1));
+    let closed = f64::from(programme.close_ticks()) * tick;
+    let released = (closed + f64::from(programme.hold_ticks) * tick).min(snapshot.status.duration);
+    if closed >= released {
+        return;
+    }
+    let quiet = context.view.theme.colours().quiet_text;
+    plot_ui.add(Span::new("", closed..=released).fill(veil(quiet, 0.09)).border_width(0.0));
+    let place = PlotPoint::new(closed, top);
+    let word = egui::RichText::new(" hold").small();
+    plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
+}
+
+fn add_curves(
+    plot_ui: &mut egui_plot::PlotUi<'_>,
+    trace: &GraspTrace,
+    plot: &TimePlot<'_>,
+    shade: impl Fn(&Curve) -> Color32,
+    width: f32,
+    named: bool,
+) {
+    for curve in &plot.curves {
+        // Undefined values leave a gap.
+        let points: Vec<[f64; 2]> =
+            trace.t.iter().enumerate().map(|(k, t)| [*t, (curve.values)(trace, k).unwrap_or(f64::NAN)]).collect();
+        let style = if curve.dashed { LineStyle::Dashed { length: 7.0 } } else { LineStyle::Solid };
+        let name = if named { curve.name.as_str() } else { "" };
+        plot_ui.line(
+            Line::new(name, PlotPoints::from(points))
+                .id(egui::Id::unique((&curve.name, trace.grasp)))
+                .color(shade(curve))
+                .width(width)
+                .style(style)
+                .allow_hover(named),
+        );
+    }
+}
+
+/// What the curves reach within the time shown, with some air, and no less than the plot's least range.
+fn value_range(context: &PanelContext<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2]) -> [f64; 2] {
+    let [mut low, mut high] = plot.least;
+    for trace in context.traces.earlier().chain(context.traces.current()) {
+        for (k, _) in trace.t.iter().enumerate().filter(|(_, t)| (from..=to).contains(*t)) {
+            for value in plot.curves.iter().filter_map(|c| (c.values)(trace, k)).filter(|v| v.is_finite()) {
+                low = low.min(value);
+                high = high.max(value);
+            }
+        }
+    }
+    // Air above, so that the word "hold" has a place of its own.
+    let air = 0.06 * (high - low);
+    [low - air, high + 3.5 * air]
+}
+
+/// Some four marks at round values.
+fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
+    let rough = (high - low) / 4.0;
+    if !(rough.is_finite() && rough > 0.0) {
+        return Vec::new();
+    }
+    let decade = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade).into_iter().find(|s| *s >= rough).unwrap_or(10.0 * decade);
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    // A step of a whole range makes all marks equally strong.
+    (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: high - low }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_few_and_round() {
+        for (low, high, want) in [
+            (-0.5, 9.0, vec![0.0, 5.0]),
+            (-1.3, 23.0, vec![0.0, 10.0, 20.0]),
+            (0.0, 0.4, vec![0.0, 0.1, 0.2, 0.3, 0.4]),
+        ] {
+            let marks: Vec<f64> = value_marks(low, high).iter().map(|m| m.value).collect();
+            assert!(
+                marks.len() == want.len() && marks.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9),
+                "{marks:?}"
+            );
+        }
+        assert!(value_marks(1.0, 1.0).is_empty());
+        assert!(value_marks(f64::NAN, 1.0).is_empty());
+    }
+}

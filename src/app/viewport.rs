@@ -1,0 +1,78 @@
+//! The renderer inside egui: it draws into a texture of its own before egui's pass begins, and copies that texture
+//! into the window during it.
+
+use egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
+use palpate_core::drawing::DrawList;
+use palpate_core::picture::PictureView;
+use palpate_render::wgpu;
+use palpate_render::{Blit, Renderer};
+
+/// Renderer and blit, kept by egui between frames.
+#[derive(Debug)]
+pub struct Viewport {
+    renderer: Renderer,
+    blit: Blit,
+    shown: Option<Key>,
+}
+
+impl Viewport {
+    /// Builds the pipelines and hands them to egui.
+    pub fn install(state: &RenderState) {
+        let viewport = Self {
+            renderer: Renderer::new(&state.device, &state.queue),
+            blit: Blit::new(&state.device, state.target_format),
+            shown: None,
+        };
+        state.renderer.write().callback_resources.insert(viewport);
+    }
+}
+
+/// What a picture shows; while it stays the same nothing is drawn again.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Key {
+    pub(super) grasp: u64,
+    pub(super) sample: f64,
+    pub(super) view: PictureView,
+    pub(super) pixels: [u32; 2],
+    pub(super) pixels_per_point: f32,
+}
+
+/// Draws one list.
+pub(super) struct Paint {
+    pub(super) key: Key,
+    pub(super) list: DrawList,
+}
+
+impl CallbackTrait for Paint {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        _screen: &ScreenDescriptor,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        if let Some(viewport) = resources.get_mut::<Viewport>()
+            && viewport.shown.as_ref() != Some(&self.key)
+        {
+            let Key { pixels, pixels_per_point, .. } = &self.key;
+            viewport.renderer.render(device, queue, encoder, &self.list, *pixels, *pixels_per_point);
+            if let Some(picture) = viewport.renderer.picture_view() {
+                viewport.blit.set_source(device, picture);
+            }
+            viewport.shown = Some(self.key.clone());
+        }
+        Vec::new()
+    }
+
+    fn paint(
+        &self,
+        _info: egui::PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        resources: &CallbackResources,
+    ) {
+        if let Some(viewport) = resources.get::<Viewport>() {
+            viewport.blit.draw(pass);
+        }
+    }
+}

@@ -1,0 +1,457 @@
+//! The whole window's contents: it owns the simulation's handle, the view state and the traces, lets panels draw, and
+//! applies what they ask for.
+
+use super::actions::{Action, Answer, Message};
+use super::files::{Ask, ask};
+use super::panels::{self, PanelContext};
+use super::theme::{self, colour};
+use super::traces::Traces;
+use super::view_state::ViewState;
+use super::viewport::Viewport;
+use super::{bars, keys};
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui_notify::Toasts;
+use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
+use glam::Vec2;
+use palpate_core::objects::{EMPTY, catalogue, thumbnail};
+use palpate_core::palette::Theme;
+use palpate_core::picture::PictureView;
+use palpate_core::scene::Scene;
+use palpate_core::sensing::SensorLayout;
+use palpate_core::workers::{Command, Notice, SimWorker, SimWorkerSetup, Snapshot, Wake};
+use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
+
+/// What a workbench starts from.
+pub struct WorkbenchSetup<'a> {
+    /// The first scene.
+    pub scene: Scene,
+    /// Where trials are stored.
+    pub store: PathBuf,
+    /// How the user looked at things last time.
+    pub view: ViewState,
+    /// Asks for the window to be drawn again; called from other threads.
+    pub wake: Wake,
+    /// Where the 3-D view is drawn; without it the rest works.
+    pub render_state: Option<&'a egui_wgpu::RenderState>,
+}
+
+/// Sensor layout of the live traces: the paper's simplest, with force.
+const LIVE_LAYOUT: &str = "C1+F";
+/// Grasps that are made before it stops: as many as the iterated recognition needs at most.
+const GRASPS: u32 = 4;
+/// Pixels per point of saved pictures.
+const PICTURE_SCALE: f32 = 2.0;
+
+/// Everything in the window.
+pub struct Workbench {
+    worker: SimWorker,
+    wake: Wake,
+    scene: Scene,
+    /// A scene that the busy worker has not taken yet.
+    unsent: bool,
+    view: ViewState,
+    traces: Traces,
+    toasts: Toasts,
+    thumbnails: BTreeMap<String, egui::TextureHandle>,
+    driver: Option<String>,
+    answers: (Sender<Answer>, Receiver<Answer>),
+    framed: bool,
+}
+
+impl Workbench {
+    /// Starts the simulation and prepares the graphics.
+    pub fn new(ctx: &egui::Context, setup: WorkbenchSetup<'_>) -> Result<Self, String> {
+        let layout = SensorLayout::named(LIVE_LAYOUT).map_err(|e| e.to_string())?;
+        let worker = SimWorker::start(SimWorkerSetup {
+            scene: setup.scene.clone(),
+            layout,
+            store: setup.store,
+            recording: true,
+            grasps: GRASPS,
+            wake: Arc::clone(&setup.wake),
+        })
+        .map_err(|e| format!("the simulation could not be started: {e}"))?;
+        let driver = setup.render_state.map(|state| {
+            Viewport::install(state);
+            describe_adapter(&state.adapter.get_info())
+        });
+        let mut view = setup.view;
+        if !panels::is_complete(&view.layout) {
+            view.layout = panels::default_layout();
+        }
+        theme::apply(ctx, view.theme);
+        Ok(Self {
+            worker,
+            wake: setup.wake,
+            scene: setup.scene,
+            unsent: false,
+            view,
+            traces: Traces::default(),
+            toasts: Toasts::default().with_anchor(egui_notify::Anchor::BottomRight).with_margin(egui::vec2(12.0, 56.0)),
+            thumbnails: load_thumbnails(ctx),
+            driver,
+            answers: channel(),
+            framed: false,
+        })
+    }
+
+    /// How the user looks at things, to be remembered.
+    pub fn view(&self) -> &ViewState {
+        &self.view
+    }
+
+    /// The newest state of the simulation.
+    pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
+        self.worker.snapshot()
+    }
+
+    /// Tells the simulation something, as a panel would.
+    pub fn act(&mut self, ctx: &egui::Context, action: Action) {
+        self.apply(ctx, action);
+    }
+
+    /// Draws everything once.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        let ctx = ui.ctx().clone();
+        self.gather(&ctx);
+        let snapshot = self.worker.snapshot();
+        if let Some(snapshot) = snapshot.as_deref().filter(|_| !self.framed) {
+            // The first picture shows everything, whatever the window's shape.
+            self.frame_all(snapshot);
+            self.framed = true;
+        }
+        let mut actions = Vec::new();
+        // The tree of panels is changed while it is drawn, so it is taken out for that time.
+        let mut layout = std::mem::replace(&mut self.view.layout, egui_tiles::Tree::empty(egui::Id::unique("drawing")));
+        let context = PanelContext {
+            snapshot: snapshot.as_deref(),
+            scene: &self.scene,
+            traces: &self.traces,
+            view: &self.view,
+            thumbnails: &self.thumbnails,
+            driver: self.driver.as_deref(),
+        };
+        actions.extend(keys::pressed(&ctx, &context));
+        let colours = self.view.theme.colours();
+        let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
+        Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, &context, &mut actions));
+        Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, &context, &mut actions));
+        let ground = Frame::new().fill(colour(colours.border));
+        CentralPanel::default().frame(ground).show(ui, |ui| {
+            layout.ui(&mut Tiling { context: &context, actions: &mut actions }, ui);
+        });
+        keys::sheet(&ctx, self.view.keys_shown, &mut actions);
+        drop_hint(&ctx);
+        self.view.layout = layout;
+        for action in actions {
+            self.apply(&ctx, action);
+        }
+        self.toasts.show(&ctx);
+    }
+
+    /// Takes in what other threads and the desktop have brought since the last frame.
+    fn gather(&mut self, ctx: &egui::Context) {
+        if self.worker.take_rows_lost() {
+            self.traces.clear();
+        }
+        for row in self.worker.rows() {
+            self.traces.push(&row);
+        }
+        let notices: Vec<Notice> = self.worker.notices().collect();
+        for notice in notices {
+            match notice {
+                Notice::Warning(text) => self.tell(Message::Warning(text)),
+                Notice::Failed(text) => {
+                    self.recover_from(&text);
+                    self.tell(Message::Error(text));
+                }
+                Notice::Stored(id) => self.tell(Message::Info(format!("trial {id} stored"))),
+            }
+        }
+        let answers: Vec<Answer> = self.answers.1.try_iter().collect();
+        for answer in answers {
+            self.take_answer(ctx, answer);
+        }
+        let dropped = ctx.input(|i| i.raw.dropped_files.clone());
+        for file in dropped {
+            self.open(&file.path().to_string_lossy());
+        }
+        if self.unsent {
+            self.send_scene();
+        }
+    }
+
+    /// After a failed load the old object is still in the hand, and the list should say so.
+    fn recover_from(&mut self, _failure: &str) {
+        if let Some(snapshot) = self.worker.snapshot() {
+            self.scene.object.source.clone_from(&snapshot.scene.object.source);
+        }
+    }
+
+    fn tell(&mut self, message: Message) {
+        // Long sentences stay until they have been read.
+        let time = |text: &str| Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
+        match message {
+            Message::Info(text) => {
+                let duration = time(&text);
+                self.toasts.info(text).duration(Some(duration)).show_progress_bar(false);
+            }
+            Message::Warning(text) => {
+                let duration = time(&text);
+                self.toasts.warning(text).duration(Some(duration)).show_progress_bar(false);
+            }
+            Message::Error(text) => {
+                let duration = time(&text) * 2;
+                self.toasts.error(text).duration(Some(duration)).show_progress_bar(false);
+            }
+        }
+    }
+
+    fn apply(&mut self, ctx: &egui::Context, action: Action) {
+        match action {
+            Action::Simulation(command) => {
+                if !self.worker.send(command) {
+                    self.tell(Message::Warning("the simulation is busy; try again in a moment".to_owned()));
+                }
+            }
+            Action::SetScene(scene) => self.set_scene(*scene),
+            Action::OpenObject(source) => self.open(&source),
+            Action::PickFile => self.ask(Ask::Object),
+            Action::SaveScene => self.ask(Ask::SaveScene),
+            Action::SavePicture => self.ask(Ask::SavePicture),
+            Action::SetCamera(camera) => self.view.camera = camera,
+            Action::FrameAll => {
+                if let Some(snapshot) = self.worker.snapshot() {
+                    self.frame_all(&snapshot);
+                }
+            }
+            Action::SetTheme(theme) => {
+                self.view.theme = theme;
+                theme::apply(ctx, theme);
+            }
+            Action::SetForces(forces) => self.view.forces = forces,
+            Action::SetTimeWindow(window) => self.view.time_window = window,
+            Action::ShowKeys(shown) => self.view.keys_shown = shown,
+            Action::ResetLayout => self.view.layout = panels::default_layout(),
+            Action::Tell(message) => self.tell(message),
+        }
+        ctx.request_repaint();
+    }
+
+    fn frame_all(&mut self, snapshot: &Snapshot) {
+        let (centre, radius) = snapshot.stage.bounds();
+        self.view.camera = self.view.camera.framing(centre, radius);
+    }
+
+    fn ask(&mut self, what: Ask) {
+        let wake = Arc::clone(&self.wake);
+        ask(what, &self.answers.0, move || wake());
+    }
+
+    fn take_answer(&mut self, ctx: &egui::Context, answer: Answer) {
+        match answer {
+            Answer::Open(path) => self.open(&path.to_string_lossy()),
+            Answer::SaveScene(path) => self.save_scene(&path),
+            Answer::SavePicture(path) => self.save_picture(path),
+            Answer::Tell(message) => self.tell(message),
+        }
+        ctx.request_repaint();
+    }
+
+    /// Grasps a built-in object, a file, or the scene in a scene file.
+    fn open(&mut self, source: &str) {
+        if source.to_ascii_lowercase().ends_with(".toml") {
+            match Scene::from_file(Path::new(source)) {
+                Ok(scene) => self.set_scene(scene),
+                Err(error) => self.tell(Message::Error(error.to_string())),
+            }
+            return;
+        }
+        let built_in = source == EMPTY || catalogue().iter().any(|b| b.name == source);
+        if !built_in {
+            self.view.remember_file(source);
+        }
+        let mut scene = self.scene.clone();
+        source.clone_into(&mut scene.object.source);
+        // Mass and size belong to the object that was there before.
+        let fresh = Scene::default().object;
+        scene.object.mass = fresh.mass;
+        scene.object.friction = fresh.friction;
+        scene.object.scale = fresh.scale;
+        scene.object.rotation_deg = fresh.rotation_deg;
+        self.set_scene(scene);
+    }
+
+    fn set_scene(&mut self, scene: Scene) {
+        if let Err(error) = scene.check() {
+            return self.tell(Message::Error(error.to_string()));
+        }
+        self.scene = scene;
+        self.send_scene();
+    }
+
+    fn send_scene(&mut self) {
+        self.unsent = !self.worker.send(Command::SetScene(Box::new(self.scene.clone())));
+    }
+
+    fn save_scene(&mut self, path: &Path) {
+        match std::fs::write(path, self.scene.to_toml()) {
+            Ok(()) => self.tell(Message::Info(format!("scene saved as {}", path.display()))),
+            Err(error) => self.tell(Message::Error(format!("cannot write {}: {error}", path.display()))),
+        }
+    }
+
+    /// Draws the view once more, off-screen and twice as fine, in a thread of its own.
+    fn save_picture(&mut self, path: PathBuf) {
+        let Some(snapshot) = self.worker.snapshot() else { return };
+        let size = Vec2::new(800.0, 560.0);
+        let view = PictureView {
+            camera: self.view.camera,
+            theme: self.view.theme,
+            forces: self.view.forces,
+            size,
+            badge: Some("SIMULATED".to_owned()),
+            ..PictureView::default()
+        };
+        let (answers, wake) = (self.answers.0.clone(), Arc::clone(&self.wake));
+        let draw = move || {
+            let drawn = draw_picture(&snapshot, &view, &path);
+            let message = match drawn {
+                Ok(()) => Message::Info(format!("picture saved as {}", path.display())),
+                Err(text) => Message::Error(text),
+            };
+            let _heard = answers.send(Answer::Tell(message));
+            wake();
+        };
+        if let Err(error) = std::thread::Builder::new().name("picture".to_owned()).spawn(draw) {
+            self.tell(Message::Error(format!("the picture could not be drawn: {error}")));
+        }
+    }
+}
+
+fn draw_picture(snapshot: &Snapshot, view: &PictureView, path: &Path) -> Result<(), String> {
+    let gpu = Gpu::headless(DriverChoice::Any).map_err(|e| e.to_string())?;
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+    let pixels = [view.size.x, view.size.y].map(|side| (side * PICTURE_SCALE) as u32);
+    let list = snapshot.stage.draw(&snapshot.frame, view);
+    let picture = Picture::draw(&gpu, &mut renderer, &list, pixels, PICTURE_SCALE).map_err(|e| e.to_string())?;
+    picture.save(path).map_err(|e| e.to_string())
+}
+
+/// Pictures of the built-in objects, as textures.
+fn load_thumbnails(ctx: &egui::Context) -> BTreeMap<String, egui::TextureHandle> {
+    let mut textures = BTreeMap::new();
+    for built_in in catalogue() {
+        if let Some(picture) = thumbnail(&built_in.name).and_then(|bytes| Picture::from_png(bytes).ok()) {
+            let size = [picture.width as usize, picture.height as usize];
+            let image = egui::ColorImage::from_rgba_unmultiplied(size, &picture.rgba);
+            let texture = ctx.load_texture(&built_in.name, image, egui::TextureOptions::LINEAR);
+            textures.insert(built_in.name.clone(), texture);
+        }
+    }
+    textures
+}
+
+/// While a file hovers over the window: what will happen when it is dropped.
+fn drop_hint(ctx: &egui::Context) {
+    if ctx.input(|i| i.raw.hovered_files.is_empty()) {
+        return;
+    }
+    let rect = ctx.content_rect();
+    let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop hint"));
+    let painter = ctx.layer_painter(layer);
+    painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(150));
+    let font = egui::FontId::proportional(22.0);
+    let text = "Drop a URDF, OBJ or STL file to grasp it";
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
+}
+
+/// How panels stand beside each other.
+struct Tiling<'a, 'b> {
+    context: &'a PanelContext<'b>,
+    actions: &'a mut Vec<Action>,
+}
+
+impl Tiling<'_, '_> {
+    fn theme(&self) -> Theme {
+        self.context.view.theme
+    }
+}
+
+impl Behavior<String> for Tiling<'_, '_> {
+    fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
+        panels::named(pane).map_or(pane.as_str(), |panel| panel.title).into()
+    }
+
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut String) -> UiResponse {
+        let colours = self.theme().colours();
+        let Some(panel) = panels::named(pane) else { return UiResponse::None };
+        let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
+        Frame::new().fill(colour(colours.background)).inner_margin(margin).show(ui, |ui| {
+            ui.set_min_size(ui.available_size());
+            (panel.ui)(ui, self.context, self.actions);
+        });
+        UiResponse::None
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
+    }
+
+    fn gap_width(&self, _style: &egui::Style) -> f32 {
+        2.0
+    }
+
+    fn min_size(&self) -> f32 {
+        70.0
+    }
+
+    fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
+        26.0
+    }
+
+    fn tab_bar_color(&self, _visuals: &egui::Visuals) -> egui::Color32 {
+        colour(self.theme().colours().raised)
+    }
+
+    fn tab_bg_color(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<String>,
+        _tile: TileId,
+        state: &TabState,
+    ) -> egui::Color32 {
+        let colours = self.theme().colours();
+        colour(if state.active { colours.background } else { colours.raised })
+    }
+
+    fn tab_text_color(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<String>,
+        _tile: TileId,
+        state: &TabState,
+    ) -> egui::Color32 {
+        let colours = self.theme().colours();
+        colour(if state.active { colours.text } else { colours.quiet_text })
+    }
+
+    fn tab_outline_stroke(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<String>,
+        _tile: TileId,
+        _state: &TabState,
+    ) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+
+    fn tab_bar_hline_stroke(&self, _visuals: &egui::Visuals) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+}

@@ -1,0 +1,218 @@
+//! `palpate demo`: grasps an object in a few random poses, tells the story, and writes a picture of each grasp. It needs
+//! no display, and shows what the window would.
+
+use super::Failure;
+use super::setup::{SceneArguments, open_store};
+use super::terminal::{say, say_json, warn};
+use glam::Vec2;
+use palpate_core::drawing::Camera;
+use palpate_core::grasping::{GraspSummary, PoseJitter, grasp, jittered};
+use palpate_core::gripper::Phase;
+use palpate_core::objects::{ObjectModel, catalogue};
+use palpate_core::palette::Theme;
+use palpate_core::picture::{PictureView, Stage};
+use palpate_core::recording::TrialId;
+use palpate_core::scene::Scene;
+use palpate_core::trial::Trial;
+use palpate_core::units::{mm, three_digits};
+use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use rand::RngExt;
+use rand::SeedableRng;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate demo`.
+#[derive(Debug, clap::Args)]
+pub(super) struct DemoArguments {
+    /// A built-in name, or a URDF, OBJ or STL file; without it one of the sixteen is drawn at random.
+    #[arg(long, value_name = "NAME|FILE")]
+    object: Option<String>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Chooses object and poses; the same seed tells the same story.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// How many grasps.
+    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    grasps: u32,
+    /// Where the pictures go.
+    #[arg(long, value_name = "FOLDER", default_value = "palpate-demo")]
+    out: PathBuf,
+    /// Do not keep the trials in the store.
+    #[arg(long)]
+    no_store: bool,
+    /// Print one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Story {
+    object: String,
+    seed: u64,
+    grasps: Vec<Told>,
+}
+
+#[derive(Serialize)]
+struct Told {
+    seed: u64,
+    offset_mm: [f64; 3],
+    yaw_deg: f64,
+    picture: Option<PathBuf>,
+    trial_id: Option<TrialId>,
+    #[serde(flatten)]
+    summary: GraspSummary,
+}
+
+/// Pixels of a picture.
+const SIZE: [u32; 2] = [1280, 800];
+
+pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let seed = arguments.seed.unwrap_or_else(|| rand::rng().random_range(0..1_000_000));
+    let name = arguments.object.clone().unwrap_or_else(|| random_object(seed));
+    let nominal = arguments.scene.scene(Some(&name))?;
+    let object = nominal.load_object()?;
+    let mut store = if arguments.no_store { None } else { Some(open_store(store)?) };
+    let mut painter = match Painter::new() {
+        Ok(painter) => Some(painter),
+        Err(failure) => {
+            warn(&format!("no pictures: {failure}"));
+            None
+        }
+    };
+    let mut story = Story { object: name, seed, grasps: Vec::new() };
+    if !arguments.json {
+        introduce(&story.object, object.as_ref(), seed)?;
+    }
+    for k in 0..arguments.grasps {
+        let pose_seed = seed.wrapping_add(u64::from(k)).wrapping_add(1);
+        let (scene, _) = jittered(&nominal, object.as_ref(), PoseJitter::default(), pose_seed);
+        let trial = grasp(&scene, object.as_ref(), pose_seed);
+        let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?;
+        let picture = match &mut painter {
+            Some(painter) => {
+                let path = arguments.out.join(format!("{}_grasp_{}.png", plain(&trial.info.object), k + 1));
+                painter.paint(&scene, object.as_ref(), &trial, &path)?;
+                Some(path)
+            }
+            None => None,
+        };
+        let summary = GraspSummary::new(&trial, &scene);
+        let mount = &scene.gripper.mount;
+        let told = Told {
+            seed: pose_seed,
+            offset_mm: mount.offset.map(|x| (x * 1e5).round() * 1e-2),
+            yaw_deg: (mount.yaw_deg * 10.0).round() * 0.1,
+            picture,
+            trial_id,
+            summary,
+        };
+        if !arguments.json {
+            tell(k + 1, arguments.grasps, &told)?;
+        }
+        story.grasps.push(told);
+    }
+    if arguments.json { say_json(&story) } else { conclude(&story) }
+}
+
+fn random_object(seed: u64) -> String {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let all = catalogue();
+    all[random.random_range(0..all.len())].name.clone()
+}
+
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect()
+}
+
+fn introduce(name: &str, object: Option<&ObjectModel>, seed: u64) -> Result<(), Failure> {
+    let Some(object) = object else { return say("The hand stays empty.") };
+    let title = catalogue().iter().find(|b| b.name == name).map_or(object.name.as_str(), |b| b.title.as_str());
+    let size = object.bounds.size().to_array().map(|side| format!("{:.0}", mm(side)));
+    let grams = three_digits(object.mass.mass * 1e3);
+    say(format!("On the pedestal: {title} ({} mm, {grams} g). Seed {seed}.", size.join(" x ")))?;
+    for warning in &object.warnings {
+        warn(warning);
+    }
+    Ok(())
+}
+
+fn tell(number: u32, of: u32, told: &Told) -> Result<(), Failure> {
+    let [x, y, z] = told.offset_mm.map(|v| format!("{v:+.1}"));
+    say("")?;
+    say(format!("Grasp {number} of {of}, {x} {y} {z} mm off and turned by {:+.0} degrees.", told.yaw_deg))?;
+    let summary = &told.summary;
+    match summary.contact_onset_s {
+        Some(onset) => say(format!("  The fingers close and touch it after {onset:.2} s."))?,
+        None => say("  The fingers close and never touch it.")?,
+    }
+    if let Some(hold) = &summary.hold {
+        let [left, right] = hold.curvature_per_m.map(three_digits);
+        say(format!("  They bend to {left} and {right} 1/m,"))?;
+        let [left, right] = hold.force_n.map(three_digits);
+        let [low, high] = hold.pressure_pa.map(|p| three_digits(p * 1e-3));
+        say(format!("  and hold it with {left} and {right} N, which is {low} and {high} kPa on the pads."))?;
+        if summary.contact_onset_s.is_some() && hold.force_n == [0.0, 0.0] {
+            say("  It has slipped out of their grasp.")?;
+        }
+    }
+    if let Some(moved) = summary.object_moved_m.filter(|moved| *moved > 1e-4) {
+        say(format!("  It has moved by {} mm to find its place between them.", three_digits(mm(moved))))?;
+    }
+    // What was said while loading need not be said again.
+    for warning in summary.warnings.iter().filter(|w| w.contains("fingers") || w.contains("steps")) {
+        warn(warning);
+    }
+    Ok(())
+}
+
+fn conclude(story: &Story) -> Result<(), Failure> {
+    say("")?;
+    let pictures: Vec<String> =
+        story.grasps.iter().filter_map(|g| Some(g.picture.as_ref()?.display().to_string())).collect();
+    if !pictures.is_empty() {
+        say(format!("Pictures: {}", pictures.join(", ")))?;
+    }
+    let trials: Vec<String> = story.grasps.iter().filter_map(|g| Some(g.trial_id?.to_string())).collect();
+    if !trials.is_empty() {
+        say(format!("Trials: {} (see `palpate trials list`)", trials.join(", ")))?;
+    }
+    Ok(())
+}
+
+/// Draws the end of the hold.
+struct Painter {
+    gpu: Gpu,
+    renderer: Renderer,
+}
+
+impl Painter {
+    fn new() -> Result<Self, Failure> {
+        let gpu = Gpu::headless(DriverChoice::Any)?;
+        let renderer = Renderer::new(&gpu.device, &gpu.queue);
+        Ok(Self { gpu, renderer })
+    }
+
+    fn paint(
+        &mut self,
+        scene: &Scene,
+        object: Option<&ObjectModel>,
+        trial: &Trial,
+        path: &Path,
+    ) -> Result<(), Failure> {
+        let held = trial.frames.iter().rfind(|f| f.phase == Phase::Hold).or(trial.frames.last());
+        let Some(frame) = held else { return Ok(()) };
+        let stage = Stage::new(scene, object, trial.info.world_from_gripper);
+        let (centre, radius) = stage.bounds();
+        let view = PictureView {
+            camera: Camera::default().framing(centre, radius),
+            theme: Theme::Dark,
+            size: Vec2::new(SIZE[0] as f32, SIZE[1] as f32),
+            badge: Some("SIMULATED".to_owned()),
+            ..PictureView::default()
+        };
+        let list = stage.draw(frame, &view);
+        Picture::draw(&self.gpu, &mut self.renderer, &list, SIZE, 1.0)?.save(path)?;
+        Ok(())
+    }
+}
