@@ -86,26 +86,29 @@ pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Ac
 /// The sheet of keys and of what the mouse does.
 pub(super) fn sheet(ctx: &egui::Context, shown: bool, actions: &mut Vec<Action>) {
     let mut open = shown;
+    let room = ctx.content_rect().height() - 90.0;
     egui::Window::new("Keys").open(&mut open).collapsible(false).resizable(false).default_width(330.0).show(
         ctx,
         |ui| {
-            egui::Grid::new("keys").num_columns(2).spacing([22.0, 4.0]).show(ui, |ui| {
-                for binding in &ALL {
-                    ui.monospace(ctx.format_shortcut(&binding.shortcut));
-                    ui.label(binding.does);
-                    ui.end_row();
-                }
-                for (how, does) in [
-                    ("drag", "turn the view"),
-                    ("right drag", "shift the view"),
-                    ("wheel", "zoom the view; in a plot, time"),
-                    ("double click", "show everything"),
-                    ("Ctrl+drag", "pull at the object"),
-                ] {
-                    ui.monospace(how);
-                    ui.label(does);
-                    ui.end_row();
-                }
+            egui::ScrollArea::vertical().max_height(room).show(ui, |ui| {
+                egui::Grid::new("keys").num_columns(2).spacing([22.0, 4.0]).show(ui, |ui| {
+                    for binding in &ALL {
+                        ui.monospace(ctx.format_shortcut(&binding.shortcut));
+                        ui.label(binding.does);
+                        ui.end_row();
+                    }
+                    for (how, does) in [
+                        ("drag", "turn the view"),
+                        ("right drag", "shift the view"),
+                        ("wheel", "zoom the view; in a plot, time"),
+                        ("double click", "show everything"),
+                        ("Ctrl+drag", "pull at the object"),
+                    ] {
+                        ui.monospace(how);
+                        ui.label(does);
+                        ui.end_row();
+                    }
+                });
             });
         },
     );

@@ -64,6 +64,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             scene: options.scene,
             store: options.store,
             view,
+            playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),
         };

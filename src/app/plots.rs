@@ -67,7 +67,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
         .set_margin_fraction(egui::Vec2::ZERO);
     if show_legend {
         let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
-        widget = widget.legend(legend.position(egui_plot::Corner::LeftTop));
+        widget = widget.legend(legend.position(egui_plot::Corner::RightTop));
     }
     let response = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(from..=to);

@@ -178,7 +178,10 @@ impl Surroundings {
     /// What still came out of the windowing library, in our words.
     pub(super) fn explain(&self, error: &eframe::Error) -> String {
         let text = error.to_string();
-        let dead = text.contains("XOpenDisplayFailed") || text.contains("NoCompositor") || text.contains("Connection");
+        let dead = text.contains("XOpenDisplayFailed")
+            || text.contains("NoCompositor")
+            || text.contains("Connection")
+            || text.contains("X server");
         if dead {
             let display = env::var("DISPLAY").unwrap_or_default();
             return format!("the display \"{display}\" does not answer; {NO_DISPLAY}");

@@ -3,7 +3,7 @@
 
 use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
-use super::panels::{self, PanelContext};
+use super::panels::{self, PanelContext, PanelKind};
 use super::theme::{self, colour};
 use super::traces::Traces;
 use super::view_state::ViewState;
@@ -20,7 +20,7 @@ use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::workers::{Command, Notice, SimWorker, SimWorkerSetup, Snapshot, Wake};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -34,6 +34,8 @@ pub struct WorkbenchSetup<'a> {
     pub store: PathBuf,
     /// How the user looked at things last time.
     pub view: ViewState,
+    /// Whether the first grasp runs by itself.
+    pub playing: bool,
     /// Asks for the window to be drawn again; called from other threads.
     pub wake: Wake,
     /// Where the 3-D view is drawn; without it the rest works.
@@ -60,8 +62,13 @@ pub struct Workbench {
     thumbnails: BTreeMap<String, egui::TextureHandle>,
     driver: Option<String>,
     answers: (Sender<Answer>, Receiver<Answer>),
+    /// What the user was told last, oldest first.
+    messages: VecDeque<String>,
     framed: bool,
 }
+
+/// Messages that are kept.
+const MOST_MESSAGES: usize = 50;
 
 impl Workbench {
     /// Starts the simulation and prepares the graphics.
@@ -73,6 +80,7 @@ impl Workbench {
             store: setup.store,
             recording: true,
             grasps: GRASPS,
+            playing: setup.playing,
             wake: Arc::clone(&setup.wake),
         })
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
@@ -96,6 +104,7 @@ impl Workbench {
             thumbnails: load_thumbnails(ctx),
             driver,
             answers: channel(),
+            messages: VecDeque::new(),
             framed: false,
         })
     }
@@ -110,7 +119,12 @@ impl Workbench {
         self.worker.snapshot()
     }
 
-    /// Tells the simulation something, as a panel would.
+    /// What the user was told last, oldest first.
+    pub fn messages(&self) -> &VecDeque<String> {
+        &self.messages
+    }
+
+    /// Does what a panel could ask for.
     pub fn act(&mut self, ctx: &egui::Context, action: Action) {
         self.apply(ctx, action);
     }
@@ -128,14 +142,7 @@ impl Workbench {
         let mut actions = Vec::new();
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
         let mut layout = std::mem::replace(&mut self.view.layout, egui_tiles::Tree::empty(egui::Id::unique("drawing")));
-        let context = PanelContext {
-            snapshot: snapshot.as_deref(),
-            scene: &self.scene,
-            traces: &self.traces,
-            view: &self.view,
-            thumbnails: &self.thumbnails,
-            driver: self.driver.as_deref(),
-        };
+        let context = self.panel_context(snapshot.as_deref());
         actions.extend(keys::pressed(&ctx, &context));
         let colours = self.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
@@ -152,6 +159,32 @@ impl Workbench {
             self.apply(&ctx, action);
         }
         self.toasts.show(&ctx);
+    }
+
+    /// Draws one panel alone, as large as there is room.
+    pub fn panel_ui(&mut self, ui: &mut Ui, panel: &PanelKind) {
+        let ctx = ui.ctx().clone();
+        self.gather(&ctx);
+        let snapshot = self.worker.snapshot();
+        let mut actions = Vec::new();
+        panel_frame(panel, self.view.theme).show(ui, |ui| {
+            ui.set_min_size(ui.available_size());
+            (panel.ui)(ui, &self.panel_context(snapshot.as_deref()), &mut actions);
+        });
+        for action in actions {
+            self.apply(&ctx, action);
+        }
+    }
+
+    fn panel_context<'a>(&'a self, snapshot: Option<&'a Snapshot>) -> PanelContext<'a> {
+        PanelContext {
+            snapshot,
+            scene: &self.scene,
+            traces: &self.traces,
+            view: &self.view,
+            thumbnails: &self.thumbnails,
+            driver: self.driver.as_deref(),
+        }
     }
 
     /// Takes in what other threads and the desktop have brought since the last frame.
@@ -194,6 +227,11 @@ impl Workbench {
     }
 
     fn tell(&mut self, message: Message) {
+        let (Message::Info(text) | Message::Warning(text) | Message::Error(text)) = &message;
+        self.messages.push_back(text.clone());
+        if self.messages.len() > MOST_MESSAGES {
+            self.messages.pop_front();
+        }
         // Long sentences stay until they have been read.
         let time = |text: &str| Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         match message {
@@ -371,6 +409,12 @@ fn drop_hint(ctx: &egui::Context) {
     painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
 }
 
+/// Ground and margin of a panel.
+fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {
+    let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
+    Frame::new().fill(colour(theme.colours().background)).inner_margin(margin)
+}
+
 /// How panels stand beside each other.
 struct Tiling<'a, 'b> {
     context: &'a PanelContext<'b>,
@@ -389,10 +433,8 @@ impl Behavior<String> for Tiling<'_, '_> {
     }
 
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut String) -> UiResponse {
-        let colours = self.theme().colours();
         let Some(panel) = panels::named(pane) else { return UiResponse::None };
-        let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
-        Frame::new().fill(colour(colours.background)).inner_margin(margin).show(ui, |ui| {
+        panel_frame(panel, self.theme()).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
             (panel.ui)(ui, self.context, self.actions);
         });

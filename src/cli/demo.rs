@@ -38,6 +38,9 @@ pub(super) struct DemoArguments {
     /// Where the pictures go.
     #[arg(long, value_name = "FOLDER", default_value = "palpate-demo")]
     out: PathBuf,
+    /// Do not draw.
+    #[arg(long)]
+    no_pictures: bool,
     /// Do not keep the trials in the store.
     #[arg(long)]
     no_store: bool,
@@ -73,13 +76,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let nominal = arguments.scene.scene(Some(&name))?;
     let object = nominal.load_object()?;
     let mut store = if arguments.no_store { None } else { Some(open_store(store)?) };
-    let mut painter = match Painter::new() {
-        Ok(painter) => Some(painter),
-        Err(failure) => {
-            warn(&format!("no pictures: {failure}"));
-            None
-        }
-    };
+    let mut painter = if arguments.no_pictures { None } else { Painter::find() };
     let mut story = Story { object: name, seed, grasps: Vec::new() };
     if !arguments.json {
         introduce(&story.object, object.as_ref(), seed)?;
@@ -187,10 +184,18 @@ struct Painter {
 }
 
 impl Painter {
-    fn new() -> Result<Self, Failure> {
-        let gpu = Gpu::headless(DriverChoice::Any)?;
-        let renderer = Renderer::new(&gpu.device, &gpu.queue);
-        Ok(Self { gpu, renderer })
+    /// A painter, or a warning where nothing can draw.
+    fn find() -> Option<Self> {
+        match Gpu::headless(DriverChoice::Any) {
+            Ok(gpu) => {
+                let renderer = Renderer::new(&gpu.device, &gpu.queue);
+                Some(Self { gpu, renderer })
+            }
+            Err(error) => {
+                warn(&format!("no pictures: {error}"));
+                None
+            }
+        }
     }
 
     fn paint(

@@ -10,7 +10,8 @@ mod trials;
 mod workshop;
 
 use crate::app::{WindowOptions, open_window};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use palpate_core::objects::{EMPTY, LoadOptions, catalogue, load};
 use palpate_core::recording::Store;
 use palpate_core::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -24,7 +25,7 @@ type Failure = Box<dyn std::error::Error>;
 /// Without a command it opens the window, with OBJECT or the lemon on the pedestal. Everything the window does can
 /// also be done here, without a display.
 #[derive(Debug, Parser)]
-#[command(name = "palpate", version, about, long_about, args_conflicts_with_subcommands = true)]
+#[command(name = "palpate", version, about, long_about)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
@@ -59,6 +60,7 @@ fn window(object: Option<&str>, store: Option<&Path>) -> Result<(), Failure> {
         if object.to_ascii_lowercase().ends_with(".toml") {
             scene = Scene::from_file(Path::new(object))?;
         } else {
+            refuse_typing_errors(object)?;
             object.clone_into(&mut scene.object.source);
         }
     }
@@ -66,9 +68,31 @@ fn window(object: Option<&str>, store: Option<&Path>) -> Result<(), Failure> {
     Ok(open_window(WindowOptions { scene, store })?)
 }
 
+/// A word that is neither a command nor an object would open a window with nothing in it.
+fn refuse_typing_errors(object: &str) -> Result<(), Failure> {
+    let known = object == EMPTY || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
+    if known {
+        return Ok(());
+    }
+    if Path::new(object).extension().is_none() {
+        let commands = Arguments::command();
+        let names: Vec<&str> = commands.get_subcommands().filter(|c| !c.is_hide_set()).map(|c| c.get_name()).collect();
+        let text = format!("'{object}' is neither a command ({}) nor an object", names.join(", "));
+        Arguments::command().error(clap::error::ErrorKind::InvalidSubcommand, text).exit();
+    }
+    load(object, &LoadOptions::default())?;
+    Ok(())
+}
+
 /// Runs the program as its arguments ask.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
+    if let (Some(object), Some(_)) = (&arguments.object, &arguments.command) {
+        let text =
+            format!("'{object}' stands before a command; name the object after it, as in palpate grasp {object}");
+        Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
+    }
+    terminal::show_log();
     let store = arguments.store.as_deref();
     let outcome = match arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(&grasp, store),

@@ -3,6 +3,9 @@
 use super::Failure;
 use std::error::Error;
 use std::io::{ErrorKind, Write};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 /// Prints a line of results.
 pub(super) fn say(line: impl std::fmt::Display) -> Result<(), Failure> {
@@ -19,6 +22,14 @@ pub(super) fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
 pub(super) fn warn(line: &str) {
     // When standard error is closed there is nobody to tell.
     let _unheard = writeln!(std::io::stderr(), "warning: {line}");
+}
+
+/// Shows what the program itself logs as a warning or worse on standard error; libraries keep their thoughts to
+/// themselves.
+pub(super) fn show_log() {
+    let ours = ["palpate", "palpate_core", "palpate_render"].map(|name| (name, LevelFilter::WARN));
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).without_time().with_target(false);
+    tracing_subscriber::registry().with(lines.with_filter(Targets::new().with_targets(ours))).init();
 }
 
 /// Prints why a command failed.

@@ -1,1 +1,26 @@
-fn main() {}
+//! Everything that takes more than one module to test, in one binary because linking is slow.
+//!
+//! - `architecture`: the layers and the homes of third-party crates, read off the sources.
+//! - `physics`: whole grasps of every object; no allocation in a step.
+//! - `determinism`: the same seed gives the same bytes.
+//! - `files`: objects and scenes from elsewhere, sound and malformed.
+//! - `store`: kills and second programs.
+//! - `command_line`: exit codes, messages, JSON.
+//! - `panels`: the window by its labels, and small pictures of its panels.
+//! - `pictures`: golden pictures of the off-screen view and of the window.
+//!
+//! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
+
+mod allocations;
+mod architecture;
+mod bench;
+mod command_line;
+mod cpu_renderer;
+mod determinism;
+mod files;
+mod golden;
+mod panels;
+mod physics;
+mod pictures;
+mod program;
+mod store;

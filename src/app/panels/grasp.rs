@@ -14,7 +14,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Act
         ui.weak("Waiting for the first grasp ..");
         return;
     };
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         match &snapshot.object {
             Some(object) => object_ui(ui, object),
             None => {

@@ -8,7 +8,7 @@ use palpate_core::scene::{Accuracy, Auto, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let mut scene = context.scene.clone();
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         section(ui, "Object", true, |ui| object_ui(ui, &mut scene, context));
         section(ui, "Gripper pose", true, |ui| pose_ui(ui, &mut scene));
         section(ui, "Programme", true, |ui| programme_ui(ui, &mut scene));
@@ -82,10 +82,11 @@ fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T
 
 /// A number that may be left to Palpate.
 fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
-    ui.label(number.name);
+    let label = ui.label(number.name);
     ui.horizontal(|ui| {
         let mut own = value.value().is_some();
-        if ui.checkbox(&mut own, "").on_hover_text("Set it, instead of taking the object's own").changed() {
+        let tick = ui.add(egui::Checkbox::without_text(&mut own)).labelled_by(label.id);
+        if tick.on_hover_text("Set it, instead of taking the object's own").changed() {
             *value = if own { Auto::Value(known) } else { Auto::Auto };
         }
         let mut shown = value.value().unwrap_or(known) * number.factor;
@@ -94,7 +95,7 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
             .speed(number.speed)
             .max_decimals(3)
             .suffix(format!("\u{2009}{}", number.unit));
-        if ui.add_enabled(own, drag).changed() {
+        if ui.add_enabled(own, drag).labelled_by(label.id).changed() {
             *value = Auto::Value(shown / number.factor);
         }
     });

@@ -38,6 +38,9 @@ pub(super) fn read_referenced(path: &Path) -> std::io::Result<Vec<u8>> {
 /// - `file:///path`, absolute and relative paths: as they are, relative ones from the URDF's folder
 pub(super) fn candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
     let reference = reference.trim();
+    if reference.is_empty() {
+        return Vec::new();
+    }
     if let Some(path) = reference.strip_prefix("file://") {
         return vec![folder.join(path)];
     }

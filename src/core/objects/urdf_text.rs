@@ -84,7 +84,7 @@ pub(super) fn clean(bytes: &[u8]) -> Result<CleanText, String> {
         return Err("it is an SDF file; Palpate reads URDF, OBJ and STL".to_owned());
     }
     if robot.name != "robot" {
-        return Err(format!("its outermost element is <{}>, not <robot>", robot.name));
+        return Err(format!("its outermost element is <{}>, not <robot>; it is not a URDF", robot.name));
     }
     let mut warnings = Vec::new();
     clean_robot(&mut robot, &mut warnings);

@@ -8,10 +8,11 @@
 //!
 //! Deleting marks; purging removes. Chunks are only ever added.
 
-use super::blob::{BlobError, decode_frames, encode_frames};
+use super::blob::{decode_frames, encode_frames};
+use super::store_error::{StoreError, fault, plain};
 use crate::geometry::Pose;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
-use rusqlite::{Connection, ErrorCode, OptionalExtension, Transaction, TransactionBehavior, params};
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -22,9 +23,9 @@ pub type TrialId = i64;
 /// "Palp" in ASCII, in the header of the SQLite file.
 const APPLICATION_ID: i32 = 0x5061_6c70;
 /// Version of the tables below. A store from a newer program is refused, an older one is brought up to date.
-const SCHEMA_VERSION: i32 = 1;
+pub(super) const SCHEMA_VERSION: i32 = 1;
 /// How long to wait for another program that is writing.
-const PATIENCE: Duration = Duration::from_secs(10);
+pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 /// Samples per chunk when a whole trial is stored at once: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
 
@@ -53,91 +54,6 @@ const TABLES: &str = "
     ) WITHOUT ROWID;
     CREATE INDEX trials_by_object ON trials (object);
 ";
-
-/// Why the store cannot do what was asked.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The folder cannot be made.
-    #[error("cannot make the folder \"{path}\" for the store: {cause}", path = path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What the system says.
-        cause: String,
-    },
-    /// SQLite cannot open the file.
-    #[error("cannot open the store \"{path}\": {cause}", path = path.display())]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// What SQLite says.
-        cause: String,
-    },
-    /// A file of another program, or no database at all.
-    #[error("\"{path}\" is not a store of Palpate's; choose another file with --store", path = path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Written by a newer program.
-    #[error(
-        "\"{path}\" was written by a newer Palpate (store version {found}, this program knows {SCHEMA_VERSION}); \
-         update Palpate",
-        path = path.display()
-    )]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        found: i32,
-    },
-    /// Another program has kept the store locked.
-    #[error("the store is busy: another program has been writing to it for {} s; try again", PATIENCE.as_secs())]
-    Busy,
-    /// No space is left.
-    #[error("the disk is full: the trial was not stored. Free some space and record again; earlier trials are safe")]
-    DiskFull,
-    /// The file cannot be written.
-    #[error("the store \"{path}\" cannot be written: it or its folder is read-only", path = path.display())]
-    ReadOnly {
-        /// The file.
-        path: PathBuf,
-    },
-    /// No such trial.
-    #[error("there is no trial {id} in the store{hint}")]
-    NoTrial {
-        /// The number asked for.
-        id: TrialId,
-        /// Where it might be.
-        hint: &'static str,
-    },
-    /// A trial whose frames cannot be read.
-    #[error("trial {id} is damaged in its part {chunk}: {cause}")]
-    Damaged {
-        /// The trial.
-        id: TrialId,
-        /// Which chunk.
-        chunk: i64,
-        /// What is wrong with it.
-        cause: BlobError,
-    },
-    /// A trial whose description cannot be read.
-    #[error("the description of trial {id} is damaged: {cause}")]
-    BadInfo {
-        /// The trial.
-        id: TrialId,
-        /// What is wrong with it.
-        cause: String,
-    },
-    /// Anything else SQLite reports.
-    #[error("the store \"{path}\" reports: {cause}", path = path.display())]
-    Sqlite {
-        /// The file.
-        path: PathBuf,
-        /// What SQLite says.
-        cause: String,
-    },
-}
 
 /// A trial as lists show it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -475,24 +391,6 @@ fn set_complete(
 
 fn json_or_default<T: Default + serde::de::DeserializeOwned>(text: &str) -> T {
     serde_json::from_str(text).unwrap_or_default()
-}
-
-/// SQLite's faults in the words of this program.
-fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
-    match error.sqlite_error_code() {
-        Some(ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
-        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => StoreError::Busy,
-        Some(ErrorCode::DiskFull) => StoreError::DiskFull,
-        Some(ErrorCode::ReadOnly) => StoreError::ReadOnly { path: path.to_owned() },
-        _ => StoreError::Sqlite { path: path.to_owned(), cause: plain(error) },
-    }
-}
-
-fn plain(error: &rusqlite::Error) -> String {
-    match error {
-        rusqlite::Error::SqliteFailure(_, Some(message)) => message.clone(),
-        other => other.to_string(),
-    }
 }
 
 /// True where the file's mount is a network file system, as far as the system tells (Linux).

@@ -13,11 +13,11 @@
 //! their order and none is lost.
 
 mod latest;
+mod messages;
 mod recorder;
 mod sim;
 
 pub use latest::Latest;
+pub use messages::{Command, FinishedGrasp, Notice, ObjectCard, Snapshot, Status, TraceRow, Wake};
 pub use recorder::{Recorder, RecorderNotice};
-pub use sim::{
-    Command, FinishedGrasp, Notice, ObjectCard, SimWorker, SimWorkerSetup, Snapshot, Status, TraceRow, Wake,
-};
+pub use sim::{SimWorker, SimWorkerSetup};

@@ -1,0 +1,109 @@
+//! What can go wrong with the store, in sentences for the user.
+
+use super::blob::BlobError;
+use super::store::{PATIENCE, SCHEMA_VERSION, TrialId};
+use rusqlite::ErrorCode;
+use std::path::{Path, PathBuf};
+
+/// Why the store cannot do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The folder cannot be made.
+    #[error("cannot make the folder \"{path}\" for the store: {cause}", path = path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// SQLite cannot open the file.
+    #[error("cannot open the store \"{path}\": {cause}", path = path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite says.
+        cause: String,
+    },
+    /// A file of another program, or no database at all.
+    #[error("\"{path}\" is not a store of Palpate's; choose another file with --store", path = path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Written by a newer program.
+    #[error(
+        "\"{path}\" was written by a newer Palpate (store version {found}, this program knows {SCHEMA_VERSION}); \
+         update Palpate",
+        path = path.display()
+    )]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i32,
+    },
+    /// Another program has kept the store locked.
+    #[error("the store is busy: another program has been writing to it for {} s; try again", PATIENCE.as_secs())]
+    Busy,
+    /// No space is left.
+    #[error("the disk is full: the trial was not stored. Free some space and record again; earlier trials are safe")]
+    DiskFull,
+    /// The file cannot be written.
+    #[error("the store \"{path}\" cannot be written: it or its folder is read-only", path = path.display())]
+    ReadOnly {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No such trial.
+    #[error("there is no trial {id} in the store{hint}")]
+    NoTrial {
+        /// The number asked for.
+        id: TrialId,
+        /// Where it might be.
+        hint: &'static str,
+    },
+    /// A trial whose frames cannot be read.
+    #[error("trial {id} is damaged in its part {chunk}: {cause}")]
+    Damaged {
+        /// The trial.
+        id: TrialId,
+        /// Which chunk.
+        chunk: i64,
+        /// What is wrong with it.
+        cause: BlobError,
+    },
+    /// A trial whose description cannot be read.
+    #[error("the description of trial {id} is damaged: {cause}")]
+    BadInfo {
+        /// The trial.
+        id: TrialId,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// Anything else SQLite reports.
+    #[error("the store \"{path}\" reports: {cause}", path = path.display())]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite says.
+        cause: String,
+    },
+}
+
+/// SQLite's faults in the words of this program.
+pub(super) fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
+    match error.sqlite_error_code() {
+        Some(ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => StoreError::Busy,
+        Some(ErrorCode::DiskFull) => StoreError::DiskFull,
+        Some(ErrorCode::ReadOnly) => StoreError::ReadOnly { path: path.to_owned() },
+        _ => StoreError::Sqlite { path: path.to_owned(), cause: plain(error) },
+    }
+}
+
+pub(super) fn plain(error: &rusqlite::Error) -> String {
+    match error {
+        rusqlite::Error::SqliteFailure(_, Some(message)) => message.clone(),
+        other => other.to_string(),
+    }
+}

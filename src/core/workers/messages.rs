@@ -1,0 +1,135 @@
+//! What travels between the simulation's thread and whoever watches it: commands in, snapshots, rows and notices out.
+
+use crate::grasping::GraspSummary;
+use crate::objects::ObjectClass;
+use crate::picture::Stage;
+use crate::recording::TrialId;
+use crate::scene::Scene;
+use crate::sensing::Channel;
+use crate::trial::Frame;
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Called whenever there is something new to show.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// What the simulation can be told.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Grasp another scene, from its start.
+    SetScene(Box<Scene>),
+    /// Go on.
+    Play,
+    /// Stand still.
+    Pause,
+    /// Advance by one sample, then stand still.
+    Step,
+    /// Back to the start of this grasp.
+    Reset,
+    /// Seconds of simulation per second on the wall.
+    SetSpeed(f64),
+    /// How many grasps to make before stopping.
+    SetGrasps(u32),
+    /// Whether trials are stored.
+    SetRecording(bool),
+    /// Pull at the object with this force [N, world axes]; zero lets go.
+    Pull(DVec3),
+    /// End the thread.
+    Quit,
+}
+
+/// What the simulation tells besides pictures and traces.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// Something about the grasp that the user should know.
+    Warning(String),
+    /// Something failed; the sentence says what, and what to try.
+    Failed(String),
+    /// A trial is in the store.
+    Stored(TrialId),
+}
+
+/// One sample as plots need it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TraceRow {
+    /// Which grasp it belongs to; rises by one with each.
+    pub grasp: u64,
+    /// Time in the grasp [s].
+    pub t: f64,
+    /// Line pressure [bar].
+    pub line_bar: f64,
+    /// One value per channel of the snapshot's list; NaN where undefined.
+    pub values: Box<[f32]>,
+}
+
+/// What is known of the object in the hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectCard {
+    /// Short name.
+    pub name: String,
+    /// What people call it.
+    pub title: String,
+    /// Size and shape class, where known.
+    pub class: Option<ObjectClass>,
+    /// Mass [kg].
+    pub mass: f64,
+    /// Friction coefficient.
+    pub friction: f64,
+    /// Extents [m].
+    pub size: DVec3,
+}
+
+/// Where the simulation stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Status {
+    /// An object that is being loaded.
+    pub loading: Option<String>,
+    /// Time passes.
+    pub playing: bool,
+    /// The last grasp has ended.
+    pub finished: bool,
+    /// Wanted speed, as a multiple of real time.
+    pub target_speed: f64,
+    /// Speed over the last half second or so; zero while standing still.
+    pub actual_speed: f64,
+    /// Which grasp of this round, from 1.
+    pub grasp_of_round: u32,
+    /// Grasps in a round.
+    pub grasps: u32,
+    /// Length of a trial [s].
+    pub duration: f64,
+    /// Trials are being stored.
+    pub recording: bool,
+}
+
+/// A grasp that has ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FinishedGrasp {
+    /// Its number, as in [`TraceRow::grasp`].
+    pub grasp: u64,
+    /// What it came to.
+    pub summary: GraspSummary,
+}
+
+/// The newest state of everything, to be drawn.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Rises with every new frame or change.
+    pub revision: u64,
+    /// The number of the grasp, as in [`TraceRow::grasp`].
+    pub grasp: u64,
+    /// The scene as it was set up, with this grasp's pose.
+    pub scene: Arc<Scene>,
+    /// Meshes for the picture.
+    pub stage: Arc<Stage>,
+    /// What is in the hand; absent for an empty hand.
+    pub object: Option<Arc<ObjectCard>>,
+    /// What the values of trace rows are.
+    pub channels: Arc<[Channel]>,
+    /// The newest frame.
+    pub frame: Arc<Frame>,
+    /// Where the simulation stands.
+    pub status: Status,
+    /// The last grasp that ended.
+    pub last: Option<Arc<FinishedGrasp>>,
+}

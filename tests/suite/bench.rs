@@ -1,0 +1,108 @@
+//! A workbench without a window, for tests: it stands still until told, so that pictures and numbers repeat.
+
+use egui_kittest::{Harness, TestRenderer};
+use palpate::app::{Action, PanelKind, ViewState, Workbench, WorkbenchSetup};
+use palpate_core::palette::Theme;
+use palpate_core::scene::Scene;
+use palpate_core::workers::{Command, Snapshot};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+/// What a test starts from.
+pub(crate) struct BenchSetup {
+    pub(crate) object: &'static str,
+    pub(crate) theme: Theme,
+    pub(crate) size: [f32; 2],
+    /// Draw this panel alone instead of the whole window.
+    pub(crate) panel: Option<&'static PanelKind>,
+    pub(crate) render_state: Option<egui_wgpu::RenderState>,
+}
+
+impl Default for BenchSetup {
+    fn default() -> Self {
+        Self { object: "lemon", theme: Theme::Dark, size: [1280.0, 820.0], panel: None, render_state: None }
+    }
+}
+
+/// The workbench and the harness that drives it.
+pub(crate) struct Bench {
+    pub(crate) harness: Harness<'static, Option<Workbench>>,
+    woken: Receiver<()>,
+    _store: tempfile::TempDir,
+}
+
+impl Bench {
+    pub(crate) fn new(setup: BenchSetup, renderer: impl TestRenderer + 'static) -> Self {
+        let store = tempfile::tempdir().unwrap();
+        let path = store.path().join("trials.sqlite");
+        let (wake, woken) = channel();
+        let mut scene = Scene::default();
+        setup.object.clone_into(&mut scene.object.source);
+        let BenchSetup { theme, panel, render_state, size, .. } = setup;
+        let draw = move |ui: &mut egui::Ui, workbench: &mut Option<Workbench>| {
+            let ctx = ui.ctx().clone();
+            let workbench = workbench.get_or_insert_with(|| {
+                let wake = wake.clone();
+                let setup = WorkbenchSetup {
+                    scene: scene.clone(),
+                    store: path.clone(),
+                    view: ViewState { theme, ..ViewState::default() },
+                    playing: false,
+                    wake: Arc::new(move || {
+                        // The test may have stopped listening.
+                        let _heard = wake.send(());
+                    }),
+                    render_state: render_state.as_ref(),
+                };
+                Workbench::new(&ctx, setup).unwrap()
+            });
+            // The harness leaves a margin that a window does not have.
+            let whole = ctx.content_rect();
+            let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(whole));
+            ui.set_clip_rect(whole);
+            match panel {
+                Some(panel) => workbench.panel_ui(&mut ui, panel),
+                None => workbench.ui(&mut ui),
+            }
+        };
+        let harness = Harness::builder().with_size(size).renderer(renderer).build_ui_state(draw, None);
+        let mut bench = Self { harness, woken, _store: store };
+        bench.until(|snapshot| snapshot.status.loading.is_none());
+        bench
+    }
+
+    /// Draws until the simulation is as wanted.
+    pub(crate) fn until(&mut self, wanted: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
+        loop {
+            self.harness.step();
+            if let Some(snapshot) = self.workbench().snapshot().filter(|s| wanted(s)) {
+                // Once more, so that what has just come is on the screen.
+                self.harness.step();
+                return snapshot;
+            }
+            self.woken.recv_timeout(Duration::from_secs(60)).expect("the simulation is alive");
+        }
+    }
+
+    pub(crate) fn workbench(&self) -> &Workbench {
+        self.harness.state().as_ref().expect("made in the first frame")
+    }
+
+    pub(crate) fn tell(&mut self, action: Action) {
+        let ctx = self.harness.ctx.clone();
+        self.harness.state_mut().as_mut().expect("made in the first frame").act(&ctx, action);
+    }
+
+    /// Runs the grasp up to `t` seconds and leaves it standing there.
+    pub(crate) fn advance_to(&mut self, t: f64) {
+        loop {
+            let now = self.workbench().snapshot().expect("loaded").frame.t;
+            if now > t - 1e-9 {
+                return;
+            }
+            self.tell(Action::Simulation(Command::Step));
+            self.until(|snapshot| snapshot.frame.t > now);
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! What the program prints and how it exits, run as a user would run it.
+
+use crate::program::{palpate, ran, run};
+use palpate_core::objects::catalogue;
+use serde_json::Value;
+use std::path::Path;
+use std::process::Stdio;
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let ran = run(folder, arguments);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    serde_json::from_str(&ran.out).unwrap()
+}
+
+/// Runs something that must fail with exit code 1, one `error:` line that holds `wanted`, and no panic.
+fn refused(folder: &Path, arguments: &[&str], wanted: &[&str]) {
+    let ran = run(folder, arguments);
+    assert_eq!(ran.code, Some(1), "{arguments:?}: {ran:?}");
+    assert!(ran.out.is_empty(), "{arguments:?}: {ran:?}");
+    assert!(!ran.err.contains("panicked"), "{arguments:?}: {ran:?}");
+    let error = ran.err.lines().find(|line| line.starts_with("error: ")).unwrap_or_default();
+    for part in wanted {
+        assert!(ran.err.contains(part) && !error.is_empty(), "{arguments:?} does not say \"{part}\": {ran:?}");
+    }
+}
+
+#[test]
+fn a_grasp_as_json_has_what_scripts_rely_on() {
+    let folder = folder();
+    let report = json(folder.path(), &["grasp", "lemon", "--json"]);
+    assert_eq!((&report["object"], &report["trial_id"]), (&"lemon".into(), &1.into()));
+    assert_eq!(
+        (&report["finite"], &report["converged"], &report["warnings"]),
+        (&true.into(), &true.into(), &Value::Array(vec![]))
+    );
+    assert!(report["cpu_ms"].as_f64().unwrap() > 0.0);
+    assert!((0.1..2.0).contains(&report["contact_onset_s"].as_f64().unwrap()));
+    for key in ["force_n", "curvature_per_m", "pressure_pa"] {
+        let pair = report["hold"][key].as_array().unwrap();
+        assert!(pair.len() == 2 && pair.iter().all(|value| value.as_f64().unwrap() > 0.0), "{key}: {pair:?}");
+    }
+    let empty = json(folder.path(), &["grasp", "empty", "--json", "--no-store"]);
+    assert_eq!((&empty["contact_onset_s"], &empty["trial_id"]), (&Value::Null, &Value::Null));
+    assert!(!empty["warnings"].as_array().unwrap().is_empty(), "fingers that cross are worth a word");
+}
+
+#[test]
+fn text_results_go_to_standard_output_and_warnings_beside() {
+    let folder = folder();
+    let ran = run(folder.path(), &["grasp", "empty"]);
+    assert!(ran.out.contains("first contact never") && ran.out.contains("stored        trial 1"), "{ran:?}");
+    assert!(ran.err.starts_with("warning: the fingers pass"), "{ran:?}");
+}
+
+#[test]
+fn trials_are_listed_shown_exported_deleted_and_restored() {
+    let folder = folder();
+    let at = folder.path();
+    for object in ["ball", "cube"] {
+        assert_eq!(run(at, &["grasp", object, "--seed", "3"]).code, Some(0));
+    }
+    let listed = json(at, &["trials", "list", "--json"]);
+    let objects: Vec<&str> = listed.as_array().unwrap().iter().map(|row| row["object"].as_str().unwrap()).collect();
+    assert_eq!(objects, ["ball", "cube"]);
+    let shown = run(at, &["trials", "show", "2"]);
+    assert!(shown.code == Some(0) && shown.out.contains("cube"), "{shown:?}");
+    let exported = run(at, &["trials", "export", "1", "2", "--out", "csv"]);
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    let files = std::fs::read_dir(at.join("csv")).unwrap().count();
+    assert_eq!(files, 4, "a trial and its contacts each");
+    assert_eq!(run(at, &["trials", "delete", "1"]).code, Some(0));
+    refused(at, &["trials", "show", "1"], &["no trial 1"]);
+    assert_eq!(run(at, &["trials", "restore", "1"]).code, Some(0));
+    assert_eq!(run(at, &["trials", "show", "1"]).code, Some(0));
+    refused(at, &["trials", "delete", "1", "99"], &["no trial 99"]);
+    assert_eq!(json(at, &["trials", "list", "--json"]).as_array().unwrap().len(), 2, "all or none are deleted");
+}
+
+#[test]
+fn exported_csv_names_its_units_and_is_complete() {
+    let folder = folder();
+    let at = folder.path();
+    assert_eq!(run(at, &["grasp", "ball", "--out", "ball.csv"]).code, Some(0));
+    let text = std::fs::read_to_string(at.join("ball.csv")).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    for column in ["t_s", "phase"] {
+        assert!(header.contains(&column), "{header:?}");
+    }
+    for unit in ["[bar]", "[1/m]", "[Pa]", "[N]", "[rad]", "[m]"] {
+        assert!(header.iter().any(|column| column.ends_with(unit)), "no column in {unit}: {header:?}");
+    }
+    let rows: Vec<&str> = lines.collect();
+    assert_eq!(rows.len(), 300);
+    assert!(rows.iter().all(|row| row.split(',').count() == header.len()));
+    assert!(at.join("ball.contacts.csv").is_file());
+}
+
+#[test]
+fn wrong_names_and_files_are_refused_in_words() {
+    let folder = folder();
+    let at = folder.path();
+    std::fs::write(at.join("notes.txt"), "hello").unwrap();
+    std::fs::write(at.join("cut.urdf"), "<robot name='x'><link name='a'><visual>").unwrap();
+    std::fs::write(at.join("typo.toml"), "[gripper.finger]\njonts = 12\n").unwrap();
+    refused(at, &["grasp", "lemmon"], &["lemmon", "did you mean \"lemon\""]);
+    refused(at, &["grasp", "gone.urdf"], &["cannot read", "gone.urdf"]);
+    refused(at, &["grasp", "notes.txt"], &[".txt", ".urdf"]);
+    refused(at, &["grasp", "cut.urdf"], &["cut", "malformed"]);
+    refused(at, &["grasp", "--scene", "typo.toml"], &["jonts", "joints"]);
+    refused(at, &["grasp", "ball", "--set", "gripper.finger.joints=900"], &["joints", "80"]);
+    refused(at, &["grasp", "ball", "--set", "gripper.finger.length=nan"], &["length"]);
+    refused(at, &["grasp", "ball", "--layout", "C9"], &["C9", "C8"]);
+    refused(at, &["grasp", "ball", "--out", "/proc/nowhere/x.csv"], &["/proc/nowhere"]);
+    refused(at, &["snapshot", "--trial", "77", "--out", "x.png"], &["no trial 77"]);
+    refused(at, &["trials", "export", "12", "--out", "x"], &["no trial 12"]);
+}
+
+#[test]
+fn wrong_use_exits_with_2() {
+    let folder = folder();
+    let at = folder.path();
+    for arguments in
+        [&["grasp", "ball", "--accuracy", "perfect"][..], &["fly"], &["snapshot"], &["trials", "show", "x"]]
+    {
+        let ran = run(at, arguments);
+        assert_eq!(ran.code, Some(2), "{ran:?}");
+        assert!(ran.err.contains("error:"), "{ran:?}");
+    }
+}
+
+#[test]
+fn without_a_display_it_says_so_and_names_the_demo() {
+    let folder = folder();
+    let ran = run::<&str>(folder.path(), &[]);
+    assert_eq!(ran.code, Some(1));
+    let lines: Vec<&str> = ran.err.lines().collect();
+    assert!(lines.len() == 1 && lines[0].contains("no display") && lines[0].contains("palpate demo"), "{ran:?}");
+}
+
+#[test]
+fn a_dead_display_is_told_alike() {
+    let folder = folder();
+    let output = palpate(&folder.path().join("t.sqlite")).env("DISPLAY", ":987").output().unwrap();
+    let ran = ran(&output);
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    assert!(!ran.err.contains("panicked"), "{ran:?}");
+    // Where the window's libraries are missing too, those come first.
+    assert!(ran.err.contains("palpate demo") || ran.err.contains("the window needs"), "{ran:?}");
+}
+
+#[test]
+fn readers_may_leave_early() {
+    let folder = folder();
+    let mut child = palpate(&folder.path().join("t.sqlite"))
+        .args(["grasp", "--print-scene"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let ran = ran(&child.wait_with_output().unwrap());
+    assert!(ran.code == Some(0) && ran.err.is_empty(), "{ran:?}");
+}
+
+#[test]
+fn a_printed_scene_is_the_scene() {
+    let folder = folder();
+    let at = folder.path();
+    let printed = run(at, &["grasp", "cube", "--print-scene", "--set", "gripper.finger.joints=12"]).out;
+    std::fs::write(at.join("scene.toml"), &printed).unwrap();
+    let again = run(at, &["grasp", "--print-scene", "--scene", "scene.toml"]).out;
+    assert_eq!(printed, again);
+    assert!(printed.contains("joints = 12") && printed.contains("source = \"cube\""));
+}
+
+#[test]
+fn the_bench_reports_rows() {
+    let folder = folder();
+    let report = json(folder.path(), &["bench", "physics", "--json", "--runs", "1"]);
+    let rows = report.as_array().or(report["rows"].as_array()).unwrap();
+    for scene in ["sphere_fixed", "sphere_free", "box_free"] {
+        let row = rows.iter().find(|row| row["scene"] == scene).unwrap();
+        for key in ["cpu_ms_median", "us_per_step", "newton_mean", "newton_max"] {
+            assert!(row[key].as_f64().unwrap() > 0.0, "{scene}: {key}");
+        }
+        assert!(row["accuracy"].is_string());
+    }
+}
+
+#[test]
+fn the_demo_tells_the_same_story_for_the_same_seed() {
+    let folder = folder();
+    let story = |out: &str| {
+        let arguments = ["demo", "--seed", "5", "--grasps", "2", "--no-store", "--no-pictures", "--json", "--out", out];
+        json(folder.path(), &arguments)
+    };
+    let (first, second) = (story("a"), story("b"));
+    assert_eq!(first, second);
+    assert_eq!(first["grasps"].as_array().unwrap().len(), 2);
+    let name = first["object"].as_str().unwrap();
+    assert!(catalogue().iter().any(|built_in| built_in.name == name), "{name}");
+}
+
+#[test]
+fn every_command_teaches() {
+    let folder = folder();
+    for command in ["grasp", "snapshot", "demo", "trials", "bench"] {
+        let ran = run(folder.path(), &[command, "--help"]);
+        assert!(ran.code == Some(0) && ran.out.contains("Usage:") && ran.out.lines().count() > 8, "{ran:?}");
+    }
+}

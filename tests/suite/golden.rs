@@ -1,0 +1,61 @@
+//! Golden pictures: `screenshots/NAME.png`. `UPDATE_SCREENSHOTS=1 cargo test --test suite` makes them anew; look at them
+//! before committing.
+
+use image::RgbaImage;
+use std::path::{Path, PathBuf};
+
+/// A pixel counts as different beyond this step in any channel. Software rasterisers of one kind agree to 1 or 2.
+const STEP: u8 = 2;
+/// So many pixels may differ: two software rasterisers were seen to differ in 88 of a million.
+const MOST_DIFFERENT: usize = 150;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("screenshots")
+}
+
+fn differing(a: &RgbaImage, b: &RgbaImage) -> usize {
+    a.pixels().zip(b.pixels()).filter(|(p, q)| (0..4).any(|k| p.0[k].abs_diff(q.0[k]) > STEP)).count()
+}
+
+/// Compares a picture with the golden one, or makes that. `drawn_by` is named when they differ.
+pub(crate) fn compare(name: &str, picture: &RgbaImage, drawn_by: &str) {
+    let path = folder().join(format!("{name}.png"));
+    if std::env::var_os("UPDATE_SCREENSHOTS").is_some() {
+        let same = image::open(&path).is_ok_and(|old| {
+            let old = old.into_rgba8();
+            old.dimensions() == picture.dimensions() && differing(&old, picture) == 0
+        });
+        if !same {
+            picture.save(&path).unwrap();
+        }
+        return;
+    }
+    let golden = match image::open(&path) {
+        Ok(golden) => golden.into_rgba8(),
+        Err(error) => panic!("{}: {error}; make it with UPDATE_SCREENSHOTS=1 cargo test --test suite", path.display()),
+    };
+    let different =
+        if golden.dimensions() == picture.dimensions() { differing(&golden, picture) } else { picture.pixels().len() };
+    if different > MOST_DIFFERENT {
+        let failed = folder().join("failed");
+        std::fs::create_dir_all(&failed).unwrap();
+        let seen = failed.join(format!("{name}.png"));
+        picture.save(&seen).unwrap();
+        panic!(
+            "{name}: {different} pixels differ (drawn by {drawn_by}). Compare {} with {}. Golden pictures come from \
+             Mesa's software rasteriser; on a machine with another OpenGL driver set LIBGL_ALWAYS_SOFTWARE=1",
+            seen.display(),
+            path.display()
+        );
+    }
+}
+
+#[test]
+fn pictures_differ_where_they_differ() {
+    let plain = RgbaImage::from_pixel(10, 10, image::Rgba([100, 100, 100, 255]));
+    let mut other = plain.clone();
+    other.put_pixel(3, 4, image::Rgba([100, 102, 100, 255]));
+    assert_eq!(differing(&plain, &other), 0);
+    other.put_pixel(5, 6, image::Rgba([100, 103, 100, 255]));
+    assert_eq!(differing(&plain, &other), 1);
+}

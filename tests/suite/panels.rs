@@ -1,0 +1,154 @@
+//! The window by its labels, as someone using a keyboard or a screen reader finds it, and a small picture of each panel
+//! in both themes. No graphics driver is needed.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::cpu_renderer::CpuRenderer;
+use crate::golden::compare;
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
+use image::RgbaImage;
+use palpate::app::ALL_PANELS;
+use palpate_core::objects::catalogue;
+use palpate_core::palette::Theme;
+use palpate_core::scene::Accuracy;
+
+fn bench(setup: BenchSetup) -> Bench {
+    Bench::new(setup, CpuRenderer::default())
+}
+
+fn whole_window() -> Bench {
+    bench(BenchSetup { size: [1400.0, 1800.0], ..BenchSetup::default() })
+}
+
+#[test]
+fn every_panel_in_both_themes() {
+    for panel in &ALL_PANELS {
+        let [dark, light] = Theme::ALL.map(|theme| {
+            let size = [300.0, 240.0];
+            let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), ..BenchSetup::default() });
+            bench.advance_to(2.6);
+            bench.harness.render().unwrap()
+        });
+        let mut pair = RgbaImage::new(dark.width() + light.width(), dark.height());
+        image::imageops::replace(&mut pair, &dark, 0, 0);
+        image::imageops::replace(&mut pair, &light, i64::from(dark.width()), 0);
+        compare(&format!("panel_{}", panel.name), &pair, "the CPU renderer of the tests");
+    }
+}
+
+#[test]
+fn time_is_steered_by_buttons() {
+    let mut bench = whole_window();
+    let start = bench.until(|s| !s.status.playing);
+    bench.harness.get_by_label("Step").click();
+    let stepped = bench.until(|s| s.frame.t > start.frame.t);
+    assert!((stepped.frame.t - 1.0 / 75.0).abs() < 1e-9);
+    bench.harness.get_by_label("Play").click();
+    bench.until(|s| s.status.playing && s.frame.t > 0.1);
+    bench.harness.get_by_label("Pause").click();
+    let paused = bench.until(|s| !s.status.playing);
+    bench.harness.get_by_label("Reset").click();
+    let reset = bench.until(|s| s.grasp > paused.grasp);
+    assert_eq!(reset.frame.t, 0.0);
+}
+
+#[test]
+fn time_is_steered_by_keys() {
+    let mut bench = whole_window();
+    bench.harness.key_press(Key::Space);
+    bench.until(|s| s.status.playing && s.frame.t > 0.05);
+    bench.harness.key_press(Key::Space);
+    let paused = bench.until(|s| !s.status.playing);
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::ArrowRight);
+    bench.until(|s| s.frame.t > paused.frame.t);
+    bench.harness.key_press(Key::Equals);
+    bench.until(|s| s.status.target_speed == 2.0);
+    bench.harness.key_press(Key::Minus);
+    bench.harness.step();
+    bench.harness.key_press(Key::Minus);
+    bench.until(|s| s.status.target_speed == 0.5);
+    bench.harness.key_press(Key::Backspace);
+    bench.until(|s| s.grasp > paused.grasp && s.frame.t == 0.0);
+}
+
+#[test]
+fn every_object_of_the_list_can_be_grasped() {
+    let mut bench = whole_window();
+    for built_in in catalogue() {
+        bench.harness.get_by_role_and_label(Role::Button, &built_in.title).click();
+        let snapshot = bench.until(|s| s.object.as_ref().is_some_and(|o| o.name == built_in.name));
+        assert_eq!(snapshot.scene.object.source, built_in.name);
+    }
+    bench.harness.get_by_role_and_label(Role::Button, "Empty hand").click();
+    bench.until(|s| s.object.is_none());
+}
+
+#[test]
+fn a_pasted_path_is_opened_and_a_wrong_one_is_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("block.urdf");
+    let text = "<robot name='block'><link name='a'><collision><geometry><box size='0.03 0.04 0.03'/></geometry>\
+                </collision></link></robot>";
+    std::fs::write(&path, text).unwrap();
+    let mut bench = whole_window();
+    let paste = |bench: &mut Bench, text: &str| {
+        let field = bench.harness.get_by_role(Role::TextInput);
+        field.focus();
+        bench.harness.step();
+        bench.harness.get_by_role(Role::TextInput).type_text(text);
+        bench.harness.step();
+        bench.harness.key_press(Key::Enter);
+    };
+    paste(&mut bench, path.to_str().unwrap());
+    bench.until(|s| s.object.as_ref().is_some_and(|o| o.name == "block"));
+    assert!(
+        bench.harness.query_by_role_and_label(Role::Button, "block.urdf").is_some(),
+        "it is listed as a recent file"
+    );
+    paste(&mut bench, "/nowhere/at/all.obj");
+    bench.until(|s| s.status.loading.is_none());
+    let heard = (0..200).any(|_| {
+        bench.harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        bench.workbench().messages().iter().any(|text| text.contains("/nowhere/at/all.obj"))
+    });
+    assert!(heard, "{:?}", bench.workbench().messages());
+    let still = bench.workbench().snapshot().unwrap();
+    assert!(still.object.as_ref().is_some_and(|o| o.name == "block"), "the old object stays in the hand");
+}
+
+#[test]
+fn scene_settings_reach_the_simulation() {
+    let mut bench = whole_window();
+    bench.harness.get_by_role_and_label(Role::ComboBox, "held").click();
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("fixed in place").click();
+    bench.until(|s| s.scene.object.fixed);
+    bench.harness.get_by_label("Accuracy").click();
+    bench.harness.run_steps(4);
+    bench.harness.get_by_role_and_label(Role::ComboBox, "time step").click();
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("draft, 1/150 s").click();
+    bench.until(|s| s.scene.solver.accuracy == Accuracy::Draft);
+    bench.harness.get_by_label("Defaults").click();
+    let back = bench.until(|s| !s.scene.object.fixed);
+    assert_eq!((back.scene.solver.accuracy, back.scene.object.source.as_str()), (Accuracy::Standard, "lemon"));
+}
+
+#[test]
+fn theme_keys_and_layout_answer() {
+    let mut bench = whole_window();
+    bench.harness.get_by_label("Theme").click();
+    bench.harness.run_steps(2);
+    assert_eq!(bench.workbench().view().theme, Theme::Light);
+    bench.harness.key_press(Key::F1);
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_label("pull at the object").is_some());
+    bench.harness.key_press(Key::Escape);
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_label("pull at the object").is_none());
+    for panel in &ALL_PANELS {
+        assert!(bench.harness.query_all_by_label(panel.title).next().is_some(), "no tab \"{}\"", panel.title);
+    }
+}

@@ -1,0 +1,105 @@
+//! Whole grasps: every object, fixed and free, and what must hold of each of them. Closed-form answers of single steps
+//! stand beside the solver, in `physics::closed_form`.
+
+use crate::allocations::allocations_in;
+use palpate_core::grasping::{GraspSummary, grasp};
+use palpate_core::gripper::Phase;
+use palpate_core::objects::{EMPTY, ObjectModel, catalogue};
+use palpate_core::physics::{Placement, Simulation};
+use palpate_core::scene::{Accuracy, Scene};
+
+fn scene_of(name: &str) -> (Scene, Option<ObjectModel>) {
+    let mut scene = Scene::default();
+    name.clone_into(&mut scene.object.source);
+    let object = scene.load_object().unwrap();
+    (scene, object)
+}
+
+#[test]
+fn every_object_is_grasped_fixed_and_free() {
+    for built_in in catalogue() {
+        let (mut scene, object) = scene_of(&built_in.name);
+        for (fixed, accuracy) in [(false, Accuracy::Standard), (true, Accuracy::Standard), (false, Accuracy::Draft)] {
+            scene.object.fixed = fixed;
+            scene.solver.accuracy = accuracy;
+            let what = format!("{}, fixed {fixed}, {}", built_in.name, accuracy.name());
+            let trial = grasp(&scene, object.as_ref(), 0);
+            let summary = GraspSummary::new(&trial, &scene);
+            assert!(summary.finite && summary.converged, "{what}: {:?}", summary.quality);
+            assert!(summary.warnings.is_empty(), "{what}: {:?}", summary.warnings);
+            let onset = summary.contact_onset_s.unwrap_or(f64::INFINITY);
+            assert!((0.1..2.5).contains(&onset), "{what}: first contact at {onset} s");
+            let hold = summary.hold.expect("the default programme holds");
+            for side in 0..2 {
+                assert!(hold.force_n[side] > 0.05, "{what}: {:?}", hold.force_n);
+                assert!(hold.pressure_pa[side] > 100.0, "{what}: {:?}", hold.pressure_pa);
+            }
+            let residual = summary.quality.static_residual;
+            assert!(residual < 0.01, "{what}: not at rest at the end of the hold, {residual}");
+            if fixed {
+                assert_eq!(summary.object_moved_m, Some(0.0), "{what}");
+            }
+        }
+    }
+}
+
+/// A grasp advanced to the end of its hold.
+fn held(scene: &Scene, object: Option<&ObjectModel>) -> (Simulation, Placement) {
+    let (mut simulation, placement) = Simulation::new(scene, object);
+    let per_actuation = u64::from(simulation.clock().ticks_per_actuation);
+    loop {
+        if simulation.tick().is_multiple_of(per_actuation) {
+            let (bar, phase) = scene.programme.command((simulation.tick() / per_actuation) as u32);
+            if phase == Phase::Release {
+                return (simulation, placement);
+            }
+            simulation.command(bar, phase);
+        }
+        simulation.advance().unwrap();
+    }
+}
+
+#[test]
+fn contact_carries_the_weight_of_a_held_object() {
+    for name in ["lemon", "box", "syringe"] {
+        let (mut scene, object) = scene_of(name);
+        let mass = object.as_ref().expect("not empty").mass.mass;
+        scene.programme.hold_ticks = 40;
+        scene.timing.duration_s = 8.0;
+        let (simulation, placement) = held(&scene, object.as_ref());
+        let force = placement.world_from_gripper.direction(simulation.object_wrench().0);
+        let weight = mass * scene.world.gravity;
+        assert!((force.z / weight - 1.0).abs() < 1e-3, "{name}: {force} against {weight} N");
+        assert!(force.truncate().length() < 1e-3 * weight.max(1.0), "{name}: {force}");
+    }
+}
+
+#[test]
+fn a_held_object_does_not_creep() {
+    let (mut scene, object) = scene_of("lemon");
+    scene.timing.duration_s = 20.0;
+    let mut place_after = |hold_ticks: u32| {
+        scene.programme.hold_ticks = hold_ticks;
+        held(&scene, object.as_ref()).0.world_from_object().expect("not empty").position
+    };
+    let (early, late) = (place_after(30), place_after(130));
+    let drift = (late - early).length() / 10.0;
+    assert!(drift < 1e-6, "it drifts by {} mm/s", drift * 1e3);
+}
+
+#[test]
+fn a_step_allocates_nothing() {
+    for (name, fixed) in [("lemon", false), ("box", false), ("case", true), (EMPTY, false)] {
+        let (mut scene, object) = scene_of(name);
+        scene.object.fixed = fixed;
+        let (mut simulation, _) = Simulation::new(&scene, object.as_ref());
+        let mut touching = 0;
+        for _ in 0..simulation.clock().total_ticks() {
+            simulation.command(1.0, Phase::Hold);
+            let (count, report) = allocations_in(|| simulation.advance());
+            assert_eq!(count, 0, "{name} at step {}", simulation.tick());
+            touching += report.unwrap().contacts;
+        }
+        assert!(name == EMPTY || touching > 0, "{name} was never touched");
+    }
+}

@@ -1,0 +1,131 @@
+//! Golden pictures of what needs a graphics driver: the off-screen view and the whole window. Drawn through OpenGL,
+//! whose software rasteriser is the same everywhere; without any driver these tests fail and name the package.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::golden::compare;
+use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
+use glam::Vec2;
+use image::RgbaImage;
+use palpate::app::Action;
+use palpate_core::drawing::{Camera, StandardView};
+use palpate_core::grasping::grasp;
+use palpate_core::objects::{EMPTY, catalogue};
+use palpate_core::palette::Theme;
+use palpate_core::picture::{PictureView, Stage};
+use palpate_core::scene::{Scene, SupportKind};
+use palpate_render::{DriverChoice, Gpu, Picture, Renderer, wanted_limits, wgpu};
+use std::sync::Arc;
+
+fn driver() -> Gpu {
+    Gpu::headless(DriverChoice::OpenGl).unwrap_or_else(|error| panic!("{error}"))
+}
+
+struct Shot {
+    object: &'static str,
+    /// Which moment [s].
+    at: f64,
+    view: StandardView,
+    theme: Theme,
+    size: [u32; 2],
+    forces: bool,
+    furniture: bool,
+}
+
+const HELD: Shot = Shot {
+    object: "lemon",
+    at: 2.9,
+    view: StandardView::Home,
+    theme: Theme::Dark,
+    size: [480, 320],
+    forces: true,
+    furniture: true,
+};
+
+fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaImage {
+    let mut scene = scene.clone();
+    shot.object.clone_into(&mut scene.object.source);
+    let object = scene.load_object().unwrap();
+    let trial = grasp(&scene, object.as_ref(), 0);
+    let frame = trial.frames.iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
+    let stage = Stage::new(&scene, object.as_ref(), trial.info.world_from_gripper);
+    let (centre, radius) = stage.bounds();
+    let view = PictureView {
+        camera: Camera::default().turned_to(shot.view).framing(centre, radius),
+        theme: shot.theme,
+        size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
+        forces: shot.forces,
+        furniture: shot.furniture,
+        badge: shot.furniture.then(|| "SIMULATED".to_owned()),
+        ..PictureView::default()
+    };
+    let picture = Picture::draw(gpu, renderer, &stage.draw(frame, &view), shot.size, 1.0).unwrap();
+    RgbaImage::from_raw(picture.width, picture.height, picture.rgba).unwrap()
+}
+
+#[test]
+fn held_objects_from_several_sides() {
+    let gpu = driver();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+    let mut check = |name: &str, shot: &Shot, scene: &Scene| {
+        compare(name, &take(&gpu, &mut renderer, scene, shot), &gpu.driver);
+    };
+    let scene = Scene::default();
+    check("view_lemon_dark", &HELD, &scene);
+    check("view_lemon_light", &Shot { theme: Theme::Light, ..HELD }, &scene);
+    check("view_box_front", &Shot { object: "box", view: StandardView::Front, ..HELD }, &scene);
+    check(
+        "view_syringe_top",
+        &Shot { object: "syringe", view: StandardView::Top, theme: Theme::Light, ..HELD },
+        &scene,
+    );
+    check("view_empty_open", &Shot { object: EMPTY, at: 0.0, forces: false, ..HELD }, &scene);
+    let mut table = Scene::default();
+    table.support.kind = SupportKind::Table;
+    table.gripper.finger.joints = 40;
+    check("view_metalbrick_bare", &Shot { object: "metalbrick", furniture: false, ..HELD }, &table);
+}
+
+#[test]
+fn the_sixteen_look_like_what_they_are() {
+    let gpu = driver();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+    let [width, height] = [240, 180];
+    let mut sheet = RgbaImage::new(4 * width, 4 * height);
+    for (k, built_in) in catalogue().iter().enumerate() {
+        let shot = Shot { object: &built_in.name, size: [width, height], forces: false, furniture: false, ..HELD };
+        let picture = take(&gpu, &mut renderer, &Scene::default(), &shot);
+        let (column, row) = (k as u32 % 4, k as u32 / 4);
+        image::imageops::replace(&mut sheet, &picture, i64::from(column * width), i64::from(row * height));
+    }
+    compare("the_sixteen_held", &sheet, &gpu.driver);
+}
+
+/// The window through the driver that the pictures above are drawn with.
+fn window(theme: Theme, size: [f32; 2]) -> Bench {
+    let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
+    setup.instance_descriptor.backends = wgpu::Backends::GL;
+    setup.device_descriptor =
+        Arc::new(|adapter| wgpu::DeviceDescriptor { required_limits: wanted_limits(adapter), ..Default::default() });
+    let state = create_render_state(setup.into(), egui_wgpu::RendererOptions::PREDICTABLE);
+    let setup = BenchSetup { theme, size, render_state: Some(state.clone()), ..BenchSetup::default() };
+    Bench::new(setup, WgpuTestRenderer::from_render_state(state))
+}
+
+#[test]
+fn the_window_in_both_themes_and_small() {
+    let by = driver().driver;
+    for (name, theme, size) in [
+        ("window_dark", Theme::Dark, [1280.0, 820.0]),
+        ("window_light", Theme::Light, [1280.0, 820.0]),
+        ("window_small", Theme::Dark, [720.0, 480.0]),
+    ] {
+        let mut bench = window(theme, size);
+        bench.advance_to(2.6);
+        compare(name, &bench.harness.render().unwrap(), &by);
+        if name == "window_small" {
+            bench.tell(Action::ShowKeys(true));
+            bench.harness.run_steps(3);
+            compare("window_keys", &bench.harness.render().unwrap(), &by);
+        }
+    }
+}

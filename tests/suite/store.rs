@@ -1,0 +1,112 @@
+//! The store when things go wrong around it: killed programs, two programs at once, files that are no stores.
+
+use crate::program::{palpate, run};
+use palpate_core::grasping::grasp;
+use palpate_core::objects::ObjectModel;
+use palpate_core::recording::Store;
+use palpate_core::scene::Scene;
+use palpate_core::trial::Trial;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Stdio};
+
+/// Starts grasping a hundred times, without pictures, and waits until the first trials are told of.
+fn busy_program(store: &Path, after_lines: usize) -> Child {
+    let mut command = palpate(store);
+    let folder = store.parent().unwrap();
+    command.args(["demo", "--object", "ball", "--seed", "1", "--grasps", "100", "--no-pictures", "--out"]).arg(folder);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert_eq!(lines.take(after_lines).filter(Result::is_ok).count(), after_lines);
+    child
+}
+
+#[test]
+fn a_kill_at_any_moment_leaves_whole_trials() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = Scene::default();
+    "ball".clone_into(&mut scene.object.source);
+    let ball = scene.load_object().unwrap();
+    for (round, after_lines) in [3, 8, 20, 41].into_iter().enumerate() {
+        let path = folder.path().join(format!("{round}.sqlite"));
+        let mut child = busy_program(&path, after_lines);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let mut store = Store::open(&path).unwrap();
+        let rows = store.list(true).unwrap();
+        assert!(!rows.is_empty(), "it was killed before its first trial");
+        for row in &rows {
+            let trial = store.load(row.id).unwrap();
+            assert_eq!((row.state.as_str(), trial.frames.len()), ("complete", 300));
+            assert!(trial == regrasped(&trial, ball.as_ref()), "trial {} is not what was grasped", row.id);
+        }
+        // The store goes on working for the next program.
+        let more = grasp(&scene, ball.as_ref(), 0);
+        assert_eq!(store.insert(&more).unwrap(), rows.len() as i64 + 1);
+    }
+}
+
+/// The same grasp once more, from what the trial says of itself.
+fn regrasped(trial: &Trial, object: Option<&ObjectModel>) -> Trial {
+    grasp(&Scene::from_toml(&trial.info.scene).unwrap(), object, trial.info.seed)
+}
+
+#[test]
+fn a_recording_cut_short_keeps_its_chunks_and_harms_no_other_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.sqlite");
+    let mut scene = Scene::default();
+    "cube".clone_into(&mut scene.object.source);
+    let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
+    let mut store = Store::open(&path).unwrap();
+    store.insert(&trial).unwrap();
+    let cut = store.begin(&trial.info).unwrap();
+    for chunk in trial.frames.chunks(75).take(3) {
+        store.append(cut, chunk).unwrap();
+    }
+    // What a power cut would leave: the files as they are, while they are in use.
+    let left = folder.path().join("left.sqlite");
+    for suffix in ["", "-wal"] {
+        let with = |path: &Path| format!("{}{suffix}", path.display());
+        std::fs::copy(with(&path), with(&left)).unwrap();
+    }
+    let found = Store::open(&left).unwrap();
+    assert!(found.load(1).unwrap() == trial);
+    assert!(found.load(cut).unwrap().frames == trial.frames[..225]);
+    let states: Vec<String> = found.list(false).unwrap().into_iter().map(|row| row.state).collect();
+    assert_eq!(states, ["complete", "recording"]);
+}
+
+#[test]
+fn two_programs_record_into_one_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shared.sqlite");
+    let grasps = |object: &str| {
+        let mut command = palpate(&path);
+        command.args(["demo", "--object", object, "--seed", "1", "--grasps", "6", "--no-pictures", "--json"]);
+        command.stdout(Stdio::null()).spawn().unwrap()
+    };
+    let (mut first, mut second) = (grasps("ball"), grasps("cube"));
+    assert!(first.wait().unwrap().success() && second.wait().unwrap().success());
+    let store = Store::open(&path).unwrap();
+    let rows = store.list(false).unwrap();
+    let of = |object: &str| rows.iter().filter(|row| row.object == object && row.state == "complete").count();
+    assert_eq!((of("ball"), of("cube")), (6, 6));
+    assert!(rows.iter().all(|row| store.load(row.id).is_ok_and(|trial| trial.frames.len() == 300)));
+}
+
+#[test]
+fn what_is_no_store_is_refused_and_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("trials.sqlite");
+    for text in ["just some notes", "SQLite format 3\0 but cut short"] {
+        std::fs::write(&path, text).unwrap();
+        let ran = run(folder.path(), &["grasp", "ball"]);
+        assert_eq!(ran.code, Some(1), "{ran:?}");
+        assert!(ran.err.starts_with("error: ") && ran.err.contains("trials.sqlite"), "{ran:?}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    }
+    let ran = run(folder.path(), &["grasp", "ball", "--store", "/proc/nowhere/trials.sqlite"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.err.contains("cannot make the folder"), "{ran:?}");
+}
