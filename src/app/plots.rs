@@ -6,7 +6,7 @@ use super::panels::PanelContext;
 use super::theme::{colour, veil};
 use super::traces::GraspTrace;
 use egui::{Color32, Ui};
-use egui_plot::{GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine};
+use egui_plot::{AxisHints, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine};
 use palpate_core::palette::Trace;
 use palpate_core::units::three_digits;
 
@@ -48,7 +48,10 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
     let theme = context.view.theme;
     let [low, high] = value_range(context, plot, [from, to]);
     let unit = plot.unit;
-    let show_legend = ui.available_width() > 260.0 && ui.available_height() > 70.0;
+    let show_legend = ui.available_width() > 360.0 && ui.available_height() > 70.0;
+    let seconds = AxisHints::new_x()
+        .formatter(|mark: GridMark, _| format!("{}\u{2009}s", plain(mark.value)))
+        .label_spacing(egui::Rangef::new(24.0, 40.0));
     let mut widget = Plot::new(plot.id)
         .allow_zoom(false)
         .allow_drag(false)
@@ -60,9 +63,9 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
         .y_axis_min_width(44.0)
         .y_axis_label(unit)
         .grid_color(colour(theme.colours().border))
-        .grid_spacing(12.0..=60.0)
+        .grid_spacing(10.0..=44.0)
         .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
-        .x_axis_formatter(|mark: GridMark, _| format!("{}\u{2009}s", plain(mark.value)))
+        .custom_x_axes(vec![seconds])
         .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .set_margin_fraction(egui::Vec2::ZERO);
     if show_legend {
@@ -72,7 +75,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
     let response = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(from..=to);
         plot_ui.set_plot_bounds_y(low..=high);
-        add_hold(plot_ui, context, high);
+        add_hold(plot_ui, context, high - 0.04 * (high - low));
         for trace in context.traces.earlier() {
             add_curves(plot_ui, trace, plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0, false);
         }
@@ -139,7 +142,7 @@ fn plain(value: f64) -> String {
 }
 
 /// Shades the hold, so that it can be told from closing and release.
-fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, top: f64) {
+fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, height: f64) {
     let Some(snapshot) = context.snapshot else { return };
     let programme = &snapshot.scene.programme;
     let tick = 1.0 / f64::from(snapshot.scene.timing.actuation_hz.max(1));
@@ -150,7 +153,7 @@ fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, top
     }
     let quiet = context.view.theme.colours().quiet_text;
     plot_ui.add(Span::new("", closed..=released).fill(veil(quiet, 0.09)).border_width(0.0));
-    let place = PlotPoint::new(closed, top);
+    let place = PlotPoint::new(closed, height);
     let word = egui::RichText::new(" hold").small();
     plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
 }

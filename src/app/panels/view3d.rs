@@ -44,7 +44,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
 fn message(ui: &Ui, rect: Rect, context: &PanelContext<'_>, text: &str) {
     let ink = colour(context.view.theme.colours().quiet_text);
     let font = egui::FontId::proportional(15.0);
-    ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, text, font, ink);
+    let galley = ui.painter().layout(text.to_owned(), font, ink, rect.width() - 24.0);
+    ui.painter().galley(rect.center() - 0.5 * galley.size(), galley, ink);
 }
 
 /// What the mouse does to the camera and to the object.
