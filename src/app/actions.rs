@@ -27,7 +27,7 @@ pub enum Action {
     SetTheme(Theme),
     /// Force arrows on or off.
     SetForces(bool),
-    /// The stretch of time that all plots show [s]; `None` for the whole grasp.
+    /// The stretch of time that all plots show (s); `None` for the whole grasp.
     SetTimeWindow(Option<[f64; 2]>),
     /// The key sheet on or off.
     ShowKeys(bool),

@@ -38,7 +38,7 @@ pub struct WindowOptions {
     pub store: PathBuf,
 }
 
-/// Size of the window when it is opened for the first time, and the smallest it can be made [points].
+/// Size of the window when it is opened for the first time, and the smallest it can be made (points).
 const FIRST_SIZE: [f32; 2] = [1280.0, 820.0];
 const LEAST_SIZE: [f32; 2] = [720.0, 480.0];
 

@@ -6,7 +6,9 @@ use super::panels::PanelContext;
 use super::theme::{colour, veil};
 use super::traces::GraspTrace;
 use egui::{Color32, Ui};
-use egui_plot::{AxisHints, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine};
+use egui_plot::{
+    AxisHints, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine,
+};
 use palpate_core::palette::Trace;
 use palpate_core::units::three_digits;
 
@@ -39,7 +41,7 @@ pub(super) struct TimePlot<'a> {
 
 /// Faintness of the grasps before the current one.
 const EARLIER: f32 = 0.28;
-/// Narrowest stretch of time that can be shown [s].
+/// Narrowest stretch of time that can be shown (s).
 const NARROWEST: f64 = 0.05;
 
 pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>, plot: &TimePlot<'_>) {

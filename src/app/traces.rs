@@ -11,9 +11,9 @@ const KEPT: usize = 4;
 pub struct GraspTrace {
     /// Which grasp.
     pub grasp: u64,
-    /// Times [s].
+    /// Times (s).
     pub t: Vec<f64>,
-    /// Line pressures [bar].
+    /// Line pressures (bar).
     pub line_bar: Vec<f64>,
     /// Channel by channel, NaN where undefined.
     pub channels: Vec<Vec<f32>>,

@@ -18,7 +18,7 @@ pub struct ViewState {
     pub forces: bool,
     /// Which panels are where; panes are the names of panels.
     pub layout: Tree<String>,
-    /// The stretch of time that all plots show [s]; `None` for the whole grasp.
+    /// The stretch of time that all plots show (s); `None` for the whole grasp.
     #[serde(skip)]
     pub time_window: Option<[f64; 2]>,
     /// The key sheet is open.

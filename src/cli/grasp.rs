@@ -48,9 +48,9 @@ struct Report {
     summary: GraspSummary,
     seed: u64,
     accuracy: &'static str,
-    /// CPU time of the simulation alone [ms].
+    /// CPU time of the simulation alone (ms).
     cpu_ms: f64,
-    /// CPU time of loading the object [ms].
+    /// CPU time of loading the object (ms).
     load_cpu_ms: f64,
     trial_id: Option<TrialId>,
 }

@@ -1,4 +1,53 @@
-//! core (tour comes here)
+//! Palpate's core: everything but the window and the graphics card. It builds alone, on a cluster node too.
+//!
+//! # The words
+//!
+//! A **finger** is a chain of N joints, bent by **line pressure** in its chamber; its inner side is a soft **pad** tiled
+//! with **taxels**. Two fingers make a gripper. A **scene** says what is grasped and how; a **grasp** closes, holds and
+//! releases; what was sampled meanwhile is a **trial**. A **layout** (C1 .. C8) says which **channels** of curvature,
+//! pressure and force are derived from a trial.
+//!
+//! # The map, lowest layer first
+//!
+//! A module imports only from layers above its own in this list; a test reads the sources and checks it.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | [`units`], [`palette`] | conversions at the edges (SI inside), colours and colour maps |
+//! | 1 | [`geometry`] | poses, circle fit, hulls, meshes and their repair, signed distance, mass properties |
+//! | 2 | [`drawing`] | what can be drawn: a plain [`drawing::DrawList`], and the camera |
+//! | 2 | [`objects`], [`gripper`] | URDF, OBJ, STL and the sixteen; what a finger, a pad and a programme are |
+//! | 3 | [`trial`] | plain frames and trials |
+//! | 4 | [`scene`] | the scene file: everything a user may set |
+//! | 5 | [`physics`] | the convex implicit step, contact, placement, and a simulation on a clock of whole ticks |
+//! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames |
+//! | 7 | [`rig`] | a gripper that can be told a pressure and read: simulated, or replayed |
+//! | 8 | [`recording`] | the SQLite store, CSV |
+//! | 9 | [`grasping`] | one grasp on any rig, random poses, a grasp in a few numbers |
+//! | 10 | [`study`] | measurements as functions |
+//! | 11 | [`picture`] | scene and frame to [`drawing::DrawList`] |
+//! | 12 | [`workers`] | named threads: commands in, snapshots and rows out |
+//!
+//! # A grasp in six lines
+//!
+//! ```
+//! use palpate_core::{grasping::{GraspSummary, grasp}, scene::Scene};
+//!
+//! let mut scene = Scene::default();
+//! scene.object.source = "lemon".to_owned();
+//! let object = scene.load_object()?;
+//! let trial = grasp(&scene, object.as_ref(), 0);
+//! let summary = GraspSummary::new(&trial, &scene);
+//! assert!(summary.converged && summary.contact_onset_s.is_some());
+//! # Ok::<(), palpate_core::objects::ObjectError>(())
+//! ```
+//!
+//! # What holds everywhere
+//!
+//! - SI units inside, [`f64`] in the physics; another unit is in the name. Poses are called `outer_from_inner`.
+//! - Record raw, derive later: a trial keeps what was felt, never what some layout makes of it.
+//! - Time is counted in whole ticks ([`scene::Clock`]); the same seed gives the same bytes, whatever the threads.
+//! - What comes from outside is checked where it comes in; after that, a wrong number is our own bug.
 
 pub mod drawing;
 pub mod geometry;

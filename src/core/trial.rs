@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 pub struct TaxelLoad {
     /// Left pad's taxels first, then the right pad's; see [`crate::gripper::TaxelGrid`].
     pub taxel: u16,
-    /// Force into the pad [N].
+    /// Force into the pad (N).
     pub normal: f32,
-    /// Shear force towards the tip [N].
+    /// Shear force towards the tip (N).
     pub along: f32,
-    /// Shear force across the finger, along the gripper's y [N].
+    /// Shear force across the finger, along the gripper's y (N).
     pub across: f32,
 }
 
@@ -23,13 +23,13 @@ pub struct TaxelLoad {
 pub struct Frame {
     /// Which sample of the trial, from 0.
     pub sample: u32,
-    /// Time since the start of the trial [s].
+    /// Time since the start of the trial (s).
     pub t: f64,
-    /// Commanded line pressure [bar].
+    /// Commanded line pressure (bar).
     pub line_bar: f64,
     /// What the programme was doing.
     pub phase: Phase,
-    /// Joint angles, left finger then right, from palm to tip [rad].
+    /// Joint angles, left finger then right, from palm to tip (rad).
     pub q: Vec<f64>,
     /// The object's frame in the world; absent for an empty hand.
     pub world_from_object: Option<Pose>,
@@ -38,7 +38,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Joint angles of one finger [rad].
+    /// Joint angles of one finger (rad).
     pub fn joints(&self, side: Side) -> &[f64] {
         let n = self.q.len() / 2;
         &self.q[side.index() * n..(side.index() + 1) * n]
@@ -53,7 +53,7 @@ impl Frame {
             .filter(move |(index, _)| *index < count)
     }
 
-    /// Sum of the normal forces on one pad [N].
+    /// Sum of the normal forces on one pad (N).
     pub fn normal_force(&self, side: Side, count: usize) -> f64 {
         self.loads(side, count).map(|(_, load)| f64::from(load.normal)).sum()
     }

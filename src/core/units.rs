@@ -4,7 +4,7 @@
 /// Pascals in one bar.
 pub const PASCAL_PER_BAR: f64 = 1e5;
 
-/// Standard gravity [m/s²] (ISO 80000-3).
+/// Standard gravity (m/s²) (ISO 80000-3).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// Metres to millimetres.

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 /// Pixels, sRGB with opacity, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Width [pixels].
+    /// Width (pixels).
     pub width: u32,
-    /// Height [pixels].
+    /// Height (pixels).
     pub height: u32,
     /// Four bytes per pixel.
     pub rgba: Vec<u8>,

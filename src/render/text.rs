@@ -6,7 +6,7 @@ use palpate_core::drawing::Align;
 use std::collections::HashMap;
 use wgpu::{Device, Queue, Texture, TextureView};
 
-/// Side of the atlas [texels]: several hundred glyphs at the sizes that overlays use.
+/// Side of the atlas (texels): several hundred glyphs at the sizes that overlays use.
 const SIDE: u32 = 512;
 /// Between a number and its unit.
 const THIN_SPACE: char = '\u{2009}';
@@ -16,11 +16,11 @@ const GAP: u32 = 1;
 /// A glyph to be copied from the atlas to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PlacedGlyph {
-    /// Top left corner in the picture [pixels].
+    /// Top left corner in the picture (pixels).
     pub(crate) at: Vec2,
-    /// Its size [pixels].
+    /// Its size (pixels).
     pub(crate) size: Vec2,
-    /// Top left corner in the atlas [texels].
+    /// Top left corner in the atlas (texels).
     pub(crate) texel: Vec2,
 }
 

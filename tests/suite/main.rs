@@ -11,6 +11,8 @@
 //!
 //! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on stops where it stands")]
+
 mod allocations;
 mod architecture;
 mod bench;

@@ -22,7 +22,7 @@ fn driver() -> Gpu {
 
 struct Shot {
     object: &'static str,
-    /// Which moment [s].
+    /// Which moment (s).
     at: f64,
     view: StandardView,
     theme: Theme,

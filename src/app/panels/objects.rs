@@ -6,7 +6,7 @@ use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_core::objects::{BuiltIn, EMPTY, ObjectClass, ShapeClass, SizeClass, catalogue};
 
-/// Side of a thumbnail [points].
+/// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {

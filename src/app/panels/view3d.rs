@@ -11,7 +11,7 @@ use palpate_core::drawing::{Camera, StandardView};
 use palpate_core::picture::PictureView;
 use palpate_core::workers::{Command, Snapshot};
 
-/// Force of a pull across the height of the picture [N].
+/// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {

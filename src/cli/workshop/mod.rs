@@ -18,7 +18,7 @@ use tools::Parts;
 
 /// How the physics sees an object.
 enum Body {
-    /// Primitives placed by position [m] and roll, pitch, yaw [rad].
+    /// Primitives placed by position (m) and roll, pitch, yaw (rad).
     Primitives(Vec<(Primitive, [f64; 3], [f64; 3])>),
     /// A closed mesh.
     Mesh(TriMesh),
@@ -30,7 +30,7 @@ struct Thing {
     title: &'static str,
     size: SizeClass,
     shape: ShapeClass,
-    /// Mass [kg].
+    /// Mass (kg).
     mass: f64,
     friction: f64,
     look: Parts,

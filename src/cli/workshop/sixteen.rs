@@ -34,7 +34,7 @@ fn mm(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z) * 1e-3
 }
 
-/// A box-shaped thing of edges x, y, z [mm].
+/// A box-shaped thing of edges x, y, z (mm).
 fn block(x: f64, y: f64, z: f64) -> Body {
     let half = mm(x, y, z) * 0.5;
     Body::Primitives(vec![(Primitive::Cuboid { half }, [0.0; 3], [0.0; 3])])
@@ -44,7 +44,7 @@ fn sphere(radius_mm: f64) -> Body {
     Body::Primitives(vec![(Primitive::Sphere { radius: radius_mm * 1e-3 }, [0.0; 3], [0.0; 3])])
 }
 
-/// A cylinder lying along y: its middle at y, its radius and length [mm].
+/// A cylinder lying along y: its middle at y, its radius and length (mm).
 fn lying_cylinder(y: f64, radius: f64, length: f64) -> (Primitive, [f64; 3], [f64; 3]) {
     let shape = Primitive::Cylinder { radius: radius * 1e-3, half_length: 0.5e-3 * length };
     (shape, [0.0, y * 1e-3, 0.0], [-FRAC_PI_2, 0.0, 0.0])
@@ -192,7 +192,7 @@ fn smallbutton() -> Thing {
     }
 }
 
-/// A flat ring facing z [m].
+/// A flat ring facing z (m).
 fn ring(inner: f64, outer: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     for k in 0..48u32 {
@@ -240,7 +240,7 @@ fn case() -> Thing {
     }
 }
 
-/// Outline of a rounded box seen from above, counter-clockwise [m].
+/// Outline of a rounded box seen from above, counter-clockwise (m).
 fn seam_outline(half: DVec3, radius: f64) -> Vec<DVec2> {
     let corner = |sx: f64, sy: f64, from: f64| {
         (0..=8).map(move |k| {
@@ -329,7 +329,7 @@ fn cylinder() -> Thing {
 const WOOD: [(&str, Rgb); 3] =
     [("wood light", Rgb(226, 194, 146)), ("wood", Rgb(214, 178, 128)), ("wood dark", Rgb(200, 160, 110))];
 
-/// A sheet of wood grain facing z, `half` [m]: strips along y whose borders waver, in tones that alternate.
+/// A sheet of wood grain facing z, `half` (m): strips along y whose borders waver, in tones that alternate.
 fn add_grain(look: &mut Parts, half: DVec2, seed: f64, place: impl Fn(TriMesh) -> TriMesh) {
     const STRIPS: u32 = 9;
     const STEPS: u32 = 24;
@@ -399,7 +399,7 @@ fn jenga() -> Thing {
     }
 }
 
-/// The part of a growth ring about a point below the end face that lies within `half` [m], facing z.
+/// The part of a growth ring about a point below the end face that lies within `half` (m), facing z.
 fn growth_ring(radius: f64, half: DVec2) -> TriMesh {
     let centre = DVec2::new(0.3 * half.x, -1.1 * half.y);
     let mut mesh = TriMesh::default();

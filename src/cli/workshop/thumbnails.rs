@@ -10,7 +10,7 @@ use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Side of a thumbnail [pixels]: shown at 40 points, so that it is sharp on fine screens too.
+/// Side of a thumbnail (pixels): shown at 40 points, so that it is sharp on fine screens too.
 const SIDE: u32 = 96;
 /// A backdrop that suits both themes.
 const BACKDROP: [Rgb; 2] = [Rgb(122, 131, 142), Rgb(84, 92, 102)];

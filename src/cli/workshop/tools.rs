@@ -95,7 +95,7 @@ pub(super) fn turned_soft(profile_mm: &[(f64, f64)], radius: f64) -> TriMesh {
     turned(&pairs)
 }
 
-/// A flat rounded rectangle facing z, `half` [m], corners rounded by `radius` [m]; a sheet, for drawing only.
+/// A flat rounded rectangle facing z, `half` (m), corners rounded by `radius` (m); a sheet, for drawing only.
 pub(super) fn sticker(half: DVec2, radius: f64) -> TriMesh {
     const ARC: u32 = 6;
     let mut outline = Vec::new();
@@ -110,7 +110,7 @@ pub(super) fn sticker(half: DVec2, radius: f64) -> TriMesh {
     fan(&outline)
 }
 
-/// A disc facing z [m]; a sheet, for drawing only.
+/// A disc facing z (m); a sheet, for drawing only.
 pub(super) fn disc(radius: f64) -> TriMesh {
     let outline: Vec<DVec2> = (0..32).map(|k| DVec2::from_angle(TAU * f64::from(k) / 32.0) * radius).collect();
     fan(&outline)
@@ -123,7 +123,7 @@ fn fan(outline: &[DVec2]) -> TriMesh {
     TriMesh { points, triangles: (0..n).map(|k| [k, (k + 1) % n, n]).collect() }
 }
 
-/// A closed ribbon on a ball of radius `radius` [m] along a curve of unit vectors, `width` [m] wide.
+/// A closed ribbon on a ball of radius `radius` (m) along a curve of unit vectors, `width` (m) wide.
 pub(super) fn ribbon(curve: &[DVec3], radius: f64, width: f64) -> TriMesh {
     // Lanes narrow enough not to dip below the ball's own facets.
     let lanes = (width / 0.0008).ceil().max(1.0) as u32;

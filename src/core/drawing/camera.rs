@@ -16,15 +16,15 @@ use std::f32::consts::{FRAC_PI_2, PI};
 /// Where the picture is seen from.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// The point in the middle of the picture [m].
+    /// The point in the middle of the picture (m).
     pub target: Vec3,
-    /// Distance of the eye from the target [m].
+    /// Distance of the eye from the target (m).
     pub distance: f32,
-    /// Turn about the vertical [rad]; 0 looks along +y, positive moves the eye towards +x.
+    /// Turn about the vertical (rad); 0 looks along +y, positive moves the eye towards +x.
     pub yaw: f32,
-    /// Height of the eye above the horizon [rad].
+    /// Height of the eye above the horizon (rad).
     pub pitch: f32,
-    /// Vertical angle of view [rad].
+    /// Vertical angle of view (rad).
     pub angle_of_view: f32,
     /// Parallel projection instead of perspective.
     pub parallel: bool,
@@ -66,7 +66,7 @@ impl StandardView {
         }
     }
 
-    /// Yaw and pitch [rad].
+    /// Yaw and pitch (rad).
     fn angles(self) -> (f32, f32) {
         match self {
             Self::Home => (-0.68, 0.30),
@@ -80,9 +80,9 @@ impl StandardView {
     }
 }
 
-/// Straight up or down, less a hair, so that "up" in the picture stays defined [rad].
+/// Straight up or down, less a hair, so that "up" in the picture stays defined (rad).
 const STEEPEST: f32 = FRAC_PI_2 - 1e-3;
-/// Nearest and farthest distance [m].
+/// Nearest and farthest distance (m).
 const DISTANCES: (f32, f32) = (0.03, 4.0);
 
 impl Default for Camera {
@@ -99,7 +99,7 @@ impl Camera {
         Self { yaw, pitch, ..self }
     }
 
-    /// Moved so that a ball of `radius` [m] about `centre` fills the picture.
+    /// Moved so that a ball of `radius` (m) about `centre` fills the picture.
     pub fn framing(self, centre: Vec3, radius: f32) -> Self {
         let distance = radius / (0.5 * self.angle_of_view).sin();
         Self { target: centre, distance: distance.clamp(DISTANCES.0, DISTANCES.1), ..self }
@@ -127,7 +127,7 @@ impl Camera {
         Self { distance: (self.distance * factor).clamp(DISTANCES.0, DISTANCES.1), ..self }
     }
 
-    /// Height of the picture at the distance of the target [m].
+    /// Height of the picture at the distance of the target (m).
     pub fn height_at_target(&self) -> f32 {
         2.0 * self.distance * (0.5 * self.angle_of_view).tan()
     }
@@ -141,7 +141,7 @@ impl Camera {
         [right, back.cross(right), back]
     }
 
-    /// Where the eye is [m].
+    /// Where the eye is (m).
     pub fn eye(&self) -> Vec3 {
         self.target + self.axes()[2] * self.distance
     }

@@ -21,7 +21,7 @@ pub struct DrawList {
     pub camera: Camera,
     /// Backdrop colours, above and below.
     pub backdrop: [Rgb; 2],
-    /// Ball that holds everything which casts a shadow: centre and radius [m].
+    /// Ball that holds everything which casts a shadow: centre and radius (m).
     pub shadow_bounds: (Vec3, f32),
     /// The ground and its grid.
     pub ground: Option<Ground>,
@@ -38,13 +38,13 @@ pub struct DrawList {
 /// The ground, level with z = `height`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
-    /// Its height [m].
+    /// Its height (m).
     pub height: f32,
     /// Its colour.
     pub colour: Rgb,
     /// Colour of the grid: a line every 10 mm, a stronger one every 50 mm.
     pub grid: Rgb,
-    /// Radius at which it has faded into the backdrop [m].
+    /// Radius at which it has faded into the backdrop (m).
     pub radius: f32,
 }
 
@@ -68,16 +68,16 @@ pub struct SoftFinger {
     pub section: Section,
     /// Loads on the pad.
     pub taxels: TaxelField,
-    /// Pressure that has the brightest colour [Pa].
+    /// Pressure that has the brightest colour (Pa).
     pub full_scale: f32,
 }
 
 /// A place on the neutral axis of a finger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingerFrame {
-    /// Arc length from the palm [m].
+    /// Arc length from the palm (m).
     pub arc: f32,
-    /// Position [m].
+    /// Position (m).
     pub position: Vec3,
     /// Unit vector towards the tip.
     pub along: Vec3,
@@ -88,13 +88,13 @@ pub struct FingerFrame {
 /// Cross-section of a finger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
-    /// Width across the bending plane [m].
+    /// Width across the bending plane (m).
     pub width: f32,
-    /// Height of the pad in front of the neutral axis [m].
+    /// Height of the pad in front of the neutral axis (m).
     pub pad: f32,
-    /// Radius of the pad's crown [m].
+    /// Radius of the pad's crown (m).
     pub crown_radius: f32,
-    /// Depth of the bellows behind the neutral axis [m].
+    /// Depth of the bellows behind the neutral axis (m).
     pub back: f32,
 }
 
@@ -105,18 +105,18 @@ pub struct TaxelField {
     pub rows: u32,
     /// Columns across it.
     pub columns: u32,
-    /// For each taxel its pressure [Pa] and how far it is pushed in [m].
+    /// For each taxel its pressure (Pa) and how far it is pushed in (m).
     pub loads: Vec<[f32; 2]>,
 }
 
 /// An arrow, for a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrow {
-    /// Where it begins [m].
+    /// Where it begins (m).
     pub from: Vec3,
-    /// Where its point is [m].
+    /// Where its point is (m).
     pub to: Vec3,
-    /// Radius of the shaft [m].
+    /// Radius of the shaft (m).
     pub radius: f32,
     /// Its colour.
     pub colour: Rgb,

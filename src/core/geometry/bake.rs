@@ -21,7 +21,7 @@ pub enum SolidPart {
 }
 
 impl SolidPart {
-    /// Bounding box in the solid's frame [m].
+    /// Bounding box in the solid's frame (m).
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Primitive(shape, pose) => {
@@ -51,21 +51,21 @@ pub enum BakeError {
 /// Nodes beyond this are refused: 32 MB and some ten seconds.
 const MOST_NODES: usize = 8_000_000;
 
-/// Lattice left around the solid [cells], so that contacts are found inside the lattice.
+/// Lattice left around the solid (cells), so that contacts are found inside the lattice.
 const MARGIN: f64 = 3.0;
 
 /// Exact distances are computed within this many cells of the surface; beyond, a lattice this much coarser gives a
 /// lower bound. Most nodes of a 60 mm body are beyond, so that baking takes a third of the time.
 const STRIDE: usize = 4;
 
-/// A lattice spacing [m] that keeps 0.75 mm where it can, six cells across the thinnest extent, and no more than
+/// A lattice spacing (m) that keeps 0.75 mm where it can, six cells across the thinnest extent, and no more than
 /// 160 cells along the longest.
 pub fn choose_cell(bounds: &Bounds) -> f64 {
     let size = bounds.size();
     (0.75e-3f64).min(size.min_element() / 6.0).max(size.max_element() / 160.0)
 }
 
-/// Samples the union of some solids with lattice spacing `cell` [m].
+/// Samples the union of some solids with lattice spacing `cell` (m).
 pub fn bake(parts: &[SolidPart], cell: f64) -> Result<DistanceGrid, BakeError> {
     let solid = parts.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
     let size = solid.size();

@@ -1,4 +1,4 @@
-//! Curvature of a planar curve from points on it: fit a circle, kappa = 1 / r [1/m] (paper, section IV-A1).
+//! Curvature of a planar curve from points on it: fit a circle, kappa = 1 / r (1/m) (paper, section IV-A1).
 //!
 //! We never form the radius, which is infinite for a straight finger. A circle is A (x² + y²) + B x + C y + D = 0
 //! and its curvature is 2 A / sqrt(B² + C² − 4 A D): zero, exactly, when the fit is a line (A = 0).
@@ -10,7 +10,7 @@
 
 use glam::DVec2;
 
-/// Signed curvature [1/m] of the circle through `points` [m], in the order in which they follow each other.
+/// Signed curvature (1/m) of the circle through `points` (m), in the order in which they follow each other.
 ///
 /// Positive when the curve turns left (from x towards y). `None` when fewer than three points, or points that
 /// all coincide, leave the circle undefined. Collinear points give exactly zero.

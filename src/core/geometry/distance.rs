@@ -1,4 +1,4 @@
-//! Signed distance to a solid [m], negative inside: in closed form for one primitive, otherwise from a baked grid.
+//! Signed distance to a solid (m), negative inside: in closed form for one primitive, otherwise from a baked grid.
 
 use super::{Bounds, Pose, Primitive};
 use glam::DVec3;
@@ -24,7 +24,7 @@ impl DistanceField {
         Self::Primitive { shape, shape_from_solid: solid_from_shape.inverse() }
     }
 
-    /// Signed distance [m]. Near the surface it is the distance; farther away it may be a lower bound, which is
+    /// Signed distance (m). Near the surface it is the distance; farther away it may be a lower bound, which is
     /// all that sphere tracing needs.
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
@@ -45,7 +45,7 @@ impl DistanceField {
         }
     }
 
-    /// Radius [m] of a ball about `centre` that holds the solid.
+    /// Radius (m) of a ball about `centre` that holds the solid.
     pub fn radius_about(&self, centre: DVec3) -> f64 {
         let (bounds, place) = match self {
             Self::Primitive { shape, shape_from_solid } => (shape.bounds(), *shape_from_solid),
@@ -62,20 +62,20 @@ impl DistanceField {
 /// Edges are rounded at about half a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceGrid {
-    /// Position of the first node [m].
+    /// Position of the first node (m).
     pub origin: DVec3,
-    /// Lattice spacing [m].
+    /// Lattice spacing (m).
     pub cell: f64,
     /// Nodes along x, y, z; at least two each.
     pub size: [usize; 3],
-    /// Distances [m], z fastest.
+    /// Distances (m), z fastest.
     pub values: Vec<f32>,
     /// Bounding box of the solid itself, inside the lattice.
     pub solid: Bounds,
 }
 
 impl DistanceGrid {
-    /// Position of a node [m].
+    /// Position of a node (m).
     pub fn node(&self, index: [usize; 3]) -> DVec3 {
         self.origin + DVec3::from_array(index.map(|i| i as f64)) * self.cell
     }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-/// Area [m²] of the convex hull of `points` [m]. Fewer than three points, or points on a line, span no area.
+/// Area (m²) of the convex hull of `points` (m). Fewer than three points, or points on a line, span no area.
 ///
 /// Sorts `points` in place, so that a caller in a loop need not allocate a copy.
 pub fn convex_hull_area(points: &mut [DVec2]) -> f64 {

@@ -6,11 +6,11 @@ use glam::{DMat3, DVec3, Vec3};
 /// What a rigid body weighs and how it resists turning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Centre of mass [m].
+    /// Centre of mass (m).
     pub centre: DVec3,
-    /// Inertia about the centre of mass, in the axes of the frame the body is given in [kg m²].
+    /// Inertia about the centre of mass, in the axes of the frame the body is given in (kg m²).
     pub inertia: DMat3,
 }
 
@@ -68,7 +68,7 @@ fn is_positive_definite(m: &DMat3) -> bool {
     m.x_axis.x > 0.0 && minor > 0.0 && m.determinant() > 0.0
 }
 
-/// Mass properties of a closed, outward-facing mesh filled at `density` [kg/m³].
+/// Mass properties of a closed, outward-facing mesh filled at `density` (kg/m³).
 pub fn mass_properties(mesh: &TriMesh, density: f64) -> MassProperties {
     // parry works in single precision: bring the mesh to unit size about its middle first.
     let bounds = mesh.bounds();

@@ -1,4 +1,4 @@
-//! Triangle meshes as plain data [m].
+//! Triangle meshes as plain data (m).
 
 use super::Pose;
 use glam::DVec3;
@@ -6,30 +6,30 @@ use glam::DVec3;
 /// A triangle soup with shared corners: what files hold and what repair works on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
-    /// Corner positions [m].
+    /// Corner positions (m).
     pub points: Vec<DVec3>,
     /// Corner indices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl TriMesh {
-    /// The three corners of a triangle [m].
+    /// The three corners of a triangle (m).
     pub fn corners(&self, triangle: [u32; 3]) -> [DVec3; 3] {
         triangle.map(|i| self.points[i as usize])
     }
 
-    /// Volume enclosed [m³]: positive when the triangles face outward. Meaningful for closed meshes only.
+    /// Volume enclosed (m³): positive when the triangles face outward. Meaningful for closed meshes only.
     pub fn signed_volume(&self) -> f64 {
         self.signed_volume_of(&self.triangles)
     }
 
-    /// The share of some of the triangles in [`TriMesh::signed_volume`] [m³].
+    /// The share of some of the triangles in [`TriMesh::signed_volume`] (m³).
     pub(super) fn signed_volume_of(&self, triangles: &[[u32; 3]]) -> f64 {
         let six_volumes: f64 = triangles.iter().map(|t| self.corners(*t)).map(|[a, b, c]| a.dot(b.cross(c))).sum();
         six_volumes / 6.0
     }
 
-    /// Bounding box of the points [m].
+    /// Bounding box of the points (m).
     pub fn bounds(&self) -> Bounds {
         Bounds::of(self.points.iter().copied())
     }
@@ -61,7 +61,7 @@ impl TriMesh {
     }
 }
 
-/// An axis-aligned box [m].
+/// An axis-aligned box (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Smallest corner.
@@ -84,22 +84,22 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// The box grown by a margin on every side [m].
+    /// The box grown by a margin on every side (m).
     pub fn grown(self, margin: f64) -> Self {
         Self { min: self.min - DVec3::splat(margin), max: self.max + DVec3::splat(margin) }
     }
 
-    /// Edge lengths [m]; zero for the empty box.
+    /// Edge lengths (m); zero for the empty box.
     pub fn size(&self) -> DVec3 {
         (self.max - self.min).max(DVec3::ZERO)
     }
 
-    /// Middle of the box [m].
+    /// Middle of the box (m).
     pub fn centre(&self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
 
-    /// Distance from a point to the box [m]; zero inside.
+    /// Distance from a point to the box (m); zero inside.
     pub fn distance(&self, p: DVec3) -> f64 {
         (self.min - p).max(p - self.max).max(DVec3::ZERO).length()
     }

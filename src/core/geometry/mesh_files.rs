@@ -6,7 +6,7 @@ use glam::DVec3;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Files larger than this are refused before they are parsed [bytes]: some five million triangles.
+/// Files larger than this are refused before they are parsed (bytes): some five million triangles.
 const LARGEST_FILE: usize = 256 << 20;
 
 /// Triangles beyond this are refused: drawing and baking would take minutes.

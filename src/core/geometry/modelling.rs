@@ -17,7 +17,7 @@ pub fn cube_sphere(n: u32) -> TriMesh {
     })
 }
 
-/// A box of half edges `half` [m] with edges rounded by `radius` [m].
+/// A box of half edges `half` (m) with edges rounded by `radius` (m).
 pub fn rounded_box(half: DVec3, radius: f64) -> TriMesh {
     const ARC: u32 = 5;
     // Per axis: an arc, a flat, an arc. Coordinates in -1..1 outside of 0 belong to the arcs.

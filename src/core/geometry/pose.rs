@@ -4,10 +4,10 @@
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// A rigid transform: rotate, then translate [m].
+/// A rigid transform: rotate, then translate (m).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Where the origin of the inner frame lies in the outer frame [m].
+    /// Where the origin of the inner frame lies in the outer frame (m).
     pub position: DVec3,
     /// How the inner frame is turned in the outer frame (unit quaternion).
     pub rotation: DQuat,
@@ -28,12 +28,12 @@ impl Pose {
         Self { position, rotation: rotation.normalize() }
     }
 
-    /// A translation [m].
+    /// A translation (m).
     pub fn from_position(position: DVec3) -> Self {
         Self { position, rotation: DQuat::IDENTITY }
     }
 
-    /// URDF's convention: fixed-axis roll, pitch, yaw [rad], i.e. R = Rz(yaw) Ry(pitch) Rx(roll).
+    /// URDF's convention: fixed-axis roll, pitch, yaw (rad), i.e. R = Rz(yaw) Ry(pitch) Rx(roll).
     pub fn from_xyz_rpy(xyz: DVec3, rpy: DVec3) -> Self {
         Self::new(xyz, DQuat::from_rotation_z(rpy.z) * DQuat::from_rotation_y(rpy.y) * DQuat::from_rotation_x(rpy.x))
     }

@@ -35,7 +35,7 @@ pub enum Primitive {
 }
 
 impl Primitive {
-    /// Signed distance [m] to the surface, negative inside.
+    /// Signed distance (m) to the surface, negative inside.
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
         match *self {
@@ -98,7 +98,7 @@ impl Primitive {
         }
     }
 
-    /// Axis-aligned bounds [m].
+    /// Axis-aligned bounds (m).
     pub fn bounds(&self) -> Bounds {
         let half = match *self {
             Self::Sphere { radius } => DVec3::splat(radius),

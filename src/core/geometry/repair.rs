@@ -40,7 +40,7 @@ pub enum MeshError {
     Open {
         /// Number of holes that remain.
         holes: usize,
-        /// Width of the widest [mm].
+        /// Width of the widest (mm).
         widest_mm: f64,
     },
     /// The surface crosses itself so that inside and outside cannot be told apart.

@@ -11,7 +11,7 @@ const DIRECTIONS: usize = 512;
 /// Points of the even cover at most; spacing grows on larger surfaces.
 const MOST_COVER_POINTS: f64 = 600.0;
 
-/// Spacing of the even cover [m] on small surfaces. A round body of 8 mm radius dips by 0.1 mm between two points.
+/// Spacing of the even cover (m) on small surfaces. A round body of 8 mm radius dips by 0.1 mm between two points.
 const COVER_SPACING: f64 = 2.5e-3;
 
 /// Extreme corners in many directions (all corners of a box, both rims of a cylinder), then points that cover the

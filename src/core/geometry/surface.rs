@@ -10,7 +10,7 @@ use std::collections::HashMap;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SurfaceVertex {
-    /// Position [m].
+    /// Position (m).
     pub position: [f32; 3],
     /// Unit normal, outward.
     pub normal: [f32; 3],

@@ -9,9 +9,9 @@ use rand_chacha::ChaCha8Rng;
 /// How far a pose may stray from straight above the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseJitter {
-    /// Largest shift along each axis [m].
+    /// Largest shift along each axis (m).
     pub shift: f64,
-    /// Largest turn about the vertical [degrees].
+    /// Largest turn about the vertical (degrees).
     pub yaw_deg: f64,
 }
 

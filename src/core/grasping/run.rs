@@ -143,7 +143,7 @@ impl GraspRun<SimRig> {
     }
 }
 
-/// A start this deep inside something is mentioned [m].
+/// A start this deep inside something is mentioned (m).
 const DEEPEST_START: f64 = 5e-4;
 
 /// When, if ever, the pads of the two fingers have changed sides.

@@ -6,7 +6,7 @@ use crate::sensing::{ContactPatch, PressureArea, Span, curvature};
 use crate::trial::{Frame, Quality, Trial};
 use serde::Serialize;
 
-/// Normal force on a pad that counts as contact [N]: below the 0.15 N at which the real force sensor wakes, well above
+/// Normal force on a pad that counts as contact (N): below the 0.15 N at which the real force sensor wakes, well above
 /// rounding.
 const CONTACT_FORCE: f64 = 1e-3;
 
@@ -21,11 +21,11 @@ pub struct GraspSummary {
     pub converged: bool,
     /// What was guessed, mended or cut short.
     pub warnings: Vec<String>,
-    /// First sample at which either pad carried load [s]; null when never.
+    /// First sample at which either pad carried load (s); null when never.
     pub contact_onset_s: Option<f64>,
     /// The end of the hold; null when the trial has none.
     pub hold: Option<HoldSummary>,
-    /// How far the object's frame moved from start to hold [m]; null for an empty hand.
+    /// How far the object's frame moved from start to hold (m); null for an empty hand.
     pub object_moved_m: Option<f64>,
     /// Solver statistics.
     pub quality: Quality,
@@ -34,11 +34,11 @@ pub struct GraspSummary {
 /// Means over the last quarter of the hold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HoldSummary {
-    /// Normal force on each pad [N].
+    /// Normal force on each pad (N).
     pub force_n: [f64; 2],
-    /// Curvature of each whole finger [1/m].
+    /// Curvature of each whole finger (1/m).
     pub curvature_per_m: [f64; 2],
-    /// Pressure over the participation area of each pad [Pa].
+    /// Pressure over the participation area of each pad (Pa).
     pub pressure_pa: [f64; 2],
 }
 

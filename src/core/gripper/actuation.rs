@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 /// One measured point of the pressure-torque curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TorquePoint {
-    /// Line pressure [bar].
+    /// Line pressure (bar).
     pub bar: f64,
-    /// Torque on every joint [N m].
+    /// Torque on every joint (N m).
     pub torque: f64,
 }
 
@@ -17,9 +17,9 @@ pub struct TorquePoint {
 pub struct Actuation {
     /// Pressure-torque curve, straight between its points and beyond them; pressures must rise.
     pub curve: Vec<TorquePoint>,
-    /// Highest line pressure [bar].
+    /// Highest line pressure (bar).
     pub max_bar: f64,
-    /// Resolution of the control box [bar]: commands are multiples of it (paper, section IV-B).
+    /// Resolution of the control box (bar): commands are multiples of it (paper, section IV-B).
     pub step_bar: f64,
 }
 
@@ -33,7 +33,7 @@ impl Default for Actuation {
 }
 
 impl Actuation {
-    /// Torque on every joint [N m] at a line pressure [bar].
+    /// Torque on every joint (N m) at a line pressure (bar).
     pub fn torque(&self, bar: f64) -> f64 {
         let line =
             |a: &TorquePoint, b: &TorquePoint| a.torque + (b.torque - a.torque) * (bar - a.bar) / (b.bar - a.bar);
@@ -48,7 +48,7 @@ impl Actuation {
         }
     }
 
-    /// The nearest command that the control box can give [bar].
+    /// The nearest command that the control box can give (bar).
     pub fn nearest_command(&self, bar: f64) -> f64 {
         // Count whole steps, so that 0.05 added twenty times is 1.
         (bar / self.step_bar).round().clamp(0.0, (self.max_bar / self.step_bar).floor()) * self.step_bar

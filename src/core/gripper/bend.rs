@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 /// One rigid segment in the finger plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SegmentPose {
-    /// Where it begins: the palm for segment 0, joint j for segment j [m].
+    /// Where it begins: the palm for segment 0, joint j for segment j (m).
     pub start: DVec2,
     /// Unit vector from its start towards the tip.
     pub along: DVec2,
@@ -31,13 +31,13 @@ impl SegmentPose {
         DVec2::new(self.along.y, -self.along.x)
     }
 
-    /// A point `along` and `inward` of the segment's start [m].
+    /// A point `along` and `inward` of the segment's start (m).
     pub fn point(&self, along: f64, inward: f64) -> DVec2 {
         self.start + self.along * along + self.inward() * inward
     }
 }
 
-/// Lays out N + 1 segments bent by N joint angles `q` [rad]; returns the tip [m].
+/// Lays out N + 1 segments bent by N joint angles `q` (rad); returns the tip (m).
 ///
 /// `lengths` and `segments` have one entry more than `q`.
 pub fn bend(lengths: &[f64], q: &[f64], segments: &mut [SegmentPose]) -> DVec2 {
@@ -59,14 +59,14 @@ pub fn bend(lengths: &[f64], q: &[f64], segments: &mut [SegmentPose]) -> DVec2 {
 pub struct BentFinger {
     /// The N + 1 segments.
     pub segments: Vec<SegmentPose>,
-    /// Their lengths [m].
+    /// Their lengths (m).
     pub lengths: Vec<f64>,
-    /// The tip [m].
+    /// The tip (m).
     pub tip: DVec2,
 }
 
 impl BentFinger {
-    /// Bends a finger by N joint angles [rad].
+    /// Bends a finger by N joint angles (rad).
     pub fn new(finger: &Finger, q: &[f64]) -> Self {
         let lengths: Vec<f64> = finger.segment_lengths().collect();
         let mut segments = vec![SegmentPose::default(); lengths.len()];
@@ -74,12 +74,12 @@ impl BentFinger {
         Self { segments, lengths, tip }
     }
 
-    /// The joints, from the palm to the tip [m].
+    /// The joints, from the palm to the tip (m).
     pub fn joints(&self) -> impl Iterator<Item = DVec2> + '_ {
         self.segments.iter().skip(1).map(|s| s.start)
     }
 
-    /// The segment at an arc length from the palm [m], and how far along it.
+    /// The segment at an arc length from the palm (m), and how far along it.
     pub fn at(&self, arc: f64) -> (usize, f64) {
         let mut rest = arc;
         for (j, length) in self.lengths.iter().enumerate() {
@@ -97,17 +97,17 @@ impl BentFinger {
 pub struct FingerPlane {
     /// +1 for the left finger, -1 for the right.
     pub sign: f64,
-    /// Distance of the neutral axis from the middle of the gripper when straight [m].
+    /// Distance of the neutral axis from the middle of the gripper when straight (m).
     pub half_gap: f64,
 }
 
 impl FingerPlane {
-    /// The plane of a finger that stands `half_gap` [m] from the middle.
+    /// The plane of a finger that stands `half_gap` (m) from the middle.
     pub fn new(side: Side, half_gap: f64) -> Self {
         Self { sign: side.closing_sign(), half_gap }
     }
 
-    /// A point of the plane, shifted `across` the finger along y [m].
+    /// A point of the plane, shifted `across` the finger along y (m).
     #[inline]
     pub fn point(&self, p: DVec2, across: f64) -> DVec3 {
         DVec3::new(self.sign * (p.x - self.half_gap), across, -p.y)

@@ -11,21 +11,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Finger {
-    /// Length from palm to tip, L [m].
+    /// Length from palm to tip, L (m).
     pub length: f64,
-    /// Width across the bending plane [m].
+    /// Width across the bending plane (m).
     pub width: f64,
-    /// Depth of the bellows behind the neutral axis [m].
+    /// Depth of the bellows behind the neutral axis (m).
     pub back: f64,
     /// Number of joints, N.
     pub joints: usize,
-    /// Mass [kg], spread evenly along the length.
+    /// Mass (kg), spread evenly along the length.
     pub mass: f64,
-    /// Bending stiffness EI [N m²]; each joint has k = EI / l.
+    /// Bending stiffness EI (N m²); each joint has k = EI / l.
     pub bending_stiffness: f64,
-    /// Relaxation time c / k of every joint [s].
+    /// Relaxation time c / k of every joint (s).
     pub damping_time: f64,
-    /// Curvature at which the bellows close up and bending stops [1/m].
+    /// Curvature at which the bellows close up and bending stops (1/m).
     pub curvature_limit: f64,
 }
 
@@ -50,27 +50,27 @@ impl Finger {
     /// Most joints a finger may have.
     pub const MOST_JOINTS: u32 = 80;
 
-    /// Length of one full segment, l = L / N [m].
+    /// Length of one full segment, l = L / N (m).
     pub fn segment_length(&self) -> f64 {
         self.length / self.joints as f64
     }
 
-    /// Stiffness of each joint, k = EI / l [N m/rad].
+    /// Stiffness of each joint, k = EI / l (N m/rad).
     pub fn joint_stiffness(&self) -> f64 {
         self.bending_stiffness / self.segment_length()
     }
 
-    /// Damping of each joint, c [N m s/rad].
+    /// Damping of each joint, c (N m s/rad).
     pub fn joint_damping(&self) -> f64 {
         self.damping_time * self.joint_stiffness()
     }
 
-    /// Arc length of joint `i` (0-based) from the palm [m].
+    /// Arc length of joint `i` (0-based) from the palm (m).
     pub fn joint_position(&self, i: usize) -> f64 {
         (i as f64 + 0.5) * self.segment_length()
     }
 
-    /// Lengths of the N + 1 rigid segments [m]: half, N - 1 whole, half.
+    /// Lengths of the N + 1 rigid segments (m): half, N - 1 whole, half.
     pub fn segment_lengths(&self) -> impl Iterator<Item = f64> + use<> {
         let (n, whole) = (self.joints, self.segment_length());
         (0..=n).map(move |j| if j == 0 || j == n { 0.5 * whole } else { whole })

@@ -74,7 +74,7 @@ pub struct Gripper {
 }
 
 impl Gripper {
-    /// Distance of each neutral axis from the middle of the gripper when open [m].
+    /// Distance of each neutral axis from the middle of the gripper when open (m).
     pub fn half_gap(&self) -> f64 {
         0.5 * self.mount.opening + self.pad.thickness
     }
@@ -94,13 +94,13 @@ impl Gripper {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Mount {
-    /// Pad to pad when open [m].
+    /// Pad to pad when open (m).
     pub opening: f64,
-    /// Height of the palm above the middle of the resting object [m].
+    /// Height of the palm above the middle of the resting object (m).
     pub grasp_depth: f64,
-    /// Shift of the gripper from straight above the object, in world axes [m].
+    /// Shift of the gripper from straight above the object, in world axes (m).
     pub offset: [f64; 3],
-    /// Turn of the gripper about the vertical [degrees].
+    /// Turn of the gripper about the vertical (degrees).
     pub yaw_deg: f64,
 }
 

@@ -26,15 +26,15 @@ pub enum PadLaw {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Pad {
-    /// Height of the pad above the neutral axis, which is also the rest length of its strands, H [m].
+    /// Height of the pad above the neutral axis, which is also the rest length of its strands, H (m).
     pub thickness: f64,
-    /// Young's modulus E [Pa].
+    /// Young's modulus E (Pa).
     pub modulus: f64,
     /// The law of compression.
     pub law: PadLaw,
-    /// Radius of the crown across the pad [m]: the middle stands proud by y² / (2 radius) at distance y.
+    /// Radius of the crown across the pad (m): the middle stands proud by y² / (2 radius) at distance y.
     pub crown_radius: f64,
-    /// Hunt-Crossley dissipation [s/m]: force is multiplied by (1 - d v), v the speed of separation.
+    /// Hunt-Crossley dissipation (s/m): force is multiplied by (1 - d v), v the speed of separation.
     pub dissipation: f64,
     /// Friction coefficient of the pad's skin against a surface of coefficient 1; combined as a geometric mean.
     pub friction: f64,
@@ -63,8 +63,8 @@ impl Default for Pad {
 const TANGENT_FROM: f64 = 0.85;
 
 impl PadLaw {
-    /// Force [N] and its slope [N/m] of a strand with small-strain stiffness `k` = E a / H [N/m] and rest length
-    /// `height` [m] under compression `x` [m]. Zero without compression.
+    /// Force (N) and its slope (N/m) of a strand with small-strain stiffness `k` = E a / H (N/m) and rest length
+    /// `height` (m) under compression `x` (m). Zero without compression.
     #[inline]
     pub fn force(self, k: f64, height: f64, x: f64) -> (f64, f64) {
         if x <= 0.0 {
@@ -83,7 +83,7 @@ impl PadLaw {
         }
     }
 
-    /// Elastic energy [J] of a strand under compression `x` [m]: the integral of the force.
+    /// Elastic energy (J) of a strand under compression `x` (m): the integral of the force.
     pub fn energy(self, k: f64, height: f64, x: f64) -> f64 {
         if x <= 0.0 {
             return 0.0;
@@ -101,7 +101,7 @@ impl PadLaw {
         }
     }
 
-    /// Compression [m] under a steady force [N]: the inverse of [`PadLaw::force`].
+    /// Compression (m) under a steady force (N): the inverse of [`PadLaw::force`].
     pub fn compression(self, k: f64, height: f64, force: f64) -> f64 {
         if force <= 0.0 {
             return 0.0;

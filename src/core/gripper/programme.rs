@@ -30,13 +30,13 @@ impl Phase {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Programme {
-    /// Pressure at which closing stops [bar].
+    /// Pressure at which closing stops (bar).
     pub peak_bar: f64,
-    /// Rise per actuation tick while closing [bar].
+    /// Rise per actuation tick while closing (bar).
     pub close_bar_per_tick: f64,
     /// Actuation ticks at the peak after the closing has ended.
     pub hold_ticks: u32,
-    /// Fall per actuation tick while releasing [bar].
+    /// Fall per actuation tick while releasing (bar).
     pub release_bar_per_tick: f64,
 }
 
@@ -59,7 +59,7 @@ impl Programme {
         self.close_ticks().saturating_add(self.hold_ticks).saturating_add(release)
     }
 
-    /// Commanded pressure [bar] during actuation tick `tick` (the first is 0), and the phase it belongs to.
+    /// Commanded pressure (bar) during actuation tick `tick` (the first is 0), and the phase it belongs to.
     pub fn command(&self, tick: u32) -> (f64, Phase) {
         let closed_at = self.close_ticks();
         let released_from = closed_at.saturating_add(self.hold_ticks);

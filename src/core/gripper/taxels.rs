@@ -26,43 +26,43 @@ impl TaxelGrid {
         self.rows * self.columns
     }
 
-    /// Distance between rows [m].
+    /// Distance between rows (m).
     pub fn row_pitch(&self) -> f64 {
         self.length / self.rows as f64
     }
 
-    /// Distance between columns [m].
+    /// Distance between columns (m).
     pub fn column_pitch(&self) -> f64 {
         self.width / self.columns as f64
     }
 
-    /// Area of each taxel, a [m²].
+    /// Area of each taxel, a (m²).
     pub fn area(&self) -> f64 {
         self.row_pitch() * self.column_pitch()
     }
 
-    /// Arc length of a taxel's middle from the palm [m].
+    /// Arc length of a taxel's middle from the palm (m).
     pub fn arc(&self, taxel: usize) -> f64 {
         ((taxel / self.columns) as f64 + 0.5) * self.row_pitch()
     }
 
-    /// Position of a taxel's middle across the finger [m].
+    /// Position of a taxel's middle across the finger (m).
     pub fn across(&self, taxel: usize) -> f64 {
         ((taxel % self.columns) as f64 + 0.5) * self.column_pitch() - 0.5 * self.width
     }
 
-    /// Height of the undeformed skin above the neutral axis, H [m]: the pad's thickness less its crown.
+    /// Height of the undeformed skin above the neutral axis, H (m): the pad's thickness less its crown.
     pub fn height(&self, taxel: usize) -> f64 {
         let across = self.across(taxel);
         self.pad.thickness - across * across / (2.0 * self.pad.crown_radius)
     }
 
-    /// Small-strain stiffness of a taxel, k = E a / H [N/m].
+    /// Small-strain stiffness of a taxel, k = E a / H (N/m).
     pub fn stiffness(&self, taxel: usize) -> f64 {
         self.pad.modulus * self.area() / self.height(taxel)
     }
 
-    /// How far a steady normal force [N] pushes a taxel in [m].
+    /// How far a steady normal force (N) pushes a taxel in (m).
     pub fn compression(&self, taxel: usize, force: f64) -> f64 {
         self.pad.law.compression(self.stiffness(taxel), self.height(taxel), force)
     }

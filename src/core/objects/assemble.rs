@@ -33,13 +33,13 @@ pub(super) struct Blueprint {
     pub(super) warnings: Vec<String>,
 }
 
-/// An object larger than this is taken to be in millimetres when that makes sense of it [m].
+/// An object larger than this is taken to be in millimetres when that makes sense of it (m).
 const LARGEST_PLAUSIBLE: f64 = 3.0;
-/// An object smaller than this is taken to be given in units of a thousand metres [m].
+/// An object smaller than this is taken to be given in units of a thousand metres (m).
 const SMALLEST_PLAUSIBLE: f64 = 5e-4;
-/// Beyond this, baking and drawing make no sense [m].
+/// Beyond this, baking and drawing make no sense (m).
 const LARGEST_POSSIBLE: f64 = 10.0;
-/// Larger than the gripper's world: loaded, with a warning [m].
+/// Larger than the gripper's world: loaded, with a warning (m).
 const LARGEST_GRASPABLE: f64 = 0.5;
 /// Friction coefficient where nothing is known of the surface: plastic and varnished wood.
 const DEFAULT_FRICTION: f64 = 0.6;

@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-/// Files beyond this size are not read [bytes].
+/// Files beyond this size are not read (bytes).
 const LARGEST_FILE: u64 = 256 << 20;
 
 /// Extensions that a URDF or OBJ may refer to; nothing else is ever opened on its behalf.

@@ -29,13 +29,13 @@ pub enum CollisionShape {
 pub struct LoadOptions {
     /// Factor on all lengths; guessed with a warning where the size is implausible.
     pub scale: Option<f64>,
-    /// Mass [kg]; taken from the file, or from volume and density.
+    /// Mass (kg); taken from the file, or from volume and density.
     pub mass: Option<f64>,
-    /// Density where the file gives no usable mass [kg/m³].
+    /// Density where the file gives no usable mass (kg/m³).
     pub density: f64,
     /// Which shape the physics sees.
     pub collision: CollisionShape,
-    /// Lattice spacing of baked distances [m]; chosen by size.
+    /// Lattice spacing of baked distances (m); chosen by size.
     pub cell: Option<f64>,
 }
 

@@ -83,7 +83,7 @@ pub enum ObjectError {
     Size {
         /// The object.
         name: String,
-        /// Its largest extent [m].
+        /// Its largest extent (m).
         metres: f64,
     },
     /// Distances could not be baked.

@@ -39,9 +39,9 @@ pub struct ObjectClass {
 /// A round bump on which an object can rest: a corner where the radius is zero, the whole of a ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RestingBall {
-    /// Centre in the object's frame [m].
+    /// Centre in the object's frame (m).
     pub centre: DVec3,
-    /// Radius [m].
+    /// Radius (m).
     pub radius: f64,
 }
 
@@ -50,7 +50,7 @@ pub struct RestingBall {
 pub struct Resting(pub Vec<RestingBall>);
 
 impl Resting {
-    /// Resting on corners [m].
+    /// Resting on corners (m).
     pub fn on_corners(corners: &[DVec3]) -> Self {
         Self(corners.iter().map(|p| RestingBall { centre: *p, radius: 0.0 }).collect())
     }
@@ -80,7 +80,7 @@ impl Resting {
         }
     }
 
-    /// How far the object reaches along a unit direction of its own frame [m].
+    /// How far the object reaches along a unit direction of its own frame (m).
     pub fn reach(&self, direction: DVec3) -> f64 {
         self.0.iter().map(|ball| ball.centre.dot(direction) + ball.radius).fold(f64::NEG_INFINITY, f64::max)
     }
@@ -92,7 +92,7 @@ fn evenly(half: f64) -> impl Iterator<Item = f64> {
     (0..=steps).map(move |i| half * (2.0 * f64::from(i) / f64::from(steps) - 1.0))
 }
 
-/// An object ready to be grasped. All geometry is in the object's own frame, z up as it is put down [m].
+/// An object ready to be grasped. All geometry is in the object's own frame, z up as it is put down (m).
 #[derive(Clone, Debug)]
 pub struct ObjectModel {
     /// Short name: the built-in's, or the file's without its extension.
@@ -116,7 +116,7 @@ pub struct ObjectModel {
 }
 
 impl ObjectModel {
-    /// An object that is one primitive of even density [kg/m³], for tests and closed-form scenes.
+    /// An object that is one primitive of even density (kg/m³), for tests and closed-form scenes.
     pub fn from_primitive(name: &str, shape: Primitive, density: f64, friction: f64) -> Self {
         let mut surface = SurfaceMesh::default();
         surface.add(&shape.tessellate(), crate::palette::Rgb(180, 180, 180));

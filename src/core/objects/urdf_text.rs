@@ -7,7 +7,7 @@
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-/// Nesting beyond this is not a URDF [levels]; it also bounds the recursion below.
+/// Nesting beyond this is not a URDF (levels); it also bounds the recursion below.
 const DEEPEST: usize = 64;
 /// Elements beyond this are not a graspable object.
 const MOST_ELEMENTS: usize = 100_000;

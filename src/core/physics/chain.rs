@@ -18,19 +18,19 @@ use glam::DVec2;
 pub(super) struct ChainModel {
     /// Joints, N.
     pub(super) joints: usize,
-    /// Lengths of the N + 1 segments [m].
+    /// Lengths of the N + 1 segments (m).
     pub(super) lengths: Vec<f64>,
-    /// Masses of the segments [kg].
+    /// Masses of the segments (kg).
     pub(super) masses: Vec<f64>,
-    /// Inertias of the segments about their own centres [kg m²].
+    /// Inertias of the segments about their own centres (kg m²).
     inertias: Vec<f64>,
-    /// Stiffness of each joint [N m/rad].
+    /// Stiffness of each joint (N m/rad).
     pub(super) stiffness: f64,
-    /// Damping of each joint [N m s/rad].
+    /// Damping of each joint (N m s/rad).
     pub(super) damping: f64,
-    /// Largest angle of each joint, either way [rad].
+    /// Largest angle of each joint, either way (rad).
     pub(super) angle_limit: f64,
-    /// Stiffness of a joint beyond its limit [N m/rad].
+    /// Stiffness of a joint beyond its limit (N m/rad).
     pub(super) limit_stiffness: f64,
 }
 
@@ -60,7 +60,7 @@ impl ChainModel {
         bend(&self.lengths, q, segments)
     }
 
-    /// Centre of a segment [m].
+    /// Centre of a segment (m).
     pub(super) fn centre(&self, segments: &[SegmentPose], j: usize) -> DVec2 {
         segments[j].point(0.5 * self.lengths[j], 0.0)
     }
@@ -86,7 +86,7 @@ impl ChainModel {
         }
     }
 
-    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane [m/s²]).
+    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane (m/s²)).
     pub(super) fn bias(
         &self,
         segments: &[SegmentPose],
@@ -114,7 +114,7 @@ impl ChainModel {
         }
     }
 
-    /// Torque [N m] with which a joint at angle `q` resists beyond its limit, and its slope [N m/rad].
+    /// Torque (N m) with which a joint at angle `q` resists beyond its limit, and its slope (N m/rad).
     #[inline]
     pub(super) fn limit_torque(&self, q: f64) -> (f64, f64) {
         let beyond = q.abs() - self.angle_limit;

@@ -41,7 +41,7 @@ impl Run {
         }
     }
 
-    /// Tip of the left finger relative to its root, inward and along [m].
+    /// Tip of the left finger relative to its root, inward and along (m).
     fn tip(&self) -> (f64, f64) {
         let n = self.model.chain.joints;
         let mut segments = vec![crate::gripper::SegmentPose::default(); n + 1];
@@ -54,7 +54,7 @@ fn torque(torque: f64) -> Drive {
     Drive { torque, ..Drive::default() }
 }
 
-/// A force inward on the left tip only [N].
+/// A force inward on the left tip only (N).
 fn tip_force(force: f64) -> Drive {
     Drive { tip_force: [DVec3::X * force, DVec3::ZERO], ..Drive::default() }
 }
@@ -116,7 +116,7 @@ fn a_cantilever_rings_at_its_modes() {
     }
 }
 
-/// The two lowest natural frequencies of the straight chain [rad/s], by inverse iteration with deflation.
+/// The two lowest natural frequencies of the straight chain (rad/s), by inverse iteration with deflation.
 fn lowest_modes(model: &Model) -> [f64; 2] {
     let n = model.chain.joints;
     let mut segments = vec![crate::gripper::SegmentPose::default(); n + 1];

@@ -44,25 +44,25 @@ pub(super) struct Contact {
     pub(super) acting: Acting,
     /// Body B.
     pub(super) against: Against,
-    /// From the reference point (the object's centre of mass) to the contact [m].
+    /// From the reference point (the object's centre of mass) to the contact (m).
     pub(super) arm: DVec3,
     /// Unit normal, from B to A.
     pub(super) normal: DVec3,
-    /// Compression at the start of the step [m]; negative while apart.
+    /// Compression at the start of the step (m); negative while apart.
     pub(super) compression: f64,
     /// Law of compression.
     pub(super) law: PadLaw,
-    /// Small-strain stiffness [N/m].
+    /// Small-strain stiffness (N/m).
     pub(super) stiffness: f64,
-    /// Rest length of the strand [m].
+    /// Rest length of the strand (m).
     pub(super) height: f64,
     /// Friction coefficient.
     pub(super) mu: f64,
-    /// Slip limit mu gamma_lag [N s].
+    /// Slip limit mu gamma_lag (N s).
     pub(super) limit: f64,
-    /// Shear at the start of the step, in the tangent plane [m].
+    /// Shear at the start of the step, in the tangent plane (m).
     pub(super) shear: DVec3,
-    /// Relative velocity at the current iterate [m/s].
+    /// Relative velocity at the current iterate (m/s).
     pub(super) velocity: DVec3,
     /// Its change along the search direction.
     pub(super) change: DVec3,
@@ -71,9 +71,9 @@ pub(super) struct Contact {
 /// What all contacts of a step share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactStep {
-    /// Step length, h [s].
+    /// Step length, h (s).
     pub(super) h: f64,
-    /// Dissipation, d [s/m].
+    /// Dissipation, d (s/m).
     pub(super) dissipation: f64,
 }
 
@@ -81,7 +81,7 @@ pub(super) struct ContactStep {
 const SHEAR_SHARE: f64 = 1.0 / 3.0;
 
 impl Contact {
-    /// Normal impulse gamma [N s] and -d gamma / d v_n, both non-negative.
+    /// Normal impulse gamma (N s) and -d gamma / d v_n, both non-negative.
     #[inline]
     pub(super) fn normal_impulse(&self, step: ContactStep, v_n: f64) -> (f64, f64) {
         let ContactStep { h, dissipation: d } = step;
@@ -94,7 +94,7 @@ impl Contact {
         (h * f * damping, h * (h * slope * damping + d * f))
     }
 
-    /// Gradient of the contact's potential with respect to v [N s]: minus the impulse on A.
+    /// Gradient of the contact's potential with respect to v (N s): minus the impulse on A.
     #[inline]
     pub(super) fn gradient(&self, step: ContactStep, velocity: DVec3) -> DVec3 {
         let v_n = self.normal.dot(velocity);
@@ -109,7 +109,7 @@ impl Contact {
         gradient
     }
 
-    /// Hessian of the contact's potential with respect to v [kg], symmetric and positive semi-definite.
+    /// Hessian of the contact's potential with respect to v (kg), symmetric and positive semi-definite.
     #[inline]
     pub(super) fn hessian(&self, step: ContactStep) -> DMat3 {
         let n = self.normal;
@@ -134,7 +134,7 @@ impl Contact {
         DMat3::from_cols(column(DVec3::X, n.x, slip.x), column(DVec3::Y, n.y, slip.y), column(DVec3::Z, n.z, slip.z))
     }
 
-    /// Stiffness of the skin in shear, k_t [N/m].
+    /// Stiffness of the skin in shear, k_t (N/m).
     #[inline]
     pub(super) fn shear_stiffness(&self) -> f64 {
         self.stiffness * SHEAR_SHARE
@@ -145,14 +145,14 @@ impl Contact {
         self.limit = self.mu * self.normal_impulse(step, self.normal.dot(self.velocity)).0;
     }
 
-    /// Force on A [N]: its normal size, and its tangential part.
+    /// Force on A (N): its normal size, and its tangential part.
     pub(super) fn force(&self, step: ContactStep) -> (f64, DVec3) {
         let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
         let tangential = -(self.gradient(step, self.velocity) + self.normal * gamma);
         (gamma / step.h, tangential / step.h)
     }
 
-    /// Shear of the skin at the end of the step [m], as far as friction lets it go.
+    /// Shear of the skin at the end of the step (m), as far as friction lets it go.
     pub(super) fn final_shear(&self, step: ContactStep) -> DVec3 {
         if self.limit <= 0.0 {
             return DVec3::ZERO;
@@ -163,7 +163,7 @@ impl Contact {
         if impulse > self.limit { e * (self.limit / impulse) } else { e }
     }
 
-    /// By how much the lagged slip limit missed the true one where it mattered [N s], and the true one.
+    /// By how much the lagged slip limit missed the true one where it mattered (N s), and the true one.
     pub(super) fn lag_mismatch(&self, step: ContactStep) -> (f64, f64) {
         let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
         let truth = self.mu * gamma;

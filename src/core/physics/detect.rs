@@ -14,16 +14,16 @@ use super::workspace::{Spatial, Workspace};
 use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
 use glam::{DMat3, DVec3};
 
-/// Gaps up to this are contacts in waiting even when nothing moves [m].
+/// Gaps up to this are contacts in waiting even when nothing moves (m).
 const STILL_MARGIN: f64 = 2e-4;
-/// Speed gained within a step that a contact in waiting allows for [m/s].
+/// Speed gained within a step that a contact in waiting allows for (m/s).
 const SPEED_MARGIN: f64 = 0.1;
 /// How much faster than now a body may become within a step before contacts are found one step late.
 const SPEED_FACTOR: f64 = 1.5;
 
 /// A surface that a strand has met.
 struct Hit {
-    /// Compression along the surface normal [m], negative while apart.
+    /// Compression along the surface normal (m), negative while apart.
     compression: f64,
     /// Outward normal of the surface, unit length.
     normal: DVec3,
@@ -68,7 +68,7 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
     }
 }
 
-/// Gap up to which contacts are kept, given the speed of approach [m].
+/// Gap up to which contacts are kept, given the speed of approach (m).
 fn margin(model: &Model, speed: f64) -> f64 {
     STILL_MARGIN + model.step.h * (SPEED_MARGIN + SPEED_FACTOR * speed)
 }
@@ -154,7 +154,7 @@ impl<'a> Solid<'a> {
         self.object_from_gripper * (p - self.centre) + self.body.centre
     }
 
-    /// Distance [m], or a lower bound where the object is far.
+    /// Distance (m), or a lower bound where the object is far.
     #[inline]
     fn distance(&self, p: DVec3) -> f64 {
         let to_ball = (p - self.centre).length() - self.body.radius;
@@ -167,11 +167,11 @@ struct Ray {
     foot: DVec3,
     axis: DVec3,
     radius: f64,
-    /// Distance of the end's centre from the foot at rest [m].
+    /// Distance of the end's centre from the foot at rest (m).
     rest: f64,
 }
 
-/// Below this gap the touch is computed from the slope of the distance instead of by more steps [m]; the error is
+/// Below this gap the touch is computed from the slope of the distance instead of by more steps (m); the error is
 /// its square over the surface's radius, 1e-8 m on a 10 mm ball.
 const CLOSE: f64 = 1e-5;
 /// Steps of sphere tracing before a ray that grazes along a surface is taken to touch where it is.

@@ -7,7 +7,7 @@ use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
 use super::workspace::Workspace;
 
-/// Kinetic energy, bending of the joints, compression and shear of the skin, and height in gravity [J].
+/// Kinetic energy, bending of the joints, compression and shear of the skin, and height in gravity (J).
 pub(super) fn mechanical_energy(model: &Model, state: &State) -> f64 {
     let mut ws = Workspace::new(model);
     lay_out(model, state, &mut ws);

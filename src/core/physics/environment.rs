@@ -14,7 +14,7 @@ const RIM_POINTS: usize = 24;
 pub(super) struct Environment {
     table: Option<Plane>,
     pedestal: Option<Pedestal>,
-    /// Height of the highest surface above the world's origin [m].
+    /// Height of the highest surface above the world's origin (m).
     top: f64,
     gripper_from_world: Pose,
 }
@@ -60,7 +60,7 @@ impl Environment {
         self.table.is_none() && self.pedestal.is_none()
     }
 
-    /// Distance [m] to the nearest surface, negative inside; infinite when there is nothing.
+    /// Distance (m) to the nearest surface, negative inside; infinite when there is nothing.
     #[inline]
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let table = self.table.map_or(f64::INFINITY, |plane| plane.up.dot(p) - plane.offset);
@@ -92,7 +92,7 @@ impl Environment {
         self.gripper_from_world.direction(DVec3::Z)
     }
 
-    /// How far a point lies above the highest surface [m]; negative below it, where only part of the environment is.
+    /// How far a point lies above the highest surface (m); negative below it, where only part of the environment is.
     pub(super) fn height_above_top(&self, p: DVec3) -> f64 {
         self.up().dot(p - self.gripper_from_world.position) - self.top
     }

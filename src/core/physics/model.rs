@@ -23,7 +23,7 @@ pub struct Model {
     pub(super) pad_friction: PadFriction,
     pub(super) body: Option<Body>,
     pub(super) environment: Environment,
-    /// Gravity [m/s²].
+    /// Gravity (m/s²).
     pub(super) gravity: DVec3,
     pub(super) tolerance: f64,
     pub(super) max_iterations: u32,
@@ -43,16 +43,16 @@ pub(super) struct PadFriction {
 pub(super) struct Body {
     pub(super) field: DistanceField,
     pub(super) resting: Resting,
-    /// Centre of mass in the object's frame [m].
+    /// Centre of mass in the object's frame (m).
     pub(super) centre: DVec3,
-    /// Radius of a ball about the centre of mass that holds the object [m].
+    /// Radius of a ball about the centre of mass that holds the object (m).
     pub(super) radius: f64,
-    /// Mass [kg].
+    /// Mass (kg).
     pub(super) mass: f64,
-    /// Inertia about the centre of mass, in object axes [kg m²].
+    /// Inertia about the centre of mass, in object axes (kg m²).
     pub(super) inertia: DMat3,
     pub(super) free: bool,
-    /// Stiffness of a contact point with the support [N/m].
+    /// Stiffness of a contact point with the support (N/m).
     pub(super) support_stiffness: f64,
     pub(super) support_friction: f64,
 }
@@ -61,7 +61,7 @@ pub(super) struct Body {
 const RESTING_POINTS: f64 = 3.0;
 
 impl Model {
-    /// Resolves a scene. `h` is the step [s]; the scene's own clock gives it in trials, tests choose it freely.
+    /// Resolves a scene. `h` is the step (s); the scene's own clock gives it in trials, tests choose it freely.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>, placement: &Placement, h: f64) -> Self {
         let gripper = &scene.gripper;
         let surface_friction = |object: &ObjectModel| scene.object.friction.value().unwrap_or(object.friction);
@@ -125,7 +125,7 @@ impl Model {
         self.body.as_ref().map_or(0, |body| body.resting.0.len())
     }
 
-    /// Step length, h [s].
+    /// Step length, h (s).
     pub fn step_length(&self) -> f64 {
         self.step.h
     }

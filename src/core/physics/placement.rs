@@ -16,10 +16,10 @@ pub struct Placement {
     pub warnings: Vec<String>,
 }
 
-/// Room kept between the palm and the top of the object, and between the fingertips and the table [m].
+/// Room kept between the palm and the top of the object, and between the fingertips and the table (m).
 const CLEARANCE: f64 = 0.003;
 
-/// Height at which an object floats when there is no support [m], so that the picture stays the same.
+/// Height at which an object floats when there is no support (m), so that the picture stays the same.
 const FLOATING_HEIGHT: f64 = 0.050;
 
 impl Placement {

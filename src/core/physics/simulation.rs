@@ -46,7 +46,7 @@ struct Totals {
 pub struct SimulationError {
     /// The step that failed.
     pub tick: u64,
-    /// Its time [s].
+    /// Its time (s).
     pub seconds: f64,
     /// What went wrong.
     pub cause: step::NotFinite,
@@ -93,13 +93,13 @@ impl Simulation {
         &self.state
     }
 
-    /// Sets the line pressure [bar] from now on.
+    /// Sets the line pressure (bar) from now on.
     pub fn command(&mut self, bar: f64, phase: Phase) {
         self.line_bar = bar;
         self.phase = phase;
     }
 
-    /// Pulls at the object's centre of mass [N, world axes] from now on, as a user does with the mouse.
+    /// Pulls at the object's centre of mass (N, world axes) from now on, as a user does with the mouse.
     pub fn pull_object(&mut self, force: DVec3) {
         self.pulls.object_force = self.model.world_from_gripper.inverse().direction(force);
     }
@@ -117,7 +117,7 @@ impl Simulation {
         Ok(report)
     }
 
-    /// Deepest compression of a strand in the state as it is, before any step [m].
+    /// Deepest compression of a strand in the state as it is, before any step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         step::lay_out(&self.model, &self.state, &mut self.workspace);
         segment_velocities(&self.model, &self.state.velocity, &mut self.workspace);
@@ -188,7 +188,7 @@ impl Simulation {
         loads
     }
 
-    /// Total force [N] and torque about its centre of mass [N m] that fingers and support exert on the object, in
+    /// Total force (N) and torque about its centre of mass (N m) that fingers and support exert on the object, in
     /// the gripper frame, in the last step.
     pub fn object_wrench(&self) -> (DVec3, DVec3) {
         let mut total = Spatial::default();
@@ -205,7 +205,7 @@ impl Simulation {
         (total.linear, total.angular)
     }
 
-    /// Deepest compression of any pad strand [m] and the largest ratio of friction to mu times normal force over
+    /// Deepest compression of any pad strand (m) and the largest ratio of friction to mu times normal force over
     /// loaded contacts, in the last step.
     pub fn contact_extremes(&self) -> (f64, f64) {
         let mut extremes = (0.0f64, 0.0f64);
@@ -256,7 +256,7 @@ impl Simulation {
         largest / torque.abs()
     }
 
-    /// Kinetic, elastic and potential energy [J], the latter relative to the gripper's frame.
+    /// Kinetic, elastic and potential energy (J), the latter relative to the gripper's frame.
     pub fn energy(&self) -> f64 {
         super::energy::mechanical_energy(&self.model, &self.state)
     }

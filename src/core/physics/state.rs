@@ -8,16 +8,16 @@ use glam::{DQuat, DVec3};
 /// State of both fingers, the object, and the skin at every place of contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// Joint angles, left finger then right, from palm to tip [rad].
+    /// Joint angles, left finger then right, from palm to tip (rad).
     pub q: Vec<f64>,
-    /// Joint rates [rad/s], then for a free object its velocity [m/s] and angular velocity [rad/s] in the gripper
+    /// Joint rates (rad/s), then for a free object its velocity (m/s) and angular velocity (rad/s) in the gripper
     /// frame.
     pub velocity: Vec<f64>,
     /// The object's centre of mass and the axes of its frame, in the gripper frame.
     pub(super) body: Pose,
-    /// Shear of the skin [m], in the axes of the segment (or of the gripper, for the object on its support).
+    /// Shear of the skin (m), in the axes of the segment (or of the gripper, for the object on its support).
     pub(super) shear: Vec<DVec3>,
-    /// Normal impulse in the last step [N s].
+    /// Normal impulse in the last step (N s).
     pub(super) lag: Vec<f64>,
 }
 
@@ -48,7 +48,7 @@ impl State {
         Some(model.world_from_gripper * gripper_from_object)
     }
 
-    /// Linear and angular velocity of a free object in the gripper frame [m/s, rad/s]; zero otherwise.
+    /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.
     pub(super) fn body_velocity(&self, model: &Model) -> (DVec3, DVec3) {
         match self.velocity.get(model.joint_count()..) {
             Some([x, y, z, a, b, c]) => (DVec3::new(*x, *y, *z), DVec3::new(*a, *b, *c)),

@@ -36,11 +36,11 @@ pub struct NotFinite {
 /// What drives a step from outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drive {
-    /// Actuation torque on every joint [N m].
+    /// Actuation torque on every joint (N m).
     pub torque: f64,
-    /// Force pulling at each fingertip, left and right, in the gripper frame [N].
+    /// Force pulling at each fingertip, left and right, in the gripper frame (N).
     pub tip_force: [DVec3; 2],
-    /// Force pulling at the object's centre of mass, in the gripper frame [N].
+    /// Force pulling at the object's centre of mass, in the gripper frame (N).
     pub object_force: DVec3,
 }
 
@@ -124,7 +124,7 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
     }
 }
 
-/// Friction limits that add up to less than this [N] are too small for their mismatch to matter.
+/// Friction limits that add up to less than this (N) are too small for their mismatch to matter.
 const FELT_FRICTION: f64 = 0.01;
 
 /// Keeps shear and normal impulse of each contact for the next step; returns the outer friction residual.

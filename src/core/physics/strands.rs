@@ -7,15 +7,15 @@ use std::ops::Range;
 /// An elastic strand: a short rod with a round end that can be pushed in along its axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Strand {
-    /// The foot, along and inward of its segment's start [m].
+    /// The foot, along and inward of its segment's start (m).
     foot: DVec2,
-    /// Distance across the finger [m].
+    /// Distance across the finger (m).
     pub(super) across: f64,
     /// True where it points out of the tip rather than out of the pad.
     points_ahead: bool,
-    /// Rest length from foot to skin, H [m].
+    /// Rest length from foot to skin, H (m).
     pub(super) height: f64,
-    /// Small-strain stiffness, k = E a / H [N/m].
+    /// Small-strain stiffness, k = E a / H (N/m).
     pub(super) stiffness: f64,
 }
 
@@ -36,9 +36,9 @@ pub(super) struct Strands {
     pub(super) on_pad: usize,
     /// Those carried by each of the N + 1 segments.
     by_segment: Vec<Range<usize>>,
-    /// Radius of the round ends [m]: half the wider pitch, so that a needle cannot pass between neighbours.
+    /// Radius of the round ends (m): half the wider pitch, so that a needle cannot pass between neighbours.
     pub(super) radius: f64,
-    /// For each segment the radius of a ball about its middle that holds its strands [m].
+    /// For each segment the radius of a ball about its middle that holds its strands (m).
     pub(super) reach: Vec<f64>,
 }
 

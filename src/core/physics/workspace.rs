@@ -81,7 +81,7 @@ pub struct Workspace {
     // layout
     /// Segments of both fingers in their planes.
     pub(super) segments: Vec<SegmentPose>,
-    /// Point about which spatial velocities are taken: the object's centre of mass [m].
+    /// Point about which spatial velocities are taken: the object's centre of mass (m).
     pub(super) reference: DVec3,
     /// Velocity of everything beyond a joint per unit of its rate, about the reference.
     pub(super) columns: Vec<Spatial>,
@@ -92,7 +92,7 @@ pub struct Workspace {
     pub(super) bias: Vec<f64>,
     /// A = M + h C + h² K of both fingers, one N x N matrix after the other.
     pub(super) finger_matrix: Vec<f64>,
-    /// Inertia of the object in the gripper frame [kg m²].
+    /// Inertia of the object in the gripper frame (kg m²).
     pub(super) body_inertia: DMat3,
     /// Momentum and known impulses, r: without contact A v = r.
     pub(super) rhs: Vec<f64>,

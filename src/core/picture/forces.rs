@@ -7,15 +7,15 @@ use crate::palette::pressure_colour;
 use crate::trial::Frame;
 use glam::DVec3;
 
-/// Length of the arrow of one newton [m].
+/// Length of the arrow of one newton (m).
 const METRES_PER_NEWTON: f64 = 0.07;
-/// Arrows are no longer than this [m], so that a hard squeeze does not leave the picture.
+/// Arrows are no longer than this (m), so that a hard squeeze does not leave the picture.
 const LONGEST: f64 = 0.09;
-/// Forces below this are not drawn [N].
+/// Forces below this are not drawn (N).
 const FAINTEST: f64 = 0.01;
-/// Force that has the brightest colour [N].
+/// Force that has the brightest colour (N).
 const FULL_SCALE: f64 = 0.5;
-/// Radius of a shaft [m].
+/// Radius of a shaft (m).
 const RADIUS: f32 = 0.0010;
 
 /// Arrows from the places of contact along the force that the object exerts on the finger.

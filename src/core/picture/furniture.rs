@@ -6,11 +6,11 @@ use crate::palette::{PRESSURE_MAP, Rgb, Theme};
 use crate::units::three_digits;
 use glam::{Vec2, Vec3};
 
-/// Distance of furniture from the edges [points].
+/// Distance of furniture from the edges (points).
 const MARGIN: f32 = 18.0;
-/// Height of its text [points].
+/// Height of its text (points).
 const TEXT: f32 = 14.0;
-/// Lengths that the scale bar may stand for [mm].
+/// Lengths that the scale bar may stand for (mm).
 pub const SCALE_STEPS: [f32; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
 /// Adds everything that fits; small pictures get less.

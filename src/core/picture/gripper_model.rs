@@ -10,7 +10,7 @@ const BODY: Rgb = Rgb(98, 106, 116);
 const CLAMP: Rgb = Rgb(74, 81, 90);
 const FITTING: Rgb = Rgb(184, 190, 198);
 const HOSE: Rgb = Rgb(70, 128, 178);
-/// Radius of the piece that the hoses lead into [m].
+/// Radius of the piece that the hoses lead into (m).
 const WRIST_RADIUS: f64 = 0.013;
 const PEDESTAL: Rgb = Rgb(176, 181, 188);
 

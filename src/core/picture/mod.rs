@@ -31,7 +31,7 @@ pub struct PictureView {
     pub forces: bool,
     /// Draw the axis gizmo, scale bar and legend.
     pub furniture: bool,
-    /// Pressure that has the brightest colour [Pa].
+    /// Pressure that has the brightest colour (Pa).
     pub full_scale: f32,
     /// Words in the top left corner: where the data come from.
     pub badge: Option<String>,
@@ -62,7 +62,7 @@ pub struct Stage {
     palm: Arc<SurfaceMesh>,
 }
 
-/// Radius of the ball in which shadows are cast [m], and the height of its middle above the table.
+/// Radius of the ball in which shadows are cast (m), and the height of its middle above the table.
 const SHADOW_RADIUS: f32 = 0.17;
 
 impl Stage {
@@ -122,7 +122,7 @@ impl Stage {
         solids
     }
 
-    /// A ball around what matters, to be framed by a camera: centre and radius [m].
+    /// A ball around what matters, to be framed by a camera: centre and radius (m).
     pub fn bounds(&self) -> (Vec3, f32) {
         let palm = self.world_from_gripper.position.as_vec3();
         let length = self.gripper.finger.length as f32;

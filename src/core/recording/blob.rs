@@ -8,13 +8,13 @@
 //! frames                  u32
 //! per frame:
 //!   sample                u32
-//!   t [s]                 f64
-//!   line pressure [bar]   f64
+//!   t (s)                 f64
+//!   line pressure (bar)   f64
 //!   phase                 u8      0 close, 1 hold, 2 release
-//!   joint angles [rad]    f64 x joints
-//!   object in the world   f64 x 7   x y z [m], quaternion x y z w       (only where has object is 1)
+//!   joint angles (rad)    f64 x joints
+//!   object in the world   f64 x 7   x y z (m), quaternion x y z w       (only where has object is 1)
 //!   loaded taxels         u16
-//!   per taxel:            u16 taxel, f32 normal, f32 along, f32 across [N]
+//!   per taxel:            u16 taxel, f32 normal, f32 along, f32 across (N)
 //! ```
 
 use crate::geometry::Pose;

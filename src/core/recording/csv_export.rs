@@ -1,7 +1,7 @@
 //! CSV for spreadsheets, pandas and plotting tools: one row per sample, units in the header, time first, no byte-order
 //! mark. A second file lists every loaded taxel with its place in the world.
 //!
-//! Columns: `t_s`, `line_pressure [bar]`, `phase`, the channels of a sensor layout, joint angles, joint positions in the
+//! Columns: `t_s`, `line_pressure (bar)`, `phase`, the channels of a sensor layout, joint angles, joint positions in the
 //! world frame (as the paper stores them, section IV-A), the object's pose. Joints are numbered from 1 at the palm.
 
 use crate::gripper::{BentFinger, Side};

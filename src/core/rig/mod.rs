@@ -41,7 +41,7 @@ pub trait Rig {
     /// Lets time pass until the next event.
     fn next_event(&mut self) -> Result<Event, RigError>;
 
-    /// Sets the line pressure [bar] from now on.
+    /// Sets the line pressure (bar) from now on.
     fn command(&mut self, bar: f64, phase: Phase);
 
     /// How far its frames so far can be trusted.

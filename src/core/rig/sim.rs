@@ -31,12 +31,12 @@ impl SimRig {
         self.simulation.frame()
     }
 
-    /// How deep the open fingers stand inside the object or its support before the first step [m].
+    /// How deep the open fingers stand inside the object or its support before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         self.simulation.starting_overlap()
     }
 
-    /// Pulls at the object [N, world axes] from now on.
+    /// Pulls at the object (N, world axes) from now on.
     pub fn pull_object(&mut self, force: DVec3) {
         self.simulation.pull_object(force);
     }

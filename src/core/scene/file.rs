@@ -38,7 +38,7 @@ pub enum SceneError {
     },
 }
 
-/// Scene files larger than this are refused before parsing [bytes].
+/// Scene files larger than this are refused before parsing (bytes).
 const LARGEST_FILE: u64 = 1 << 20;
 
 impl Scene {

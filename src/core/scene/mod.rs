@@ -63,13 +63,13 @@ pub struct ObjectSetup {
     pub source: String,
     /// Held in place instead of resting freely until the fingers move it.
     pub fixed: bool,
-    /// Fixed-axis roll, pitch, yaw of the object as it is put down [degrees].
+    /// Fixed-axis roll, pitch, yaw of the object as it is put down (degrees).
     pub rotation_deg: [f64; 3],
-    /// Shift of the object from the middle of its support [m].
+    /// Shift of the object from the middle of its support (m).
     pub shift: [f64; 2],
-    /// Mass [kg]; `auto` takes it from the file, or else from volume and density.
+    /// Mass (kg); `auto` takes it from the file, or else from volume and density.
     pub mass: Auto,
-    /// Density used where the file gives no usable mass [kg/m³].
+    /// Density used where the file gives no usable mass (kg/m³).
     pub density: f64,
     /// Friction coefficient of the surface; `auto` takes the object's own, or 0.6.
     pub friction: Auto,
@@ -97,15 +97,15 @@ pub enum SupportKind {
 pub struct Support {
     /// Pedestal, table or none.
     pub kind: SupportKind,
-    /// Height of the pedestal above the table [m].
+    /// Height of the pedestal above the table (m).
     pub height: f64,
-    /// Radius of the pedestal [m].
+    /// Radius of the pedestal (m).
     pub radius: f64,
     /// Friction coefficient; combined with the object's as a geometric mean.
     pub friction: f64,
-    /// How far a resting object may sink into the support under its own weight [m].
+    /// How far a resting object may sink into the support under its own weight (m).
     pub sink: f64,
-    /// Least stiffness of a contact point [N/m], for light objects that are pressed down.
+    /// Least stiffness of a contact point (N/m), for light objects that are pressed down.
     pub stiffness: f64,
 }
 
@@ -121,7 +121,7 @@ pub struct Solver {
     pub max_iterations: u32,
     /// Times the friction limits are brought up to date with the normal forces within a step.
     pub relag_passes: u32,
-    /// Lattice spacing of baked distances [m]; `auto` chooses by the object's size.
+    /// Lattice spacing of baked distances (m); `auto` chooses by the object's size.
     pub distance_cell: Auto,
 }
 
@@ -164,7 +164,7 @@ impl Accuracy {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct World {
-    /// Gravity along -z [m/s²].
+    /// Gravity along -z (m/s²).
     pub gravity: f64,
 }
 

@@ -12,7 +12,7 @@ pub struct Timing {
     pub sample_hz: u32,
     /// Changes of commanded pressure per second.
     pub actuation_hz: u32,
-    /// Length of a trial, T [s].
+    /// Length of a trial, T (s).
     pub duration_s: f64,
 }
 
@@ -42,7 +42,7 @@ pub(super) const FASTEST_COMMON_HZ: u32 = 10_000;
 pub(super) const MOST_TICKS: u64 = 50_000_000;
 
 impl Timing {
-    /// The smallest rate that both rates divide [Hz].
+    /// The smallest rate that both rates divide (Hz).
     pub fn common_hz(&self) -> u64 {
         let (a, b) = (u64::from(self.sample_hz.max(1)), u64::from(self.actuation_hz.max(1)));
         a / greatest_common_divisor(a, b) * b
@@ -63,12 +63,12 @@ impl Timing {
 }
 
 impl Clock {
-    /// Length of one step, h [s].
+    /// Length of one step, h (s).
     pub fn step(&self) -> f64 {
         1.0 / f64::from(self.ticks_per_second)
     }
 
-    /// Time of a tick [s].
+    /// Time of a tick (s).
     pub fn seconds(&self, tick: u64) -> f64 {
         tick as f64 / f64::from(self.ticks_per_second)
     }

@@ -1,4 +1,4 @@
-//! Curvature of a finger section: fit a circle to the tracked joints, kappa = 1 / r [1/m] (paper, section IV-A1).
+//! Curvature of a finger section: fit a circle to the tracked joints, kappa = 1 / r (1/m) (paper, section IV-A1).
 //!
 //! The circle through the joints of a chain that bends by phi per segment of length l has curvature
 //! 2 sin(phi / 2) / l, which is phi / l less phi² / 24 of it: 0.09 % low at 8 degrees per joint. A section with
@@ -9,7 +9,7 @@ use crate::geometry::signed_curvature;
 use crate::gripper::BentFinger;
 use glam::DVec2;
 
-/// Curvature [1/m] of a stretch of a bent finger, positive when it bends inward; exactly zero when straight.
+/// Curvature (1/m) of a stretch of a bent finger, positive when it bends inward; exactly zero when straight.
 pub fn curvature(bent: &BentFinger, q: &[f64], span: &Span) -> f64 {
     let length: f64 = bent.lengths.iter().sum();
     let segment = length / q.len() as f64;

@@ -101,11 +101,11 @@ pub const CATALOGUE: [SensorLayout; 8] = [
 /// What a channel measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Curvature [1/m].
+    /// Curvature (1/m).
     Curvature,
-    /// Pressure [Pa].
+    /// Pressure (Pa).
     Pressure,
-    /// Normal force [N].
+    /// Normal force (N).
     Force,
 }
 

@@ -51,22 +51,22 @@ impl ContactPatch {
         patch
     }
 
-    /// Total normal force, F [N].
+    /// Total normal force, F (N).
     pub fn force(&self) -> f64 {
         self.force
     }
 
-    /// Participation area [m²]; zero without load.
+    /// Participation area (m²); zero without load.
     pub fn participation_area(&self) -> f64 {
         if self.force > 0.0 { self.force * self.force / self.sum_of_squares_over_area } else { 0.0 }
     }
 
-    /// Area of the convex hull of the loaded taxels' middles on the unrolled pad [m²].
+    /// Area of the convex hull of the loaded taxels' middles on the unrolled pad (m²).
     pub fn hull_area(&self) -> f64 {
         convex_hull_area(&mut self.points.clone())
     }
 
-    /// Pressure [Pa]: zero without load, `None` where load spans no area.
+    /// Pressure (Pa): zero without load, `None` where load spans no area.
     pub fn pressure(&self, area: PressureArea) -> Option<f64> {
         if self.force == 0.0 {
             return Some(0.0);

@@ -28,11 +28,11 @@ pub struct CostRow {
     pub scene: &'static str,
     /// Which accuracy.
     pub accuracy: &'static str,
-    /// Step length [s].
+    /// Step length (s).
     pub step_s: f64,
-    /// CPU time of one trial [ms]: the median over the runs.
+    /// CPU time of one trial (ms): the median over the runs.
     pub cpu_ms_median: f64,
-    /// CPU time of one step [µs].
+    /// CPU time of one step (µs).
     pub us_per_step: f64,
     /// Mean Newton iterations per step.
     pub newton_mean: f64,

@@ -32,7 +32,7 @@ pub enum Command {
     SetGrasps(u32),
     /// Whether trials are stored.
     SetRecording(bool),
-    /// Pull at the object with this force [N, world axes]; zero lets go.
+    /// Pull at the object with this force (N, world axes); zero lets go.
     Pull(DVec3),
     /// End the thread.
     Quit,
@@ -54,9 +54,9 @@ pub enum Notice {
 pub struct TraceRow {
     /// Which grasp it belongs to; rises by one with each.
     pub grasp: u64,
-    /// Time in the grasp [s].
+    /// Time in the grasp (s).
     pub t: f64,
-    /// Line pressure [bar].
+    /// Line pressure (bar).
     pub line_bar: f64,
     /// One value per channel of the snapshot's list; NaN where undefined.
     pub values: Box<[f32]>,
@@ -71,11 +71,11 @@ pub struct ObjectCard {
     pub title: String,
     /// Size and shape class, where known.
     pub class: Option<ObjectClass>,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
     /// Friction coefficient.
     pub friction: f64,
-    /// Extents [m].
+    /// Extents (m).
     pub size: DVec3,
 }
 
@@ -96,7 +96,7 @@ pub struct Status {
     pub grasp_of_round: u32,
     /// Grasps in a round.
     pub grasps: u32,
-    /// Length of a trial [s].
+    /// Length of a trial (s).
     pub duration: f64,
     /// Trials are being stored.
     pub recording: bool,

@@ -16,7 +16,7 @@ use wgpu::{Texture, VertexBufferLayout, VertexStepMode};
 const RINGS: usize = 128;
 /// Rings that round off the tip.
 const TIP_RINGS: usize = 6;
-/// Length over which the tip is rounded [m].
+/// Length over which the tip is rounded (m).
 const TIP_ROUNDING: f32 = 0.0022;
 /// Bellows along the finger.
 const RIBS: f32 = 10.0;
@@ -48,7 +48,7 @@ struct SkinUniform {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Vertex {
     ring: f32,
-    /// Across, inward [m].
+    /// Across, inward (m).
     offset: [f32; 2],
     /// Across, inward, along.
     normal: [f32; 3],

@@ -30,7 +30,7 @@ fn obj_text(mesh: &TriMesh) -> String {
     write_obj("test", "test.mtl", &[("body", ColouredPart { mesh: mesh.clone(), colour: None })]).0
 }
 
-/// A ring lying flat [m].
+/// A ring lying flat (m).
 fn torus(ring: f64, tube: f64, around: usize, across: usize) -> TriMesh {
     let angle = |k: usize, of: usize| std::f64::consts::TAU * k as f64 / of as f64;
     let point = |i: usize, j: usize| {
