@@ -6,6 +6,7 @@ use crate::geometry::{
     choose_cell, mass_properties, repair, support_points,
 };
 use crate::palette::Rgb;
+use crate::units::three_digits;
 use std::sync::Arc;
 
 /// A shape as a file declares it, in its own frame.
@@ -165,8 +166,10 @@ impl Blueprint {
         };
         let after = size * scale * 1e3;
         self.warnings.push(format!(
-            "as given, \"{}\" is {size:.3e} m across: {guess}? It is used at {after:.1} mm; set object.scale to decide",
-            self.name
+            "as given, \"{}\" is {} m across: {guess}? It is used at {} mm; set object.scale to decide",
+            self.name,
+            three_digits(size),
+            three_digits(after),
         ));
         scale
     }
@@ -224,9 +227,9 @@ impl Blueprint {
             declared
         } else {
             if options.mass.is_none() {
-                let (density, grams) = (options.density, from_shape.mass * 1e3);
+                let (density, grams) = (options.density, three_digits(from_shape.mass * 1e3));
                 self.warnings.push(format!(
-                    "\"{}\" gives no usable mass; {grams:.0} g follow from its volume at {density} kg/m³",
+                    "\"{}\" gives no usable mass; {grams} g follow from its volume at {density} kg/m³",
                     self.name
                 ));
             }

@@ -16,7 +16,8 @@ pub(super) type MeshReader<'a> = &'a dyn Fn(&str) -> Result<Vec<ColouredPart>, M
 pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Result<Blueprint, ObjectError> {
     let malformed = |cause: String| ObjectError::Malformed { name: name.to_owned(), cause };
     let clean = urdf_text::clean(bytes).map_err(malformed)?;
-    let robot = urdf_rs::read_from_string(&clean.text).map_err(|e| malformed(e.to_string()))?;
+    let robot = urdf_rs::read_from_string(&clean.text)
+        .map_err(|e| malformed(e.to_string().trim_start_matches("custom: ").to_owned()))?;
     let mut blueprint = Blueprint { warnings: clean.warnings, ..Blueprint::new(name) };
     let poses = link_poses(&robot, &mut blueprint.warnings).map_err(malformed)?;
     let colours: HashMap<&str, Rgb> =

@@ -76,7 +76,7 @@ impl Element {
 pub(super) fn clean(bytes: &[u8]) -> Result<CleanText, String> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    if text.contains("${") || text.contains("<xacro:") {
+    if text.contains("${") || text.contains("$(") || text.contains("<xacro:") {
         return Err("it is a xacro template, not a URDF; run `xacro FILE > object.urdf` first".to_owned());
     }
     let mut robot = parse(text)?;

@@ -296,18 +296,29 @@ fn a_free_object_in_flight_keeps_its_momentum() {
     scene.gripper.mount.opening = 0.5;
     let brick =
         ObjectModel::from_primitive("brick", Primitive::Cuboid { half: DVec3::new(0.03, 0.015, 0.006) }, 800.0, 0.5);
-    let mut run = Run::new(&scene, Some(&brick), 1e-3);
-    run.state.velocity[20..].copy_from_slice(&[0.01, 0.0, 0.02, 3.0, 0.1, 0.2]);
+    // Spins up to half a turn per step.
+    for (h, spin) in [(1e-3, 1.0), (1e-2, 100.0), (1e-3, 1000.0)] {
+        flies_freely(&scene, &brick, h, DVec3::new(3.0, 0.1, 0.2) * spin);
+    }
+}
+
+fn flies_freely(scene: &Scene, brick: &ObjectModel, h: f64, angular: DVec3) {
+    let mut run = Run::new(scene, Some(brick), h);
+    run.state.velocity[20..].copy_from_slice(&[0.01, 0.0, 0.02, angular.x, angular.y, angular.z]);
     let spin = |run: &Run| {
         let r = run.state.body.matrix();
         let (linear, angular) = run.state.body_velocity(&run.model);
         (linear, r * (brick.mass.inertia * (r.transpose() * angular)))
     };
     let before = spin(&run);
-    run.steps(2000, &Drive::default());
+    run.steps((2.0 / h) as usize, &Drive::default());
     let after = spin(&run);
     assert!(after.0.abs_diff_eq(before.0, 1e-12));
-    assert!((after.1 - before.1).length() < 0.02 * before.1.length(), "{before:?} {after:?}");
+    assert!((after.1 - before.1).length() < 1e-9 * before.1.length(), "{before:?} {after:?}");
+    let least = brick.mass.inertia.to_cols_array().iter().step_by(4).copied().fold(f64::INFINITY, f64::min);
+    let fastest = before.1.length() / least;
+    let now = run.state.body_velocity(&run.model).1.length();
+    assert!(now <= fastest * (1.0 + 1e-9), "{now} rad/s, but the momentum allows {fastest} at most");
 }
 
 #[test]

@@ -51,6 +51,7 @@ pub(super) struct Body {
     pub(super) mass: f64,
     /// Inertia about the centre of mass, in object axes (kg m²).
     pub(super) inertia: DMat3,
+    pub(super) inverse_inertia: DMat3,
     pub(super) free: bool,
     /// Stiffness of a contact point with the support (N/m).
     pub(super) support_stiffness: f64,
@@ -74,6 +75,7 @@ impl Model {
             radius: object.field.radius_about(object.mass.centre),
             mass: object.mass.mass,
             inertia: object.mass.inertia,
+            inverse_inertia: object.mass.inertia.inverse(),
             free: !scene.object.fixed,
             support_stiffness: (object.mass.mass * scene.world.gravity / (RESTING_POINTS * scene.support.sink))
                 .max(scene.support.stiffness),

@@ -57,15 +57,24 @@ impl State {
     }
 
     /// Moves joints and object by one step at the current velocities.
+    ///
+    /// A turning object keeps its angular momentum L = I w while I turns with it: w+ = I+^-1 I w. To first order in h
+    /// that is the gyroscopic torque, but the spin can never exceed |L| over the least moment of inertia, however
+    /// long the step: an explicit torque flung light splinters out of the range of numbers.
     pub(super) fn integrate(&mut self, model: &Model) {
         let h = model.step.h;
         for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
             *q += h * rate;
         }
-        if model.free_body().is_some() {
+        if let Some(body) = model.free_body() {
             let (linear, angular) = self.body_velocity(model);
             self.body.position += linear * h;
+            let before = self.body.matrix();
             self.body.rotation = (DQuat::from_scaled_axis(angular * h) * self.body.rotation).normalize();
+            let after = self.body.matrix();
+            let momentum = before * (body.inertia * (before.transpose() * angular));
+            let spin = after * (body.inverse_inertia * (after.transpose() * momentum));
+            self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
         }
     }
 

@@ -116,9 +116,9 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
         let (linear, angular) = state.body_velocity(model);
         let r = state.body.matrix();
         ws.body_inertia = r * body.inertia * r.transpose();
-        let spin = ws.body_inertia * angular;
         let known_linear = (linear + model.gravity * h) * body.mass + drive.object_force * h;
-        let known_angular = spin - angular.cross(spin) * h;
+        // No gyroscopic torque: `State::integrate` carries the angular momentum over, which amounts to it.
+        let known_angular = ws.body_inertia * angular;
         ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());
         ws.rhs[2 * n + 3..].copy_from_slice(&known_angular.to_array());
     }
