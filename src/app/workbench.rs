@@ -13,6 +13,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_notify::Toasts;
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 use glam::Vec2;
+use palpate_core::drawing::Camera;
 use palpate_core::objects::{EMPTY, catalogue, thumbnail};
 use palpate_core::palette::Theme;
 use palpate_core::picture::PictureView;
@@ -64,7 +65,10 @@ pub struct Workbench {
     answers: (Sender<Answer>, Receiver<Answer>),
     /// What the user was told last, oldest first.
     messages: VecDeque<String>,
-    framed: bool,
+    /// The camera as it was last framed; while the user leaves it there, it follows the objects.
+    framed: Option<Camera>,
+    /// The object last seen in the hand: a built-in name or a file.
+    seen: Option<String>,
 }
 
 /// Messages that are kept.
@@ -105,7 +109,8 @@ impl Workbench {
             driver,
             answers: channel(),
             messages: VecDeque::new(),
-            framed: false,
+            framed: None,
+            seen: None,
         })
     }
 
@@ -134,10 +139,8 @@ impl Workbench {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
         let snapshot = self.worker.snapshot();
-        if let Some(snapshot) = snapshot.as_deref().filter(|_| !self.framed) {
-            // The first picture shows everything, whatever the window's shape.
-            self.frame_all(snapshot);
-            self.framed = true;
+        if let Some(snapshot) = snapshot.as_deref() {
+            self.take_note_of_object(snapshot);
         }
         let mut actions = Vec::new();
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
@@ -174,6 +177,21 @@ impl Workbench {
         for action in actions {
             self.apply(&ctx, action);
         }
+    }
+
+    /// A new object is shown whole and, where it came from a file, remembered.
+    fn take_note_of_object(&mut self, snapshot: &Snapshot) {
+        let source = &snapshot.scene.object.source;
+        if self.seen.as_ref() == Some(source) {
+            return;
+        }
+        if self.framed.is_none_or(|camera| camera == self.view.camera) {
+            self.frame_all(snapshot);
+        }
+        if source != EMPTY && !catalogue().iter().any(|b| b.name == *source) {
+            self.view.remember_file(source);
+        }
+        self.seen = Some(source.clone());
     }
 
     fn panel_context<'a>(&'a self, snapshot: Option<&'a Snapshot>) -> PanelContext<'a> {
@@ -284,6 +302,7 @@ impl Workbench {
     fn frame_all(&mut self, snapshot: &Snapshot) {
         let (centre, radius) = snapshot.stage.bounds();
         self.view.camera = self.view.camera.framing(centre, radius);
+        self.framed = Some(self.view.camera);
     }
 
     fn ask(&mut self, what: Ask) {
@@ -309,10 +328,6 @@ impl Workbench {
                 Err(error) => self.tell(Message::Error(error.to_string())),
             }
             return;
-        }
-        let built_in = source == EMPTY || catalogue().iter().any(|b| b.name == source);
-        if !built_in {
-            self.view.remember_file(source);
         }
         let mut scene = self.scene.clone();
         source.clone_into(&mut scene.object.source);

@@ -8,7 +8,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::ALL_PANELS;
+use palpate::app::{ALL_PANELS, Action};
 use palpate_core::objects::catalogue;
 use palpate_core::palette::Theme;
 use palpate_core::scene::Accuracy;
@@ -116,6 +116,22 @@ fn a_pasted_path_is_opened_and_a_wrong_one_is_explained() {
     assert!(heard, "{:?}", bench.workbench().messages());
     let still = bench.workbench().snapshot().unwrap();
     assert!(still.object.as_ref().is_some_and(|o| o.name == "block"), "the old object stays in the hand");
+    assert!(bench.harness.query_by_role_and_label(Role::Button, "all.obj").is_none(), "only what loads is remembered");
+}
+
+#[test]
+fn values_beyond_a_field_s_range_are_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("anvil.urdf");
+    let text = "<robot name='anvil'><link name='a'><inertial><mass value='40'/></inertial><collision><geometry>\
+                <box size='0.05 0.1 0.05'/></geometry></collision></link></robot>";
+    std::fs::write(&path, text).unwrap();
+    let mut bench = whole_window();
+    bench.tell(Action::OpenObject(path.to_str().unwrap().to_owned()));
+    let loaded = bench.until(|s| s.object.as_ref().is_some_and(|o| o.name == "anvil"));
+    bench.harness.run_steps(4);
+    let after = bench.workbench().snapshot().unwrap();
+    assert_eq!((after.grasp, after.object.as_ref().unwrap().mass), (loaded.grasp, 40.0));
 }
 
 #[test]

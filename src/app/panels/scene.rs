@@ -39,7 +39,8 @@ fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui))
     });
 }
 
-/// A number in another unit than the scene holds it in.
+/// A number in another unit than the scene holds it in. The range binds what the user enters; a value from outside,
+/// be it out of this range, is shown as it is and left alone.
 struct Number<'a> {
     name: &'a str,
     unit: &'a str,
@@ -55,6 +56,7 @@ impl Number<'_> {
         let mut shown = *value * self.factor;
         let drag = DragValue::new(&mut shown)
             .range(self.range[0]..=self.range[1])
+            .clamp_existing_to_range(false)
             .speed(self.speed)
             .max_decimals(3)
             .suffix(format!("\u{2009}{}", self.unit));
@@ -92,6 +94,7 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
         let mut shown = value.value().unwrap_or(known) * number.factor;
         let drag = DragValue::new(&mut shown)
             .range(number.range[0]..=number.range[1])
+            .clamp_existing_to_range(false)
             .speed(number.speed)
             .max_decimals(3)
             .suffix(format!("\u{2009}{}", number.unit));
@@ -135,7 +138,8 @@ fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
     Number { name: "close per tick", unit: "bar", factor: 1.0, range: [step, max], speed: 0.005 }
         .ui(ui, &mut programme.close_bar_per_tick);
     let label = ui.label("hold");
-    let ticks = DragValue::new(&mut programme.hold_ticks).range(0..=600).suffix(" ticks");
+    let ticks =
+        DragValue::new(&mut programme.hold_ticks).range(0..=600).clamp_existing_to_range(false).suffix(" ticks");
     ui.add(ticks).labelled_by(label.id);
     ui.end_row();
     Number { name: "release per tick", unit: "bar", factor: 1.0, range: [step, max], speed: 0.005 }
@@ -152,7 +156,10 @@ fn solver_ui(ui: &mut Ui, scene: &mut Scene) {
     ];
     choice(ui, "time step", &mut scene.solver.accuracy, &names);
     let label = ui.label("sampling");
-    ui.add(DragValue::new(&mut scene.timing.sample_hz).range(1..=1000).suffix("\u{2009}Hz")).labelled_by(label.id);
+    ui.add(
+        DragValue::new(&mut scene.timing.sample_hz).range(1..=1000).clamp_existing_to_range(false).suffix("\u{2009}Hz"),
+    )
+    .labelled_by(label.id);
     ui.end_row();
 }
 

@@ -57,6 +57,8 @@ pub struct Stage {
     gripper: Gripper,
     world_from_gripper: Pose,
     object: Option<Arc<SurfaceMesh>>,
+    /// Radius of a ball that holds the object (m); zero for an empty hand.
+    object_radius: f32,
     pedestal: Option<Arc<SurfaceMesh>>,
     has_table: bool,
     palm: Arc<SurfaceMesh>,
@@ -73,6 +75,7 @@ impl Stage {
             gripper: scene.gripper.clone(),
             world_from_gripper,
             object: object.map(|o| Arc::clone(&o.surface)),
+            object_radius: object.map_or(0.0, |o| 0.5 * o.bounds.size().length() as f32),
             pedestal: (support.kind == SupportKind::Pedestal).then(|| Arc::new(gripper_model::pedestal(support))),
             has_table: support.kind != SupportKind::None,
             palm: Arc::new(gripper_model::palm(&scene.gripper)),
@@ -126,7 +129,8 @@ impl Stage {
     pub fn bounds(&self) -> (Vec3, f32) {
         let palm = self.world_from_gripper.position.as_vec3();
         let length = self.gripper.finger.length as f32;
-        (palm - Vec3::Z * (0.42 * length), 1.12 * length)
+        // A large object is shown whole; it stands between the fingers, a little below the middle.
+        (palm - Vec3::Z * (0.42 * length), (1.12 * length).max(1.1 * self.object_radius + 0.3 * length))
     }
 }
 
