@@ -2,7 +2,7 @@
 
 use super::Failure;
 use std::error::Error;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal as _, Write};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
 use tracing_subscriber::util::SubscriberInitExt as _;
@@ -29,6 +29,7 @@ pub(super) fn warn(line: &str) {
 pub(super) fn show_log() {
     let ours = ["palpate", "palpate_core", "palpate_render"].map(|name| (name, LevelFilter::WARN));
     let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).without_time().with_target(false);
+    let lines = lines.with_ansi(std::io::stderr().is_terminal());
     tracing_subscriber::registry().with(lines.with_filter(Targets::new().with_targets(ours))).init();
 }
 
