@@ -37,7 +37,8 @@ fn run(what: Ask) -> Option<Answer> {
     let dialog = rfd::FileDialog::new();
     match what {
         Ask::Object => {
-            let path = dialog.set_title("Open an object").add_filter("URDF, OBJ, STL", &["urdf", "obj", "stl", "xml"]);
+            let path = dialog.set_title("Open an object or a scene");
+            let path = path.add_filter("URDF, OBJ, STL, scene", &["urdf", "obj", "stl", "xml", "toml"]);
             path.pick_file().map(Answer::Open)
         }
         Ask::SaveScene => {

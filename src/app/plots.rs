@@ -46,7 +46,9 @@ const NARROWEST: f64 = 0.05;
 
 pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>, plot: &TimePlot<'_>) {
     let duration = context.snapshot.map_or(4.0, |s| s.status.duration);
-    let [from, to] = context.view.time_window.unwrap_or([0.0, duration]);
+    // A window from before the trial became shorter shows nothing that is there.
+    let fits = |[from, to]: &[f64; 2]| *from >= 0.0 && to - from >= 0.5 * NARROWEST && *to <= duration + 1e-9;
+    let [from, to] = context.view.time_window.filter(fits).unwrap_or([0.0, duration]);
     let theme = context.view.theme;
     let [low, high] = value_range(context, plot, [from, to]);
     let unit = plot.unit;
@@ -130,9 +132,10 @@ fn moved_window(
     if response.hovered() && wheel != 0.0 {
         let about = drag.pointer?.clamp(from, to);
         let factor = (-f64::from(wheel) * 0.004).exp().max(NARROWEST / drag.width);
-        let window = [about - (about - from) * factor, about + (to - about) * factor];
-        let whole = window[0] <= 0.0 && window[1] >= duration;
-        return Some((!whole).then_some([window[0].max(0.0), window[1].min(duration)]));
+        let start = (about - (about - from) * factor).clamp(0.0, (duration - NARROWEST).max(0.0));
+        let end = (about + (to - about) * factor).clamp(start + NARROWEST, (start + NARROWEST).max(duration));
+        let whole = start <= 0.0 && end >= duration;
+        return Some((!whole).then_some([start, end]));
     }
     None
 }

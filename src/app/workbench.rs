@@ -14,12 +14,12 @@ use egui_notify::Toasts;
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 use glam::Vec2;
 use palpate_core::drawing::Camera;
-use palpate_core::objects::{EMPTY, catalogue, thumbnail};
+use palpate_core::objects::{EMPTY, anchored, catalogue, thumbnail};
 use palpate_core::palette::Theme;
 use palpate_core::picture::PictureView;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
-use palpate_core::workers::{Command, Notice, SimWorker, SimWorkerSetup, Snapshot, Wake};
+use palpate_core::workers::{Command, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -217,10 +217,8 @@ impl Workbench {
         for notice in notices {
             match notice {
                 Notice::Warning(text) => self.tell(Message::Warning(text)),
-                Notice::Failed(text) => {
-                    self.recover_from(&text);
-                    self.tell(Message::Error(text));
-                }
+                Notice::Failed(text) => self.tell(Message::Error(text)),
+                Notice::SceneRefused(refusal) => self.take_refusal(*refusal),
                 Notice::Stored(id) => self.tell(Message::Info(format!("trial {id} stored"))),
             }
         }
@@ -237,11 +235,12 @@ impl Workbench {
         }
     }
 
-    /// After a failed load the old object is still in the hand, and the list should say so.
-    fn recover_from(&mut self, _failure: &str) {
-        if let Some(snapshot) = self.worker.snapshot() {
-            self.scene.object.source.clone_from(&snapshot.scene.object.source);
+    /// The scene before goes on, and list and settings should say so, unless something else has been asked for since.
+    fn take_refusal(&mut self, refusal: Refusal) {
+        if self.scene == refusal.refused {
+            self.scene = refusal.kept;
         }
+        self.tell(Message::Error(refusal.cause));
     }
 
     fn tell(&mut self, message: Message) {
@@ -271,8 +270,8 @@ impl Workbench {
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
         match action {
             Action::Simulation(command) => {
-                if !self.worker.send(command) {
-                    self.tell(Message::Warning("the simulation is busy; try again in a moment".to_owned()));
+                if let Err(cause) = self.worker.send(command) {
+                    self.tell(Message::Warning(cause.to_string()));
                 }
             }
             Action::SetScene(scene) => self.set_scene(*scene),
@@ -330,7 +329,7 @@ impl Workbench {
             return;
         }
         let mut scene = self.scene.clone();
-        source.clone_into(&mut scene.object.source);
+        scene.object.source = anchored(source);
         // Mass and size belong to the object that was there before.
         let fresh = Scene::default().object;
         scene.object.mass = fresh.mass;
@@ -349,7 +348,7 @@ impl Workbench {
     }
 
     fn send_scene(&mut self) {
-        self.unsent = !self.worker.send(Command::SetScene(Box::new(self.scene.clone())));
+        self.unsent = self.worker.send(Command::SetScene(Box::new(self.scene.clone()))) == Err(NotSent::Busy);
     }
 
     fn save_scene(&mut self, path: &Path) {
@@ -420,7 +419,7 @@ fn drop_hint(ctx: &egui::Context) {
     let painter = ctx.layer_painter(layer);
     painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(150));
     let font = egui::FontId::proportional(22.0);
-    let text = "Drop a URDF, OBJ or STL file to grasp it";
+    let text = "Drop a URDF, OBJ, STL or scene file to grasp it";
     painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
 }
 

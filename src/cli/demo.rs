@@ -3,7 +3,7 @@
 
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
-use super::terminal::{say, say_json, warn};
+use super::terminal::{file_name_of, say, say_json, warn};
 use glam::Vec2;
 use palpate_core::drawing::Camera;
 use palpate_core::grasping::{GraspSummary, PoseJitter, grasp, jittered};
@@ -72,8 +72,9 @@ const SIZE: [u32; 2] = [1280, 800];
 
 pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(), Failure> {
     let seed = arguments.seed.unwrap_or_else(|| rand::rng().random_range(0..1_000_000));
-    let name = arguments.object.clone().unwrap_or_else(|| random_object(seed));
-    let nominal = arguments.scene.scene(Some(&name))?;
+    let random = (arguments.object.is_none() && arguments.scene.scene.is_none()).then(|| random_object(seed));
+    let nominal = arguments.scene.scene(arguments.object.as_deref().or(random.as_deref()))?;
+    let name = nominal.object.source.clone();
     let object = nominal.load_object()?;
     let mut store = if arguments.no_store { None } else { Some(open_store(store)?) };
     let mut painter = if arguments.no_pictures { None } else { Painter::find() };
@@ -88,7 +89,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?;
         let picture = match &mut painter {
             Some(painter) => {
-                let path = arguments.out.join(format!("{}_grasp_{}.png", plain(&trial.info.object), k + 1));
+                let path = arguments.out.join(format!("{}_grasp_{}.png", file_name_of(&trial.info.object), k + 1));
                 painter.paint(&scene, object.as_ref(), &trial, &path)?;
                 Some(path)
             }
@@ -105,21 +106,26 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
             summary,
         };
         if !arguments.json {
-            tell(k + 1, arguments.grasps, &told)?;
+            tell(k + 1, arguments.grasps, &told, object.as_ref().map_or(&[], |o| &o.warnings))?;
         }
         story.grasps.push(told);
     }
-    if arguments.json { say_json(&story) } else { conclude(&story) }
+    if arguments.json {
+        say_json(&story)?
+    } else {
+        conclude(&story)?
+    }
+    if story.grasps.iter().all(|told| told.summary.finite) {
+        Ok(())
+    } else {
+        Err("a grasp left the range of numbers; see the warnings".into())
+    }
 }
 
 fn random_object(seed: u64) -> String {
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let all = catalogue();
     all[random.random_range(0..all.len())].name.clone()
-}
-
-fn plain(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect()
 }
 
 fn introduce(name: &str, object: Option<&ObjectModel>, seed: u64) -> Result<(), Failure> {
@@ -134,7 +140,8 @@ fn introduce(name: &str, object: Option<&ObjectModel>, seed: u64) -> Result<(), 
     Ok(())
 }
 
-fn tell(number: u32, of: u32, told: &Told) -> Result<(), Failure> {
+/// `known` has been said while loading.
+fn tell(number: u32, of: u32, told: &Told, known: &[String]) -> Result<(), Failure> {
     let [x, y, z] = told.offset_mm.map(|v| format!("{v:+.1}"));
     say("")?;
     say(format!("Grasp {number} of {of}, {x} {y} {z} mm off and turned by {:+.0} degrees.", told.yaw_deg))?;
@@ -156,8 +163,7 @@ fn tell(number: u32, of: u32, told: &Told) -> Result<(), Failure> {
     if let Some(moved) = summary.object_moved_m.filter(|moved| *moved > 1e-4) {
         say(format!("  It has moved by {} mm to find its place between them.", three_digits(mm(moved))))?;
     }
-    // What was said while loading need not be said again.
-    for warning in summary.warnings.iter().filter(|w| w.contains("fingers") || w.contains("steps")) {
+    for warning in summary.warnings.iter().filter(|w| !known.contains(w)) {
         warn(warning);
     }
     Ok(())

@@ -19,7 +19,7 @@ pub(super) struct GraspArguments {
     #[command(flatten)]
     scene: SceneArguments,
     /// Draw the gripper's pose at random from this seed: up to 5 mm off, turned by up to 25 degrees.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     seed: Option<u64>,
     /// Write the trial as CSV here, and its contacts beside it as .contacts.csv.
     #[arg(long, value_name = "FILE.csv")]

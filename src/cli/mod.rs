@@ -11,7 +11,7 @@ mod workshop;
 
 use crate::app::{WindowOptions, open_window};
 use clap::{CommandFactory, Parser, Subcommand};
-use palpate_core::objects::{EMPTY, LoadOptions, catalogue, load};
+use palpate_core::objects::{EMPTY, anchored, catalogue};
 use palpate_core::recording::Store;
 use palpate_core::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ type Failure = Box<dyn std::error::Error>;
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
-    /// The object to begin with: a built-in name, or a URDF, OBJ or STL file.
+    /// What to begin with: a built-in object, a URDF, OBJ or STL file, or a scene file (.toml).
     object: Option<String>,
     /// The SQLite file that holds the trials (default: the platform's data folder).
     #[arg(long, global = true, value_name = "FILE")]
@@ -60,28 +60,25 @@ fn window(object: Option<&str>, store: Option<&Path>) -> Result<(), Failure> {
         if object.to_ascii_lowercase().ends_with(".toml") {
             scene = Scene::from_file(Path::new(object))?;
         } else {
-            refuse_typing_errors(object)?;
-            object.clone_into(&mut scene.object.source);
+            refuse_typing_errors(object);
+            scene.object.source = anchored(object);
         }
+        // A file is tried before there is a window to complain in.
+        scene.load_object()?;
     }
     let store = store.map_or_else(Store::default_path, Path::to_owned);
     Ok(open_window(WindowOptions { scene, store })?)
 }
 
 /// A word that is neither a command nor an object would open a window with nothing in it.
-fn refuse_typing_errors(object: &str) -> Result<(), Failure> {
+fn refuse_typing_errors(object: &str) {
     let known = object == EMPTY || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
-    if known {
-        return Ok(());
-    }
-    if Path::new(object).extension().is_none() {
+    if !known && Path::new(object).extension().is_none() {
         let commands = Arguments::command();
         let names: Vec<&str> = commands.get_subcommands().filter(|c| !c.is_hide_set()).map(|c| c.get_name()).collect();
         let text = format!("'{object}' is neither a command ({}) nor an object", names.join(", "));
         Arguments::command().error(clap::error::ErrorKind::InvalidSubcommand, text).exit();
     }
-    load(object, &LoadOptions::default())?;
-    Ok(())
 }
 
 /// Runs the program as its arguments ask.

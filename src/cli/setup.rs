@@ -1,6 +1,7 @@
 //! The arguments that say what is grasped and how, shared by all commands that simulate.
 
 use super::Failure;
+use palpate_core::objects::anchored;
 use palpate_core::recording::Store;
 use palpate_core::scene::{Accuracy, Scene};
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ impl SceneArguments {
             None => Scene::default(),
         };
         if let Some(object) = object {
-            object.clone_into(&mut scene.object.source);
+            scene.object.source = anchored(object);
         }
         if let Some(accuracy) = self.accuracy {
             scene.solver.accuracy = accuracy;

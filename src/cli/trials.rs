@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::setup::open_store;
-use super::terminal::{say, say_json, table, warn};
+use super::terminal::{file_name_of, say, say_json, table, warn};
 use palpate_core::grasping::GraspSummary;
 use palpate_core::recording::{Store, TrialId, TrialRow, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_core::scene::Scene;
@@ -205,16 +205,11 @@ fn export(
         let path = if as_file {
             out.to_owned()
         } else {
-            out.join(format!("trial_{id}_{}.csv", plain_name(&trial.info.object)))
+            out.join(format!("trial_{id}_{}.csv", file_name_of(&trial.info.object)))
         };
         write_trial_csv(&path, &trial, &scene, &sensors)?;
         write_contacts_csv(&contacts_path(&path), &trial, &scene)?;
         say(path.display())?;
     }
     Ok(())
-}
-
-/// An object's name without anything that a file name should not have.
-fn plain_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect()
 }

@@ -65,7 +65,7 @@ fn time_is_steered_by_keys() {
     bench.harness.key_press(Key::Equals);
     bench.until(|s| s.status.target_speed == 2.0);
     bench.harness.key_press(Key::Minus);
-    bench.harness.step();
+    bench.until(|s| s.status.target_speed == 1.0);
     bench.harness.key_press(Key::Minus);
     bench.until(|s| s.status.target_speed == 0.5);
     bench.harness.key_press(Key::Backspace);

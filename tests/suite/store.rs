@@ -9,16 +9,18 @@ use palpate_core::trial::Trial;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Stdio};
+use std::time::Duration;
 
-/// Starts grasping a hundred times, without pictures, and waits until the first trials are told of.
-fn busy_program(store: &Path, after_lines: usize) -> Child {
+/// Starts grasping a hundred times, without pictures, and waits until the first trials are told of. The reader has to be
+/// kept, or the program ends by itself.
+fn busy_program(store: &Path, after_lines: usize) -> (Child, impl Sized) {
     let mut command = palpate(store);
     let folder = store.parent().unwrap();
     command.args(["demo", "--object", "ball", "--seed", "1", "--grasps", "100", "--no-pictures", "--out"]).arg(folder);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    assert_eq!(lines.take(after_lines).filter(Result::is_ok).count(), after_lines);
-    child
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert_eq!(lines.by_ref().take(after_lines).filter(Result::is_ok).count(), after_lines);
+    (child, lines)
 }
 
 #[test]
@@ -27,9 +29,11 @@ fn a_kill_at_any_moment_leaves_whole_trials() {
     let mut scene = Scene::default();
     "ball".clone_into(&mut scene.object.source);
     let ball = scene.load_object().unwrap();
-    for (round, after_lines) in [3, 8, 20, 41].into_iter().enumerate() {
+    for round in 0..12 {
         let path = folder.path().join(format!("{round}.sqlite"));
-        let mut child = busy_program(&path, after_lines);
+        let (mut child, _reader) = busy_program(&path, 8 + 3 * round as usize);
+        // Anywhere between two lines: while grasping, or while writing.
+        std::thread::sleep(Duration::from_millis(round * 7 % 31));
         child.kill().unwrap();
         child.wait().unwrap();
         let mut store = Store::open(&path).unwrap();

@@ -1,7 +1,6 @@
 //! This grasp in numbers: what is in the hand, what the sensors read now, and what the last grasp came to.
 
 use super::PanelContext;
-use super::objects::class_words;
 use crate::app::actions::Action;
 use egui::{Grid, RichText, ScrollArea, Ui};
 use palpate_core::gripper::Side;
@@ -40,7 +39,7 @@ fn object_ui(ui: &mut Ui, object: &ObjectCard) {
     let text = format!("{} mm, {grams} g, friction {:.2}", size.join(" × "), object.friction);
     ui.weak(text);
     if let Some(class) = object.class {
-        ui.weak(class_words(class));
+        ui.weak(class.to_string());
     }
 }
 

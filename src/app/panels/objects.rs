@@ -4,7 +4,7 @@ use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
-use palpate_core::objects::{BuiltIn, EMPTY, ObjectClass, ShapeClass, SizeClass, catalogue};
+use palpate_core::objects::{EMPTY, catalogue};
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
@@ -23,7 +23,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         for built_in in catalogue() {
             let texture = context.thumbnails.get(&built_in.name);
             let clicked =
-                row(ui, context, chosen == built_in.name, texture, &built_in.title, &words(built_in)).clicked();
+                row(ui, context, chosen == built_in.name, texture, &built_in.title, &built_in.class().to_string())
+                    .clicked();
             if clicked {
                 actions.push(Action::OpenObject(built_in.name.clone()));
             }
@@ -49,24 +50,6 @@ fn open_row(ui: &mut Ui, actions: &mut Vec<Action>) {
         path.clear();
     }
     ui.data_mut(|data| data.insert_temp(id, path));
-}
-
-fn words(built_in: &BuiltIn) -> String {
-    class_words(built_in.class())
-}
-
-/// Size and shape in two words.
-pub(super) fn class_words(class: ObjectClass) -> String {
-    let size = match class.size {
-        SizeClass::Tiny => "tiny",
-        SizeClass::Large => "large",
-    };
-    let shape = match class.shape {
-        ShapeClass::Cubic => "cubic",
-        ShapeClass::Cylindrical => "cylindrical",
-        ShapeClass::Spherical => "spherical",
-    };
-    format!("{size}, {shape}")
 }
 
 /// A row to click: picture, title, and a quiet line below.

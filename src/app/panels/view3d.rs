@@ -55,10 +55,14 @@ fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, actions
     let drag = Vec2::new(moved.x, moved.y);
     let camera = context.view.camera;
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
-    if response.drag_stopped() {
+    // Letting go of the button or of Ctrl lets go of the object.
+    let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
+    let pulled = ui.data(|data| data.get_temp::<bool>(response.id)).unwrap_or(false);
+    if pulled && !pulling {
         actions.push(Action::Simulation(Command::Pull(DVec3::ZERO)));
     }
-    if response.dragged_by(PointerButton::Primary) && ctrl {
+    ui.data_mut(|data| data.insert_temp(response.id, pulling));
+    if pulling {
         actions.push(Action::Simulation(Command::Pull(pull(response, &camera, height))));
     } else if response.dragged_by(PointerButton::Primary) && !shift {
         actions.push(Action::SetCamera(camera.orbited(drag)));

@@ -101,15 +101,7 @@ fn files_of(thing: &Thing) -> Vec<MadeFile> {
 }
 
 fn facts_of(thing: &Thing) -> String {
-    let size = match thing.size {
-        SizeClass::Tiny => "tiny",
-        SizeClass::Large => "large",
-    };
-    let shape = match thing.shape {
-        ShapeClass::Cubic => "cubic",
-        ShapeClass::Cylindrical => "cylindrical",
-        ShapeClass::Spherical => "spherical",
-    };
+    let (size, shape) = (thing.size.name(), thing.shape.name());
     format!("title = \"{}\"\nsize = \"{size}\"\nshape = \"{shape}\"\nfriction = {}\n", thing.title, thing.friction)
 }
 

@@ -136,11 +136,11 @@ fn parse_obj(
     models.into_iter().map(part).collect()
 }
 
-fn parse_stl(name: &str, bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
-    // A binary file announces its count; believe it only when the bytes are there.
-    let looks_like_text = bytes.trim_ascii_start().starts_with(b"solid");
+fn parse_stl(name: &str, mut bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
+    // A binary file announces its count; believe it only when the bytes are there. Its header may say "solid" too.
     let announced = bytes.get(80..84).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
     let expected = announced.map(|n| 84 + 50 * n);
+    let looks_like_text = bytes.trim_ascii_start().starts_with(b"solid") && expected != Some(bytes.len());
     if !looks_like_text && expected.is_none_or(|expected| expected > bytes.len()) {
         let cause = match announced {
             Some(n) => format!("it announces {n} triangles but ends after {} bytes", bytes.len()),
@@ -148,12 +148,31 @@ fn parse_stl(name: &str, bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
         };
         return Err(damaged(name, &cause));
     }
+    // The reader tells the two kinds apart by how a file begins, and stops at the end of the first solid.
+    if looks_like_text {
+        bytes = as_one_solid(&String::from_utf8_lossy(&bytes));
+    } else if let Some(first) = bytes.first_mut() {
+        *first = 0;
+    }
     let mut reader = Cursor::new(bytes);
     let mesh = stl_io::read_stl(&mut reader).map_err(|e| damaged(name, &e))?;
     Ok(TriMesh {
         points: mesh.vertices.iter().map(|v| DVec3::from_array(<[f32; 3]>::from(*v).map(f64::from))).collect(),
         triangles: mesh.faces.iter().map(|f| f.vertices.map(|i| i as u32)).collect(),
     })
+}
+
+/// A text STL whose solids are one, with the header that the reader expects.
+fn as_one_solid(text: &str) -> Vec<u8> {
+    let mut one = String::from("solid all\n");
+    for line in text.lines().map(str::trim) {
+        if !line.starts_with("solid") && !line.starts_with("endsolid") {
+            one.push_str(line);
+            one.push('\n');
+        }
+    }
+    one.push_str("endsolid all\n");
+    one.into_bytes()
 }
 
 /// Writes parts as OBJ text and its material text, with enough digits for a micrometre in a metre.
@@ -229,6 +248,26 @@ mod tests {
         bytes[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
         let result = read_mesh("a.stl", &in_memory(vec![("a.stl", bytes)]));
         assert!(matches!(result, Err(MeshFileError::Damaged { .. })));
+    }
+
+    #[test]
+    fn stl_comes_in_many_dresses() {
+        let facet = |z: f32| {
+            format!(
+                "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
+            )
+        };
+        let count =
+            |bytes: Vec<u8>| read_mesh("a.stl", &in_memory(vec![("a.stl", bytes)])).map(|p| p[0].mesh.triangles.len());
+        let two = format!("solid a\n{}endsolid a\nsolid b\n{}endsolid b\n", facet(0.0), facet(1.0));
+        assert_eq!(count(two.into_bytes()).expect("two solids"), 2);
+        assert_eq!(count(format!("\n  solid\n{}endsolid", facet(0.0)).into_bytes()).expect("no name"), 1);
+        let mut binary = b"solid by some exporter\n".to_vec();
+        binary.resize(80, b' ');
+        binary.extend(1u32.to_le_bytes());
+        binary.extend([0; 50]);
+        assert_eq!(count(binary).expect("binary"), 1);
+        assert!(count(format!("solid a\n{}", &facet(0.0)[..40]).into_bytes()).is_err(), "cut short");
     }
 
     #[test]

@@ -34,7 +34,12 @@ pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, jitter: PoseJitter,
         for (offset, nominal) in drawn.gripper.mount.offset.iter_mut().zip(scene.gripper.mount.offset) {
             *offset = nominal + within(jitter.shift);
         }
-        drawn.gripper.mount.yaw_deg = scene.gripper.mount.yaw_deg + within(jitter.yaw_deg);
+        // A whole turn more or less is the same pose, and keeps to the range of scene files.
+        let yaw = scene.gripper.mount.yaw_deg + within(jitter.yaw_deg);
+        drawn.gripper.mount.yaw_deg = if yaw.abs() > 180.0 { (yaw + 180.0).rem_euclid(360.0) - 180.0 } else { yaw };
+        if drawn.check().is_err() {
+            continue;
+        }
         if prepare(&drawn, object, seed).rig_mut().starting_overlap() <= 0.0 {
             return (drawn, rejected);
         }

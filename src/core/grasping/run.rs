@@ -83,6 +83,11 @@ impl<R: Rig> GraspRun<R> {
         &mut self.rig
     }
 
+    /// Adds something that should be known of the trial.
+    pub fn warn(&mut self, text: String) {
+        self.info.warnings.push(text);
+    }
+
     /// Frames sampled so far.
     pub fn frames(&self) -> &[Frame] {
         &self.frames
@@ -154,7 +159,7 @@ fn fingers_cross(scene: &Scene, frames: &[Frame]) -> Option<f64> {
         let bent = BentFinger::new(&gripper.finger, frame.joints(side));
         (0..grid.rows)
             .map(|row| {
-                let (segment, along) = bent.at(grid.arc(row * grid.columns));
+                let (segment, along) = grid.place(row * grid.columns, &gripper.finger);
                 bent.segments[segment].point(along, gripper.pad.thickness).x
             })
             .fold(0.0, f64::max)

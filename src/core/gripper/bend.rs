@@ -78,18 +78,6 @@ impl BentFinger {
     pub fn joints(&self) -> impl Iterator<Item = DVec2> + '_ {
         self.segments.iter().skip(1).map(|s| s.start)
     }
-
-    /// The segment at an arc length from the palm (m), and how far along it.
-    pub fn at(&self, arc: f64) -> (usize, f64) {
-        let mut rest = arc;
-        for (j, length) in self.lengths.iter().enumerate() {
-            if rest < *length || j + 1 == self.lengths.len() {
-                return (j, rest);
-            }
-            rest -= length;
-        }
-        (0, arc)
-    }
 }
 
 /// From the plane of one finger to the gripper frame.
@@ -132,8 +120,6 @@ mod tests {
         assert!(bent.tip.abs_diff_eq(DVec2::new(0.075, 0.025), 1e-15));
         assert!(bent.segments[1].inward().abs_diff_eq(DVec2::new(0.0, -1.0), 1e-15));
         assert_eq!(bent.joints().count(), 2);
-        assert_eq!(bent.at(0.03).0, 1);
-        assert_eq!(bent.at(0.2).0, 2);
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub struct Mount {
     pub opening: f64,
     /// Height of the palm above the middle of the resting object (m).
     pub grasp_depth: f64,
-    /// Shift of the gripper from straight above the object, in world axes (m).
+    /// Shift of the gripper from straight above the middle of the support, in world axes (m).
     pub offset: [f64; 3],
     /// Turn of the gripper about the vertical (degrees).
     pub yaw_deg: f64,

@@ -67,6 +67,13 @@ impl TaxelGrid {
         self.pad.law.compression(self.stiffness(taxel), self.height(taxel), force)
     }
 
+    /// The rigid segment that carries a taxel on a finger of N joints, and how far along it the taxel lies (m).
+    pub fn place(&self, taxel: usize, finger: &Finger) -> (usize, f64) {
+        let segment = self.segment(taxel, finger.joints);
+        let start = if segment == 0 { 0.0 } else { (segment as f64 - 0.5) * finger.segment_length() };
+        (segment, self.arc(taxel) - start)
+    }
+
     /// The rigid segment that carries a taxel when the finger has `joints` joints.
     ///
     /// Segment j spans arc lengths (j - 1/2) L / N to (j + 1/2) L / N; computed in whole numbers, so that a taxel
@@ -92,6 +99,23 @@ mod tests {
         assert!((grid.arc(first) + grid.arc(last) - finger.length).abs() < 1e-15);
         assert!((grid.across(first) + grid.across(last)).abs() < 1e-15);
         assert!(grid.height(first) < pad.thickness);
+    }
+
+    #[test]
+    fn a_taxel_lies_on_the_segment_that_carries_it() {
+        // With 40 joints under 40 rows every taxel lies exactly over a joint.
+        for joints in [2, 7, 10, 40, 80] {
+            let finger = Finger { joints, ..Finger::default() };
+            let grid = TaxelGrid::new(&finger, &Pad::default());
+            let lengths: Vec<f64> = finger.segment_lengths().collect();
+            for taxel in 0..grid.count() {
+                let (segment, along) = grid.place(taxel, &finger);
+                assert_eq!(segment, grid.segment(taxel, joints));
+                assert!((-1e-12..lengths[segment] + 1e-12).contains(&along), "N = {joints}, taxel {taxel}: {along}");
+                let arc = lengths[..segment].iter().sum::<f64>() + along;
+                assert!((arc - grid.arc(taxel)).abs() < 1e-12);
+            }
+        }
     }
 
     #[test]

@@ -31,6 +31,8 @@ pub(super) struct Blueprint {
     pub(super) visual_solids: Vec<SolidPart>,
     pub(super) collision: Vec<SolidPart>,
     pub(super) inertials: Vec<Inertial>,
+    /// Triangles of all meshes, seen and touched.
+    triangles: usize,
     pub(super) warnings: Vec<String>,
 }
 
@@ -42,6 +44,8 @@ const SMALLEST_PLAUSIBLE: f64 = 5e-4;
 const LARGEST_POSSIBLE: f64 = 10.0;
 /// Larger than the gripper's world: loaded, with a warning (m).
 const LARGEST_GRASPABLE: f64 = 0.5;
+/// Triangles of one object beyond this are refused, however many meshes they come in.
+const MOST_TRIANGLES: usize = 4_000_000;
 /// Friction coefficient where nothing is known of the surface: plastic and varnished wood.
 const DEFAULT_FRICTION: f64 = 0.6;
 /// Colour where the file gives none.
@@ -55,12 +59,24 @@ impl Blueprint {
             visual_solids: Vec::new(),
             collision: Vec::new(),
             inertials: Vec::new(),
+            triangles: 0,
             warnings: Vec::new(),
         }
     }
 
+    /// Counts the triangles of a mesh; false when the object would have too many of them in all.
+    fn makes_room_for(&mut self, shape: &ShapeSource) -> bool {
+        if let ShapeSource::Mesh(parts) = shape {
+            self.triangles += parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+        }
+        self.triangles <= MOST_TRIANGLES
+    }
+
     /// Adds what is seen. A colour given here overrides those of the mesh file, as in every URDF viewer.
     pub(super) fn add_visual(&mut self, shape: &ShapeSource, place: &Pose, colour: Option<Rgb>) {
+        if !self.makes_room_for(shape) {
+            return;
+        }
         match shape {
             ShapeSource::Primitive(primitive) => {
                 let mut mesh = primitive.tessellate();
@@ -81,6 +97,9 @@ impl Blueprint {
 
     /// Adds what is touched.
     pub(super) fn add_collision(&mut self, shape: &ShapeSource, place: &Pose) {
+        if !self.makes_room_for(shape) {
+            return;
+        }
         self.collision.push(match shape {
             ShapeSource::Primitive(primitive) => SolidPart::Primitive(*primitive, *place),
             ShapeSource::Mesh(parts) => SolidPart::Mesh(joined(parts, place)),
@@ -89,6 +108,10 @@ impl Blueprint {
 
     /// Builds the object as the scene wants it.
     pub(super) fn build(mut self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+        if self.triangles > MOST_TRIANGLES {
+            let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
+            return Err(ObjectError::Malformed { name: self.name, cause });
+        }
         let mut solids = match options.collision {
             CollisionShape::File if !self.collision.is_empty() => std::mem::take(&mut self.collision),
             CollisionShape::File | CollisionShape::Visual => std::mem::take(&mut self.visual_solids),
@@ -191,9 +214,8 @@ impl Blueprint {
             if let SolidPart::Mesh(mesh) = solid {
                 let repaired = repair(mesh).map_err(|cause| ObjectError::Unsound { name: self.name.clone(), cause })?;
                 *mesh = repaired.mesh;
-                // Joining corners is what every STL needs; the rest is worth a word.
-                let notable = repaired.notes.into_iter().filter(|note| !note.contains("coinciding"));
-                self.warnings.extend(notable.map(|note| format!("mesh of \"{}\": {note}", self.name)));
+                self.warnings
+                    .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{}\": {note}", self.name)));
             }
         }
         Ok(())
@@ -211,6 +233,7 @@ impl Blueprint {
                 SolidPart::Mesh(mesh) => mass_properties(mesh, options.density),
             })
             .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
+        let from_shape = self.sound_or_boxed(from_shape, solids);
         let declared = self
             .inertials
             .iter()
@@ -250,6 +273,26 @@ impl Blueprint {
             Some(mass) => chosen.with_mass(mass),
             None => chosen,
         }
+    }
+}
+
+impl Blueprint {
+    /// Mass properties that a body can have: those computed, or where a tangled mesh gives impossible ones, those of a
+    /// box around it.
+    fn sound_or_boxed(&mut self, computed: MassProperties, solids: &[SolidPart]) -> MassProperties {
+        if computed.is_physical() {
+            return computed;
+        }
+        let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
+        let half = (0.5 * bounds.size()).max(glam::DVec3::splat(1e-5));
+        let cuboid = Primitive::Cuboid { half };
+        self.warnings.push(format!("the mesh of \"{}\" is tangled: its inertia is that of a box around it", self.name));
+        let mass = if computed.mass.is_finite() && computed.mass > 0.0 {
+            computed.mass
+        } else {
+            cuboid.mass_properties().mass
+        };
+        cuboid.mass_properties().with_mass(mass).seen_from(&Pose::from_position(bounds.centre()))
     }
 }
 

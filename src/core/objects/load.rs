@@ -51,6 +51,13 @@ impl Default for LoadOptions {
     }
 }
 
+/// A source that names the same object from any folder: files that exist get their whole path, names stay names.
+pub fn anchored(source: &str) -> String {
+    let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);
+    let whole = std::path::absolute(source).ok().filter(|path| !named && path.exists());
+    whole.and_then(|path| path.to_str().map(str::to_owned)).unwrap_or_else(|| source.to_owned())
+}
+
 /// Loads a built-in object by name, or a URDF, OBJ or STL file by path; `None` for an empty hand.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, ObjectError> {
     if source == EMPTY {

@@ -9,7 +9,7 @@ mod urdf;
 mod urdf_text;
 
 pub use catalogue::{BuiltIn, catalogue, thumbnail};
-pub use load::{CollisionShape, EMPTY, LoadOptions, load};
+pub use load::{CollisionShape, EMPTY, LoadOptions, anchored, load};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
 
 use crate::geometry::{BakeError, MeshError, MeshFileError};

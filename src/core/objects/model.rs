@@ -15,6 +15,16 @@ pub enum SizeClass {
     Large,
 }
 
+impl SizeClass {
+    /// Its name in files and on the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tiny => "tiny",
+            Self::Large => "large",
+        }
+    }
+}
+
 /// The paper's three approximate shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -27,6 +37,17 @@ pub enum ShapeClass {
     Spherical,
 }
 
+impl ShapeClass {
+    /// Its name in files and on the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cubic => "cubic",
+            Self::Cylindrical => "cylindrical",
+            Self::Spherical => "spherical",
+        }
+    }
+}
+
 /// What stage one says of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ObjectClass {
@@ -34,6 +55,12 @@ pub struct ObjectClass {
     pub size: SizeClass,
     /// Cubic, cylindrical or spherical.
     pub shape: ShapeClass,
+}
+
+impl std::fmt::Display for ObjectClass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}, {}", self.size.name(), self.shape.name())
+    }
 }
 
 /// A round bump on which an object can rest: a corner where the radius is zero, the whole of a ball.

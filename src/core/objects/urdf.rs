@@ -18,7 +18,8 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
     let clean = urdf_text::clean(bytes).map_err(malformed)?;
     let robot = urdf_rs::read_from_string(&clean.text)
         .map_err(|e| malformed(e.to_string().trim_start_matches("custom: ").to_owned()))?;
-    let mut blueprint = Blueprint { warnings: clean.warnings, ..Blueprint::new(name) };
+    let mut blueprint = Blueprint::new(name);
+    blueprint.warnings = clean.warnings;
     let poses = link_poses(&robot, &mut blueprint.warnings).map_err(malformed)?;
     let colours: HashMap<&str, Rgb> =
         robot.materials.iter().filter_map(|m| Some((m.name.as_str(), colour_of(m)?))).collect();

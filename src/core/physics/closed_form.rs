@@ -222,13 +222,6 @@ fn a_passive_gripper_gains_no_energy() {
             run.steps(1, &Drive::default());
             let now = energy(&run);
             largest = largest.max(now - before);
-            if now - before > 1e-5 {
-                eprintln!(
-                    "h {h} rise {} E {now} contacts {}",
-                    now - before,
-                    run.ws.contacts.iter().filter(|c| c.compression > 0.0).count()
-                );
-            }
             before = now;
         }
         assert!(before < start, "h = {h}: {start} J became {before} J");

@@ -27,7 +27,7 @@ pub struct StepReport {
 
 /// A step that must not be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{body} left the range of numbers; the last good state is kept. Try a smaller time step or softer contact")]
+#[error("{body} left the range of numbers; the samples before it are kept. Try a smaller time step or softer contact")]
 pub struct NotFinite {
     /// What became non-finite, in words.
     pub body: String,
@@ -44,8 +44,8 @@ pub struct Drive {
     pub object_force: DVec3,
 }
 
-/// Advances the state by one step. On failure the state is left as it was
-/// before, but for velocities, which are those that failed.
+/// Advances the state by one step. On failure the state is not to be used any
+/// more; whoever wants the last good one keeps the last frame.
 pub fn step(model: &Model, state: &mut State, ws: &mut Workspace, drive: &Drive) -> Result<StepReport, NotFinite> {
     lay_out(model, state, ws);
     gather_dynamics(model, state, ws, drive);

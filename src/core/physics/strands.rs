@@ -48,10 +48,7 @@ const TIP_COLUMNS: usize = 3;
 
 impl Strands {
     pub(super) fn new(finger: &Finger, pad: &Pad, grid: &TaxelGrid) -> Self {
-        let half = 0.5 * finger.segment_length();
         let lengths: Vec<f64> = finger.segment_lengths().collect();
-        // Arc length at which each segment starts: 0, l/2, 3l/2, ..
-        let start = |j: usize| if j == 0 { 0.0 } else { (2 * j - 1) as f64 * half };
         let mut all = Vec::with_capacity(grid.count() + TIP_ROWS * TIP_COLUMNS);
         let mut by_segment: Vec<Range<usize>> = Vec::with_capacity(lengths.len());
         for j in 0..lengths.len() {
@@ -60,7 +57,7 @@ impl Strands {
             while all.len() < grid.count() && grid.segment(all.len(), finger.joints) == j {
                 let taxel = all.len();
                 all.push(Strand {
-                    foot: DVec2::new(grid.arc(taxel) - start(j), 0.0),
+                    foot: DVec2::new(grid.place(taxel, finger).1, 0.0),
                     across: grid.across(taxel),
                     points_ahead: false,
                     height: grid.height(taxel),

@@ -27,9 +27,8 @@ pub(super) fn arrows(gripper: &Gripper, world_from_gripper: &Pose, frame: &Frame
         let bent = BentFinger::new(&gripper.finger, frame.joints(side));
         let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0.0); bent.segments.len()];
         for (taxel, load) in frame.loads(side, grid.count()) {
-            let segment_index = grid.segment(taxel, gripper.finger.joints);
+            let (segment_index, along) = grid.place(taxel, &gripper.finger);
             let segment = &bent.segments[segment_index];
-            let (_, along) = bent.at(grid.arc(taxel));
             let force = f64::from(load.normal);
             let skin = grid.height(taxel) - grid.compression(taxel, force);
             let place = plane.point(segment.point(along, skin), grid.across(taxel));

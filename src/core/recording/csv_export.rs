@@ -63,7 +63,7 @@ pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(
             for side in Side::BOTH {
                 let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
                 for (taxel, load) in frame.loads(side, grid.count()) {
-                    let (segment, along) = bent.at(grid.arc(taxel));
+                    let (segment, along) = grid.place(taxel, &scene.gripper.finger);
                     let in_plane = bent.segments[segment].point(along, grid.height(taxel));
                     let in_gripper = scene.gripper.plane(side).point(in_plane, grid.across(taxel));
                     let place = trial.info.world_from_gripper.point(in_gripper);

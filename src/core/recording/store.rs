@@ -15,7 +15,7 @@ use crate::trial::{Frame, Quality, Trial, TrialInfo};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Names a trial within its store.
 pub type TrialId = i64;
@@ -69,7 +69,7 @@ pub struct TrialRow {
     /// Name of the object.
     pub object: String,
     /// Seed of the pose.
-    pub seed: i64,
+    pub seed: u64,
     /// Samples stored.
     pub samples: i64,
     /// Whether it stayed finite and converged.
@@ -135,7 +135,7 @@ impl Store {
         } else {
             "WAL"
         };
-        self.connection.pragma_update(None, "journal_mode", mode).map_err(fault)?;
+        self.set_journal(mode)?;
         self.connection.pragma_update(None, "synchronous", "NORMAL").map_err(fault)?;
         self.connection.pragma_update(None, "foreign_keys", true).map_err(fault)?;
         let transaction = self.write()?;
@@ -146,6 +146,18 @@ impl Store {
             transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
         }
         transaction.commit().map_err(fault)
+    }
+
+    /// Changing the journal takes the lock without waiting for it, so that two programs which make one store together
+    /// would trip over each other; hence the waiting is done here.
+    fn set_journal(&self, mode: &str) -> Result<(), StoreError> {
+        let start = Instant::now();
+        loop {
+            match self.connection.pragma_update(None, "journal_mode", mode).map_err(|e| self.fault(&e)) {
+                Err(StoreError::Busy) if start.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(5)),
+                outcome => return outcome,
+            }
+        }
     }
 
     /// Refuses files of other programs and of newer versions, before anything is written.
@@ -229,7 +241,7 @@ impl Store {
         let rows = self.connection.prepare(sql).and_then(|mut statement| {
             statement
                 .query_map([with_deleted], |row| {
-                    let quality: Quality = json_or_default(&row.get::<_, String>(7)?);
+                    let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
                     let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
                     Ok(TrialRow {
                         id: row.get(0)?,
@@ -237,9 +249,9 @@ impl Store {
                         state: row.get(2)?,
                         rig: row.get(3)?,
                         object: row.get(4)?,
-                        seed: row.get(5)?,
+                        seed: row.get::<_, i64>(5)?.cast_unsigned(),
                         samples: row.get(6)?,
-                        sound: quality.finite && quality.converged,
+                        sound: quality.is_some_and(|quality| quality.finite && quality.converged),
                         warnings: warnings.len(),
                         deleted: row.get(9)?,
                     })
@@ -297,10 +309,12 @@ impl Store {
     }
 
     fn no_trial(&self, id: TrialId) -> StoreError {
-        let sql = "SELECT count(*) FROM trials WHERE id = ?1";
-        let deleted = self.connection.query_row(sql, [id], |row| row.get::<_, i64>(0)).is_ok_and(|n| n > 0);
-        let hint = if deleted { ": it was deleted; `palpate trials restore` brings it back" } else { "" };
-        StoreError::NoTrial { id, hint }
+        let sql = "SELECT deleted IS NOT NULL FROM trials WHERE id = ?1";
+        match self.connection.query_row(sql, [id], |row| row.get::<_, bool>(0)) {
+            Ok(true) => StoreError::NoTrial { id, hint: ": it was deleted; `palpate trials restore` brings it back" },
+            Ok(false) => StoreError::NotDeleted { id },
+            Err(_) => StoreError::NoTrial { id, hint: "" },
+        }
     }
 
     /// Marks trials as deleted, all or none of them. They can be restored until they are purged.

@@ -62,6 +62,12 @@ pub enum StoreError {
         /// Where it might be.
         hint: &'static str,
     },
+    /// A trial to be restored that is there.
+    #[error("trial {id} is not deleted")]
+    NotDeleted {
+        /// The trial.
+        id: TrialId,
+    },
     /// A trial whose frames cannot be read.
     #[error("trial {id} is damaged in its part {chunk}: {cause}")]
     Damaged {

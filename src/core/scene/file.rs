@@ -2,6 +2,7 @@
 //! leave the default in force in silence.
 
 use super::Scene;
+use crate::objects::anchored;
 use std::path::{Path, PathBuf};
 
 /// Why a scene was refused.
@@ -75,11 +76,8 @@ impl Scene {
         let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
         let mut scene = Self::from_toml(&text)?;
         let beside = path.parent().unwrap_or(Path::new("")).join(&scene.object.source);
-        if beside.is_file()
-            && let Some(found) = beside.to_str()
-        {
-            found.clone_into(&mut scene.object.source);
-        }
+        let beside = beside.to_str().filter(|_| beside.is_file());
+        scene.object.source = anchored(beside.unwrap_or(&scene.object.source));
         Ok(scene)
     }
 

@@ -39,14 +39,38 @@ pub enum Command {
 }
 
 /// What the simulation tells besides pictures and traces.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
     /// Something about the grasp that the user should know.
     Warning(String),
     /// Something failed; the sentence says what, and what to try.
     Failed(String),
+    /// A scene could not be set up; the one before goes on.
+    SceneRefused(Box<Refusal>),
     /// A trial is in the store.
     Stored(TrialId),
+}
+
+/// A scene that could not be set up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// The scene.
+    pub refused: Scene,
+    /// The scene that goes on instead.
+    pub kept: Scene,
+    /// Why, in a sentence for the user.
+    pub cause: String,
+}
+
+/// Why a command was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotSent {
+    /// Too many are waiting.
+    #[error("the simulation is busy; try again in a moment")]
+    Busy,
+    /// The thread has ended.
+    #[error("the simulation has stopped; restart Palpate")]
+    Gone,
 }
 
 /// One sample as plots need it.

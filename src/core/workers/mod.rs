@@ -18,6 +18,6 @@ mod recorder;
 mod sim;
 
 pub use latest::Latest;
-pub use messages::{Command, FinishedGrasp, Notice, ObjectCard, Snapshot, Status, TraceRow, Wake};
+pub use messages::{Command, FinishedGrasp, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
 pub use recorder::{Recorder, RecorderNotice};
 pub use sim::{SimWorker, SimWorkerSetup};

@@ -38,7 +38,8 @@ impl Recorder {
     pub fn start(store: PathBuf, tell: impl Fn(RecorderNotice) + Send + 'static) -> std::io::Result<Self> {
         let (messages, inbox) = channel();
         let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            Writer { path: store, store: None, trial: None, waiting: Vec::new(), tell: Box::new(tell) }.work(&inbox);
+            Writer { path: store, store: None, trial: Open::None, waiting: Vec::new(), tell: Box::new(tell) }
+                .work(&inbox);
         })?;
         Ok(Self { messages: Some(messages), thread: Some(thread) })
     }
@@ -84,16 +85,25 @@ impl Drop for Recorder {
 struct Writer {
     path: PathBuf,
     store: Option<Store>,
-    trial: Option<TrialId>,
+    trial: Open,
     waiting: Vec<Frame>,
     tell: Box<dyn Fn(RecorderNotice) + Send>,
+}
+
+/// The trial being recorded.
+enum Open {
+    None,
+    /// Nothing of it is in the store yet: scenes that are passed over within a second leave no trace.
+    Announced(Box<TrialInfo>),
+    /// Its first chunk is in.
+    Begun(TrialId),
 }
 
 impl Writer {
     fn work(mut self, inbox: &Receiver<Message>) {
         while let Ok(message) = inbox.recv() {
             if let Err(error) = self.take(message) {
-                self.trial = None;
+                self.trial = Open::None;
                 self.waiting.clear();
                 (self.tell)(RecorderNotice::Failed(error.to_string()));
             }
@@ -104,11 +114,10 @@ impl Writer {
         match message {
             Message::Begin(info) => {
                 self.waiting.clear();
-                self.trial = None;
-                self.trial = Some(self.store()?.begin(&info)?);
+                self.trial = Open::Announced(info);
             }
             Message::Frame(frame) => {
-                if self.trial.is_some() {
+                if !matches!(self.trial, Open::None) {
                     self.waiting.push(*frame);
                 }
                 if self.waiting.len() >= CHUNK {
@@ -116,15 +125,15 @@ impl Writer {
                 }
             }
             Message::Finish(quality, warnings) => {
-                self.write_waiting()?;
-                if let Some(id) = self.trial.take() {
+                if let Some(id) = self.write_waiting()? {
+                    self.trial = Open::None;
                     self.store()?.finish(id, &quality, &warnings)?;
                     (self.tell)(RecorderNotice::Stored(id));
                 }
             }
             Message::Discard => {
                 self.waiting.clear();
-                if let Some(id) = self.trial.take() {
+                if let Open::Begun(id) = std::mem::replace(&mut self.trial, Open::None) {
                     self.store()?.delete(&[id])?;
                 }
             }
@@ -132,12 +141,17 @@ impl Writer {
         Ok(())
     }
 
-    fn write_waiting(&mut self) -> Result<(), StoreError> {
+    /// Writes the frames that wait, beginning the trial where it has not been begun; its number, if there is one.
+    fn write_waiting(&mut self) -> Result<Option<TrialId>, StoreError> {
         let waiting = std::mem::take(&mut self.waiting);
-        match self.trial {
-            Some(id) => self.store()?.append(id, &waiting),
-            None => Ok(()),
-        }
+        let id = match std::mem::replace(&mut self.trial, Open::None) {
+            Open::None => return Ok(None),
+            Open::Announced(info) => self.store()?.begin(&info)?,
+            Open::Begun(id) => id,
+        };
+        self.store()?.append(id, &waiting)?;
+        self.trial = Open::Begun(id);
+        Ok(Some(id))
     }
 
     fn store(&mut self) -> Result<&mut Store, StoreError> {

@@ -1,21 +1,22 @@
 //! The simulation's thread: it owns the rig, keeps pace with the clock on the wall, and publishes what it sees.
 
 use super::latest::Latest;
-use super::messages::{Command, FinishedGrasp, Notice, ObjectCard, Snapshot, Status, TraceRow, Wake};
+use super::messages::{Command, FinishedGrasp, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
 use super::recorder::{Recorder, RecorderNotice};
 use crate::grasping::{GraspRun, GraspSummary, PoseJitter, jittered, prepare};
-use crate::objects::{LoadOptions, ObjectModel, catalogue};
+use crate::objects::{EMPTY, LoadOptions, ObjectModel, catalogue};
 use crate::picture::Stage;
 use crate::rig::SimRig;
 use crate::scene::Scene;
 use crate::sensing::{Channel, PressureArea, SensorLayout, Sensors};
 use crate::trial::Frame;
+use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError, channel, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// What a simulation worker starts from.
 pub struct SimWorkerSetup {
@@ -48,13 +49,14 @@ const LATEST: f64 = 0.25;
 /// Time over which the actual speed is measured.
 const SPEED_WINDOW: Duration = Duration::from_millis(500);
 
-/// A handle on the simulation's thread. Dropping it ends the thread and waits for it.
+/// A handle on the simulation's thread. Dropping it ends the thread and waits for what it still has to store.
 #[derive(Debug)]
 pub struct SimWorker {
     commands: SyncSender<Command>,
     snapshots: Arc<Latest<Snapshot>>,
     rows: Receiver<TraceRow>,
     rows_lost: Arc<AtomicBool>,
+    loading: Arc<AtomicBool>,
     notices: Receiver<Notice>,
     thread: Option<JoinHandle<()>>,
 }
@@ -66,11 +68,12 @@ impl SimWorker {
         let (row_sender, rows) = sync_channel(MOST_ROWS);
         let (notice_sender, notices) = channel();
         let snapshots = Arc::new(Latest::default());
-        let rows_lost = Arc::new(AtomicBool::new(false));
+        let [rows_lost, loading] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let outlets = Outlets {
             snapshots: Arc::clone(&snapshots),
             rows: row_sender,
             rows_lost: Arc::clone(&rows_lost),
+            loading: Arc::clone(&loading),
             notices: notice_sender,
             wake: Arc::clone(&setup.wake),
         };
@@ -87,12 +90,15 @@ impl SimWorker {
                 last_words.1();
             }
         })?;
-        Ok(Self { commands, snapshots, rows, rows_lost, notices, thread: Some(thread) })
+        Ok(Self { commands, snapshots, rows, rows_lost, loading, notices, thread: Some(thread) })
     }
 
-    /// Sends a command; false when too many are waiting or the thread has ended.
-    pub fn send(&self, command: Command) -> bool {
-        self.commands.try_send(command).is_ok()
+    /// Sends a command.
+    pub fn send(&self, command: Command) -> Result<(), NotSent> {
+        self.commands.try_send(command).map_err(|error| match error {
+            TrySendError::Full(_) => NotSent::Busy,
+            TrySendError::Disconnected(_) => NotSent::Gone,
+        })
     }
 
     /// The newest snapshot; absent until the first scene has been loaded.
@@ -118,12 +124,20 @@ impl SimWorker {
 
 impl Drop for SimWorker {
     fn drop(&mut self) {
-        // With a full queue the thread is busy; it sees the closed channel when it gets there.
-        while let Err(TrySendError::Full(_)) = self.commands.try_send(Command::Quit) {
-            std::thread::sleep(Duration::from_millis(1));
+        let wait = || std::thread::sleep(Duration::from_millis(1));
+        // Loading a large file cannot be interrupted; a window that closes does not wait for it.
+        let loading = || self.loading.load(Ordering::Relaxed);
+        while self.send(Command::Quit) == Err(NotSent::Busy) && !loading() {
+            wait();
         }
         if let Some(thread) = self.thread.take() {
-            let _ended = thread.join();
+            while !thread.is_finished() && !loading() {
+                wait();
+            }
+            if thread.is_finished() {
+                // A panic in the thread has been told already.
+                let _ended = thread.join();
+            }
         }
     }
 }
@@ -132,6 +146,7 @@ struct Outlets {
     snapshots: Arc<Latest<Snapshot>>,
     rows: SyncSender<TraceRow>,
     rows_lost: Arc<AtomicBool>,
+    loading: Arc<AtomicBool>,
     notices: Sender<Notice>,
     wake: Wake,
 }
@@ -151,6 +166,10 @@ struct Current {
     stage: Arc<Stage>,
     sensors: Sensors,
     frame: Arc<Frame>,
+    /// Warnings at its beginning; those that come later are told at its end.
+    told: usize,
+    /// The user has pulled at the object.
+    pulled: bool,
     ended: bool,
 }
 
@@ -158,7 +177,14 @@ struct Current {
 struct LoadedObject {
     source: String,
     options: LoadOptions,
+    /// When its file was written, and how long it is: a file that was exported anew is loaded anew.
+    stamp: Option<(SystemTime, u64)>,
     model: Option<Arc<ObjectModel>>,
+}
+
+fn stamp_of(source: &str) -> Option<(SystemTime, u64)> {
+    let metadata = std::fs::metadata(source).ok()?;
+    Some((metadata.modified().ok()?, metadata.len()))
 }
 
 struct Session {
@@ -174,7 +200,10 @@ struct Session {
     last: Option<Arc<FinishedGrasp>>,
     revision: u64,
     grasp: u64,
-    seed: u64,
+    /// The scene has been grasped as it is written; what follows comes from random poses.
+    own_pose_done: bool,
+    /// Random poses drawn for this scene so far; the next one's seed is one more.
+    poses_drawn: u64,
     pace: Pace,
     next_grasp_at: Option<Instant>,
     recorder_busy: bool,
@@ -235,13 +264,14 @@ impl Session {
             last: None,
             revision: 0,
             grasp: 0,
-            seed: 0,
+            own_pose_done: false,
+            poses_drawn: 0,
             pace: Pace::starting_at(0.0),
             next_grasp_at: None,
             recorder_busy: false,
             outlets,
         };
-        session.begin_round();
+        session.begin_somehow();
         while session.wait_and_obey(inbox) {
             session.advance();
         }
@@ -290,13 +320,11 @@ impl Session {
 
     fn obey(&mut self, command: Command) {
         match command {
-            Command::SetScene(scene) => {
-                self.nominal = *scene;
-                self.begin_round();
-            }
+            Command::SetScene(scene) => self.set_scene(*scene),
             Command::Play => {
                 self.status.playing = true;
                 if self.status.finished {
+                    // More of the same, not the same once more: the next poses are new ones.
                     self.begin_round();
                 } else {
                     self.set_pace();
@@ -311,7 +339,10 @@ impl Session {
                 self.status.actual_speed = 0.0;
                 self.take_frame();
             }
-            Command::Reset => self.begin_round(),
+            Command::Reset => {
+                self.own_pose_done = false;
+                self.begin_round();
+            }
             Command::SetSpeed(speed) => {
                 self.status.target_speed = speed.clamp(1.0 / 64.0, 64.0);
                 self.set_pace();
@@ -324,8 +355,8 @@ impl Session {
                 }
             }
             Command::Pull(force) => {
-                if let Some(current) = self.current.as_mut().filter(|_| force.is_finite()) {
-                    current.run.rig_mut().pull_object(force);
+                if let Some(current) = self.current.as_mut().filter(|c| force.is_finite() && !c.ended) {
+                    current.pull(force);
                 }
             }
             Command::Quit => {}
@@ -337,7 +368,35 @@ impl Session {
         self.pace = Pace::starting_at(self.current.as_ref().map_or(0.0, |current| current.frame.t));
     }
 
-    /// The first grasp of a round, in the scene's own pose.
+    /// Begins with the scene that was asked for or, where that cannot be had, with an empty hand.
+    fn begin_somehow(&mut self) {
+        if let Err(cause) = self.load_object(&self.nominal.clone()) {
+            let refused = self.nominal.clone();
+            EMPTY.clone_into(&mut self.nominal.object.source);
+            self.refuse(refused, cause);
+        }
+        self.begin_round();
+    }
+
+    /// Grasps another scene; where it cannot be had, the current grasp goes on as if nothing had been asked.
+    fn set_scene(&mut self, scene: Scene) {
+        if let Err(cause) = self.load_object(&scene) {
+            return self.refuse(scene, cause);
+        }
+        self.nominal = scene;
+        self.own_pose_done = false;
+        self.poses_drawn = 0;
+        // Whoever chooses an object after the last grasp wants to see it grasped.
+        self.status.playing |= self.status.finished;
+        self.begin_round();
+    }
+
+    fn refuse(&self, refused: Scene, cause: String) {
+        let refusal = Refusal { refused, kept: self.nominal.clone(), cause };
+        self.outlets.tell(Notice::SceneRefused(Box::new(refusal)));
+    }
+
+    /// The first grasp of a round.
     fn begin_round(&mut self) {
         self.status.grasp_of_round = 0;
         self.begin_grasp();
@@ -346,22 +405,27 @@ impl Session {
     fn begin_grasp(&mut self) {
         self.drop_recording();
         self.next_grasp_at = None;
-        let Some(model) = self.load_object() else { return };
+        if let Err(cause) = self.load_object(&self.nominal.clone()) {
+            // The file has changed for the worse since; the object as it was will do.
+            self.outlets.tell(Notice::Failed(cause));
+        }
+        let model = self.object.as_ref().and_then(|object| object.model.clone());
         self.status.finished = false;
         self.status.grasp_of_round += 1;
-        let again = self.status.grasp_of_round > 1;
-        self.seed = if again { self.seed + 1 } else { 0 };
+        let again = self.own_pose_done;
+        self.own_pose_done = true;
         // The first grasp is the scene as written; the following ones come from random poses.
-        let scene = if again {
-            jittered(&self.nominal, model.as_deref(), PoseJitter::default(), self.seed).0
+        let (scene, seed) = if again {
+            self.poses_drawn += 1;
+            (jittered(&self.nominal, model.as_deref(), PoseJitter::default(), self.poses_drawn).0, self.poses_drawn)
         } else {
-            self.nominal.clone()
+            (self.nominal.clone(), 0)
         };
         let sensors = match Sensors::new(&self.layout, &scene.gripper, PressureArea::Participation) {
             Ok(sensors) => sensors,
             Err(error) => return self.outlets.tell(Notice::Failed(error.to_string())),
         };
-        let mut run = prepare(&scene, model.as_deref(), self.seed);
+        let mut run = prepare(&scene, model.as_deref(), seed);
         if !again {
             for warning in &run.info().warnings {
                 self.outlets.tell(Notice::Warning(warning.clone()));
@@ -378,35 +442,31 @@ impl Session {
         self.channels = sensors.channels().into();
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
         let frame = Arc::new(run.rig_mut().first_look());
-        self.current = Some(Current { run, scene: Arc::new(scene), stage, sensors, frame, ended: false });
+        self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
+        let (told, scene) = (run.info().warnings.len(), Arc::new(scene));
+        self.current = Some(Current { run, scene, stage, sensors, frame, told, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
         self.publish();
     }
 
-    /// The object of the nominal scene; the outer `None` when it cannot be had.
-    fn load_object(&mut self) -> Option<Option<Arc<ObjectModel>>> {
-        let (source, options) = (self.nominal.object.source.clone(), self.nominal.load_options());
-        let known = self.object.as_ref().filter(|o| o.source == source && o.options == options);
-        if let Some(known) = known {
-            return Some(known.model.clone());
+    /// Loads a scene's object, unless it is the one at hand. On failure, which comes as a sentence, that one stays.
+    fn load_object(&mut self, scene: &Scene) -> Result<(), String> {
+        let (source, options) = (scene.object.source.clone(), scene.load_options());
+        let stamp = stamp_of(&source);
+        let is_known = |o: &LoadedObject| o.source == source && o.options == options && o.stamp == stamp;
+        if self.object.as_ref().is_some_and(is_known) {
+            return Ok(());
         }
         self.status.loading = Some(source.clone());
         self.publish();
-        let loaded = self.nominal.load_object();
+        self.outlets.loading.store(true, Ordering::Relaxed);
+        let loaded = scene.load_object();
+        self.outlets.loading.store(false, Ordering::Relaxed);
         self.status.loading = None;
-        match loaded {
-            Ok(model) => {
-                let model = model.map(Arc::new);
-                self.card = model.as_ref().map(|model| Arc::new(card_of(model)));
-                self.object = Some(LoadedObject { source, options, model: model.clone() });
-                Some(model)
-            }
-            Err(error) => {
-                self.outlets.tell(Notice::Failed(error.to_string()));
-                self.publish();
-                None
-            }
-        }
+        self.publish();
+        let model = loaded.map_err(|error| error.to_string())?.map(Arc::new);
+        self.object = Some(LoadedObject { source, options, stamp, model });
+        Ok(())
     }
 
     /// Takes all samples that are due, within the budget.
@@ -475,8 +535,7 @@ impl Session {
         let Some(current) = self.current.as_mut() else { return };
         current.ended = true;
         let trial = current.run.clone().finish(&current.scene);
-        let already_told = current.run.info().warnings.len();
-        for warning in trial.info.warnings.iter().skip(already_told) {
+        for warning in trial.info.warnings.iter().skip(current.told) {
             self.outlets.tell(Notice::Warning(warning.clone()));
         }
         if self.recorder_busy
@@ -525,14 +584,27 @@ impl Session {
     }
 }
 
-fn card_of(model: &ObjectModel) -> ObjectCard {
+impl Current {
+    /// Pulls at the object; a trial that was meddled with says so.
+    fn pull(&mut self, force: DVec3) {
+        if force != DVec3::ZERO && !self.pulled {
+            self.pulled = true;
+            let t = self.frame.t;
+            self.run
+                .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
+        }
+        self.run.rig_mut().pull_object(force);
+    }
+}
+
+fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
     let built_in = catalogue().iter().find(|b| b.name == model.name);
     ObjectCard {
         name: model.name.clone(),
         title: built_in.map_or_else(|| model.name.clone(), |b| b.title.clone()),
         class: model.class,
         mass: model.mass.mass,
-        friction: model.friction,
+        friction: scene.object.friction.value().unwrap_or(model.friction),
         size: model.bounds.size(),
     }
 }
@@ -560,6 +632,24 @@ mod tests {
     }
 
     impl Watched {
+        fn tell(&self, command: Command) {
+            self.worker.send(command).expect("room");
+        }
+
+        /// Waits for a scene to be refused.
+        fn refusal(&self) -> Refusal {
+            loop {
+                let refused = self.worker.notices().find_map(|notice| match notice {
+                    Notice::SceneRefused(refusal) => Some(*refusal),
+                    _ => None,
+                });
+                if let Some(refusal) = refused {
+                    return refusal;
+                }
+                self.woken.recv_timeout(Duration::from_secs(60)).expect("the worker is alive");
+            }
+        }
+
         /// Waits, as long as it keeps waking us, until the snapshot is as wanted.
         fn until(&self, wanted: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
             loop {
@@ -583,7 +673,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("trials.sqlite");
         let watched = start(ball(), path.clone(), 2);
-        assert!(watched.worker.send(Command::SetSpeed(64.0)));
+        watched.tell(Command::SetSpeed(64.0));
         watched.until(|s| s.status.finished);
         let rows: Vec<TraceRow> = watched.worker.rows().collect();
         assert_eq!(rows.len(), 240, "two grasps of 120 samples, none lost");
@@ -601,12 +691,12 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("trials.sqlite");
         let watched = start(ball(), path.clone(), 1);
-        watched.worker.send(Command::Pause);
+        watched.tell(Command::Pause);
         let paused = watched.until(|s| !s.status.playing);
-        watched.worker.send(Command::Step);
+        watched.tell(Command::Step);
         let stepped = watched.until(|s| s.frame.t > paused.frame.t);
         assert!((stepped.frame.t - paused.frame.t - 1.0 / 75.0).abs() < 1e-9);
-        watched.worker.send(Command::Reset);
+        watched.tell(Command::Reset);
         let reset = watched.until(|s| s.grasp > stepped.grasp);
         assert_eq!(reset.frame.t, 0.0);
         drop(watched);
@@ -617,18 +707,73 @@ mod tests {
     #[test]
     fn a_scene_that_cannot_be_loaded_leaves_the_old_one() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let watched = start(ball(), folder.path().join("trials.sqlite"), 1);
-        watched.until(|s| s.object.is_some());
+        let path = folder.path().join("trials.sqlite");
+        let watched = start(ball(), path.clone(), 2);
+        watched.until(|s| s.object.is_some() && s.frame.t > 0.05);
         let mut missing = ball();
         "/nowhere/at/all.urdf".clone_into(&mut missing.object.source);
-        watched.worker.send(Command::SetScene(Box::new(missing)));
-        let notice = loop {
-            if let Some(notice) = watched.worker.notices().find(|n| matches!(n, Notice::Failed(_))) {
-                break notice;
-            }
-            watched.woken.recv_timeout(Duration::from_secs(60)).expect("the worker is alive");
-        };
-        assert!(matches!(notice, Notice::Failed(text) if text.contains("/nowhere/at/all.urdf")));
-        assert!(watched.worker.snapshot().is_some_and(|s| s.object.as_ref().is_some_and(|o| o.name == "ball")));
+        watched.tell(Command::SetScene(Box::new(missing.clone())));
+        let refusal = watched.refusal();
+        assert!(refusal.cause.contains("/nowhere/at/all.urdf"));
+        assert!(refusal.refused == missing && refusal.kept == ball());
+        // The grasp that was going on goes on, is stored, and the next one follows.
+        watched.tell(Command::SetSpeed(64.0));
+        let last = watched.until(|s| s.status.finished);
+        assert!(last.grasp == 2 && last.object.as_ref().is_some_and(|o| o.name == "ball"));
+        watched.tell(Command::Reset);
+        watched.until(|s| s.grasp == 3);
+        drop(watched);
+        let rows = Store::open(&path).expect("opens").list(false).expect("lists");
+        assert_eq!(
+            rows.iter().map(|row| (row.object.as_str(), row.seed)).collect::<Vec<_>>(),
+            [("ball", 0), ("ball", 1)]
+        );
+    }
+
+    #[test]
+    fn a_first_scene_that_cannot_be_loaded_leaves_an_empty_hand() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut missing = ball();
+        "/nowhere/at/all.urdf".clone_into(&mut missing.object.source);
+        let watched = start(missing, folder.path().join("trials.sqlite"), 1);
+        assert_eq!(watched.refusal().kept.object.source, EMPTY);
+        assert!(watched.until(|s| s.frame.t > 0.0).object.is_none());
+        watched.tell(Command::SetScene(Box::new(ball())));
+        watched.until(|s| s.object.is_some() && s.frame.t > 0.0);
+    }
+
+    #[test]
+    fn more_grasps_come_from_new_poses_and_pulled_ones_say_so() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("trials.sqlite");
+        let watched = start(ball(), path.clone(), 2);
+        watched.tell(Command::SetSpeed(64.0));
+        watched.until(|s| s.status.finished);
+        watched.tell(Command::Play);
+        watched.until(|s| s.grasp == 3);
+        watched.tell(Command::Pull(DVec3::new(0.0, 0.3, 0.0)));
+        watched.until(|s| s.status.finished && s.grasp == 4);
+        drop(watched);
+        let store = Store::open(&path).expect("opens");
+        let rows = store.list(false).expect("lists");
+        assert_eq!(rows.iter().map(|row| row.seed).collect::<Vec<_>>(), [0, 1, 2, 3]);
+        let warnings: Vec<Vec<String>> = (1..=4).map(|id| store.load(id).expect("whole").info.warnings).collect();
+        let pulled = |k: usize| warnings[k].iter().any(|w: &String| w.contains("pulled by hand"));
+        assert!(!pulled(0) && !pulled(1) && pulled(2) && !pulled(3), "{warnings:?}");
+    }
+
+    #[test]
+    fn scenes_that_are_passed_over_leave_nothing_in_the_store() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("trials.sqlite");
+        let watched = start(ball(), path.clone(), 1);
+        for k in 0..20 {
+            let mut scene = ball();
+            scene.gripper.mount.yaw_deg = f64::from(k);
+            watched.tell(Command::SetScene(Box::new(scene)));
+            watched.until(|s| s.scene.gripper.mount.yaw_deg == f64::from(k));
+        }
+        drop(watched);
+        assert!(Store::open(&path).expect("opens").list(true).expect("lists").is_empty());
     }
 }

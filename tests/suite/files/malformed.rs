@@ -240,11 +240,12 @@ proptest! {
             "object.source=\"cube\"".to_owned(),
             "timing.duration_s=1.2".to_owned(),
         ];
-        if let Ok(scene) = Scene::default().with_settings(&settings) {
-            let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
-            prop_assert!(trial.info.quality.finite, "{settings:?}");
-            prop_assert!(trial.frames.iter().all(|f| f.q.iter().all(|q| q.abs() < 10.0)), "{settings:?}");
-        }
+        let scene = Scene::default().with_settings(&settings);
+        prop_assert!(scene.is_ok(), "{settings:?}: {scene:?}");
+        let scene = scene.unwrap();
+        let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
+        prop_assert!(trial.info.quality.finite, "{settings:?}");
+        prop_assert!(trial.frames.iter().all(|f| f.q.iter().all(|q| q.abs() < 10.0)), "{settings:?}");
     }
 }
 
