@@ -180,7 +180,7 @@ fn beaten(bytes: &[u8], blows: &[Blow]) -> Vec<u8> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn beaten_urdf_survives(blows in blows()) {
