@@ -111,9 +111,9 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         story.grasps.push(told);
     }
     if arguments.json {
-        say_json(&story)?
+        say_json(&story)?;
     } else {
-        conclude(&story)?
+        conclude(&story)?;
     }
     if story.grasps.iter().all(|told| told.summary.finite) {
         Ok(())
