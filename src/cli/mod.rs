@@ -90,18 +90,11 @@ pub fn run() -> ExitCode {
         Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
     }
     terminal::show_log();
-    let store = arguments.store.as_deref();
-    let outcome = match arguments.command {
-        Some(Command::Grasp(grasp)) => grasp::run(&grasp, store),
-        Some(Command::Demo(demo)) => demo::run(&demo, store),
-        Some(Command::Snapshot(snapshot)) => snapshot::run(&snapshot, store),
-        Some(Command::Trials(trials)) => trials::run(&trials, store),
-        Some(Command::Bench(bench)) => bench::run(&bench),
-        Some(Command::Workshop(workshop)) => workshop::run(&workshop),
-        None => window(arguments.object.as_deref(), store),
-    };
+    terminal::put_faults_into_words();
+    // A fault has been told by the time it arrives here.
+    let outcome = std::panic::catch_unwind(|| obey(&arguments)).unwrap_or(Ok(ExitCode::FAILURE));
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         // Whoever reads our output has heard enough: `palpate trials list | head`.
         Err(failure) if terminal::is_closed_pipe(failure.as_ref()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -109,4 +102,18 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let store = arguments.store.as_deref();
+    match &arguments.command {
+        Some(Command::Grasp(grasp)) => grasp::run(grasp, store)?,
+        Some(Command::Demo(demo)) => demo::run(demo, store)?,
+        Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
+        Some(Command::Trials(trials)) => trials::run(trials, store)?,
+        Some(Command::Bench(bench)) => bench::run(bench)?,
+        Some(Command::Workshop(workshop)) => workshop::run(workshop)?,
+        None => window(arguments.object.as_deref(), store)?,
+    }
+    Ok(ExitCode::SUCCESS)
 }

@@ -33,6 +33,16 @@ pub(super) fn show_log() {
     tracing_subscriber::registry().with(lines.with_filter(Targets::new().with_targets(ours))).init();
 }
 
+/// From now on a panic, ours or a library's, is told as one sentence instead of a trace.
+pub(super) fn put_faults_into_words() {
+    std::panic::set_hook(Box::new(|fault| {
+        let place = fault.location().map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
+        let what = fault.payload_as_str().unwrap_or("no words");
+        let text = format!("Palpate met a fault of its own: {what} ({place}). Trials in the store are safe");
+        complain(&format!("{text}; please report this with what you did"));
+    }));
+}
+
 /// Prints why a command failed.
 pub(super) fn complain(line: &str) {
     let _unheard = writeln!(std::io::stderr(), "error: {line}");
