@@ -16,6 +16,8 @@ mod latest;
 mod messages;
 mod recorder;
 mod sim;
+#[cfg(test)]
+mod sim_tests;
 
 pub use latest::Latest;
 pub use messages::{Command, FinishedGrasp, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
