@@ -6,7 +6,7 @@ use super::setup::{SceneArguments, open_store};
 use super::terminal::{file_name_of, say, say_json, warn};
 use glam::Vec2;
 use palpate_core::drawing::Camera;
-use palpate_core::grasping::{GraspSummary, PoseJitter, grasp, jittered};
+use palpate_core::grasping::{GraspSummary, PoseSampler, grasp};
 use palpate_core::gripper::Phase;
 use palpate_core::objects::{ObjectModel, catalogue};
 use palpate_core::palette::Theme;
@@ -82,9 +82,10 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     if !arguments.json {
         introduce(&story.object, object.as_ref(), seed)?;
     }
+    let sampler = PoseSampler::new(&nominal, object.as_ref());
     for k in 0..arguments.grasps {
         let pose_seed = seed.wrapping_add(u64::from(k)).wrapping_add(1);
-        let (scene, _) = jittered(&nominal, object.as_ref(), PoseJitter::default(), pose_seed);
+        let (scene, _) = sampler.draw(object.as_ref(), pose_seed);
         let trial = grasp(&scene, object.as_ref(), pose_seed);
         let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?;
         let picture = match &mut painter {

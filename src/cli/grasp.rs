@@ -3,7 +3,7 @@
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json, warn};
-use palpate_core::grasping::{GraspSummary, PoseJitter, grasp, jittered};
+use palpate_core::grasping::{GraspSummary, grasp, jittered};
 use palpate_core::recording::{TrialId, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
@@ -18,7 +18,7 @@ pub(super) struct GraspArguments {
     object: Option<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Draw the gripper's pose at random from this seed: up to 5 mm off, turned by up to 25 degrees.
+    /// Draw the pose at random from this seed, as the scene's `pose` or --preset says.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     seed: Option<u64>,
     /// Write the trial as CSV here, and its contacts beside it as .contacts.csv.
@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     let object = nominal.load_object()?;
     let load_cpu_ms = loading.elapsed().as_secs_f64() * 1e3;
     let scene = match arguments.seed {
-        Some(seed) => jittered(&nominal, object.as_ref(), PoseJitter::default(), seed).0,
+        Some(seed) => jittered(&nominal, object.as_ref(), seed).0,
         None => nominal,
     };
     let seed = arguments.seed.unwrap_or(0);

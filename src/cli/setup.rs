@@ -3,7 +3,7 @@
 use super::Failure;
 use palpate_core::objects::anchored;
 use palpate_core::recording::Store;
-use palpate_core::scene::{Accuracy, Scene};
+use palpate_core::scene::{Accuracy, PosePreset, Scene};
 use std::path::{Path, PathBuf};
 
 /// What to simulate.
@@ -18,6 +18,10 @@ pub(super) struct SceneArguments {
     /// Hold the object in place instead of letting it rest freely.
     #[arg(long)]
     pub(super) fixed: bool,
+    /// How random poses vary: A (3 mm, 10 degrees), M (5 mm, 25 degrees), B (8 mm, any turn, any face it rests on) or
+    /// C (12 mm, any orientation).
+    #[arg(long, value_name = "A|M|B|C", value_parser = parse_preset)]
+    pub(super) preset: Option<PosePreset>,
     /// Set any key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
@@ -26,6 +30,10 @@ pub(super) struct SceneArguments {
 fn parse_accuracy(text: &str) -> Result<Accuracy, String> {
     let found = Accuracy::ALL.into_iter().find(|a| a.name() == text);
     found.ok_or_else(|| "choose draft, standard or reference".to_owned())
+}
+
+fn parse_preset(text: &str) -> Result<PosePreset, String> {
+    PosePreset::named(text).ok_or_else(|| "choose A, M, B or C".to_owned())
 }
 
 impl SceneArguments {
@@ -40,6 +48,9 @@ impl SceneArguments {
         }
         if let Some(accuracy) = self.accuracy {
             scene.solver.accuracy = accuracy;
+        }
+        if let Some(preset) = self.preset {
+            scene.pose = preset.poses();
         }
         scene.object.fixed |= self.fixed;
         Ok(scene.with_settings(&self.settings)?)

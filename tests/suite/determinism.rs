@@ -2,7 +2,7 @@
 //! dates are what differs between two trials, and are left out.
 
 use crate::program::palpate;
-use palpate_core::grasping::{PoseJitter, grasp, jittered};
+use palpate_core::grasping::{grasp, jittered};
 use palpate_core::recording::{Store, encode_frames, write_contacts_csv, write_trial_csv};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
@@ -17,7 +17,7 @@ fn jittered_grasp(name: &str, seed: u64) -> (Scene, Trial) {
     let mut scene = Scene::default();
     name.clone_into(&mut scene.object.source);
     let object = scene.load_object().unwrap();
-    let (scene, _) = jittered(&scene, object.as_ref(), PoseJitter::default(), seed);
+    let (scene, _) = jittered(&scene, object.as_ref(), seed);
     let trial = grasp(&scene, object.as_ref(), seed);
     (scene, trial)
 }

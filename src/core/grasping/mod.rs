@@ -4,6 +4,6 @@ mod poses;
 mod run;
 mod summary;
 
-pub use poses::{PoseJitter, jittered};
+pub use poses::{PoseSampler, jittered};
 pub use run::{GraspRun, grasp, prepare};
 pub use summary::{GraspSummary, HoldSummary};

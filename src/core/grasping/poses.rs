@@ -1,69 +1,130 @@
-//! Random poses: the gripper is shifted and turned over the resting object, seeded, so that a seed names a pose.
+//! Random poses: the gripper is shifted and turned over the resting object, which may lie on another face. Seeded, so
+//! that a seed names a pose.
 
 use super::run::prepare;
 use crate::objects::ObjectModel;
-use crate::scene::Scene;
+use crate::physics::{natural_rotations, random_rotation};
+use crate::scene::{Faces, Scene};
+use glam::{DQuat, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// How far a pose may stray from straight above the object.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseJitter {
-    /// Largest shift along each axis (m).
-    pub shift: f64,
-    /// Largest turn about the vertical (degrees).
-    pub yaw_deg: f64,
-}
-
-impl Default for PoseJitter {
-    fn default() -> Self {
-        Self { shift: 0.005, yaw_deg: 25.0 }
-    }
-}
 
 /// Draws before a scene that leaves no room is accepted as it is.
 const MOST_DRAWS: u32 = 100;
 
-/// The scene with its gripper moved to a random pose, and how many draws were thrown away because the open fingers
-/// would have stood inside the object.
-pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, jitter: PoseJitter, seed: u64) -> (Scene, u32) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut drawn = scene.clone();
-    for rejected in 0..MOST_DRAWS {
+/// Draws poses for one object in one scene, as the scene's `pose` says.
+#[derive(Clone, Debug)]
+pub struct PoseSampler {
+    scene: Scene,
+    /// Where natural faces are wanted: orientations to draw from.
+    natural: Vec<DQuat>,
+}
+
+impl PoseSampler {
+    /// Prepares to draw; finding the natural faces takes some tenths of a second.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> Self {
+        // A free object cannot lie anyhow: it would fall off its pedestal before the fingers come.
+        let lies_naturally = match scene.pose.faces {
+            Faces::Nominal => false,
+            Faces::Natural => true,
+            Faces::Any => !scene.object.fixed,
+        };
+        let natural = object.filter(|_| lies_naturally).map(natural_rotations).unwrap_or_default();
+        Self { scene: scene.clone(), natural }
+    }
+
+    /// The scene in the pose that `seed` names, and how many draws were thrown away because the open fingers would
+    /// have stood inside the object.
+    pub fn draw(&self, object: Option<&ObjectModel>, seed: u64) -> (Scene, u32) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut drawn = self.scene.clone();
+        for rejected in 0..MOST_DRAWS {
+            self.draw_once(&mut drawn, &mut random);
+            if drawn.check().is_ok() && prepare(&drawn, object, seed).rig_mut().starting_overlap() <= 0.0 {
+                return (drawn, rejected);
+            }
+        }
+        (drawn, MOST_DRAWS)
+    }
+
+    fn draw_once(&self, drawn: &mut Scene, random: &mut ChaCha8Rng) {
+        let (nominal, spread) = (&self.scene.gripper.mount, &self.scene.pose);
         let mut within = |most: f64| most * (2.0 * random.random::<f64>() - 1.0);
-        for (offset, nominal) in drawn.gripper.mount.offset.iter_mut().zip(scene.gripper.mount.offset) {
-            *offset = nominal + within(jitter.shift);
+        let mount = &mut drawn.gripper.mount;
+        for axis in 0..3 {
+            mount.offset[axis] = nominal.offset[axis] + within(spread.shift[axis]);
         }
         // A whole turn more or less is the same pose, and keeps to the range of scene files.
-        let yaw = scene.gripper.mount.yaw_deg + within(jitter.yaw_deg);
-        drawn.gripper.mount.yaw_deg = if yaw.abs() > 180.0 { (yaw + 180.0).rem_euclid(360.0) - 180.0 } else { yaw };
-        if drawn.check().is_err() {
-            continue;
-        }
-        if prepare(&drawn, object, seed).rig_mut().starting_overlap() <= 0.0 {
-            return (drawn, rejected);
+        let yaw = nominal.yaw_deg + within(spread.yaw_deg);
+        mount.yaw_deg = if yaw.abs() > 180.0 { (yaw + 180.0).rem_euclid(360.0) - 180.0 } else { yaw };
+        match spread.faces {
+            Faces::Natural | Faces::Any if !self.natural.is_empty() => {
+                lay(drawn, self.natural[random.random_range(0..self.natural.len())]);
+            }
+            Faces::Any => lay(drawn, random_rotation(random)),
+            Faces::Nominal | Faces::Natural => {}
         }
     }
-    (drawn, MOST_DRAWS)
+}
+
+/// Lays the object as a rotation says.
+fn lay(scene: &mut Scene, rotation: DQuat) {
+    let (yaw, pitch, roll) = rotation.to_euler(EulerRot::ZYX);
+    scene.object.rotation_deg = [roll, pitch, yaw].map(f64::to_degrees);
+}
+
+/// One pose of an object in a scene; whoever wants many keeps a [`PoseSampler`].
+pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scene, u32) {
+    PoseSampler::new(scene, object).draw(object, seed)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Primitive;
+    use crate::scene::{PRESETS, PosePreset};
     use glam::DVec3;
+
+    fn brick() -> ObjectModel {
+        ObjectModel::from_primitive("brick", Primitive::Cuboid { half: DVec3::new(0.015, 0.03, 0.006) }, 500.0, 0.5)
+    }
 
     #[test]
     fn a_seed_names_a_pose_within_its_range() {
-        let scene = Scene::default();
-        let jitter = PoseJitter::default();
-        let (first, _) = jittered(&scene, None, jitter, 7);
-        assert_eq!(jittered(&scene, None, jitter, 7).0, first);
-        assert_ne!(jittered(&scene, None, jitter, 8).0, first);
-        for offset in first.gripper.mount.offset {
-            assert!(offset.abs() <= jitter.shift);
+        for preset in PRESETS {
+            let scene = Scene { pose: preset.poses(), ..Scene::default() };
+            let sampler = PoseSampler::new(&scene, Some(&brick()));
+            let (first, _) = sampler.draw(Some(&brick()), 7);
+            assert_eq!(jittered(&scene, Some(&brick()), 7).0, first, "{}", preset.name);
+            assert_ne!(sampler.draw(Some(&brick()), 8).0, first);
+            for (offset, most) in first.gripper.mount.offset.iter().zip(scene.pose.shift) {
+                assert!(offset.abs() <= most);
+            }
+            assert!(first.gripper.mount.yaw_deg.abs() <= scene.pose.yaw_deg && first.gripper.mount.yaw_deg != 0.0);
+            assert_eq!(first.object.rotation_deg == [0.0; 3], scene.pose.faces == Faces::Nominal, "{}", preset.name);
         }
-        assert!(first.gripper.mount.yaw_deg.abs() <= jitter.yaw_deg && first.gripper.mount.yaw_deg != 0.0);
+    }
+
+    #[test]
+    fn natural_faces_are_flat_ones() {
+        let poses = PosePreset::named("B").expect("in the list").poses();
+        let sampler = PoseSampler::new(&Scene { pose: poses, ..Scene::default() }, Some(&brick()));
+        for seed in 1..20 {
+            let [roll, pitch, yaw] = sampler.draw(Some(&brick()), seed).0.object.rotation_deg.map(f64::to_radians);
+            let up = crate::geometry::Pose::from_xyz_rpy(DVec3::ZERO, DVec3::new(roll, pitch, yaw))
+                .inverse()
+                .direction(DVec3::Z);
+            assert!(up.abs().max_element() > 0.99, "seed {seed}: {up}");
+        }
+    }
+
+    #[test]
+    fn poses_stay_within_what_a_scene_file_may_say() {
+        let mut scene = Scene::default();
+        scene.gripper.mount.yaw_deg = 179.0;
+        for seed in 0..20 {
+            assert!(jittered(&scene, None, seed).0.check().is_ok());
+        }
     }
 
     #[test]
@@ -71,10 +132,11 @@ mod tests {
         // 80 mm between pads that are 84 mm apart: most shifts collide.
         let slab = Primitive::Cuboid { half: DVec3::new(0.040, 0.02, 0.02) };
         let object = ObjectModel::from_primitive("slab", slab, 500.0, 0.5);
-        let jitter = PoseJitter { shift: 0.008, yaw_deg: 0.0 };
-        let (scene, rejected) = jittered(&Scene::default(), Some(&object), jitter, 3);
+        let mut wide = Scene::default();
+        (wide.pose.shift, wide.pose.yaw_deg) = ([0.008; 3], 0.0);
+        let (scene, rejected) = jittered(&wide, Some(&object), 3);
         assert!(scene.gripper.mount.offset[0].abs() < 0.0021 + 1e-9, "{:?}", scene.gripper.mount.offset);
-        let total: u32 = (0..20).map(|seed| jittered(&Scene::default(), Some(&object), jitter, seed).1).sum();
+        let total: u32 = (0..20).map(|seed| jittered(&wide, Some(&object), seed).1).sum();
         assert!(total > 20 && rejected < MOST_DRAWS, "{total}");
     }
 }

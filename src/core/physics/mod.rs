@@ -21,6 +21,7 @@ mod energy;
 mod environment;
 mod model;
 mod placement;
+mod resting;
 mod simulation;
 mod skyline;
 mod solve;
@@ -31,6 +32,7 @@ mod workspace;
 
 pub use model::Model;
 pub use placement::Placement;
+pub use resting::{natural_rotations, random_rotation};
 pub use simulation::{Simulation, SimulationError};
 pub use state::State;
 pub use step::{Drive, NotFinite, StepReport, step};

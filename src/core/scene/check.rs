@@ -65,6 +65,8 @@ impl Scene {
         ranges.number("object.density", object.density, 0.1..=30_000.0);
         ranges.auto("object.friction", object.friction, 0.0..=100.0);
         ranges.auto("object.scale", object.scale, 1e-9..=1e9);
+        ranges.numbers("pose.shift", &self.pose.shift, &(0.0..=0.5));
+        ranges.number("pose.yaw_deg", self.pose.yaw_deg, 0.0..=180.0);
         let support = &self.support;
         ranges.number("support.height", support.height, 0.0..=2.0);
         ranges.number("support.radius", support.radius, 5e-4..=1.0);

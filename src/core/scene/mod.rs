@@ -6,10 +6,12 @@
 mod auto;
 mod check;
 mod file;
+mod poses;
 mod timing;
 
 pub use auto::Auto;
 pub use file::SceneError;
+pub use poses::{Faces, PRESETS, PosePreset, PoseSpread};
 pub use timing::{Clock, Timing};
 
 use crate::gripper::{Gripper, Programme};
@@ -27,6 +29,8 @@ pub struct Scene {
     pub support: Support,
     /// The gripper and where it is held.
     pub gripper: Gripper,
+    /// How poses vary from grasp to grasp.
+    pub pose: PoseSpread,
     /// Line pressure over time.
     pub programme: Programme,
     /// Rates and duration.

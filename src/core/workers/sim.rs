@@ -3,7 +3,7 @@
 use super::latest::Latest;
 use super::messages::{Command, FinishedGrasp, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
 use super::recorder::{Recorder, RecorderNotice};
-use crate::grasping::{GraspRun, GraspSummary, PoseJitter, jittered, prepare};
+use crate::grasping::{GraspRun, GraspSummary, PoseSampler, prepare};
 use crate::objects::{EMPTY, LoadOptions, ObjectModel, catalogue};
 use crate::picture::Stage;
 use crate::rig::SimRig;
@@ -204,6 +204,8 @@ struct Session {
     own_pose_done: bool,
     /// Random poses drawn for this scene so far; the next one's seed is one more.
     poses_drawn: u64,
+    /// Draws them; made when the first one is wanted.
+    sampler: Option<PoseSampler>,
     pace: Pace,
     next_grasp_at: Option<Instant>,
     recorder_busy: bool,
@@ -266,6 +268,7 @@ impl Session {
             grasp: 0,
             own_pose_done: false,
             poses_drawn: 0,
+            sampler: None,
             pace: Pace::starting_at(0.0),
             next_grasp_at: None,
             recorder_busy: false,
@@ -384,6 +387,7 @@ impl Session {
             return self.refuse(scene, cause);
         }
         self.nominal = scene;
+        self.sampler = None;
         self.own_pose_done = false;
         self.poses_drawn = 0;
         // Whoever chooses an object after the last grasp wants to see it grasped.
@@ -417,7 +421,8 @@ impl Session {
         // The first grasp is the scene as written; the following ones come from random poses.
         let (scene, seed) = if again {
             self.poses_drawn += 1;
-            (jittered(&self.nominal, model.as_deref(), PoseJitter::default(), self.poses_drawn).0, self.poses_drawn)
+            let sampler = self.sampler.get_or_insert_with(|| PoseSampler::new(&self.nominal, model.as_deref()));
+            (sampler.draw(model.as_deref(), self.poses_drawn).0, self.poses_drawn)
         } else {
             (self.nominal.clone(), 0)
         };
@@ -466,6 +471,7 @@ impl Session {
         self.publish();
         let model = loaded.map_err(|error| error.to_string())?.map(Arc::new);
         self.object = Some(LoadedObject { source, options, stamp, model });
+        self.sampler = None;
         Ok(())
     }
 
