@@ -1,6 +1,7 @@
 //! The command line: every headless command, and the door to the window. Exit codes: 0 done, 1 failed, 2 wrong use.
 
 mod bench;
+mod collect;
 mod demo;
 mod grasp;
 mod setup;
@@ -42,6 +43,8 @@ enum Command {
     Grasp(grasp::GraspArguments),
     /// Grasp an object in a few random poses, tell the story, write pictures; needs no display.
     Demo(demo::DemoArguments),
+    /// Grasp many objects in many random poses, in parallel, into the store; taken up again where it was interrupted.
+    Collect(collect::CollectArguments),
     /// Draw a scene or a stored trial into a PNG file, without a window.
     Snapshot(snapshot::SnapshotArguments),
     /// List, show, export, delete and restore recorded trials.
@@ -109,6 +112,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(grasp, store)?,
         Some(Command::Demo(demo)) => demo::run(demo, store)?,
+        Some(Command::Collect(collect)) => collect::run(collect, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,

@@ -55,6 +55,12 @@ enum What {
         #[arg(long)]
         hull: bool,
     },
+    /// Copy the trials of other stores into this one; what is here already is not copied again.
+    Merge {
+        /// The other stores.
+        #[arg(required = true, value_name = "FILE")]
+        stores: Vec<PathBuf>,
+    },
     /// Mark trials as deleted; `restore` takes it back.
     Delete {
         /// Their numbers.
@@ -79,6 +85,14 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         What::Export { ids, out, layout, hull } => {
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             export(&store, ids, out, &SensorLayout::named(layout)?, area)
+        }
+        What::Merge { stores } => {
+            for other in stores {
+                let merged = store.merge_from(other)?;
+                let (added, known) = (merged.added, merged.known);
+                say(format!("{}: {added} trial(s) added, {known} were here already", other.display()))?;
+            }
+            Ok(())
         }
         What::Delete { ids } => {
             store.delete(ids)?;

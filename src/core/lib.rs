@@ -19,11 +19,11 @@
 //! | 2 | [`objects`], [`gripper`] | URDF, OBJ, STL and the sixteen; what a finger, a pad and a programme are |
 //! | 3 | [`trial`] | plain frames and trials |
 //! | 4 | [`scene`] | the scene file: everything a user may set |
-//! | 5 | [`physics`] | the convex implicit step, contact, placement, and a simulation on a clock of whole ticks |
+//! | 5 | [`physics`] | the convex implicit step, contact, placement, resting faces, and a simulation on a clock of whole ticks |
 //! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames |
 //! | 7 | [`rig`] | a gripper that can be told a pressure and read: simulated, or replayed |
 //! | 8 | [`recording`] | the SQLite store, CSV |
-//! | 9 | [`grasping`] | one grasp on any rig, random poses, a grasp in a few numbers |
+//! | 9 | [`grasping`] | one grasp on any rig, random poses, data sets, a grasp in a few numbers |
 //! | 10 | [`study`] | measurements as functions |
 //! | 11 | [`picture`] | scene and frame to [`drawing::DrawList`] |
 //! | 12 | [`workers`] | named threads: commands in, snapshots and rows out |

@@ -106,6 +106,9 @@ pub struct TrialInfo {
     pub object: String,
     /// Seed from which the pose was drawn; 0 where the scene's own pose was used.
     pub seed: u64,
+    /// The data set it was made for, if any; within one, object and seed name a trial.
+    #[serde(default)]
+    pub collection: Option<String>,
     /// The whole scene as TOML, every key written out.
     pub scene: String,
     /// Where the gripper was held.

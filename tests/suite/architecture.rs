@@ -42,6 +42,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("glam", &["src"]),
     ("image", &["src/render"]),
     ("include_dir", &["src/core/objects", "src/render/shaders.rs"]),
+    ("indicatif", &["src/cli"]),
     ("libloading", &["src/app/startup.rs"]),
     ("parry3d", &["src/core/geometry"]),
     ("pollster", &["src/render"]),

@@ -2,9 +2,12 @@
 
 use crate::program::{palpate, ran, run};
 use palpate_core::objects::catalogue;
+use palpate_core::recording::Store;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Stdio;
+use std::time::Duration;
 
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir().unwrap()
@@ -207,9 +210,43 @@ fn the_demo_tells_the_same_story_for_the_same_seed() {
 }
 
 #[test]
+fn a_data_set_survives_a_kill_and_is_joined_from_parts() {
+    let folder = folder();
+    let at = folder.path();
+    let collect = ["collect", "--objects", "ball,smallcube", "--trials", "12", "--preset", "A", "--json"];
+    // Killed as soon as something is stored, and taken up again.
+    let mut child = palpate(&at.join("trials.sqlite")).args(collect).stdout(Stdio::null()).spawn().unwrap();
+    while Store::open(&at.join("trials.sqlite")).unwrap().list(false).unwrap().is_empty() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let report = json(at, &collect);
+    let count = |key: &str| report[key].as_u64().unwrap();
+    assert_eq!(count("stored") + count("known"), 24, "{report}");
+    assert!(count("known") > 0 && count("unsound") == 0, "{report}");
+    // The same in two parts, joined.
+    for part in ["1/2", "2/2"] {
+        let store = format!("part{}.sqlite", &part[..1]);
+        let ran = run(at, &[&collect[..], &["--shard", part, "--store", &store]].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+    }
+    let merged = run(at, &["trials", "merge", "part1.sqlite", "part2.sqlite", "--store", "joined.sqlite"]);
+    assert!(merged.code == Some(0) && merged.out.matches("12 trial(s) added").count() == 2, "{merged:?}");
+    let seeds = |store: &str| {
+        let rows = Store::open(&at.join(store)).unwrap().list(false).unwrap();
+        rows.into_iter().map(|row| (row.object, row.seed)).collect::<BTreeSet<_>>()
+    };
+    assert!(seeds("trials.sqlite") == seeds("joined.sqlite") && seeds("joined.sqlite").len() == 24);
+    refused(at, &["trials", "merge", "gone.sqlite"], &["gone.sqlite", "no such file"]);
+    refused(at, &["collect", "--objects", "lemmon"], &["lemmon", "lemon"]);
+    assert_eq!(run(at, &["collect", "--shard", "3/2"]).code, Some(2));
+}
+
+#[test]
 fn every_command_teaches() {
     let folder = folder();
-    for command in ["grasp", "snapshot", "demo", "trials", "bench"] {
+    for command in ["grasp", "collect", "snapshot", "demo", "trials", "bench"] {
         let ran = run(folder.path(), &[command, "--help"]);
         assert!(ran.code == Some(0) && ran.out.contains("Usage:") && ran.out.lines().count() > 8, "{ran:?}");
     }

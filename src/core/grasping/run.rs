@@ -26,6 +26,7 @@ pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspR
         rig: rig.name().to_owned(),
         object: object.map_or("empty", |o| &o.name).to_owned(),
         seed,
+        collection: None,
         scene: scene.to_toml(),
         world_from_gripper: placement.world_from_gripper,
         quality: rig.quality(),

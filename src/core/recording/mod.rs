@@ -7,5 +7,5 @@ mod store_error;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_trial_csv};
-pub use store::{Store, TrialId, TrialRow};
+pub use store::{Merged, Store, TrialId, TrialRow};
 pub use store_error::StoreError;

@@ -14,6 +14,7 @@ use crate::geometry::Pose;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -23,11 +24,18 @@ pub type TrialId = i64;
 /// "Palp" in ASCII, in the header of the SQLite file.
 const APPLICATION_ID: i32 = 0x5061_6c70;
 /// Version of the tables below. A store from a newer program is refused, an older one is brought up to date.
-pub(super) const SCHEMA_VERSION: i32 = 1;
+pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
 /// How long to wait for another program that is writing.
 pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 /// Samples per chunk when a whole trial is stored at once: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
+
+/// What makes each version out of the one before; the first makes the tables.
+const MIGRATIONS: [&str; 2] = [
+    TABLES,
+    "ALTER TABLE trials ADD COLUMN collection TEXT;
+     CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
+];
 
 const TABLES: &str = "
     CREATE TABLE trials (
@@ -141,8 +149,12 @@ impl Store {
         let transaction = self.write()?;
         let version: i32 = transaction.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fault)?;
         if version == 0 {
-            transaction.execute_batch(TABLES).map_err(fault)?;
             transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(fault)?;
+        }
+        for migration in MIGRATIONS.iter().skip(usize::try_from(version).unwrap_or(0)) {
+            transaction.execute_batch(migration).map_err(fault)?;
+        }
+        if version < SCHEMA_VERSION {
             transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
         }
         transaction.commit().map_err(fault)
@@ -221,17 +233,58 @@ impl Store {
     pub fn insert(&mut self, trial: &Trial) -> Result<TrialId, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
-        let stored = (|| {
-            let id = insert_info(&transaction, &trial.info)?;
-            for frames in trial.frames.chunks(FRAMES_PER_CHUNK) {
-                insert_chunk(&transaction, id, frames)?;
-            }
-            set_complete(&transaction, id, &trial.info.quality, &trial.info.warnings)?;
-            Ok(id)
-        })();
-        let id = stored.map_err(|e| fault(&path, &e))?;
+        let id = insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
         transaction.commit().map_err(|e| fault(&path, &e))?;
         Ok(id)
+    }
+
+    /// Stores the trials of a collection, all or nothing, but for those that are there already; returns how many.
+    pub fn insert_collected<'a>(&mut self, trials: impl Iterator<Item = &'a Trial>) -> Result<u32, StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        let mut stored = 0;
+        for trial in trials {
+            if !is_collected(&transaction, &trial.info).map_err(|e| fault(&path, &e))? {
+                insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
+                stored += 1;
+            }
+        }
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        Ok(stored)
+    }
+
+    /// Object and seed of every trial of a collection, deleted ones too: what is not wanted is not made again.
+    pub fn collected(&self, collection: &str) -> Result<BTreeSet<(String, u64)>, StoreError> {
+        let sql = "SELECT object, seed FROM trials WHERE collection = ?1";
+        let rows = self.connection.prepare(sql).and_then(|mut statement| {
+            statement.query_map([collection], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?.cast_unsigned())))?.collect()
+        });
+        rows.map_err(|e| self.fault(&e))
+    }
+
+    /// Copies what another store holds and this one does not. Trials keep their identity, so that merging twice adds
+    /// nothing the second time; their numbers are new ones.
+    pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
+        // Opening it brings it up to date, or says why it cannot be read.
+        if !other.is_file() {
+            let cause = "there is no such file".to_owned();
+            return Err(StoreError::Open { path: other.to_owned(), cause });
+        }
+        drop(Self::open(other)?);
+        let path = self.path.clone();
+        let fault = |e: rusqlite::Error| fault(&path, &e);
+        self.connection.execute("ATTACH DATABASE ?1 AS other", [other.to_string_lossy()]).map_err(fault)?;
+        let merged = self.write().and_then(|transaction| {
+            let count = "SELECT count(*) FROM other.trials";
+            let total: i64 = transaction.query_row(count, [], |row| row.get(0)).map_err(fault)?;
+            transaction.execute_batch(CHOOSE_INCOMING).map_err(fault)?;
+            let added = transaction.execute(COPY_TRIALS, []).map_err(fault)? as u64;
+            transaction.execute_batch(COPY_CHUNKS).map_err(fault)?;
+            transaction.commit().map_err(fault)?;
+            Ok(Merged { added, known: total.cast_unsigned().saturating_sub(added) })
+        });
+        self.connection.execute("DETACH DATABASE other", []).map_err(fault)?;
+        merged
     }
 
     /// All trials, oldest first; deleted ones only when asked for.
@@ -267,18 +320,18 @@ impl Store {
     }
 
     fn load_info(&self, id: TrialId) -> Result<TrialInfo, StoreError> {
-        let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version FROM trials \
-                   WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 3], String);
+        let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
+                   collection FROM trials WHERE id = ?1 AND deleted IS NULL";
+        type Columns = (String, String, i64, String, [String; 3], String, Option<String>);
         let found: Option<Columns> = self
             .connection
             .query_row(sql, [id], |row| {
                 let texts = [row.get(4)?, row.get(5)?, row.get(6)?];
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, texts, row.get(7)?))
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, texts, row.get(7)?, row.get(8)?))
             })
             .optional()
             .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, [pose, quality, warnings], version)) = found else {
+        let Some((rig, object, seed, scene, [pose, quality, warnings], version, collection)) = found else {
             return Err(self.no_trial(id));
         };
         let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
@@ -286,6 +339,7 @@ impl Store {
             rig,
             object,
             seed: seed.cast_unsigned(),
+            collection,
             scene,
             world_from_gripper: serde_json::from_str::<Pose>(&pose).map_err(bad)?,
             quality: serde_json::from_str(&quality).map_err(bad)?,
@@ -357,10 +411,58 @@ impl Store {
     }
 }
 
+/// What a merge came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Merged {
+    /// Trials copied.
+    pub added: u64,
+    /// Trials that were here already.
+    pub known: u64,
+}
+
+const CHOOSE_INCOMING: &str = "
+    CREATE TEMP TABLE incoming AS SELECT theirs.id FROM other.trials AS theirs
+    WHERE NOT EXISTS (
+        SELECT 1 FROM main.trials AS ours WHERE ours.uid = theirs.uid OR (
+            ours.collection = theirs.collection AND ours.object = theirs.object AND ours.seed = theirs.seed));
+";
+
+const COPY_TRIALS: &str = "
+    INSERT INTO main.trials (uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings,
+        version, samples, deleted, collection)
+    SELECT uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings, version, samples,
+        deleted, collection
+    FROM other.trials WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id;
+";
+
+const COPY_CHUNKS: &str = "
+    INSERT INTO main.chunks (trial, number, frames)
+    SELECT ours.id, chunks.number, chunks.frames FROM temp.incoming
+    JOIN other.trials AS theirs ON theirs.id = incoming.id
+    JOIN main.trials AS ours ON ours.uid = theirs.uid
+    JOIN other.chunks AS chunks ON chunks.trial = theirs.id;
+    DROP TABLE temp.incoming;
+";
+
+fn insert_whole(transaction: &Transaction<'_>, trial: &Trial) -> rusqlite::Result<TrialId> {
+    let id = insert_info(transaction, &trial.info)?;
+    for frames in trial.frames.chunks(FRAMES_PER_CHUNK) {
+        insert_chunk(transaction, id, frames)?;
+    }
+    set_complete(transaction, id, &trial.info.quality, &trial.info.warnings)?;
+    Ok(id)
+}
+
+/// True when another program has collected this trial meanwhile.
+fn is_collected(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<bool> {
+    let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE collection = ?1 AND object = ?2 AND seed = ?3)";
+    transaction.query_row(sql, params![info.collection, info.object, info.seed.cast_signed()], |row| row.get(0))
+}
+
 fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<TrialId> {
     transaction.execute(
-        "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
         params![
             info.rig,
             info.object,
@@ -370,6 +472,7 @@ fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Res
             json(&info.quality),
             json(&info.warnings),
             info.version,
+            info.collection,
         ],
     )?;
     Ok(transaction.last_insert_rowid())
@@ -509,6 +612,51 @@ mod tests {
         store.delete(&[b])?;
         assert_eq!(store.purge()?, 1);
         assert_eq!(store.list(true)?.len(), 1);
+        Ok(())
+    }
+
+    #[test]
+    fn a_store_of_version_1_is_brought_up_to_date() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("old.sqlite");
+        let old = Connection::open(&path)?;
+        old.execute_batch(TABLES)?;
+        old.pragma_update(None, "application_id", APPLICATION_ID)?;
+        old.pragma_update(None, "user_version", 1)?;
+        old.execute_batch(
+            "INSERT INTO trials (state, rig, object, seed, scene, world_from_gripper, quality, warnings, version)
+             VALUES ('complete', 'sim', 'ball', 3, '', '{\"position\":[0,0,0],\"rotation\":[0,0,0,1]}', '{}', '[]', '0')",
+        )?;
+        drop(old);
+        let store = Store::open(&path)?;
+        let trial = store.load(1)?;
+        assert_eq!((trial.info.seed, trial.info.collection), (3, None));
+        assert_eq!(Store::open(&path)?.list(false)?.len(), 1, "and stays so");
+        Ok(())
+    }
+
+    #[test]
+    fn merging_adds_what_is_new_and_only_once() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = |name: &str| folder.path().join(name);
+        let (mut all, mut shard) = (Store::open(&path("all.sqlite"))?, Store::open(&path("shard.sqlite"))?);
+        let mut trial = trial(0);
+        for seed in 1..=3 {
+            trial.info.seed = seed;
+            trial.info.collection = Some("set".to_owned());
+            assert_eq!(shard.insert_collected([&trial].into_iter())?, 1);
+            assert_eq!(shard.insert_collected([&trial].into_iter())?, 0, "twice is once");
+        }
+        // The same trial of the same collection, made elsewhere.
+        all.insert_collected([&trial].into_iter())?;
+        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 2, known: 1 });
+        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 0, known: 3 });
+        assert_eq!(all.collected("set")?.len(), 3);
+        for id in 1..=3 {
+            assert!(all.load(id)?.frames == trial.frames);
+        }
+        assert!(matches!(all.merge_from(&path("gone.sqlite")), Err(StoreError::Open { .. })));
+        assert!(!path("gone.sqlite").exists());
         Ok(())
     }
 

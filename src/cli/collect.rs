@@ -1,0 +1,90 @@
+//! `palpate collect`: a simulated data set into the store, in parallel, resumable, in parts.
+
+use super::Failure;
+use super::setup::{SceneArguments, open_store};
+use super::terminal::{say, say_json};
+use indicatif::{ProgressBar, ProgressStyle};
+use palpate_core::grasping::{CollectionPlan, CollectionReport, Shard, all_objects, collect};
+use serde::Serialize;
+use std::path::Path;
+
+/// Arguments of `palpate collect`.
+#[derive(Debug, clap::Args)]
+pub(super) struct CollectArguments {
+    /// Trials of each object.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trials: u32,
+    /// Built-in names or files, separated by commas; without it the sixteen and the empty hand.
+    #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
+    objects: Vec<String>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Other seeds give other poses.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Do only part K of N equal parts, for several machines; `palpate trials merge` joins their stores.
+    #[arg(long, value_name = "K/N", value_parser = parse_shard)]
+    shard: Option<Shard>,
+    /// Threads; as many as there are cores where it is left out. The data do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_shard(text: &str) -> Result<Shard, String> {
+    let parsed = || {
+        let (number, of) = text.split_once('/')?;
+        Shard::new(number.parse().ok()?, of.parse().ok()?)
+    };
+    parsed().ok_or_else(|| "write K/N with K from 1 to N, as in 3/8".to_owned())
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Told {
+    #[serde(flatten)]
+    report: CollectionReport,
+    /// CPU time of the whole command (s).
+    cpu_s: f64,
+    threads: usize,
+}
+
+pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let objects = if arguments.objects.is_empty() { all_objects() } else { arguments.objects.clone() };
+    let plan = CollectionPlan {
+        scene: arguments.scene.scene(None)?,
+        objects,
+        trials: arguments.trials,
+        seed: arguments.seed,
+        shard: arguments.shard.unwrap_or(Shard::WHOLE),
+    };
+    let threads = match arguments.threads {
+        Some(threads) => usize::from(threads),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let mut store = open_store(store)?;
+    // It draws on standard error, and only on a terminal.
+    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?);
+    let start = cpu_time::ProcessTime::now();
+    let outcome = collect(&plan, &mut store, threads, &mut |progress| {
+        bar.set_length(u64::from(progress.of));
+        bar.set_message(progress.object);
+        bar.set_position(u64::from(progress.done));
+    });
+    bar.finish_and_clear();
+    let told = Told { report: outcome?, cpu_s: start.elapsed().as_secs_f64(), threads };
+    if arguments.json { say_json(&told) } else { tell(&told, store.path()) }
+}
+
+fn tell(told: &Told, store: &Path) -> Result<(), Failure> {
+    let report = &told.report;
+    say(format!("collection    {} in {}", report.collection, store.display()))?;
+    say(format!("stored        {} trials now, {} were there already", report.stored, report.known))?;
+    say(format!("poses         {} drawn again because the open fingers had no room", report.redrawn))?;
+    if report.unsound > 0 {
+        say(format!("unsound       {} trials did not converge in every step; they are marked", report.unsound))?;
+    }
+    say(format!("cost          {:.1} s CPU on {} threads", told.cpu_s, told.threads))
+}
