@@ -217,6 +217,7 @@ fn a_data_set_survives_a_kill_and_is_joined_from_parts() {
     // Killed as soon as something is stored, and taken up again.
     let mut child = palpate(&at.join("trials.sqlite")).args(collect).stdout(Stdio::null()).spawn().unwrap();
     while Store::open(&at.join("trials.sqlite")).unwrap().list(false).unwrap().is_empty() {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended before it stored anything");
         std::thread::sleep(Duration::from_millis(2));
     }
     child.kill().unwrap();

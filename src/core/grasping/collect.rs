@@ -190,7 +190,14 @@ impl Line<'_> {
             while k > self.stored.load(Ordering::Relaxed) + MOST_AHEAD && !self.stop.load(Ordering::Relaxed) {
                 std::thread::sleep(Duration::from_millis(1));
             }
-            if self.stop.load(Ordering::Relaxed) || made.send((k, bench.make(*task))).is_err() {
+            if self.stop.load(Ordering::Relaxed) {
+                return;
+            }
+            // Others would wait for this task for ever if a fault ended the thread.
+            let make = std::panic::AssertUnwindSafe(|| bench.make(*task));
+            let outcome = std::panic::catch_unwind(make)
+                .unwrap_or_else(|_| Err(format!("grasping with seed {} met a fault of the program", task.seed)));
+            if made.send((k, outcome)).is_err() {
                 return;
             }
         }

@@ -2,10 +2,12 @@
 
 mod blob;
 mod csv_export;
+mod merge;
 mod store;
 mod store_error;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_trial_csv};
-pub use store::{Merged, Store, TrialId, TrialRow};
+pub use merge::Merged;
+pub use store::{Store, TrialId, TrialRow};
 pub use store_error::StoreError;

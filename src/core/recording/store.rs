@@ -91,7 +91,7 @@ pub struct TrialRow {
 /// An open store.
 #[derive(Debug)]
 pub struct Store {
-    connection: Connection,
+    pub(super) connection: Connection,
     path: PathBuf,
     warnings: Vec<String>,
 }
@@ -177,11 +177,12 @@ impl Store {
         let read = |pragma: &str| {
             self.connection.pragma_query_value(None, pragma, |row| row.get::<_, i32>(0)).map_err(|e| self.fault(&e))
         };
-        let (application, version) = (read("application_id")?, read("user_version")?);
+        // Tables first: another program may be making the store just now, and gives it tables and name at once.
         let tables: i64 = self
             .connection
             .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
             .map_err(|e| self.fault(&e))?;
+        let (application, version) = (read("application_id")?, read("user_version")?);
         if application != APPLICATION_ID && tables > 0 {
             return Err(StoreError::Foreign { path: self.path.clone() });
         }
@@ -196,7 +197,7 @@ impl Store {
     }
 
     /// A transaction that takes the write lock at once, so that it cannot fail half-way for want of it.
-    fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
+    pub(super) fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
         let path = self.path.clone();
         self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(|e| fault(&path, &e))
     }
@@ -260,31 +261,6 @@ impl Store {
             statement.query_map([collection], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?.cast_unsigned())))?.collect()
         });
         rows.map_err(|e| self.fault(&e))
-    }
-
-    /// Copies what another store holds and this one does not. Trials keep their identity, so that merging twice adds
-    /// nothing the second time; their numbers are new ones.
-    pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
-        // Opening it brings it up to date, or says why it cannot be read.
-        if !other.is_file() {
-            let cause = "there is no such file".to_owned();
-            return Err(StoreError::Open { path: other.to_owned(), cause });
-        }
-        drop(Self::open(other)?);
-        let path = self.path.clone();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        self.connection.execute("ATTACH DATABASE ?1 AS other", [other.to_string_lossy()]).map_err(fault)?;
-        let merged = self.write().and_then(|transaction| {
-            let count = "SELECT count(*) FROM other.trials";
-            let total: i64 = transaction.query_row(count, [], |row| row.get(0)).map_err(fault)?;
-            transaction.execute_batch(CHOOSE_INCOMING).map_err(fault)?;
-            let added = transaction.execute(COPY_TRIALS, []).map_err(fault)? as u64;
-            transaction.execute_batch(COPY_CHUNKS).map_err(fault)?;
-            transaction.commit().map_err(fault)?;
-            Ok(Merged { added, known: total.cast_unsigned().saturating_sub(added) })
-        });
-        self.connection.execute("DETACH DATABASE other", []).map_err(fault)?;
-        merged
     }
 
     /// All trials, oldest first; deleted ones only when asked for.
@@ -410,39 +386,6 @@ impl Store {
         Ok(removed)
     }
 }
-
-/// What a merge came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Merged {
-    /// Trials copied.
-    pub added: u64,
-    /// Trials that were here already.
-    pub known: u64,
-}
-
-const CHOOSE_INCOMING: &str = "
-    CREATE TEMP TABLE incoming AS SELECT theirs.id FROM other.trials AS theirs
-    WHERE NOT EXISTS (
-        SELECT 1 FROM main.trials AS ours WHERE ours.uid = theirs.uid OR (
-            ours.collection = theirs.collection AND ours.object = theirs.object AND ours.seed = theirs.seed));
-";
-
-const COPY_TRIALS: &str = "
-    INSERT INTO main.trials (uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings,
-        version, samples, deleted, collection)
-    SELECT uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings, version, samples,
-        deleted, collection
-    FROM other.trials WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id;
-";
-
-const COPY_CHUNKS: &str = "
-    INSERT INTO main.chunks (trial, number, frames)
-    SELECT ours.id, chunks.number, chunks.frames FROM temp.incoming
-    JOIN other.trials AS theirs ON theirs.id = incoming.id
-    JOIN main.trials AS ours ON ours.uid = theirs.uid
-    JOIN other.chunks AS chunks ON chunks.trial = theirs.id;
-    DROP TABLE temp.incoming;
-";
 
 fn insert_whole(transaction: &Transaction<'_>, trial: &Trial) -> rusqlite::Result<TrialId> {
     let id = insert_info(transaction, &trial.info)?;
@@ -632,31 +575,6 @@ mod tests {
         let trial = store.load(1)?;
         assert_eq!((trial.info.seed, trial.info.collection), (3, None));
         assert_eq!(Store::open(&path)?.list(false)?.len(), 1, "and stays so");
-        Ok(())
-    }
-
-    #[test]
-    fn merging_adds_what_is_new_and_only_once() -> Result<(), StoreError> {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = |name: &str| folder.path().join(name);
-        let (mut all, mut shard) = (Store::open(&path("all.sqlite"))?, Store::open(&path("shard.sqlite"))?);
-        let mut trial = trial(0);
-        for seed in 1..=3 {
-            trial.info.seed = seed;
-            trial.info.collection = Some("set".to_owned());
-            assert_eq!(shard.insert_collected([&trial].into_iter())?, 1);
-            assert_eq!(shard.insert_collected([&trial].into_iter())?, 0, "twice is once");
-        }
-        // The same trial of the same collection, made elsewhere.
-        all.insert_collected([&trial].into_iter())?;
-        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 2, known: 1 });
-        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 0, known: 3 });
-        assert_eq!(all.collected("set")?.len(), 3);
-        for id in 1..=3 {
-            assert!(all.load(id)?.frames == trial.frames);
-        }
-        assert!(matches!(all.merge_from(&path("gone.sqlite")), Err(StoreError::Open { .. })));
-        assert!(!path("gone.sqlite").exists());
         Ok(())
     }
 
