@@ -3,10 +3,14 @@
 mod bench;
 mod collect;
 mod demo;
+mod evaluate;
 mod grasp;
+mod learning;
+mod recognise;
 mod setup;
 mod snapshot;
 mod terminal;
+mod train;
 mod trials;
 mod workshop;
 
@@ -45,6 +49,12 @@ enum Command {
     Demo(demo::DemoArguments),
     /// Grasp many objects in many random poses, in parallel, into the store; taken up again where it was interrupted.
     Collect(collect::CollectArguments),
+    /// Fit a recogniser to stored trials and save it.
+    Train(train::TrainArguments),
+    /// Judge recognisers on trials they have not seen: accuracy, calibration, stage one, several grasps, cost.
+    Evaluate(evaluate::EvaluateArguments),
+    /// Say what stored trials are grasps of.
+    Recognise(recognise::RecogniseArguments),
     /// Draw a scene or a stored trial into a PNG file, without a window.
     Snapshot(snapshot::SnapshotArguments),
     /// List, show, export, delete and restore recorded trials.
@@ -113,6 +123,9 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Grasp(grasp)) => grasp::run(grasp, store)?,
         Some(Command::Demo(demo)) => demo::run(demo, store)?,
         Some(Command::Collect(collect)) => collect::run(collect, store)?,
+        Some(Command::Train(train)) => train::run(train, store)?,
+        Some(Command::Evaluate(evaluate)) => evaluate::run(evaluate, store)?,
+        Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,

@@ -4,7 +4,9 @@ use super::Failure;
 use super::setup::open_store;
 use super::terminal::{file_name_of, say, say_json, table, warn};
 use palpate_core::grasping::GraspSummary;
-use palpate_core::recording::{Store, TrialId, TrialRow, contacts_path, write_contacts_csv, write_trial_csv};
+use palpate_core::recording::{
+    Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_contacts_csv, write_trial_csv,
+};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
 use palpate_core::trial::Trial;
@@ -55,6 +57,12 @@ enum What {
         #[arg(long)]
         hull: bool,
     },
+    /// Take in grasps that were recorded elsewhere, from CSV files with the columns trial, label, t_s and any channels.
+    Import {
+        /// The files. Columns `size` (tiny, large) and `shape` (cubic, cylindrical, spherical) teach stage one.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+    },
     /// Copy the trials of other stores into this one; what is here already is not copied again.
     Merge {
         /// The other stores.
@@ -86,6 +94,12 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             export(&store, ids, out, &SensorLayout::named(layout)?, area)
         }
+        What::Import { files } => {
+            for file in files {
+                import(&mut store, file)?;
+            }
+            Ok(())
+        }
         What::Merge { stores } => {
             for other in stores {
                 let merged = store.merge_from(other)?;
@@ -104,6 +118,17 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         }
         What::Purge => say(format!("removed {} trial(s) for good", store.purge()?)),
     }
+}
+
+fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
+    let import = read_trials_csv(file)?;
+    for warning in &import.warnings {
+        warn(warning);
+    }
+    let collection = file.file_stem().map_or_else(|| "import".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let added = store.insert_imported(&collection, &import.trials)?;
+    let known = import.trials.len() - added as usize;
+    say(format!("{}: {added} trial(s) added as collection {collection}, {known} were here already", file.display()))
 }
 
 fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Result<(), Failure> {

@@ -57,6 +57,7 @@ pub mod objects;
 pub mod palette;
 pub mod physics;
 pub mod picture;
+pub mod recognition;
 pub mod recording;
 pub mod rig;
 pub mod scene;

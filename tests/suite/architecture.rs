@@ -27,9 +27,11 @@ const SEEN_BY_RENDER: [&str; 3] = ["geometry", "palette", "drawing"];
 /// Where each third-party crate may be named.
 const HOMES: &[(&str, &[&str])] = &[
     ("ab_glyph", &["src/render/text.rs"]),
+    ("candle_core", &["src/core/recognition"]),
+    ("candle_nn", &["src/core/recognition/rivals/convolution.rs"]),
     ("bytemuck", &["src/render", "src/core/geometry", "src/core/recording"]),
     ("clap", &["src/cli"]),
-    ("cpu_time", &["src/cli", "src/core/study"]),
+    ("cpu_time", &["src/cli", "src/core/study", "src/core/recognition/evaluation.rs", "src/core/recognition/methods.rs"]),
     ("csv", &["src/core/recording"]),
     ("directories", &["src/core/recording"]),
     ("eframe", &["src/app"]),
@@ -44,17 +46,21 @@ const HOMES: &[(&str, &[&str])] = &[
     ("include_dir", &["src/core/objects", "src/render/shaders.rs"]),
     ("indicatif", &["src/cli"]),
     ("libloading", &["src/app/startup.rs"]),
+    ("matrixmultiply", &["src/core/recognition/network/gemm.rs"]),
     ("parry3d", &["src/core/geometry"]),
     ("pollster", &["src/render"]),
     ("quick_xml", &["src/core/objects"]),
-    ("rand", &["src/core/grasping", "src/core/physics/resting.rs", "src/cli/demo.rs"]),
-    ("rand_chacha", &["src/core/grasping", "src/core/physics/resting.rs", "src/cli/demo.rs"]),
+    ("rand", RANDOM),
+    ("rand_chacha", RANDOM),
     ("rapier3d", &["src/core/physics"]),
-    ("rayon", &["src/core/geometry"]),
+    ("rayon", &["src/core/geometry", "src/core/recognition/rivals/convolution.rs"]),
     ("rfd", &["src/app/files.rs"]),
     ("rusqlite", &["src/core/recording"]),
+    ("safetensors", &["src/core/recognition/model_file.rs"]),
     ("serde", &["src"]),
     ("serde_json", &["src"]),
+    ("smartcore", &["src/core/recognition/rivals"]),
+    ("statrs", &["src/core/recognition/metrics"]),
     ("stl_io", &["src/core/geometry"]),
     ("strsim", &["src/core/objects", "src/core/scene"]),
     ("thiserror", &["src"]),
@@ -65,6 +71,15 @@ const HOMES: &[(&str, &[&str])] = &[
     ("urdf_rs", &["src/core/objects"]),
     ("wgpu", &["src/render", "src/app"]),
     ("winit", &["src/app/startup.rs"]),
+];
+
+/// Where things are drawn at random, always from a seed.
+const RANDOM: &[&str] = &[
+    "src/core/grasping",
+    "src/core/physics/resting.rs",
+    "src/core/sensing/model/streams.rs",
+    "src/core/recognition",
+    "src/cli/demo.rs",
 ];
 
 fn root() -> &'static Path {

@@ -1,11 +1,14 @@
-//! One grasp on any rig: run the programme, keep the frames, say what happened.
+//! One grasp on any rig: run the programme, keep the frames, say what happened; many grasps into a data set; grasp after
+//! grasp until it is clear what is in the hand.
 
 mod collect;
+mod identify;
 mod poses;
 mod run;
 mod summary;
 
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
+pub use identify::{Identification, IdentificationView, IdentifyError};
 pub use poses::{PoseSampler, jittered};
 pub use run::{GraspRun, grasp, prepare};
 pub use summary::{GraspSummary, HoldSummary};

@@ -23,9 +23,9 @@ const CHOOSE_INCOMING: &str = "
 
 const COPY_TRIALS: &str = "
     INSERT INTO main.trials (uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings,
-        version, samples, deleted, collection)
+        version, samples, deleted, collection, size, shape)
     SELECT uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings, version, samples,
-        deleted, collection
+        deleted, collection, size, shape
     FROM other.trials WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id;
 ";
 
@@ -35,6 +35,11 @@ const COPY_CHUNKS: &str = "
     JOIN other.trials AS theirs ON theirs.id = incoming.id
     JOIN main.trials AS ours ON ours.uid = theirs.uid
     JOIN other.chunks AS chunks ON chunks.trial = theirs.id;
+    INSERT INTO main.readings (trial, channels, samples)
+    SELECT ours.id, readings.channels, readings.samples FROM temp.incoming
+    JOIN other.trials AS theirs ON theirs.id = incoming.id
+    JOIN main.trials AS ours ON ours.uid = theirs.uid
+    JOIN other.readings AS readings ON readings.trial = theirs.id;
     DROP TABLE temp.incoming;
 ";
 

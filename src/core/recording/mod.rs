@@ -2,12 +2,15 @@
 
 mod blob;
 mod csv_export;
+mod csv_import;
 mod merge;
+mod readings;
 mod store;
 mod store_error;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_trial_csv};
+pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use merge::Merged;
 pub use store::{Store, TrialId, TrialRow};
 pub use store_error::StoreError;

@@ -4,6 +4,7 @@
 //! ```text
 //! trials   one row each: what is known of a trial; `state` is 'recording' until its last chunk is in
 //! chunks   its frames, about a second each, as described in `blob`
+//! readings channels of an imported trial, which has no frames
 //! ```
 //!
 //! Deleting marks; purging removes. Chunks are only ever added.
@@ -31,10 +32,17 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 2] = [
+const MIGRATIONS: [&str; 3] = [
     TABLES,
     "ALTER TABLE trials ADD COLUMN collection TEXT;
      CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
+    "ALTER TABLE trials ADD COLUMN size TEXT;
+     ALTER TABLE trials ADD COLUMN shape TEXT;
+     CREATE TABLE readings (
+        trial INTEGER PRIMARY KEY REFERENCES trials (id) ON DELETE CASCADE,
+        channels TEXT NOT NULL,
+        samples BLOB NOT NULL
+     );",
 ];
 
 const TABLES: &str = "
@@ -78,6 +86,10 @@ pub struct TrialRow {
     pub object: String,
     /// Seed of the pose.
     pub seed: u64,
+    /// The data set it was made for, if any.
+    pub collection: Option<String>,
+    /// Size and shape of the object where they came with the trial.
+    pub properties: Option<(String, String)>,
     /// Samples stored.
     pub samples: i64,
     /// Whether it stayed finite and converged.
@@ -265,8 +277,8 @@ impl Store {
 
     /// All trials, oldest first; deleted ones only when asked for.
     pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
-        let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted FROM trials \
-                   WHERE ?1 OR deleted IS NULL ORDER BY id";
+        let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, \
+                   collection, size, shape FROM trials WHERE ?1 OR deleted IS NULL ORDER BY id";
         let rows = self.connection.prepare(sql).and_then(|mut statement| {
             statement
                 .query_map([with_deleted], |row| {
@@ -279,6 +291,8 @@ impl Store {
                         rig: row.get(3)?,
                         object: row.get(4)?,
                         seed: row.get::<_, i64>(5)?.cast_unsigned(),
+                        collection: row.get(10)?,
+                        properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
                         samples: row.get(6)?,
                         sound: quality.is_some_and(|quality| quality.finite && quality.converged),
                         warnings: warnings.len(),

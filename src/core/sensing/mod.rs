@@ -4,14 +4,17 @@
 
 mod curvature;
 mod layout;
+pub mod model;
 mod pressure;
+mod signals;
 
 pub use curvature::curvature;
 pub use layout::{CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, Span};
 pub use pressure::{ContactPatch, PressureArea};
+pub use signals::Signals;
 
 use crate::gripper::{BentFinger, Gripper, Side, TaxelGrid};
-use crate::trial::Frame;
+use crate::trial::{Frame, Trial};
 
 /// A layout on a gripper, ready to read frames.
 #[derive(Clone, Debug)]
@@ -47,6 +50,17 @@ impl Sensors {
                 Quantity::Force => Some(self.patch(frame, channel).force()),
             })
             .collect()
+    }
+
+    /// Reads a whole trial. Where a pressure is undefined it counts as none.
+    pub fn signals(&self, trial: &Trial) -> Signals {
+        let channels = self.channels.iter().map(Channel::name).collect();
+        let mut signals = Signals { channels, ..Signals::default() };
+        for frame in &trial.frames {
+            let row: Vec<f32> = self.read(frame).into_iter().map(|v| v.unwrap_or_default() as f32).collect();
+            signals.push(frame.t, &row);
+        }
+        signals
     }
 
     fn patch(&self, frame: &Frame, channel: &Channel) -> ContactPatch {

@@ -1,5 +1,11 @@
 //! Experiments as functions: data in, tables out, no window. Each can be run from the command line.
 
+mod comparison;
 mod physics_cost;
+mod search;
 
+pub use comparison::{
+    Comparison, ComparisonError, ComparisonRow, Controls, Difference, fed_back_against_independent, in_table_order,
+};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost};
+pub use search::{SearchRow, search};

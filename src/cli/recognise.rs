@@ -1,0 +1,149 @@
+//! `palpate recognise`: what a model says of stored trials, one after the other, and of all of them together.
+
+use super::Failure;
+use super::setup::open_store;
+use super::terminal::{say, say_json, table};
+use palpate_core::recognition::{Belief, Model, Pmf, Source, View, shipped_model};
+use palpate_core::recording::TrialId;
+use palpate_core::sensing::model::SensorModel;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate recognise`.
+#[derive(Debug, clap::Args)]
+pub(super) struct RecogniseArguments {
+    /// Numbers of the trials.
+    #[arg(required = true)]
+    trials: Vec<TrialId>,
+    /// A saved model; the one that comes with Palpate where it is left out.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// The trials are grasps of one object: also say what they come to together.
+    #[arg(long)]
+    together: bool,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is said of one trial.
+#[derive(Serialize)]
+struct Said {
+    trial: TrialId,
+    /// Its label in the store.
+    truth: String,
+    decided: String,
+    probability: f64,
+    stage_one: Option<StageOne>,
+    pmf: BTreeMap<String, f64>,
+}
+
+/// Size and shape.
+#[derive(Serialize)]
+pub(super) struct StageOne {
+    pub(super) size: String,
+    pub(super) size_probability: f64,
+    pub(super) shape: String,
+    pub(super) shape_probability: f64,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Told {
+    trials: Vec<Said>,
+    /// All of them as grasps of one object.
+    together: Option<Together>,
+}
+
+#[derive(Serialize)]
+struct Together {
+    decided: String,
+    probability: f64,
+    pmf: BTreeMap<String, f64>,
+}
+
+/// The model the user named, or the one that comes with the program.
+pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
+    Ok(match path {
+        Some(path) => Model::load(path)?,
+        None => shipped_model()?,
+    })
+}
+
+/// Through which sensors a model wants to see simulated trials.
+pub(super) fn view_of(model: &Model) -> View {
+    let data = &model.card.data;
+    View {
+        layout: data.layout.clone().unwrap_or_else(|| View::default().layout),
+        sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
+    }
+}
+
+/// Probabilities by name, for JSON.
+pub(super) fn named(model: &Model, pmf: &Pmf) -> BTreeMap<String, f64> {
+    model.card.labels.classes.iter().map(|c| c.name.clone()).zip(pmf.probabilities().iter().copied()).collect()
+}
+
+pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let model = load_model(arguments.model.as_deref())?;
+    let store = open_store(store)?;
+    let labels = &model.card.labels;
+    let mut belief = Belief::default();
+    let mut said = Vec::new();
+    for id in &arguments.trials {
+        let data = Source::default().read_trial(&store, *id, &view_of(&model))?;
+        model.check_channels(&data.channels)?;
+        let grasp = &data.examples[0].grasp;
+        let alone = model.recogniser.recognise(grasp, None);
+        let with = belief.now().map_or_else(
+            || alone.pmf.clone(),
+            |before| model.recogniser.recognise(grasp, Some(before)).pmf,
+        );
+        belief.add(with, alone.pmf.clone());
+        let (class, probability) = alone.pmf.top();
+        let stage_one = alone.properties.as_ref().map(|properties| {
+            let ((size, size_probability), (shape, shape_probability)) = (properties.size.top(), properties.shape.top());
+            StageOne {
+                size: labels.sizes[size].clone(),
+                size_probability,
+                shape: labels.shapes[shape].clone(),
+                shape_probability,
+            }
+        });
+        said.push(Said {
+            trial: *id,
+            truth: data.labels.classes[0].name.clone(),
+            decided: labels.classes[class].name.clone(),
+            probability,
+            stage_one,
+            pmf: named(&model, &alone.pmf),
+        });
+    }
+    let together = belief.now().filter(|_| arguments.together).map(|pmf| Together {
+        decided: labels.classes[pmf.top().0].name.clone(),
+        probability: pmf.top().1,
+        pmf: named(&model, pmf),
+    });
+    if arguments.json {
+        return say_json(&Told { trials: said, together });
+    }
+    let cells: Vec<Vec<String>> = said
+        .iter()
+        .map(|said| {
+            let properties = said.stage_one.as_ref().map_or_else(String::new, |s| format!("{}, {}", s.size, s.shape));
+            vec![
+                said.trial.to_string(),
+                said.truth.clone(),
+                properties,
+                said.decided.clone(),
+                format!("{:.0} %", 100.0 * said.probability),
+            ]
+        })
+        .collect();
+    table(&["trial", "label", "stage one", "recognised as", "sure"], &cells)?;
+    match together {
+        Some(all) => say(format!("together: {} ({:.0} %)", all.decided, 100.0 * all.probability)),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,150 @@
+//! `palpate train`: fits a recogniser to stored trials and saves it.
+
+use super::Failure;
+use super::learning::{DataArguments, known_method, models_folder, progress_bar};
+use super::setup::open_store;
+use super::terminal::{say, say_json, table};
+use palpate_core::recognition::{Dataset, FitError, Fitting, METHODS, Method, Model};
+use palpate_core::study::{SearchRow, search};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Arguments of `palpate train`.
+#[derive(Debug, clap::Args)]
+pub(super) struct TrainArguments {
+    /// The method; `--list` shows them all.
+    #[arg(required_unless_present = "list")]
+    method: Option<String>,
+    /// List the methods and what they are.
+    #[arg(long)]
+    list: bool,
+    #[command(flatten)]
+    data: DataArguments,
+    /// Learn from at most this many trials of each object, oldest first.
+    #[arg(long, value_name = "N")]
+    trials: Option<usize>,
+    /// Change a setting, e.g. --set epochs=50 (may be repeated).
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<String>,
+    /// Print the method's settings and stop.
+    #[arg(long)]
+    print_settings: bool,
+    /// Try the stated grid of settings by cross-validation on the training trials first, and train with the best.
+    #[arg(long)]
+    search: bool,
+    /// Where to save the model (.safetensors); its card is written beside it.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Trained<'a> {
+    model: &'a Path,
+    method: &'a str,
+    trials: usize,
+    channels: &'a [String],
+    parameters: usize,
+    train_cpu_s: f64,
+    data: String,
+    search: Option<Vec<SearchRow>>,
+}
+
+pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<(), Failure> {
+    if arguments.list {
+        let rows: Vec<Vec<String>> =
+            METHODS.iter().map(|m| vec![m.key.to_owned(), m.title.to_owned(), m.about.to_owned()]).collect();
+        return table(&["method", "name", "what it is"], &rows);
+    }
+    let method = known_method(arguments.method.as_deref().unwrap_or_default())?;
+    if arguments.print_settings {
+        return match method.recipe {
+            Some(recipe) => say_json(&recipe()),
+            None => say("this method has no settings that can be changed"),
+        };
+    }
+    let store = open_store(store)?;
+    let data = arguments.data.read(&store, false, arguments.trials)?;
+    let mut settings = parse_settings(&arguments.settings)?;
+    let search = if arguments.search { Some(searched(method, &data, arguments, &mut settings)?) } else { None };
+    let mut model = fitted(method, &data, arguments, settings)?;
+    if let Some(rows) = &search {
+        model.card.metrics = serde_json::json!({ "search": rows });
+    }
+    let out = arguments.out.clone().unwrap_or_else(|| models_folder().join(format!("{}.safetensors", method.key)));
+    model.save(&out)?;
+    let trained = Trained {
+        model: &out,
+        method: method.key,
+        trials: data.examples.len(),
+        channels: &data.channels,
+        parameters: model.card.parameters,
+        train_cpu_s: model.card.train_cpu_s,
+        data: data.about.described(),
+        search,
+    };
+    if arguments.json {
+        return say_json(&trained);
+    }
+    say(format!("method      {} ({})", method.title, method.key))?;
+    say(format!("data        {} trials: {}", trained.trials, trained.data))?;
+    say(format!("channels    {}", trained.channels.join(", ")))?;
+    say(format!("parameters  {}", trained.parameters))?;
+    say(format!("cost        {:.1} s CPU", trained.train_cpu_s))?;
+    say(format!("saved       {}", out.display()))
+}
+
+/// Settings as the user wrote them: numbers, true or false.
+fn parse_settings(written: &[String]) -> Result<serde_json::Map<String, serde_json::Value>, Failure> {
+    let parse = |text: &String| -> Result<(String, serde_json::Value), Failure> {
+        let (name, value) = text.split_once('=').ok_or_else(|| format!("write --set NAME=VALUE, not \"{text}\""))?;
+        let value = serde_json::from_str(value.trim())
+            .map_err(|_| format!("setting {name}: \"{value}\" is no number, true or false"))?;
+        Ok((name.trim().to_owned(), value))
+    };
+    written.iter().map(parse).collect()
+}
+
+fn fitted(
+    method: &'static Method,
+    data: &Dataset,
+    arguments: &TrainArguments,
+    settings: serde_json::Map<String, serde_json::Value>,
+) -> Result<Model, FitError> {
+    let bar = progress_bar("training").map_err(|e| FitError::Failed { cause: e.to_string() })?;
+    bar.set_length(1000);
+    let stop = AtomicBool::new(false);
+    let fitting = Fitting {
+        seed: arguments.data.seed,
+        quick: arguments.data.quick,
+        settings,
+        progress: &|share| bar.set_position((share * 1000.0) as u64),
+        stop: &stop,
+    };
+    let model = method.train(data, &fitting);
+    bar.finish_and_clear();
+    model
+}
+
+fn searched(
+    method: &'static Method,
+    data: &Dataset,
+    arguments: &TrainArguments,
+    settings: &mut serde_json::Map<String, serde_json::Value>,
+) -> Result<Vec<SearchRow>, Failure> {
+    let bar = progress_bar("searching")?;
+    let rows = search(method, data, arguments.data.seed, arguments.data.quick, settings, &|done, of| {
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    let rows = rows?;
+    if let Some(best) = rows.first() {
+        settings.extend(best.settings.clone());
+    }
+    Ok(rows)
+}

@@ -1,0 +1,169 @@
+//! What successive grasps of one object come to, and when to stop.
+
+use super::Pmf;
+use serde::{Deserialize, Serialize};
+
+/// What is believed after some grasps of the same object.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Belief {
+    /// What the recogniser said after each grasp, with those before.
+    steps: Vec<Pmf>,
+    /// What it said of each grasp by itself.
+    alone: Vec<Pmf>,
+}
+
+impl Belief {
+    /// Takes in another grasp: what the recogniser says of it with those before, and alone.
+    pub fn add(&mut self, with_before: Pmf, alone: Pmf) {
+        self.steps.push(with_before);
+        self.alone.push(alone);
+    }
+
+    /// What is believed now; none before the first grasp.
+    pub fn now(&self) -> Option<&Pmf> {
+        self.steps.last()
+    }
+
+    /// What was believed after each grasp.
+    pub fn steps(&self) -> &[Pmf] {
+        &self.steps
+    }
+
+    /// What was said after each grasp, with those before and alone.
+    pub fn pairs(&self) -> impl Iterator<Item = (&Pmf, &Pmf)> {
+        self.steps.iter().zip(&self.alone)
+    }
+
+    /// Number of grasps.
+    pub fn grasps(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// How well the belief explains the grasps it came from: mean logarithm of the probability that each of them alone
+    /// gives to what is believed in the end. Grasps of an unknown object contradict each other or convince nobody.
+    pub fn agreement(&self) -> f64 {
+        agreement(self.now(), &self.alone)
+    }
+}
+
+pub(super) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
+    let Some(belief) = belief.filter(|_| !alone.is_empty()) else { return 0.0 };
+    let explained = |pmf: &Pmf| -> f64 {
+        let p: f64 = belief.probabilities().iter().zip(pmf.probabilities()).map(|(b, p)| b * p).sum();
+        p.max(1e-12).ln()
+    };
+    alone.iter().map(explained).sum::<f64>() / alone.len() as f64
+}
+
+/// From which agreement on an object counts as known, calibrated on grasps of known objects that were held back from
+/// training.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rejection {
+    /// Share of known objects that are taken for unknown.
+    pub share: f64,
+    /// Least agreement after one grasp, two, and so on; the last holds for more.
+    pub least: Vec<f64>,
+}
+
+impl Rejection {
+    /// True when the grasps of a belief are worse explained than those of known objects ever but for the share.
+    pub fn rejects(&self, belief: &Belief) -> bool {
+        let at = belief.grasps().clamp(1, self.least.len().max(1)) - 1;
+        self.least.get(at).is_some_and(|least| belief.agreement() < *least)
+    }
+}
+
+/// When to stop grasping.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StopRule {
+    /// Probability from which on the most likely class is taken as certain.
+    pub threshold: f64,
+    /// Most grasps.
+    pub most_grasps: usize,
+}
+
+impl Default for StopRule {
+    fn default() -> Self {
+        // The paper's plateau is at three to four grasps (section V-E).
+        Self { threshold: 0.9, most_grasps: 4 }
+    }
+}
+
+/// Why grasping ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// One class reached the threshold.
+    Sure,
+    /// The limit of grasps was reached first.
+    GraspLimit,
+    /// The grasps agree on none of the known classes.
+    Unknown,
+}
+
+impl StopReason {
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sure => "sure",
+            Self::GraspLimit => "grasp-limit",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+impl StopRule {
+    /// Whether to stop with a belief, and why; `None` to go on.
+    pub fn judge(&self, belief: &Belief, rejection: Option<&Rejection>) -> Option<StopReason> {
+        let top = belief.now()?.top().1;
+        let unknown = rejection.is_some_and(|rejection| rejection.rejects(belief));
+        if belief.grasps() >= self.most_grasps {
+            return Some(match (unknown, top >= self.threshold) {
+                (true, _) => StopReason::Unknown,
+                (false, true) => StopReason::Sure,
+                (false, false) => StopReason::GraspLimit,
+            });
+        }
+        (top >= self.threshold && !unknown).then_some(StopReason::Sure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grasp(belief: &mut Belief, weights: [f64; 3]) {
+        let alone = Pmf::from_weights(weights);
+        let with = belief.now().map_or_else(|| alone.clone(), |now| now.times(&alone));
+        belief.add(with, alone);
+    }
+
+    #[test]
+    fn it_stops_when_sure_or_at_the_limit() {
+        let rule = StopRule { threshold: 0.9, most_grasps: 3 };
+        let mut belief = Belief::default();
+        assert_eq!(rule.judge(&belief, None), None);
+        grasp(&mut belief, [0.7, 0.2, 0.1]);
+        assert_eq!(rule.judge(&belief, None), None);
+        grasp(&mut belief, [0.8, 0.1, 0.1]);
+        assert_eq!(rule.judge(&belief, None), Some(StopReason::Sure));
+        let mut torn = Belief::default();
+        for weights in [[0.5, 0.5, 0.0], [0.4, 0.4, 0.2], [0.5, 0.5, 0.0]] {
+            grasp(&mut torn, weights);
+        }
+        assert_eq!(rule.judge(&torn, None), Some(StopReason::GraspLimit));
+    }
+
+    #[test]
+    fn contradicting_grasps_are_unknown() {
+        let rejection = Rejection { share: 0.05, least: vec![-2.0, -1.0, -1.0] };
+        let rule = StopRule { threshold: 0.9, most_grasps: 2 };
+        let mut torn = Belief::default();
+        grasp(&mut torn, [0.98, 0.01, 0.01]);
+        assert_eq!(rule.judge(&torn, Some(&rejection)), Some(StopReason::Sure));
+        grasp(&mut torn, [0.01, 0.98, 0.01]);
+        assert!(torn.agreement() < -0.6 && torn.agreement() > -1.0);
+        let strict = Rejection { least: vec![-0.5], ..rejection };
+        assert_eq!(rule.judge(&torn, Some(&strict)), Some(StopReason::Unknown));
+    }
+}

@@ -1,0 +1,188 @@
+//! A grasp as a row of numbers, for recognisers that know no time: its course in even windows, or a few hand-made
+//! measures of each channel.
+
+use super::data::{Dataset, Sequence};
+use serde::{Deserialize, Serialize};
+
+/// What the numbers are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum FeatureKind {
+    /// Means of every channel over even windows of time.
+    Course,
+    /// Measures a person would take: when a channel rises, how far, how fast, where it ends, how fingers differ.
+    Measures,
+}
+
+/// How grasps become rows, learned from training data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Features {
+    kind: FeatureKind,
+    /// Channels of a grasp.
+    channels: usize,
+    /// Length of the grasps learned from (s).
+    duration_s: f32,
+    /// A tenth of the way from the lowest to the highest value that each channel had: it has risen beyond this.
+    risen: Vec<f32>,
+    /// For each channel the one on the other finger.
+    mirror: Option<Vec<usize>>,
+}
+
+/// Windows of the course: three a tenth of the default grasp.
+const WINDOWS: usize = 30;
+/// Measures of each channel.
+const MEASURES: usize = 9;
+
+impl Features {
+    pub(super) fn fit(kind: FeatureKind, data: &Dataset) -> Self {
+        let channels = data.channels.len();
+        let mut lengths: Vec<f32> = data.examples.iter().filter_map(|e| e.grasp.t_s.last().copied()).collect();
+        lengths.sort_by(f32::total_cmp);
+        let duration_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0).max(1e-3);
+        let mut range = vec![(f32::INFINITY, f32::NEG_INFINITY); channels];
+        for (_, row) in data.examples.iter().flat_map(|e| e.grasp.rows()) {
+            for ((low, high), x) in range.iter_mut().zip(row) {
+                (*low, *high) = (low.min(*x), high.max(*x));
+            }
+        }
+        let risen = range.iter().map(|(low, high)| if high > low { low + 0.1 * (high - low) } else { 0.0 }).collect();
+        Self { kind, channels, duration_s, risen, mirror: super::network::mirror(&data.channels) }
+    }
+
+    /// Numbers of a row.
+    pub(super) fn width(&self) -> usize {
+        match self.kind {
+            FeatureKind::Course => self.channels * WINDOWS,
+            FeatureKind::Measures => self.channels * (MEASURES + 1),
+        }
+    }
+
+    /// True when it can read grasps of so many channels: it may come from a file.
+    pub(super) fn is_sound(&self, channels: usize) -> bool {
+        self.channels == channels
+            && self.duration_s.is_finite()
+            && self.duration_s > 0.0
+            && self.risen.len() == channels
+            && self.mirror.as_ref().is_none_or(|m| m.len() == channels && m.iter().all(|to| *to < channels))
+    }
+
+    /// The row of a grasp.
+    pub(super) fn row(&self, grasp: &Sequence) -> Vec<f32> {
+        match self.kind {
+            FeatureKind::Course => self.course(grasp),
+            FeatureKind::Measures => self.measures(grasp),
+        }
+    }
+
+    /// The row of a grasp with left and right exchanged.
+    pub(super) fn mirrored(&self, grasp: &Sequence) -> Option<Vec<f32>> {
+        let mirror = self.mirror.as_ref()?;
+        let exchanged = grasp.rows().flat_map(|(_, row)| mirror.iter().map(|from| row[*from]));
+        Some(self.row(&Sequence { t_s: grasp.t_s.clone(), values: exchanged.collect() }))
+    }
+
+    fn course(&self, grasp: &Sequence) -> Vec<f32> {
+        let mut sums = vec![0.0; self.width()];
+        let mut counts = [0u32; WINDOWS];
+        for (t, row) in grasp.rows() {
+            let window = ((t / self.duration_s * WINDOWS as f32 - 1e-3) as usize).min(WINDOWS - 1);
+            counts[window] += 1;
+            sums[window * self.channels..].iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        }
+        let mut before = vec![0.0; self.channels];
+        for (window, count) in sums.chunks_exact_mut(self.channels.max(1)).zip(counts) {
+            // A window without samples, of a grasp that ended early, holds what was there last.
+            if count == 0 {
+                window.copy_from_slice(&before);
+            } else {
+                window.iter_mut().for_each(|x| *x /= count as f32);
+            }
+            before.copy_from_slice(window);
+        }
+        sums
+    }
+
+    fn measures(&self, grasp: &Sequence) -> Vec<f32> {
+        let mut row = Vec::with_capacity(self.width());
+        let count = grasp.len().max(1) as f32;
+        let last = grasp.len().saturating_sub(1);
+        let at = |sample: usize, channel: usize| grasp.values.get(sample * self.channels + channel).copied().unwrap_or(0.0);
+        for channel in 0..self.channels {
+            let values = || (0..grasp.len()).map(|sample| at(sample, channel));
+            let mean = values().sum::<f32>() / count;
+            let deviation = (values().map(|x| (x - mean) * (x - mean)).sum::<f32>() / count).sqrt();
+            let highest = values().fold(f32::NEG_INFINITY, f32::max).max(f32::MIN);
+            let onset = (0..grasp.len()).find(|sample| at(*sample, channel) > self.risen[channel]);
+            let onset_t = onset.map_or(self.duration_s, |sample| grasp.t_s[sample]);
+            let end = tail_mean(grasp, channel, self.channels, 0.1);
+            let half = (0..grasp.len()).find(|sample| at(*sample, channel) > 0.5 * end).unwrap_or(last);
+            // How steeply it rises in the tenth of a grasp after its onset.
+            let from = onset.unwrap_or(last);
+            let to = (from + grasp.len() / 10).min(last);
+            let rise = at(to, channel) - at(from, channel);
+            let middle = at(grasp.len() / 2, channel);
+            let late = at(grasp.len() * 2 / 3, channel);
+            let half_t = grasp.t_s.get(half).copied().unwrap_or(0.0);
+            row.extend([mean, deviation, highest, end, onset_t, half_t, rise, middle, late]);
+        }
+        for channel in 0..self.channels {
+            let other = self.mirror.as_ref().map_or(channel, |mirror| mirror[channel]);
+            row.push(row[channel * MEASURES + 3] - row[other * MEASURES + 3]);
+        }
+        row.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        row
+    }
+}
+
+/// Mean over the last share of a channel's samples.
+fn tail_mean(grasp: &Sequence, channel: usize, channels: usize, share: f32) -> f32 {
+    let count = ((grasp.len() as f32 * share).ceil() as usize).clamp(1, grasp.len().max(1));
+    let values = grasp.values.iter().skip(channel).step_by(channels.max(1));
+    values.skip(grasp.len().saturating_sub(count)).sum::<f32>() / count as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data::{Class, DataCard, Example, Labels};
+    use super::*;
+    use std::sync::Arc;
+
+    /// A step to 2 at 0.5 s on the left, to 4 on the right.
+    fn data() -> Dataset {
+        let t_s: Vec<f32> = (1..=100).map(|i| i as f32 * 0.01).collect();
+        let values = t_s.iter().flat_map(|t| if *t > 0.5 { [2.0, 4.0] } else { [0.0, 0.0] }).collect();
+        let grasp = Arc::new(Sequence { t_s, values });
+        let class = Class { name: "a".to_owned(), size: None, shape: None };
+        Dataset {
+            channels: ["force_left", "force_right"].map(str::to_owned).to_vec(),
+            labels: Labels { classes: vec![class], ..Labels::default() },
+            examples: vec![Example { id: 1, class: 0, grasp }],
+            about: DataCard::default(),
+        }
+    }
+
+    #[test]
+    fn measures_find_the_step() {
+        let data = data();
+        let features = Features::fit(FeatureKind::Measures, &data);
+        let row = features.row(&data.examples[0].grasp);
+        assert_eq!(row.len(), features.width());
+        let [mean, _, highest, end, onset, half, ..] = row[..] else { panic!("too short") };
+        assert!((mean - 1.0).abs() < 1e-5 && highest == 2.0 && end == 2.0, "{row:?}");
+        assert!((onset - 0.51).abs() < 1e-5 && (half - 0.51).abs() < 1e-5);
+        assert_eq!(row[2 * MEASURES..], [-2.0, 2.0]);
+        let mirrored = features.mirrored(&data.examples[0].grasp).expect("has two sides");
+        assert_eq!(mirrored[3], 4.0);
+    }
+
+    #[test]
+    fn courses_hold_what_was_there_last() {
+        let data = data();
+        let features = Features::fit(FeatureKind::Course, &data);
+        let whole = features.row(&data.examples[0].grasp);
+        assert_eq!((whole[0], whole[2 * WINDOWS - 1]), (0.0, 4.0));
+        let short = features.row(&data.examples[0].grasp.until(0.7));
+        assert_eq!(short[2 * WINDOWS - 2], 2.0);
+        assert!(features.row(&Sequence::default()).iter().all(|x| *x == 0.0));
+    }
+}

@@ -1,0 +1,21 @@
+//! How good a recogniser is, how much of that the number of trials supports, and whether one is better than another.
+//!
+//! - [`Confusion`] counts decisions: accuracy, precision, recall, F1.
+//! - [`Forecasts`] judges probabilities: calibration error, log-likelihood, Brier score, top-k accuracy.
+//! - [`Bootstrap`] puts an [`Interval`] around any of these, or around the difference of two models on the same trials.
+//! - [`McNemar`], [`corrected_t`] and [`holm`] test differences: on one test set, across splits, and many at a time.
+//!
+//! Objects and decisions are class numbers from zero, trials are positions in the slices handed in. Nothing here
+//! panics or returns NaN: where a number is undefined the answer is `None`.
+
+mod bootstrap;
+mod calibration;
+mod confusion;
+mod difference;
+mod interval;
+
+pub use bootstrap::Bootstrap;
+pub use calibration::{CALIBRATION_BINS, Confident, Forecasts, PROBABILITY_FLOOR, ReliabilityPoint};
+pub use confusion::{ClassScores, Confusion, Scores};
+pub use difference::{McNemar, SplitTest, corrected_t, holm};
+pub use interval::{Interval, LEVEL};

@@ -1,0 +1,450 @@
+//! The paper's recurrent macro-layer (Fig. 2a): LSTM, fully connected, dropout, fully connected, softmax. Without the
+//! first fully connected layer it is the four-layer network of Zuo et al. that the paper starts from.
+//!
+//! It can be read out after any step, so that one network answers while the fingers still close and at the end. Its
+//! outputs may be several groups, each with a softmax of its own: size and shape in stage one. For iterated
+//! recognition, logarithms of the probabilities before can be added to the outputs through a learned gain, so that the
+//! network begins as the product of experts and learns where to depart from it.
+
+use super::gemm::{Matrix, multiply};
+use super::gates;
+use super::lstm::{LiveLstm, LiveState, LstmGradients, LstmWeights, LstmWorkspace};
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Sizes of a macro-layer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MacroShape {
+    /// Values per step.
+    pub inputs: usize,
+    /// LSTM units.
+    pub units: usize,
+    /// Width of the first fully connected layer; none in Zuo's network.
+    pub hidden: Option<usize>,
+    /// Outputs in each group; each group is a PMF.
+    pub groups: Vec<usize>,
+    /// Whether probabilities before are added to the outputs.
+    pub with_prior: bool,
+}
+
+/// A named part of the parameters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Its name, as in files.
+    pub name: &'static str,
+    /// Its shape, row-major.
+    pub shape: Vec<usize>,
+    /// Where it stands among all parameters.
+    pub place: Range<usize>,
+}
+
+impl MacroShape {
+    /// Sum of the groups.
+    pub fn outputs(&self) -> usize {
+        self.groups.iter().sum()
+    }
+
+    /// All parameters, in the order in which they lie in memory.
+    pub fn blocks(&self) -> Vec<Block> {
+        let (gates, outputs) = (4 * self.units, self.outputs());
+        let mut parts = vec![
+            ("lstm.weight_ih", vec![gates, self.inputs]),
+            ("lstm.weight_hh", vec![gates, self.units]),
+            ("lstm.bias", vec![gates]),
+        ];
+        if let Some(hidden) = self.hidden {
+            parts.extend([("fc1.weight", vec![hidden, self.units]), ("fc1.bias", vec![hidden])]);
+        }
+        let last = self.hidden.unwrap_or(self.units);
+        parts.extend([("fc2.weight", vec![outputs, last]), ("fc2.bias", vec![outputs])]);
+        if self.with_prior {
+            parts.push(("prior.gain", vec![1]));
+        }
+        let mut end = 0;
+        parts
+            .into_iter()
+            .map(|(name, shape)| {
+                let start = end;
+                end += shape.iter().product::<usize>();
+                Block { name, shape, place: start..end }
+            })
+            .collect()
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.blocks().last().map_or(0, |block| block.place.end)
+    }
+}
+
+/// A macro-layer with its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MacroLayer {
+    shape: MacroShape,
+    blocks: Vec<Block>,
+    values: Vec<f32>,
+}
+
+/// A batch of sequences, and where each is read out.
+#[derive(Clone, Debug, Default)]
+pub struct Batch {
+    /// Inputs, [steps][sequences][inputs]; sequences that end early are padded with anything finite.
+    pub x: Vec<f32>,
+    /// Steps of the longest sequence.
+    pub steps: usize,
+    /// Number of sequences.
+    pub sequences: usize,
+    /// Where outputs are wanted.
+    pub read_outs: Vec<ReadOut>,
+    /// True class per sequence and group, [sequences][groups]; only for training.
+    pub targets: Vec<usize>,
+    /// Logarithms of the probabilities before, [sequences][outputs]; only with a prior.
+    pub log_prior: Vec<f32>,
+}
+
+/// One place at which a batch is read out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadOut {
+    /// After which step.
+    pub step: usize,
+    /// Of which sequence.
+    pub sequence: usize,
+    /// Its share in the loss; shares of a batch sum to one.
+    pub weight: f32,
+}
+
+/// Regularisation of a training step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Regular {
+    /// Share of the first fully connected layer's outputs that is dropped.
+    pub dropout: f32,
+    /// Share of each target that is spread over all classes of its group.
+    pub smoothing: f32,
+}
+
+/// Memory of forward and backward passes, allocated once.
+#[derive(Clone, Debug)]
+pub struct Pass {
+    lstm: LstmWorkspace,
+    /// Hidden states at the read-outs, [read-outs][units].
+    read: Vec<f32>,
+    d_read: Vec<f32>,
+    /// Outputs of the first fully connected layer, [read-outs][hidden].
+    hidden: Vec<f32>,
+    d_hidden: Vec<f32>,
+    /// What became of each of them: zero, or the factor of dropout.
+    mask: Vec<f32>,
+    /// Scores, then their gradients, [read-outs][outputs].
+    scores: Vec<f32>,
+}
+
+impl Pass {
+    /// For networks of one shape.
+    pub fn new(shape: &MacroShape) -> Self {
+        let none = Vec::new;
+        Self {
+            lstm: LstmWorkspace::new(shape.inputs, shape.units),
+            read: none(),
+            d_read: none(),
+            hidden: none(),
+            d_hidden: none(),
+            mask: none(),
+            scores: none(),
+        }
+    }
+
+    /// Scores (logits) of the last forward pass, [read-outs][outputs].
+    pub fn scores(&self) -> &[f32] {
+        &self.scores
+    }
+}
+
+impl MacroLayer {
+    /// Random parameters: uniform within one over the root of the fan-in, as PyTorch's, and one added to the biases
+    /// of the forget gates, with which gradients survive long sequences.
+    pub fn new(shape: MacroShape, random: &mut impl Rng) -> Self {
+        let blocks = shape.blocks();
+        let mut values = vec![0.0; shape.parameters()];
+        for block in &blocks {
+            let fan_in = match block.name {
+                "lstm.weight_ih" | "lstm.weight_hh" | "lstm.bias" | "fc1.weight" | "fc1.bias" => shape.units,
+                _ => shape.hidden.unwrap_or(shape.units),
+            };
+            let most = 1.0 / (fan_in as f32).sqrt();
+            values[block.place.clone()].fill_with(|| most * (2.0 * random.random::<f32>() - 1.0));
+            match block.name {
+                "lstm.bias" => {
+                    let forget = block.place.start + shape.units..block.place.start + 2 * shape.units;
+                    values[forget].iter_mut().for_each(|b| *b += 1.0);
+                }
+                "prior.gain" => values[block.place.clone()].fill(1.0),
+                _ => {}
+            }
+        }
+        Self { shape, blocks, values }
+    }
+
+    /// A macro-layer from its parameters in the order of [`MacroShape::blocks`]; `None` when there are too many, too
+    /// few, or some that are no numbers.
+    pub fn from_values(shape: MacroShape, values: Vec<f32>) -> Option<Self> {
+        let fits = values.len() == shape.parameters() && values.iter().all(|v| v.is_finite());
+        fits.then(|| Self { blocks: shape.blocks(), shape, values })
+    }
+
+    /// Its sizes.
+    pub fn shape(&self) -> &MacroShape {
+        &self.shape
+    }
+
+    /// All parameters, in the order of [`MacroShape::blocks`].
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// All parameters, for an optimiser.
+    pub fn values_mut(&mut self) -> &mut [f32] {
+        &mut self.values
+    }
+
+    fn block(&self, name: &str) -> &[f32] {
+        let block = self.blocks.iter().find(|b| b.name == name);
+        block.map_or(&[], |b| &self.values[b.place.clone()])
+    }
+
+    fn lstm_weights(&self) -> LstmWeights<'_> {
+        LstmWeights { w: self.block("lstm.weight_ih"), u: self.block("lstm.weight_hh"), b: self.block("lstm.bias") }
+    }
+
+    /// Runs a batch forward; the scores stand in `pass`. With `dropout`, a random share of the hidden layer is left
+    /// out.
+    fn forward(&self, batch: &Batch, dropout: Option<(f32, &mut dyn Rng)>, pass: &mut Pass) {
+        let (shape, count) = (&self.shape, batch.read_outs.len());
+        pass.lstm.forward(self.lstm_weights(), &batch.x, batch.steps, batch.sequences);
+        pass.read.clear();
+        for at in &batch.read_outs {
+            let states = pass.lstm.hidden(at.step);
+            pass.read.extend_from_slice(&states[at.sequence * shape.units..(at.sequence + 1) * shape.units]);
+        }
+        let (last, width) = match shape.hidden {
+            Some(hidden) => {
+                fill_rows(&mut pass.hidden, self.block("fc1.bias"), count);
+                let weights = Matrix::new(self.block("fc1.weight"), hidden, shape.units).t();
+                multiply(Matrix::new(&pass.read, count, shape.units), weights, 1.0, &mut pass.hidden);
+                (&mut pass.hidden, hidden)
+            }
+            None => {
+                pass.hidden.clone_from(&pass.read);
+                (&mut pass.hidden, shape.units)
+            }
+        };
+        pass.mask.clear();
+        pass.mask.resize(last.len(), 1.0);
+        if let Some((share, random)) = dropout {
+            let keep = 1.0 / (1.0 - share);
+            pass.mask.fill_with(|| if random.random::<f32>() < share { 0.0 } else { keep });
+        }
+        for (value, factor) in last.iter_mut().zip(&mut pass.mask) {
+            // The rectifier belongs to the first fully connected layer.
+            if shape.hidden.is_some() && *value <= 0.0 {
+                *factor = 0.0;
+            }
+            *value *= *factor;
+        }
+        let outputs = shape.outputs();
+        fill_rows(&mut pass.scores, self.block("fc2.bias"), count);
+        let weights = Matrix::new(self.block("fc2.weight"), outputs, width).t();
+        multiply(Matrix::new(last, count, width), weights, 1.0, &mut pass.scores);
+        if let [gain] = self.block("prior.gain") {
+            for (row, at) in pass.scores.chunks_exact_mut(outputs).zip(&batch.read_outs) {
+                let prior = &batch.log_prior[at.sequence * outputs..(at.sequence + 1) * outputs];
+                row.iter_mut().zip(prior).for_each(|(score, log)| *score += gain * log);
+            }
+        }
+    }
+
+    /// Scores (logits) at the read-outs of a batch, [read-outs][outputs], in `pass`.
+    pub fn score(&self, batch: &Batch, pass: &mut Pass) {
+        self.forward(batch, None, pass);
+    }
+
+    /// Weighted cross-entropy of a batch, and its gradient with respect to all parameters, written over `gradient`.
+    pub fn loss(
+        &self,
+        batch: &Batch,
+        regular: Regular,
+        random: &mut dyn Rng,
+        gradient: &mut [f32],
+        pass: &mut Pass,
+    ) -> f64 {
+        let dropout = (regular.dropout > 0.0).then_some((regular.dropout, random));
+        self.forward(batch, dropout, pass);
+        let loss = self.score_gradients(batch, regular.smoothing, pass);
+        let (shape, count, outputs) = (&self.shape, batch.read_outs.len(), self.shape.outputs());
+        let mut parts = split(gradient, &self.blocks);
+        if shape.with_prior {
+            let mut of_gain = 0.0;
+            for (row, at) in pass.scores.chunks_exact(outputs).zip(&batch.read_outs) {
+                let prior = &batch.log_prior[at.sequence * outputs..(at.sequence + 1) * outputs];
+                of_gain += row.iter().zip(prior).map(|(d, log)| d * log).sum::<f32>();
+            }
+            parts.of("prior.gain")[0] = of_gain;
+        }
+        let width = shape.hidden.unwrap_or(shape.units);
+        let d_scores = Matrix::new(&pass.scores, count, outputs);
+        multiply(d_scores.t(), Matrix::new(&pass.hidden, count, width), 0.0, parts.of("fc2.weight"));
+        sum_rows(&pass.scores, parts.of("fc2.bias"));
+        pass.d_hidden.resize(count * width, 0.0);
+        multiply(d_scores, Matrix::new(self.block("fc2.weight"), outputs, width), 0.0, &mut pass.d_hidden);
+        pass.d_hidden.iter_mut().zip(&pass.mask).for_each(|(d, factor)| *d *= factor);
+        if let Some(hidden) = shape.hidden {
+            let d_hidden = Matrix::new(&pass.d_hidden, count, hidden);
+            multiply(d_hidden.t(), Matrix::new(&pass.read, count, shape.units), 0.0, parts.of("fc1.weight"));
+            sum_rows(&pass.d_hidden, parts.of("fc1.bias"));
+            pass.d_read.resize(count * shape.units, 0.0);
+            let weights = Matrix::new(self.block("fc1.weight"), hidden, shape.units);
+            multiply(d_hidden, weights, 0.0, &mut pass.d_read);
+        } else {
+            std::mem::swap(&mut pass.d_read, &mut pass.d_hidden);
+        }
+        let [w, u, b] = ["lstm.weight_ih", "lstm.weight_hh", "lstm.bias"].map(|name| parts.take(name));
+        let (units, d_read) = (shape.units, &pass.d_read);
+        // Read-outs come in the order of their steps, and are met from the last.
+        let mut left = batch.read_outs.len();
+        let read_out = |step: usize, dh: &mut [f32]| {
+            while left > 0 && batch.read_outs[left - 1].step == step {
+                left -= 1;
+                let to = &mut dh[batch.read_outs[left].sequence * units..][..units];
+                to.iter_mut().zip(&d_read[left * units..]).for_each(|(sum, d)| *sum += d);
+            }
+        };
+        pass.lstm.backward(self.lstm_weights(), &batch.x, read_out, &mut LstmGradients { w, u, b });
+        loss
+    }
+
+    /// Turns scores into the loss's gradient with respect to them.
+    fn score_gradients(&self, batch: &Batch, smoothing: f32, pass: &mut Pass) -> f64 {
+        debug_assert!(batch.read_outs.is_sorted_by_key(|at| at.step));
+        let groups = &self.shape.groups;
+        let mut loss = 0.0;
+        for (row, at) in pass.scores.chunks_exact_mut(self.shape.outputs()).zip(&batch.read_outs) {
+            let mut row = row;
+            for (group, &classes) in groups.iter().enumerate() {
+                let (scores, rest) = row.split_at_mut(classes);
+                row = rest;
+                let target = batch.targets[at.sequence * groups.len() + group];
+                let highest = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                let log_sum = highest + scores.iter().map(|s| gates::exp(s - highest)).sum::<f32>().ln();
+                let spread = smoothing / classes as f32;
+                for (class, score) in scores.iter_mut().enumerate() {
+                    let wanted = spread + if class == target { 1.0 - smoothing } else { 0.0 };
+                    loss += f64::from(at.weight * wanted * (log_sum - *score));
+                    *score = at.weight * (gates::exp(*score - log_sum) - wanted);
+                }
+            }
+        }
+        loss
+    }
+}
+
+fn fill_rows(rows: &mut Vec<f32>, row: &[f32], count: usize) {
+    rows.clear();
+    for _ in 0..count {
+        rows.extend_from_slice(row);
+    }
+}
+
+fn sum_rows(rows: &[f32], sums: &mut [f32]) {
+    sums.fill(0.0);
+    for row in rows.chunks_exact(sums.len()) {
+        sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+    }
+}
+
+/// A flat gradient seen as its named parts.
+struct Parts<'a>(Vec<(&'static str, &'a mut [f32])>);
+
+fn split<'a>(mut flat: &'a mut [f32], blocks: &[Block]) -> Parts<'a> {
+    let mut parts = Vec::new();
+    for block in blocks {
+        let (part, rest) = flat.split_at_mut(block.place.len());
+        parts.push((block.name, part));
+        flat = rest;
+    }
+    Parts(parts)
+}
+
+impl<'a> Parts<'a> {
+    fn of(&mut self, name: &str) -> &mut [f32] {
+        self.0.iter_mut().find(|(n, _)| *n == name).map_or(&mut [], |(_, part)| part)
+    }
+
+    fn take(&mut self, name: &str) -> &'a mut [f32] {
+        let found = self.0.iter_mut().find(|(n, _)| *n == name);
+        found.map_or(&mut [], |(_, part)| std::mem::take(part))
+    }
+}
+
+/// A macro-layer that reads one sample at a time; a step allocates nothing.
+#[derive(Clone, Debug)]
+pub struct LiveMacroLayer {
+    shape: MacroShape,
+    lstm: LiveLstm,
+    state: LiveState,
+    /// [units][hidden]
+    w1: Vec<f32>,
+    b1: Vec<f32>,
+    /// [hidden][outputs]
+    w2: Vec<f32>,
+    b2: Vec<f32>,
+    gain: f32,
+    hidden: Vec<f32>,
+    scores: Vec<f32>,
+}
+
+impl LiveMacroLayer {
+    /// Ready for the first sample of a sequence.
+    pub fn new(layer: &MacroLayer) -> Self {
+        let shape = layer.shape.clone();
+        let lstm = LiveLstm::new(layer.lstm_weights(), shape.inputs, shape.units);
+        let transposed = |name: &str, columns: usize| -> Vec<f32> {
+            let from = layer.block(name);
+            (0..columns).flat_map(|j| from.iter().skip(j).step_by(columns).copied()).collect()
+        };
+        Self {
+            state: lstm.start(),
+            lstm,
+            w1: transposed("fc1.weight", shape.units),
+            b1: layer.block("fc1.bias").to_vec(),
+            w2: transposed("fc2.weight", shape.hidden.unwrap_or(shape.units)),
+            b2: layer.block("fc2.bias").to_vec(),
+            gain: layer.block("prior.gain").first().copied().unwrap_or(0.0),
+            hidden: vec![0.0; shape.hidden.unwrap_or(shape.units)],
+            scores: vec![0.0; shape.outputs()],
+            shape,
+        }
+    }
+
+    /// Back to the beginning of a sequence.
+    pub fn reset(&mut self) {
+        self.state.reset();
+    }
+
+    /// Takes in one sample; gives the scores (logits) after it. `log_prior` has one value per output, or none.
+    pub fn step(&mut self, x: &[f32], log_prior: &[f32]) -> &[f32] {
+        self.lstm.step(&mut self.state, x);
+        if self.shape.hidden.is_some() {
+            self.hidden.copy_from_slice(&self.b1);
+            gates::add_row_product(self.state.hidden(), &self.w1, &mut self.hidden);
+            self.hidden.iter_mut().for_each(|v| *v = v.max(0.0));
+        } else {
+            self.hidden.copy_from_slice(self.state.hidden());
+        }
+        self.scores.copy_from_slice(&self.b2);
+        gates::add_row_product(&self.hidden, &self.w2, &mut self.scores);
+        for (score, log) in self.scores.iter_mut().zip(log_prior) {
+            *score += self.gain * log;
+        }
+        &self.scores
+    }
+}

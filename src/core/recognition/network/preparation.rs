@@ -1,0 +1,246 @@
+//! From readings to a network's inputs: even steps, compressed and standardised channels. Everything is learned from
+//! training data, kept with the network, and done sample by sample in the same way when readings arrive live.
+//!
+//! Each channel becomes two inputs: its scaled value, and how far it departs from the mean course of all training
+//! grasps at that step, in deviations at that step. What is common to all grasps, the closing itself, is much larger
+//! than what tells objects apart.
+
+use super::super::data::{Dataset, Sequence};
+use serde::{Deserialize, Serialize};
+
+/// How readings become inputs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Preparation {
+    /// Inputs per second.
+    pub rate_hz: f32,
+    /// One scale per channel.
+    pub scales: Vec<Scale>,
+    /// Mean scaled value per step and channel; the last step holds for later ones.
+    pub course: Vec<Vec<f32>>,
+    /// One over the deviation from it per step and channel.
+    pub factors: Vec<Vec<f32>>,
+}
+
+/// How values of one channel are scaled: asinh(x / knee), then mean and deviation. Pressures span decades; below the
+/// knee the scale is linear, above it logarithmic.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scale {
+    /// Where the logarithm begins, in the channel's unit; zero for a linear scale.
+    pub knee: f32,
+    /// Mean of the compressed values.
+    pub mean: f32,
+    /// One over their standard deviation.
+    pub factor: f32,
+}
+
+impl Scale {
+    fn compressed(self, x: f32) -> f32 {
+        if self.knee > 0.0 { (x / self.knee).asinh() } else { x }
+    }
+
+    fn apply(self, x: f32) -> f32 {
+        ((self.compressed(x) - self.mean) * self.factor).clamp(-MOST_DEVIATIONS, MOST_DEVIATIONS)
+    }
+}
+
+/// A channel whose largest value is this many times its typical one is compressed.
+const WIDE: f32 = 4.0;
+/// Scaled values are kept within this many deviations, whatever comes in.
+const MOST_DEVIATIONS: f32 = 20.0;
+
+impl Preparation {
+    /// Learns scales from training data.
+    pub fn fit(data: &Dataset, rate_hz: f32) -> Self {
+        let channels = data.channels.len();
+        let mut columns: Vec<Vec<f32>> = vec![Vec::new(); channels];
+        for example in &data.examples {
+            let plain = Binner::plain(rate_hz, channels).whole(&example.grasp);
+            for row in plain.chunks_exact(channels.max(1)) {
+                columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
+            }
+        }
+        let scales: Vec<Scale> = columns.iter_mut().map(|column| fitted(column)).collect();
+        let (course, factors) = mean_course(data, rate_hz, &scales);
+        Self { rate_hz, scales, course, factors }
+    }
+
+    /// Inputs per step.
+    pub fn width(&self) -> usize {
+        2 * self.scales.len()
+    }
+
+    /// True when all parts have sizes that fit each other and hold numbers: preparations come from files.
+    pub fn is_sound(&self) -> bool {
+        let finite = |rows: &[Vec<f32>]| rows.iter().flatten().all(|x| x.is_finite());
+        let fits = |rows: &[Vec<f32>]| !rows.is_empty() && rows.iter().all(|row| row.len() == self.scales.len());
+        let scales = self.scales.iter().all(|s| s.knee.is_finite() && s.mean.is_finite() && s.factor.is_finite());
+        let parts = [&self.course, &self.factors];
+        self.rate_hz > 0.0
+            && self.rate_hz <= 1000.0
+            && scales
+            && !self.scales.is_empty()
+            && parts.iter().all(|rows| fits(rows) && finite(rows))
+            && self.course.len() == self.factors.len()
+    }
+
+    /// Inputs of a whole sequence, [steps][width].
+    pub fn inputs(&self, sequence: &Sequence) -> Vec<f32> {
+        Binner::new(self).whole(sequence)
+    }
+}
+
+/// Departures smaller than this share of a channel's deviation over all are not enlarged to a whole one.
+const LEAST_DEPARTURE: f64 = 0.02;
+
+/// Mean and one over the deviation of scaled values at each step, over all sequences that reach it.
+fn mean_course(data: &Dataset, rate_hz: f32, scales: &[Scale]) -> (Vec<Vec<f32>>, Vec<Vec<f32>>) {
+    let channels = scales.len();
+    let mut sums: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
+    for example in &data.examples {
+        let binner = Binner { scales: Some(scales.to_vec()), ..Binner::plain(rate_hz, channels) };
+        for (step, row) in binner.whole(&example.grasp).chunks_exact(channels.max(1)).enumerate() {
+            if step >= sums.len() {
+                sums.push((0.0, vec![[0.0; 2]; channels]));
+            }
+            let (count, of_step) = &mut sums[step];
+            *count += 1.0;
+            for (sum, x) in of_step.iter_mut().zip(row) {
+                sum[0] += f64::from(*x);
+                sum[1] += f64::from(*x) * f64::from(*x);
+            }
+        }
+    }
+    // Steps that few sequences reach say little.
+    let most = sums.first().map_or(0.0, |(count, _)| *count);
+    sums.retain(|(count, _)| *count >= 0.25 * most);
+    let mean = |(count, of_step): &(f64, Vec<[f64; 2]>)| of_step.iter().map(|s| (s[0] / count) as f32).collect();
+    let factor = |(count, of_step): &(f64, Vec<[f64; 2]>)| {
+        let deviation = |s: &[f64; 2]| (s[1] / count - (s[0] / count).powi(2)).max(0.0).sqrt();
+        of_step.iter().map(|s| (1.0 / deviation(s).max(LEAST_DEPARTURE)) as f32).collect()
+    };
+    (sums.iter().map(mean).collect(), sums.iter().map(factor).collect())
+}
+
+fn fitted(column: &mut [f32]) -> Scale {
+    let mut sizes: Vec<f32> = column.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
+    sizes.sort_by(f32::total_cmp);
+    let at = |share: f64| sizes.get(((sizes.len() as f64 - 1.0).max(0.0) * share) as usize).copied().unwrap_or(0.0);
+    let typical = at(0.5);
+    let knee = if typical > 0.0 && at(0.995) > WIDE * typical { typical } else { 0.0 };
+    let scale = Scale { knee, mean: 0.0, factor: 1.0 };
+    column.iter_mut().for_each(|x| *x = scale.compressed(*x));
+    let count = column.len().max(1) as f64;
+    let mean = column.iter().map(|x| f64::from(*x)).sum::<f64>() / count;
+    let variance = column.iter().map(|x| (f64::from(*x) - mean).powi(2)).sum::<f64>() / count;
+    // A channel that never changes tells nothing, and rounding errors should not be blown up into something.
+    let deviation = variance.sqrt();
+    let factor = if deviation > 1e-6 * mean.abs().max(1e-30) { 1.0 / deviation } else { 0.0 };
+    Scale { knee, mean: mean as f32, factor: factor as f32 }
+}
+
+/// Means of readings over even steps of time, as they arrive.
+#[derive(Clone, Debug)]
+pub struct Binner {
+    rate_hz: f32,
+    /// None where readings are taken as they are.
+    scales: Option<Vec<Scale>>,
+    /// Means and factors per step; none where only scaled values are wanted.
+    course: Vec<(Vec<f32>, Vec<f32>)>,
+    /// Steps given so far.
+    given: usize,
+    step: u32,
+    sums: Vec<f32>,
+    count: u32,
+    out: Vec<f32>,
+}
+
+impl Binner {
+    /// At the start of a sequence.
+    pub fn new(preparation: &Preparation) -> Self {
+        let scales = Some(preparation.scales.clone());
+        let course = preparation.course.iter().cloned().zip(preparation.factors.iter().cloned()).collect();
+        let out = vec![0.0; preparation.width()];
+        Self { scales, course, out, ..Self::plain(preparation.rate_hz, preparation.scales.len()) }
+    }
+
+    /// Back to the start of a sequence.
+    pub fn reset(&mut self) {
+        (self.step, self.count, self.given) = (0, 0, 0);
+        self.sums.fill(0.0);
+    }
+
+    fn plain(rate_hz: f32, channels: usize) -> Self {
+        Self {
+            rate_hz,
+            scales: None,
+            course: Vec::new(),
+            given: 0,
+            step: 0,
+            sums: vec![0.0; channels],
+            count: 0,
+            out: vec![0.0; channels],
+        }
+    }
+
+    fn whole(mut self, sequence: &Sequence) -> Vec<f32> {
+        let mut inputs = Vec::new();
+        for (t, row) in sequence.rows() {
+            if let Some(step) = self.push(t, row) {
+                inputs.extend_from_slice(step);
+            }
+        }
+        if let Some(step) = self.finish() {
+            inputs.extend_from_slice(step);
+        }
+        inputs
+    }
+
+    /// Takes in a reading at a time (s); gives the inputs of the step before when it is the first of another one.
+    pub fn push(&mut self, t: f32, row: &[f32]) -> Option<&[f32]> {
+        // A reading on the border belongs to the step before: the sample at 0.04 s ends the first 25th of a second.
+        let step = ((t * self.rate_hz - 1e-3).floor().clamp(0.0, 1e9)) as u32;
+        let complete = step != self.step && self.count > 0;
+        if complete {
+            self.close();
+        }
+        self.step = step;
+        self.sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        self.count += 1;
+        complete.then_some(&self.out[..])
+    }
+
+    /// The inputs of the last step, if anything was read in it.
+    pub fn finish(&mut self) -> Option<&[f32]> {
+        let complete = self.count > 0;
+        if complete {
+            self.close();
+        }
+        complete.then_some(&self.out[..])
+    }
+
+    fn close(&mut self) {
+        let share = 1.0 / self.count as f32;
+        for (channel, (out, sum)) in self.out.iter_mut().zip(&mut self.sums).enumerate() {
+            let scale = self.scales.as_ref().map(|scales| scales[channel]);
+            *out = scale.map_or(*sum * share, |scale| scale.apply(*sum * share));
+            *sum = 0.0;
+        }
+        if let Some((means, factors)) = self.course.get(self.given.min(self.course.len().saturating_sub(1))) {
+            let (scaled, departures) = self.out.split_at_mut(self.sums.len());
+            for (((departure, x), mean), factor) in departures.iter_mut().zip(scaled).zip(means).zip(factors) {
+                *departure = ((*x - mean) * factor).clamp(-MOST_DEVIATIONS, MOST_DEVIATIONS);
+            }
+        }
+        self.given += 1;
+        self.count = 0;
+    }
+}
+
+/// For each channel the one on the other finger, where every channel has one: `.._left..` and `.._right..`.
+pub fn mirror(channels: &[String]) -> Option<Vec<usize>> {
+    let other = |name: &String| {
+        let swapped = if name.contains("left") { name.replace("left", "right") } else { name.replace("right", "left") };
+        channels.iter().position(|c| *c == swapped && swapped != *name)
+    };
+    channels.iter().map(other).collect()
+}

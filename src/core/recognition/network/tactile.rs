@@ -1,0 +1,505 @@
+//! The recognisers of the paper: a macro-layer by itself, the dual-stage LSTM, and its iterated form.
+//!
+//! ```text
+//! readings --+--> stage one: macro-layer --> PMF of size, PMF of shape --+
+//!            |                                                           v
+//!            +------------------- skip connection ------> stage two: macro-layer --> PMF of class
+//!                                                                        ^                |
+//!                                            (iterated) PMF before ------+<---------------+
+//! ```
+//!
+//! Both stages run step by step: after every step stage two sees what stage one says by then. So the same network
+//! answers while the fingers close and at the end.
+
+use super::super::belief::{Rejection, agreement};
+use super::super::data::{Dataset, Sequence};
+use super::super::model_file::{Arrays, ModelCard};
+use super::super::{FitError, Fitting, LiveRecogniser, Pmf, Properties, Recogniser, Verdict, check_enough};
+use super::committee::{Committee, HeldBack, LiveCommittee, Plan};
+use super::lessons::{Book, Earlier, Plain};
+use super::macro_layer::{MacroLayer, MacroShape};
+use super::preparation::{Binner, Preparation, mirror};
+use super::recipe::Recipe;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// One of the paper's networks, fitted.
+#[derive(Clone, Debug)]
+pub struct TactileNetwork {
+    learned: Learned,
+    stage_one: Option<Committee>,
+    stage_two: Committee,
+    rejection: Rejection,
+}
+
+/// What is learned besides weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Learned {
+    recipe: Recipe,
+    preparation: Preparation,
+    /// Shapes and temperatures of the stages.
+    stage_one: Option<CommitteeCard>,
+    stage_two: CommitteeCard,
+}
+
+/// Everything about a committee but its weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct CommitteeCard {
+    shape: MacroShape,
+    members: usize,
+    temperatures: Vec<Vec<f32>>,
+}
+
+impl CommitteeCard {
+    fn of(committee: &Committee) -> Self {
+        Self {
+            shape: committee.shape().clone(),
+            members: committee.members.len(),
+            temperatures: committee.temperatures.clone(),
+        }
+    }
+}
+
+/// Share of known objects that may be taken for unknown.
+const REJECTED_SHARE: f64 = 0.02;
+/// Beliefs drawn to calibrate the rejection for each number of grasps.
+const DRAWN_BELIEFS: usize = 4000;
+/// Numbers of grasps for which it is calibrated.
+const MOST_GRASPS: usize = 6;
+
+impl TactileNetwork {
+    /// Fits a network as a recipe says.
+    pub fn fit(data: &Dataset, recipe: Recipe, method: &'static str, fitting: &Fitting<'_>) -> Result<Self, FitError> {
+        // Every part must have grasps of every class, or a member would never have met it.
+        let halves = if recipe.two_stages && !recipe.cross_fitted { 2 } else { 1 };
+        check_enough(data, 2 * halves)?;
+        if recipe.two_stages && !data.labels.have_properties() {
+            return Err(FitError::NoProperties { method });
+        }
+        let work = Work { data, recipe: &recipe, fitting, preparation: Preparation::fit(data, recipe.rate_hz) };
+        let pages: Vec<Vec<f32>> = data.examples.iter().map(|e| work.preparation.inputs(&e.grasp)).collect();
+        let everything: Vec<usize> = (0..pages.len()).collect();
+        let (for_one, for_two) = if halves == 2 { work.halves() } else { (everything.clone(), everything) };
+        let end_of_one = if recipe.two_stages { if recipe.iterated { 0.33 } else { 0.5 } } else { 0.0 };
+        let (stage_one, beside) = if recipe.two_stages {
+            let (committee, held_back) = work.fit_stage_one(&pages, &for_one, 0.0..end_of_one)?;
+            let beside = work.beside(&committee, &held_back, &pages, &for_one, &for_two);
+            (Some(committee), beside)
+        } else {
+            (None, vec![Vec::new(); for_two.len()])
+        };
+        let (stage_two, alone) = work.fit_stage_two(&pages, &for_two, &beside, end_of_one..1.0)?;
+        let rejection = calibrated_rejection(&alone, fitting.seed);
+        let learned = Learned {
+            preparation: work.preparation,
+            stage_one: stage_one.as_ref().map(CommitteeCard::of),
+            stage_two: CommitteeCard::of(&stage_two),
+            recipe,
+        };
+        Ok(Self { learned, stage_one, stage_two, rejection })
+    }
+
+    /// Brings a network back from its card and arrays.
+    pub fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, String> {
+        let learned: Learned =
+            serde_json::from_value(card.settings.clone()).map_err(|e| format!("its settings: {e}"))?;
+        learned.recipe.check().map_err(|e| e.to_string())?;
+        if !learned.preparation.is_sound() || learned.preparation.scales.len() != card.channels.len() {
+            return Err("its preparation does not fit its channels".to_owned());
+        }
+        let labels = &card.labels;
+        let readings = learned.preparation.width();
+        let properties = vec![labels.sizes.len(), labels.shapes.len()];
+        let stage_one = match &learned.stage_one {
+            Some(own) => Some(read_committee(arrays, "stage_one", own, readings, &properties)?),
+            None => None,
+        };
+        let beside = stage_one.as_ref().map_or(0, |committee| committee.shape().outputs());
+        let before = if learned.recipe.iterated { labels.classes.len() } else { 0 };
+        let classes = [labels.classes.len()];
+        let stage_two = read_committee(arrays, "stage_two", &learned.stage_two, readings + beside + before, &classes)?;
+        if stage_two.shape().with_prior != learned.recipe.iterated {
+            return Err("its second stage is not what its recipe says".to_owned());
+        }
+        Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone().unwrap_or_default() })
+    }
+
+    fn reader(&self) -> LiveTactile {
+        let classes = self.stage_two.shape().outputs();
+        LiveTactile {
+            binner: Binner::new(&self.learned.preparation),
+            stage_one: self.stage_one.as_ref().map(LiveCommittee::new),
+            stage_two: LiveCommittee::new(&self.stage_two),
+            iterated: self.learned.recipe.iterated,
+            before: Pmf::uniform(classes),
+            log_before: Vec::new(),
+            row: Vec::new(),
+            latest: None,
+        }
+        .at_the_start(None)
+    }
+}
+
+fn read_committee(
+    arrays: &Arrays,
+    name: &str,
+    card: &CommitteeCard,
+    inputs: usize,
+    groups: &[usize],
+) -> Result<Committee, String> {
+    let shape = &card.shape;
+    let whole = shape.inputs == inputs
+        && shape.groups == groups
+        && (1..=4096).contains(&shape.units)
+        && shape.hidden.is_none_or(|hidden| (1..=4096).contains(&hidden))
+        && groups.iter().all(|classes| *classes > 0)
+        && (1..=100).contains(&card.members)
+        && card.temperatures.len() == groups.len()
+        && card.temperatures.iter().flatten().all(|t| t.is_finite() && *t > 0.0);
+    if !whole {
+        return Err(format!("the sizes of {name} do not fit the model's channels and labels"));
+    }
+    let mut members = Vec::new();
+    for member in 0..card.members {
+        let mut values = Vec::new();
+        for block in shape.blocks() {
+            values.extend(arrays.get(&format!("{name}.{member}.{}", block.name), &block.shape)?);
+        }
+        members.push(MacroLayer::from_values(shape.clone(), values).ok_or("an array does not fit")?);
+    }
+    Ok(Committee { members, temperatures: card.temperatures.clone() })
+}
+
+/// What fitting needs at every stage.
+struct Work<'a> {
+    data: &'a Dataset,
+    recipe: &'a Recipe,
+    fitting: &'a Fitting<'a>,
+    preparation: Preparation,
+}
+
+impl Work<'_> {
+    /// Grasps for the first stage and for the second.
+    fn halves(&self) -> (Vec<usize>, Vec<usize>) {
+        let half_of = self.data.folds(2, self.fitting.seed ^ 0x5eed);
+        let of = |half: usize| (0..half_of.len()).filter(|k| half_of[*k] == half).collect();
+        (of(0), of(1))
+    }
+
+    /// Parts for cross-fitting among some grasps.
+    fn parts(&self, grasps: &[usize]) -> Vec<usize> {
+        self.data.part(grasps).folds(self.recipe.parts, self.fitting.seed ^ 0xf01d)
+    }
+
+    fn shape(&self, inputs: usize, groups: Vec<usize>, with_prior: bool) -> MacroShape {
+        let hidden = (self.recipe.hidden > 0).then_some(self.recipe.hidden);
+        MacroShape { inputs, units: self.recipe.units, hidden, groups, with_prior }
+    }
+
+    /// How readings, and what stands beside them, are exchanged when left and right are.
+    fn mirror(&self, beside: usize) -> Option<Vec<usize>> {
+        let channels = self.data.channels.len();
+        let of_channels = mirror(&self.data.channels).filter(|_| self.recipe.mirror)?;
+        let scaled = of_channels.iter().copied();
+        let departures = of_channels.iter().map(|to| to + channels);
+        Some(scaled.chain(departures).chain(2 * channels..2 * channels + beside).collect())
+    }
+
+    fn fit_stage_one(
+        &self,
+        pages: &[Vec<f32>],
+        grasps: &[usize],
+        share: Range<f64>,
+    ) -> Result<(Committee, HeldBack), FitError> {
+        let labels = &self.data.labels;
+        let properties = |k: usize| {
+            let class = &labels.classes[self.data.examples[k].class];
+            Some(vec![class.size?, class.shape?])
+        };
+        // The empty hand has neither size nor shape, and nothing to teach here.
+        let taught: Vec<usize> = grasps.iter().copied().filter(|k| properties(*k).is_some()).collect();
+        let book = Book {
+            width: self.preparation.width(),
+            pages: taught.iter().map(|k| pages[*k].clone()).collect(),
+            targets: taught.iter().filter_map(|k| properties(*k)).collect(),
+            mirror: self.mirror(0),
+            readings: self.preparation.width(),
+            noise: self.recipe.noise,
+            earlier: None,
+        };
+        let plan = Plan {
+            shape: self.shape(book.width, vec![labels.sizes.len(), labels.shapes.len()], false),
+            training: &self.recipe.training,
+            folds: (&self.parts(&taught), self.recipe.parts),
+            cross_fitted: self.recipe.cross_fitted,
+            seed: self.fitting.seed.wrapping_mul(1000),
+            share,
+        };
+        let (committee, of_taught) = Committee::fit(&plan, &Plain::new(&book), self.fitting)?;
+        let mut held_back: HeldBack = vec![None; pages.len()];
+        for (k, scores) in taught.into_iter().zip(of_taught) {
+            held_back[k] = scores;
+        }
+        Ok((committee, held_back))
+    }
+
+    /// What stage one says of the grasps of stage two after every step, without having seen them: held-back answers
+    /// where it was cross-fitted, plain ones of grasps from the other half.
+    fn beside(
+        &self,
+        committee: &Committee,
+        held_back: &HeldBack,
+        pages: &[Vec<f32>],
+        for_one: &[usize],
+        for_two: &[usize],
+    ) -> Vec<Vec<f32>> {
+        let width = self.preparation.width();
+        let mut live = LiveCommittee::new(committee);
+        let of_grasp = |k: &usize| -> Vec<f32> {
+            let flat = |pmfs: Vec<Pmf>| -> Vec<f32> {
+                pmfs.iter().flat_map(|pmf| pmf.probabilities().iter().map(|p| *p as f32)).collect()
+            };
+            let seen = for_one == for_two;
+            if let Some(scores) = held_back[*k].as_ref().filter(|_| seen) {
+                let outputs = committee.shape().outputs();
+                let rows = scores.chunks_exact(outputs).enumerate();
+                rows.flat_map(|(step, row)| flat(committee.honest(row, step))).collect()
+            } else {
+                live.reset();
+                pages[*k].chunks_exact(width).flat_map(|row| flat(live.step(row, &[]))).collect()
+            }
+        };
+        for_two.iter().map(of_grasp).collect()
+    }
+
+    /// Fits the second stage; gives also what held-back networks say of single grasps, with their true classes.
+    fn fit_stage_two(
+        &self,
+        pages: &[Vec<f32>],
+        grasps: &[usize],
+        beside: &[Vec<f32>],
+        share: Range<f64>,
+    ) -> Result<(Committee, Vec<(usize, Pmf)>), FitError> {
+        let readings = self.preparation.width();
+        let classes = self.data.labels.classes.len();
+        let steps = |k: usize| pages[k].len() / readings;
+        let added = grasps.iter().zip(beside).find(|(k, _)| steps(**k) > 0).map_or(0, |(k, b)| b.len() / steps(*k));
+        let folds = self.parts(grasps);
+        let book_with = |extra: usize, earlier: Option<Earlier>| {
+            let page = |(k, beside): (&usize, &Vec<f32>)| -> Vec<f32> {
+                let mut page = Vec::with_capacity(steps(*k) * (readings + added + extra));
+                for step in 0..steps(*k) {
+                    page.extend_from_slice(&pages[*k][step * readings..(step + 1) * readings]);
+                    page.extend_from_slice(&beside[step * added..(step + 1) * added]);
+                    page.extend(std::iter::repeat_n(1.0 / extra.max(1) as f32, extra));
+                }
+                page
+            };
+            Book {
+                width: readings + added + extra,
+                pages: grasps.iter().zip(beside).map(page).collect(),
+                targets: grasps.iter().map(|k| vec![self.data.examples[*k].class]).collect(),
+                mirror: self.mirror(added + extra),
+                readings,
+                noise: self.recipe.noise,
+                earlier,
+            }
+        };
+        let plan = |inputs: usize, with_prior: bool, cross_fitted: bool, share: Range<f64>| Plan {
+            shape: self.shape(inputs, vec![classes], with_prior),
+            training: &self.recipe.training,
+            folds: (&folds, self.recipe.parts),
+            cross_fitted,
+            seed: self.fitting.seed.wrapping_mul(1000) + 500 + u64::from(with_prior) * 100,
+            share,
+        };
+        let truth = |n: usize| self.data.examples[grasps[n]].class;
+        let alone = |committee: &Committee, held_back: &HeldBack| -> Vec<(usize, Pmf)> {
+            let last = |n: usize| {
+                let scores = held_back[n].as_ref()?;
+                let steps = scores.len() / classes;
+                let row = scores.get((steps.checked_sub(1)?) * classes..)?;
+                committee.honest(row, steps - 1).pop()
+            };
+            (0..grasps.len()).filter_map(|n| Some((truth(n), last(n)?))).collect()
+        };
+        if !self.recipe.iterated {
+            let book = book_with(0, None);
+            let plan = plan(book.width, false, self.recipe.cross_fitted, share);
+            let (committee, held_back) = Committee::fit(&plan, &Plain::new(&book), self.fitting)?;
+            let alone = alone(&committee, &held_back);
+            return Ok((committee, alone));
+        }
+        // The mock network of the paper (section V-E): what it says of grasps it has not seen stands for the grasps
+        // that came before.
+        let middle = 0.5 * (share.start + share.end);
+        let book = book_with(0, None);
+        let (mock, held_back) =
+            Committee::fit(&plan(book.width, false, true, share.start..middle), &Plain::new(&book), self.fitting)?;
+        let of_mock = alone(&mock, &held_back);
+        let same = |n: usize| (0..grasps.len()).filter(|m| *m != n && truth(*m) == truth(n)).collect();
+        let earlier = Earlier {
+            alone: of_mock.iter().map(|(_, pmf)| pmf.clone()).collect(),
+            same: (0..grasps.len()).map(same).collect(),
+            classes,
+        };
+        let book = book_with(classes, Some(earlier));
+        let plan = plan(book.width, true, self.recipe.cross_fitted, middle..share.end);
+        let (committee, held_back) = Committee::fit(&plan, &Plain::new(&book), self.fitting)?;
+        let alone = alone(&committee, &held_back);
+        Ok((committee, alone))
+    }
+}
+
+/// Draws beliefs of several held-back grasps of the same object, and finds the agreement that all but a share of them
+/// reach.
+fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Rejection {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0e1ec7);
+    let mut of_class: Vec<Vec<&Pmf>> = Vec::new();
+    for (class, pmf) in alone {
+        of_class.resize(of_class.len().max(class + 1), Vec::new());
+        of_class[*class].push(pmf);
+    }
+    of_class.retain(|pmfs| !pmfs.is_empty());
+    if of_class.is_empty() {
+        return Rejection::default();
+    }
+    let least = (1..=MOST_GRASPS)
+        .map(|grasps| {
+            let mut reached: Vec<f64> = (0..DRAWN_BELIEFS)
+                .map(|n| {
+                    let own = &of_class[n % of_class.len()];
+                    let drawn: Vec<Pmf> = (0..grasps).map(|_| own[random.random_range(0..own.len())].clone()).collect();
+                    let belief = drawn.iter().skip(1).fold(drawn[0].clone(), |belief, pmf| belief.times(pmf));
+                    agreement(Some(&belief), &drawn)
+                })
+                .collect();
+            reached.sort_by(f64::total_cmp);
+            reached[(REJECTED_SHARE * DRAWN_BELIEFS as f64) as usize]
+        })
+        .collect();
+    Rejection { share: REJECTED_SHARE, least }
+}
+
+impl Recogniser for TactileNetwork {
+    fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
+        let mut reader = self.reader();
+        reader.begin(before);
+        for (t, row) in grasp.rows() {
+            reader.push(t, row);
+        }
+        reader.finish().unwrap_or_else(|| Verdict {
+            pmf: before.cloned().unwrap_or_else(|| Pmf::uniform(self.stage_two.shape().outputs())),
+            properties: None,
+        })
+    }
+
+    fn live(&self) -> Option<Box<dyn LiveRecogniser>> {
+        Some(Box::new(self.reader()))
+    }
+
+    fn arrays(&self) -> Arrays {
+        let mut arrays = Arrays::default();
+        let stages = [("stage_one", self.stage_one.as_ref()), ("stage_two", Some(&self.stage_two))];
+        for (name, committee) in stages {
+            for (member, layer) in committee.iter().flat_map(|c| &c.members).enumerate() {
+                for block in layer.shape().blocks() {
+                    let values = &layer.values()[block.place.clone()];
+                    arrays.put(format!("{name}.{member}.{}", block.name), &block.shape, values);
+                }
+            }
+        }
+        arrays
+    }
+
+    fn parameters(&self) -> usize {
+        let of = |committee: &Committee| committee.members.iter().map(|m| m.values().len()).sum::<usize>();
+        self.stage_one.as_ref().map_or(0, of) + of(&self.stage_two)
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(&self.learned).unwrap_or_default()
+    }
+
+    fn rejection(&self) -> Option<&Rejection> {
+        Some(&self.rejection)
+    }
+}
+
+/// Both stages, reading sample by sample.
+struct LiveTactile {
+    binner: Binner,
+    stage_one: Option<LiveCommittee>,
+    stage_two: LiveCommittee,
+    iterated: bool,
+    before: Pmf,
+    log_before: Vec<f32>,
+    row: Vec<f32>,
+    latest: Option<Verdict>,
+}
+
+impl LiveTactile {
+    fn at_the_start(mut self, before: Option<&Pmf>) -> Self {
+        self.begin(before);
+        self
+    }
+
+    fn answer(&mut self) -> Verdict {
+        let properties = self.stage_one.as_mut().and_then(|stage_one| {
+            let readings = self.row.len();
+            let pmfs = stage_one.step(&self.row[..readings], &[]);
+            let [size, shape]: [Pmf; 2] = pmfs.try_into().ok()?;
+            for pmf in [&size, &shape] {
+                self.row.extend(pmf.probabilities().iter().map(|p| *p as f32));
+            }
+            Some(Properties { size, shape })
+        });
+        if self.iterated {
+            self.row.extend(self.before.probabilities().iter().map(|p| *p as f32));
+        }
+        let pmf = self.stage_two.step(&self.row, &self.log_before).pop();
+        let pmf = pmf.unwrap_or_else(|| self.before.clone());
+        // A network that is not iterated knows nothing of earlier grasps: they count as independent observations.
+        let pmf = if self.iterated { pmf } else { self.before.times(&pmf) };
+        let verdict = Verdict { pmf, properties };
+        self.latest = Some(verdict.clone());
+        verdict
+    }
+}
+
+impl LiveRecogniser for LiveTactile {
+    fn begin(&mut self, before: Option<&Pmf>) {
+        self.binner.reset();
+        if let Some(stage_one) = &mut self.stage_one {
+            stage_one.reset();
+        }
+        self.stage_two.reset();
+        let classes = self.before.classes();
+        self.before = before.filter(|b| b.classes() == classes).cloned().unwrap_or_else(|| Pmf::uniform(classes));
+        self.log_before.clear();
+        if self.iterated {
+            self.log_before.extend(self.before.logarithms().map(|l| l as f32));
+        }
+        self.latest = None;
+    }
+
+    fn push(&mut self, t: f32, row: &[f32]) -> Option<Verdict> {
+        let inputs = self.binner.push(t, row)?;
+        self.row.clear();
+        self.row.extend_from_slice(inputs);
+        Some(self.answer())
+    }
+
+    fn finish(&mut self) -> Option<Verdict> {
+        match self.binner.finish() {
+            Some(inputs) => {
+                self.row.clear();
+                self.row.extend_from_slice(inputs);
+                Some(self.answer())
+            }
+            None => self.latest.clone(),
+        }
+    }
+}

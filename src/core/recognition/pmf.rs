@@ -1,0 +1,139 @@
+//! A probability for each class.
+
+use serde::{Deserialize, Serialize};
+
+/// Probabilities below this count as this when they are multiplied or taken to the logarithm: no single grasp may rule
+/// a class out for ever.
+const FLOOR: f64 = 1e-6;
+
+/// A probability mass function over classes; never empty, sums to one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Pmf(Vec<f64>);
+
+impl Pmf {
+    /// Every one of `classes` as likely as the others.
+    pub fn uniform(classes: usize) -> Self {
+        Self(vec![1.0 / classes.max(1) as f64; classes.max(1)])
+    }
+
+    /// Softmax of scores.
+    pub fn from_scores(scores: impl IntoIterator<Item = f64>) -> Self {
+        let scores: Vec<f64> = scores.into_iter().collect();
+        let highest = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self::from_weights(scores.into_iter().map(|s| (s - highest).exp()))
+    }
+
+    /// Weights made to sum to one; weights that are negative or no numbers count as none, and where nothing is left
+    /// all classes are equally likely.
+    pub fn from_weights(weights: impl IntoIterator<Item = f64>) -> Self {
+        let mut weights: Vec<f64> = weights.into_iter().map(|w| if w > 0.0 && w.is_finite() { w } else { 0.0 }).collect();
+        let sum: f64 = weights.iter().sum();
+        if sum > 0.0 && sum.is_finite() {
+            weights.iter_mut().for_each(|w| *w /= sum);
+            Self(weights)
+        } else {
+            Self::uniform(weights.len())
+        }
+    }
+
+    /// One probability per class.
+    pub fn probabilities(&self) -> &[f64] {
+        &self.0
+    }
+
+    /// Number of classes.
+    pub fn classes(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The most likely class (the first of several), and its probability.
+    pub fn top(&self) -> (usize, f64) {
+        let mut best = (0, self.0[0]);
+        for (class, &p) in self.0.iter().enumerate() {
+            if p > best.1 {
+                best = (class, p);
+            }
+        }
+        best
+    }
+
+    /// Natural logarithms, not below that of one in a million.
+    pub fn logarithms(&self) -> impl Iterator<Item = f64> + '_ {
+        self.0.iter().map(|p| p.max(FLOOR).ln())
+    }
+
+    /// What two independent observations say together, where all classes were equally likely before: the product of
+    /// experts.
+    pub fn times(&self, other: &Self) -> Self {
+        Self::from_scores(self.logarithms().zip(other.logarithms()).map(|(a, b)| a + b))
+    }
+
+    /// Sharper (below one) or flatter (above one) by a temperature.
+    pub fn at_temperature(&self, temperature: f64) -> Self {
+        Self::from_scores(self.logarithms().map(|l| l / temperature))
+    }
+
+    /// Mean of several.
+    pub fn mean<'a>(of: impl IntoIterator<Item = &'a Self>) -> Option<Self> {
+        let mut of = of.into_iter();
+        let mut sum = of.next()?.0.clone();
+        for pmf in of {
+            sum.iter_mut().zip(&pmf.0).for_each(|(s, p)| *s += p);
+        }
+        Some(Self::from_weights(sum))
+    }
+
+    /// Probabilities of groups of classes, where `group_of` says to which group, if any, a class belongs.
+    pub fn grouped(&self, groups: usize, group_of: impl Fn(usize) -> Option<usize>) -> Self {
+        let mut weights = vec![0.0; groups];
+        for (class, p) in self.0.iter().enumerate() {
+            if let Some(group) = group_of(class) {
+                weights[group] += p;
+            }
+        }
+        Self::from_weights(weights)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_follow_bayes() {
+        let (a, b) = (Pmf::from_weights([0.6, 0.3, 0.1]), Pmf::from_weights([0.2, 0.5, 0.3]));
+        let both = a.times(&b);
+        let want = [0.12, 0.15, 0.03].map(|p| p / 0.30);
+        assert!(both.probabilities().iter().zip(want).all(|(p, w)| (p - w).abs() < 1e-12));
+        let same = a.times(&Pmf::uniform(3));
+        assert!(same.probabilities().iter().zip(a.probabilities()).all(|(p, w)| (p - w).abs() < 1e-12));
+    }
+
+    #[test]
+    fn one_grasp_rules_nothing_out_for_ever() {
+        let sure = Pmf::from_weights([1.0, 0.0]);
+        let mut belief = sure.clone();
+        for _ in 0..3 {
+            belief = belief.times(&Pmf::from_weights([0.001, 0.999]));
+        }
+        assert_eq!(belief.top().0, 1);
+    }
+
+    #[test]
+    fn strange_weights_still_sum_to_one() {
+        for weights in [vec![f64::NAN, 1.0], vec![0.0; 3], vec![f64::INFINITY, 2.0], vec![-1.0, 4.0], vec![1e308, 1e308]] {
+            let pmf = Pmf::from_weights(weights);
+            assert!((pmf.probabilities().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+        assert!((Pmf::from_scores([1e6, -1e6]).top().1 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn temperature_and_groups() {
+        let pmf = Pmf::from_weights([0.8, 0.2]);
+        assert!((pmf.at_temperature(0.5).probabilities()[0] - 0.64 / 0.68).abs() < 1e-9);
+        let grouped = Pmf::from_weights([0.5, 0.3, 0.2]).grouped(2, |class| [Some(0), Some(1), Some(0)][class]);
+        assert!((grouped.probabilities()[0] - 0.7).abs() < 1e-12);
+    }
+}

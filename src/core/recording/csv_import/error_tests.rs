@@ -1,0 +1,122 @@
+//! Every fault of a file, with the sentence it earns.
+
+use super::*;
+
+/// The error's text.
+fn refusal(text: &[u8]) -> String {
+    read_trials(text, "f").expect_err("must be refused").to_string()
+}
+
+fn refused(text: &str, essence: &[&str]) {
+    let said = refusal(text.as_bytes());
+    for part in essence {
+        assert!(said.contains(part), "no {part} in: {said}");
+    }
+}
+
+/// Below a usual header, the rows.
+fn rows_refused(rows: &str, essence: &[&str]) {
+    refused(&format!("trial,label,t_s,size,shape,p\n{rows}"), essence);
+}
+
+#[test]
+fn files_without_content() {
+    refused("", &["cannot import \"f\": the file has no header"]);
+    refused("\n , ,\n", &["no header"]);
+    refused("trial,label,t_s,p\n\n,,,\n", &["no row below its header"]);
+    refused("a,x,0,1\n", &["line 1: there is no column \"trial\" and no \"label\" and no \"t_s\"", "has a, x, 0, 1"]);
+    refused("\n\ntrial;class;time;p\n", &["line 3: ", "\"class\" meant as \"label\"", "\"time\" meant as \"t_s\""]);
+    refused("trial,label,t_s,phase\na,x,0,pre\na,x,1,post\n", &["no column holds numbers"]);
+    assert!(refusal(b"\xFF\xFEt\0r\0i\0a\0l\0").contains("save the file as \"CSV UTF-8\""));
+    assert!(refusal(b"trial,label,t_s,p\na,K\xE4se,0,1\n").contains("line 2: the column \"label\" holds bytes"));
+}
+
+#[test]
+fn lines_are_counted_through_blanks_and_breaks() {
+    for end in ["\n", "\r\n", "\r"] {
+        let text = "\ntrial,label,t_s,notes,p\n\na,x,0,\"two\nlines\",1\n,,,,\n\na,x,q,,1".replace('\n', end);
+        refused(&text, &["line 8: the time \"q\" is not a number of seconds"]);
+    }
+}
+
+#[test]
+fn rows_that_do_not_fit() {
+    rows_refused("a,x,0,,\n", &["line 2: the row has 5 fields but the header has 6"]);
+    rows_refused("a,x,0,,,1,2\n", &["has 7 fields"]);
+    rows_refused(" ,x,0,,,1\n", &["\"trial\" is empty"]);
+    rows_refused("a,,0,,,1\n", &["\"label\" is empty"]);
+    rows_refused("a,x,,,,1\n", &["\"t_s\" is empty"]);
+    rows_refused(&format!("a,{},0,,,1\n", "x".repeat(201)), &["201 characters, the limit is 200"]);
+    rows_refused("a,\"x\ny\",0,,,1\n", &["line 2: the name \"x\\ny\" in \"label\" has a line break"]);
+    rows_refused("a\u{7},x,0,,,1\n", &["a\\u{7}", "\"trial\""]);
+    rows_refused("a,x,0,Huge,,1\n", &["line 2: \"Huge\" is not a size; allowed are tiny, large"]);
+    rows_refused("a,x,0,,flat,1\n", &["\"flat\" is not a shape; allowed are cubic, cylindrical, spherical"]);
+    rows_refused(&format!("a,\"x,{}", "y,0\n".repeat(300_000)), &["longer than 1 MiB", "quotation mark"]);
+}
+
+#[test]
+fn numbers_that_are_none() {
+    rows_refused("a,x,0,,,1\na,x,1,,,oops\n", &["line 3: \"oops\" in the column \"p\" is not a number"]);
+    rows_refused("a,x,0,,,oops\na,x,1,,,1\n", &["line 2: \"oops\"", "remove the column"]);
+    rows_refused("a,x,0,,,1\na,x,1,,,\"1,5\"\n", &["decimal commas need a semicolon"]);
+    rows_refused("a,x,0,,,-inf\n", &["line 2: \"-inf\" in the column \"p\" is infinite"]);
+    rows_refused("a,x,0,,,1e39\n", &["beyond 3.4e38"]);
+    rows_refused("a,x,nan,,,1\n", &["the time \"nan\" is not a number"]);
+    rows_refused("a,x,inf,,,1\n", &["the time \"inf\""]);
+    rows_refused("a,x,1700000000000,,,1\n", &["1700000000000 s is beyond", "not in milliseconds"]);
+}
+
+#[test]
+fn trials_that_contradict_themselves() {
+    rows_refused("a,x,1,,,1\na,x,0.5,,,1\n", &["line 3: in trial \"a\" the time falls from 1 s to 0.5 s"]);
+    rows_refused(
+        "a,x,0,,,1\nb,y,0,,,1\na,y,1,,,1\n",
+        &["line 4: the label of trial \"a\" changes from \"x\" to \"y\""],
+    );
+    rows_refused(
+        "a,x,0,tiny,,1\na,x,1,,,1\nb,x,0,large,,1\n",
+        &["line 4: the size of \"x\" is \"tiny\" in earlier rows and \"large\" here"],
+    );
+    rows_refused("a,x,0,,cubic,1\nb,x,0,,spherical,1\n", &["the shape of \"x\" is \"cubic\""]);
+    rows_refused(
+        "a,x,0,,,1\na,x,1,,,1\nb,y,0,,,\nb,y,1,,,nan\n",
+        &["line 4: the channel \"p\" has no reading in trial \"b\""],
+    );
+    rows_refused("a,x,0,,,1\na,x,1,,,1\nb,y,0,,,2\n", &["line 4: trial \"b\" has only 1 sample"]);
+    rows_refused("a,x,0,,,1\na,x,0,,,2\n", &["trial \"a\" has only 1 sample", "at different times"]);
+    rows_refused(
+        "a,x,0,,,1\na,x,1,,,1\nb,y,0,,,1\nb,y,1,,,1\nc,y,0,,,1\nc,y,0.5,,,1\n",
+        &["line 6: trial \"c\" lasts 0.5 s, less than one step at the common rate of 1 Hz"],
+    );
+}
+
+#[test]
+fn wild_times_ask_for_no_memory() {
+    rows_refused("a,x,0,,,1\na,x,0.01,,,1\na,x,1e12,,,1\n", &["line 4: the time 1000000000000 s is beyond"]);
+    rows_refused(
+        "a,x,0,,,1\na,x,0.01,,,1\na,x,0.02,,,1\na,x,1e10,,,1\n",
+        &["line 2: trial \"a\" runs from 0 s to 10000000000 s", "100 Hz", "wrong time"],
+    );
+    // Each trial within its bounds, but not all of them together.
+    let mut many = "trial,label,t_s,p,q\n".to_owned();
+    for trial in 0..150 {
+        many.push_str(&format!("{trial},x,0,1,1\n{trial},x,0.001,1,1\n{trial},x,0.002,1,1\n{trial},x,999,1,1\n"));
+    }
+    refused(&many, &["more than 200000000 readings"]);
+}
+
+#[test]
+fn more_than_is_meant() {
+    let mut long = "trial,label,t_s,p\n".to_owned();
+    (0..=MOST_SAMPLES).for_each(|k| long.push_str(&format!("a,x,{k},1\n")));
+    refused(&long, &["line 1000002: trial \"a\" has more than 1000000 samples"]);
+    let mut many = "trial,label,t_s,p\n".to_owned();
+    (0..=MOST_TRIALS).for_each(|k| many.push_str(&format!("{k},x,0,1\n")));
+    refused(&many, &["more than 1000000 trials"]);
+    // Long names of many channels, once for each of many trials.
+    let names: Vec<String> = (0..200).map(|i| format!("{i}{}", "n".repeat(197))).collect();
+    let mut heavy = format!("trial,label,t_s,{}\n", names.join(","));
+    let readings = ",1".repeat(200);
+    (0..50_000).for_each(|k| heavy.push_str(&format!("{},x,{}{readings}\n", k / 2, k % 2)));
+    refused(&heavy, &["25000 trials with 200 channels each are too many"]);
+}

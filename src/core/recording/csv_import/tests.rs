@@ -1,0 +1,186 @@
+//! Small files and what they must be read as.
+
+use super::*;
+
+fn read(text: &str) -> Import {
+    read_trials(text.as_bytes(), "grasps.csv").expect("a good file")
+}
+
+/// The only trial's readings of its only channel.
+fn values(import: &Import) -> &[f32] {
+    &import.trials[0].signals.values
+}
+
+const GOLDEN: &str = "\
+trial,label,t_s,size,shape,left [Pa],right (Pa)
+a 1,Apple,0,tiny,Spherical,1,10
+a 1,Apple,0.01,,,2,20
+b,Tin can,5,LARGE,cylindrical,3,30
+b,Tin can,5.01,,,4,40
+c,Apple,0,,,5,50
+c,Apple,0.01,,,6,60
+";
+
+#[test]
+fn a_regular_file_is_read_as_it_stands() {
+    let import = read(GOLDEN);
+    assert_eq!(import.warnings, Vec::<String>::new());
+    let said: Vec<_> = import
+        .trials
+        .iter()
+        .map(|t| (t.name.as_str(), t.label.as_str(), t.size.as_deref(), t.shape.as_deref()))
+        .collect();
+    let apple = (Some("tiny"), Some("spherical"));
+    assert_eq!(
+        said,
+        [
+            ("a 1", "Apple", apple.0, apple.1),
+            ("b", "Tin can", Some("large"), Some("cylindrical")),
+            ("c", "Apple", apple.0, apple.1)
+        ]
+    );
+    let second = &import.trials[1].signals;
+    assert_eq!(second.channels, ["left", "right"]);
+    assert_eq!(
+        (second.t_s.as_slice(), second.values.as_slice()),
+        ([5.0, 5.01].as_slice(), [3.0, 30.0, 4.0, 40.0].as_slice())
+    );
+}
+
+#[test]
+fn dialects_say_the_same() {
+    let plain = read(GOLDEN);
+    let quoted = GOLDEN.replace("Tin can", "\"Tin can\"").replace("0.01", "\" 0.01 \"");
+    let spreadsheet = GOLDEN.replace(',', ";").replace('.', ",").replace('\n', "\r\n");
+    let filled_up = GOLDEN.replace('\n', ",,\n").replacen("(Pa),,", "(Pa)", 1).replace("\nb", "\n,,,,,,\n\n  \nb");
+    let shouting = GOLDEN.replacen("trial,label,t_s", " TRIAL , Label,T_S [s]", 1);
+    for text in [
+        format!("\u{feff}{GOLDEN}"),
+        format!("\n\r\n{}", GOLDEN.trim_end()),
+        GOLDEN.replace('\n', "\r"),
+        GOLDEN.replace(',', "\t"),
+        quoted,
+        spreadsheet,
+        filled_up,
+        shouting,
+    ] {
+        assert_eq!(read(&text), plain, "{text}");
+    }
+}
+
+#[test]
+fn rows_of_different_trials_may_alternate() {
+    let import = read("p,t_s,label,trial\n1,0,x,a\n5,0,y,b\n2,1,x,a\n6,1,y,b\n3,2,x,a\n7,2,y,b\n");
+    assert_eq!(values(&import), [1.0, 2.0, 3.0]);
+    assert_eq!(import.trials[1].signals.values, [5.0, 6.0, 7.0]);
+}
+
+#[test]
+fn a_regular_file_comes_through_exactly() {
+    let mut text = "trial,label,t_s,a,b\n".to_owned();
+    let mut written = Vec::new();
+    for trial in 0..6_u32 {
+        for k in 0..80_u32 {
+            let t = f64::from(k) / 75.0;
+            let row = [(t * 7.3).sin() as f32 * 1e-5, 101_325.0 + t.cos() as f32 * (1 + trial) as f32];
+            text.push_str(&format!("{trial},{},{t},{},{}\n", trial % 2, row[0], row[1]));
+            written.push((t, row));
+        }
+    }
+    let import = read(&text);
+    assert_eq!(import.warnings, Vec::<String>::new());
+    let samples = import.trials.iter().flat_map(|t| (0..t.signals.len()).map(|k| (t.signals.t_s[k], t.signals.row(k))));
+    assert!(samples.zip(&written).all(|((t, row), (wt, wrow))| t.to_bits() == wt.to_bits() && row == wrow));
+    assert_eq!(import.trials.iter().map(|t| t.signals.len()).sum::<usize>(), written.len());
+}
+
+#[test]
+fn columns_without_numbers_are_left_out() {
+    let import =
+        read(",trial,label,t_s,phase,p,notes\n0,a,x,0,pre,1,\n1,a,x,1,\"con\ntact\",2,\n2,b,y,0,,3,\n3,b,y,1,,4,nan\n");
+    assert_eq!(import.trials[0].signals.channels, ["p"]);
+    assert_eq!(values(&import), [1.0, 2.0]);
+    for what in ["column 1 has no name", "\"phase\" holds no number", "\"notes\" holds no number", "only 2 trials"] {
+        assert!(import.warnings.iter().any(|w| w.contains(what)), "{what}: {:?}", import.warnings);
+    }
+    assert_eq!(import.warnings.len(), 4);
+}
+
+#[test]
+fn gaps_and_repeated_times_are_mended_and_told() {
+    let import = read("trial,label,t_s,p\na,x,0,\na,x,1,10\na,x,2,nan\na,x,3,30\na,x,3,40\n");
+    assert_eq!(values(&import), [10.0, 10.0, 25.0, 40.0]);
+    assert_eq!(
+        import.warnings,
+        [
+            "trial \"a\": at 1 repeated time the last row was kept",
+            "trial \"a\": 2 missing readings were interpolated in \"p\"",
+            "only one label: there is nothing to tell apart, and training will refuse",
+            "only 1 trial: too few to learn from one and be tested on another"
+        ]
+    );
+}
+
+#[test]
+fn other_rates_come_to_the_common_one() {
+    let mut text = "trial,label,t_s,p\n".to_owned();
+    for (trial, hz, count) in [("a", 100, 11), ("b", 100, 21), ("c", 50, 6), ("d", 200, 21)] {
+        for k in 0..count {
+            let t = f64::from(k) / f64::from(hz);
+            text.push_str(&format!("{trial},{},{t},{}\n", trial == "a", 3.0 * t));
+        }
+    }
+    let import = read(&text);
+    assert_eq!(
+        import.warnings,
+        [
+            "2 of 4 trials were resampled to 100 Hz: the times are uneven or at another rate (50 to 200 Hz)",
+            "the trials differ in length: 11 to 21 samples (0.1 to 0.2 s)"
+        ]
+    );
+    for trial in &import.trials {
+        assert_eq!(trial.signals.len(), if trial.name == "b" { 21 } else { 11 });
+        for (k, t) in trial.signals.t_s.iter().enumerate() {
+            assert!((t - 0.01 * k as f64).abs() < 1e-12);
+            assert!((f64::from(trial.signals.values[k]) - 3.0 * t).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn doubtful_rates_are_told() {
+    let fast = read("trial,label,t_s,p\na,x,0,1\na,x,0.0005,2\na,x,0.001,3\nb,y,0,1\nb,y,0.0002,2\nb,y,0.0011,3\n");
+    assert!(fast.warnings[0].contains("2 of 2 trials were resampled to 1000 Hz"), "{:?}", fast.warnings);
+    assert_eq!(
+        (fast.trials[0].signals.t_s.as_slice(), values(&fast)),
+        ([0.0, 0.001].as_slice(), [1.0, 3.0].as_slice())
+    );
+    let slow = read("trial,label,t_s,p\na,x,0,1\na,x,13.3,2\nb,y,0,1\nb,y,13.3,2\n");
+    assert_eq!(slow.warnings[0], "the trials have only 0.0752 samples per second; is t_s really in seconds?");
+}
+
+#[test]
+fn many_warnings_of_one_kind_are_counted() {
+    let mut text = "trial,label,t_s,p\n".to_owned();
+    for trial in 0..150 {
+        text.push_str(&format!("{trial},{},0,1\n{trial},{0},1,\n", trial % 2));
+    }
+    let import = read_trials(text.replace("149,0", "149,1").as_bytes(), "many").expect("a good file");
+    assert_eq!(import.warnings.len(), 101);
+    assert_eq!(import.warnings[100], "and 50 more channels of trials with missing readings");
+}
+
+#[test]
+fn a_file_is_named_in_its_errors() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("grasps.csv");
+    let missing = read_trials_csv(&path).expect_err("not there").to_string();
+    assert!(missing.starts_with("cannot import \"grasps.csv\": No such file"), "{missing}");
+    std::fs::write(&path, GOLDEN).expect("writes");
+    assert_eq!(read_trials_csv(&path).expect("a good file"), read(GOLDEN));
+    let is_folder = read_trials_csv(folder.path()).expect_err("a folder").to_string();
+    assert!(is_folder.contains("directory"), "{is_folder}");
+    std::fs::File::create(&path).and_then(|file| file.set_len(LARGEST_FILE + 1)).expect("a hollow file");
+    let large = read_trials_csv(&path).expect_err("too large").to_string();
+    assert!(large.contains("larger than 2 GiB"), "{large}");
+}

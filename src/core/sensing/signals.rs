@@ -1,0 +1,46 @@
+//! What sensors report over a whole trial: named channels over time, the form in which recognisers and files know a
+//! grasp, whatever rig it came from.
+
+/// Readings of several channels at the same instants.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Signals {
+    /// Names of the channels, as in `curvature_left`.
+    pub channels: Vec<String>,
+    /// Times of the samples, rising (s).
+    pub t_s: Vec<f64>,
+    /// One row of channel values per sample, in the channels' units; never NaN.
+    pub values: Vec<f32>,
+}
+
+impl Signals {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// True when nothing was sampled.
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// Values of one sample, one per channel.
+    pub fn row(&self, sample: usize) -> &[f32] {
+        let width = self.channels.len();
+        &self.values[sample * width..(sample + 1) * width]
+    }
+
+    /// The first part of them, up to a time (s).
+    pub fn until(mut self, t: f64) -> Self {
+        let count = self.t_s.partition_point(|own| *own <= t);
+        self.t_s.truncate(count);
+        self.values.truncate(count * self.channels.len());
+        self
+    }
+
+    /// Adds a sample.
+    pub fn push(&mut self, t: f64, row: &[f32]) {
+        debug_assert_eq!(row.len(), self.channels.len());
+        self.t_s.push(t);
+        self.values.extend_from_slice(row);
+    }
+}
