@@ -3,7 +3,9 @@
 use super::Failure;
 use super::terminal::{say, say_json, table};
 use palpate_core::scene::Accuracy;
-use palpate_core::study::{CostRow, bench_scenes, physics_cost};
+use palpate_core::study::{
+    CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost,
+};
 
 /// Arguments of `palpate bench`.
 #[derive(Debug, clap::Args)]
@@ -26,19 +28,72 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// CPU time of a training step of the macro-layer, ours and candle's, on one thread; tests/peers/lstm_step.py times
+    /// PyTorch on the same sizes.
+    Training {
+        /// Steps per row; the median counts.
+        #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..=1000))]
+        runs: u16,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
+    /// CPU time of one live step of the macro-layer: a sample in, probabilities out.
+    Live {
+        /// Sequences per row; the median counts.
+        #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u16).range(1..=1000))]
+        runs: u16,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
+/// Channels of C1, and of a layout with a pressure sensor on every joint.
+const FEW_AND_MANY: [usize; 2] = [4, 22];
+
 pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
-    let What::Physics { runs, reference, json } = &arguments.what;
+    match &arguments.what {
+        What::Physics { runs, reference, json } => physics(*runs, *reference, *json),
+        What::Training { runs, json } => {
+            let mut rows = Vec::new();
+            for sizes in FEW_AND_MANY.map(StepSizes::usual) {
+                rows.push(kernel_step_cost(sizes, usize::from(*runs)));
+                rows.push(candle_step_cost(sizes, usize::from(*runs))?);
+            }
+            networks(&rows, *json)?;
+            if *json { Ok(()) } else { say("CPU time of one thread; PyTorch: python tests/peers/lstm_step.py") }
+        }
+        What::Live { runs, json } => {
+            networks(&FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs))), *json)
+        }
+    }
+}
+
+fn networks(rows: &[NetworkCost], json: bool) -> Result<(), Failure> {
+    if json {
+        return say_json(&rows);
+    }
+    let cells: Vec<Vec<String>> = rows
+        .iter()
+        .map(|row| {
+            let times = [row.cpu_ms_median, row.cpu_ms_least].map(|ms| format!("{ms:.4}"));
+            [vec![row.what.to_owned(), row.sizes.channels.to_string()], times.to_vec()].concat()
+        })
+        .collect();
+    table(&["what", "channels", "CPU ms", "least"], &cells)
+}
+
+fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
     let mut rows: Vec<CostRow> = Vec::new();
     for scene in &bench_scenes()? {
         for accuracy in Accuracy::ALL {
-            if accuracy != Accuracy::Reference || *reference {
-                rows.push(physics_cost(scene, accuracy, usize::from(*runs)));
+            if accuracy != Accuracy::Reference || reference {
+                rows.push(physics_cost(scene, accuracy, usize::from(runs)));
             }
         }
     }
-    if *json {
+    if json {
         return say_json(&rows);
     }
     let cells: Vec<Vec<String>> = rows

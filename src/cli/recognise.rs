@@ -3,7 +3,7 @@
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
-use palpate_core::recognition::{Belief, Model, Pmf, Source, View, shipped_model};
+use palpate_core::recognition::{Belief, Labels, Model, Pmf, Source, Verdict, View, shipped_model};
 use palpate_core::recording::TrialId;
 use palpate_core::sensing::model::SensorModel;
 use serde::Serialize;
@@ -46,6 +46,16 @@ pub(super) struct StageOne {
     pub(super) size_probability: f64,
     pub(super) shape: String,
     pub(super) shape_probability: f64,
+}
+
+impl StageOne {
+    /// The most likely size and shape; none where the model has no stage one.
+    pub(super) fn of(verdict: &Verdict, labels: &Labels) -> Option<Self> {
+        let properties = verdict.properties.as_ref()?;
+        let ((size, size_probability), (shape, shape_probability)) = (properties.size.top(), properties.shape.top());
+        let (size, shape) = (labels.sizes.get(size)?.clone(), labels.shapes.get(shape)?.clone());
+        Some(Self { size, size_probability, shape, shape_probability })
+    }
 }
 
 /// What `--json` prints.
@@ -102,15 +112,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         );
         belief.add(with, alone.pmf.clone());
         let (class, probability) = alone.pmf.top();
-        let stage_one = alone.properties.as_ref().map(|properties| {
-            let ((size, size_probability), (shape, shape_probability)) = (properties.size.top(), properties.shape.top());
-            StageOne {
-                size: labels.sizes[size].clone(),
-                size_probability,
-                shape: labels.shapes[shape].clone(),
-                shape_probability,
-            }
-        });
+        let stage_one = StageOne::of(&alone, labels);
         said.push(Said {
             trial: *id,
             truth: data.labels.classes[0].name.clone(),

@@ -8,8 +8,8 @@ use super::poses::PoseSampler;
 use super::run::grasp;
 use crate::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use crate::recording::{Store, StoreError};
-use crate::scene::Scene;
-use crate::trial::Trial;
+use crate::scene::{Between, Scene};
+use crate::trial::{Frame, Trial};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -90,8 +90,13 @@ pub enum CollectionError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Task {
     object: usize,
+    /// Which of the object's trials, from 0.
+    number: u64,
     seed: u64,
 }
+
+/// Where objects stay as they were released, so many grasps follow each other before the object is put down anew.
+const SUCCESSION: u64 = 5;
 
 /// The sixteen and the empty hand.
 pub fn all_objects() -> Vec<String> {
@@ -108,7 +113,7 @@ impl CollectionPlan {
 
     fn tasks(&self) -> Vec<Task> {
         let all = self.objects.iter().enumerate().flat_map(|(object, name)| {
-            (0..u64::from(self.trials)).map(move |number| Task { object, seed: self.seed_of(name, number) })
+            (0..u64::from(self.trials)).map(move |number| Task { object, number, seed: self.seed_of(name, number) })
         });
         let ours = |(k, _): &(usize, Task)| k % self.shard.of as usize + 1 == self.shard.number as usize;
         all.enumerate().filter(ours).map(|(_, task)| task).collect()
@@ -282,8 +287,21 @@ impl<'a> Bench<'a> {
         let slot = &self.objects[task.object];
         let loaded = slot.get_or_init(|| self.load(task.object).map_err(|error| error.to_string()));
         let on_bench = loaded.as_ref().map_err(Clone::clone)?;
-        let (scene, redrawn) = on_bench.sampler.draw(on_bench.model.as_ref(), task.seed);
-        let mut trial = grasp(&scene, on_bench.model.as_ref(), task.seed);
+        let model = on_bench.model.as_ref();
+        // What a trial finds depends on those before it in its succession. They are grasped again rather than looked
+        // up, so that every trial can be made by itself, in any order.
+        let first = match self.plan.scene.pose.between {
+            Between::Reposed => task.number,
+            Between::AsReleased => task.number - task.number % SUCCESSION,
+        };
+        let mut released: Option<Frame> = None;
+        for number in first..task.number {
+            let seed = self.plan.seed_of(&self.plan.objects[task.object], number);
+            let (scene, _) = on_bench.sampler.draw_after(model, seed, released.as_ref());
+            released = grasp(&scene, model, seed).frames.pop();
+        }
+        let (scene, redrawn) = on_bench.sampler.draw_after(model, task.seed, released.as_ref());
+        let mut trial = grasp(&scene, model, task.seed);
         trial.info.collection = Some(self.collection.to_owned());
         Ok((trial, redrawn))
     }
@@ -349,6 +367,26 @@ mod tests {
         let mut all = contents(&resumed);
         all.sort();
         assert!(all == sorted, "resumed");
+    }
+
+    #[test]
+    fn successions_of_released_objects_do_not_depend_on_threads_either() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut plan = CollectionPlan { trials: 7, objects: vec!["smallcube".to_owned()], ..plan() };
+        plan.scene.timing.duration_s = 4.0;
+        plan.scene.pose.between = Between::AsReleased;
+        let run = |name: &str, trials: u32, threads: usize| {
+            let mut store = store(&folder, name);
+            collect(&CollectionPlan { trials, ..plan.clone() }, &mut store, threads, &mut |_| ()).expect("collects");
+            store
+        };
+        let whole = contents(&run("one", 7, 1));
+        assert!(contents(&run("two", 7, 2)) == whole);
+        run("resumed", 3, 2);
+        assert!(contents(&run("resumed", 7, 2)) == whole);
+        let shift = |k: usize| Scene::from_toml(&whole[k].3).expect("a scene").object.shift;
+        assert_eq!((shift(0), shift(5)), ([0.0; 2], [0.0; 2]), "put down anew after five");
+        assert!((1..5).any(|k| shift(k) != [0.0; 2]), "left where the fingers pushed it");
     }
 
     #[test]

@@ -30,6 +30,7 @@ pub enum IdentifyError {
 /// A model at work on successive grasps of one object.
 pub struct Identification {
     model: Arc<Model>,
+    labels: Arc<Labels>,
     rule: StopRule,
     sensors: Option<Sensors>,
     live: Option<Box<dyn LiveRecogniser>>,
@@ -82,6 +83,7 @@ impl Identification {
     pub fn new(model: Arc<Model>, rule: StopRule) -> Self {
         let live = model.recogniser.live();
         Self {
+            labels: Arc::new(model.card.labels.clone()),
             model,
             rule,
             sensors: None,
@@ -107,9 +109,12 @@ impl Identification {
         self.closed = true;
     }
 
-    /// When to stop from now on.
+    /// When to stop from now on. A decision stands; between two grasps it may turn out that no other is needed.
     pub fn set_rule(&mut self, rule: StopRule) {
         self.rule = rule;
+        if self.closed && self.decision.is_none() {
+            self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
+        }
     }
 
     /// Another grasp of the same object begins.
@@ -186,7 +191,7 @@ impl Identification {
     /// Everything that can be shown.
     pub fn view(&self) -> IdentificationView {
         IdentificationView {
-            labels: Arc::new(self.model.card.labels.clone()),
+            labels: Arc::clone(&self.labels),
             rule: self.rule,
             verdict: self.verdict.clone(),
             listening: !self.closed,

@@ -4,8 +4,9 @@
 use super::run::prepare;
 use crate::objects::ObjectModel;
 use crate::physics::{natural_rotations, random_rotation};
-use crate::scene::{Faces, Scene};
-use glam::{DQuat, EulerRot};
+use crate::scene::{Between, Faces, ObjectSetup, Scene, SupportKind};
+use crate::trial::Frame;
+use glam::{DQuat, DVec2, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -47,6 +48,39 @@ impl PoseSampler {
         (drawn, MOST_DRAWS)
     }
 
+    /// The scene of a grasp that follows another of the same object, which the fingers have left as it is in
+    /// `released`. It stays there where the scene says so and it still lies on its support; in all other cases this is
+    /// [`PoseSampler::draw`].
+    pub fn draw_after(&self, object: Option<&ObjectModel>, seed: u64, released: Option<&Frame>) -> (Scene, u32) {
+        let left = released.and_then(|frame| self.left_behind(object?, frame));
+        let Some(object_setup) = left else { return self.draw(object, seed) };
+        let lying = Self { scene: Scene { object: object_setup, ..self.scene.clone() }, natural: Vec::new() };
+        lying.draw(object, seed)
+    }
+
+    /// The object's setup in the pose in which it was left; `None` where it is to be put down anew.
+    fn left_behind(&self, object: &ObjectModel, frame: &Frame) -> Option<ObjectSetup> {
+        let pose = frame.world_from_object?;
+        if self.scene.pose.between != Between::AsReleased || self.scene.object.fixed {
+            return None;
+        }
+        let centre = pose.point(object.mass.centre);
+        let support = &self.scene.support;
+        let (top, reach) = match support.kind {
+            SupportKind::Pedestal => (support.height, support.radius),
+            SupportKind::Table => (0.0, f64::INFINITY),
+            SupportKind::None => return None,
+        };
+        let offset = centre.truncate() - DVec2::from_array(self.scene.object.shift);
+        if centre.z < top || offset.length() > reach || !centre.is_finite() {
+            return None;
+        }
+        let mut scene = self.scene.clone();
+        lay(&mut scene, pose.rotation);
+        scene.object.shift = centre.truncate().to_array();
+        scene.check().is_ok().then_some(scene.object)
+    }
+
     fn draw_once(&self, drawn: &mut Scene, random: &mut ChaCha8Rng) {
         let (nominal, spread) = (&self.scene.gripper.mount, &self.scene.pose);
         let mut within = |most: f64| most * (2.0 * random.random::<f64>() - 1.0);
@@ -61,8 +95,8 @@ impl PoseSampler {
             Faces::Natural | Faces::Any if !self.natural.is_empty() => {
                 lay(drawn, self.natural[random.random_range(0..self.natural.len())]);
             }
-            Faces::Any => lay(drawn, random_rotation(random)),
-            Faces::Nominal | Faces::Natural => {}
+            Faces::Any if self.scene.object.fixed => lay(drawn, random_rotation(random)),
+            Faces::Any | Faces::Nominal | Faces::Natural => {}
         }
     }
 }
@@ -125,6 +159,27 @@ mod tests {
         for seed in 0..20 {
             assert!(jittered(&scene, None, seed).0.check().is_ok());
         }
+    }
+
+    #[test]
+    fn an_object_stays_as_it_was_left_unless_it_fell() {
+        let mut scene = Scene::default();
+        scene.pose.between = Between::AsReleased;
+        let sampler = PoseSampler::new(&scene, Some(&brick()));
+        let (first, _) = sampler.draw(Some(&brick()), 3);
+        let trial = crate::grasping::grasp(&first, Some(&brick()), 3);
+        let mut released = trial.frames.last().expect("has frames").clone();
+        let (next, _) = sampler.draw_after(Some(&brick()), 4, Some(&released));
+        let placed = crate::physics::Placement::new(&next, Some(&brick())).world_from_object.expect("an object");
+        let left = released.world_from_object.expect("an object");
+        assert!((placed.position - left.position).length() < 3e-4, "{placed:?} instead of {left:?}");
+        assert!(placed.rotation.dot(left.rotation).abs() > 0.999_999);
+        assert_ne!(next.gripper.mount, first.gripper.mount, "the gripper comes from elsewhere");
+
+        let again = sampler.draw(Some(&brick()), 4);
+        released.world_from_object = Some(crate::geometry::Pose { position: DVec3::Z * 0.005, ..left });
+        assert_eq!(sampler.draw_after(Some(&brick()), 4, Some(&released)), again, "it fell off its pedestal");
+        assert_eq!(sampler.draw_after(Some(&brick()), 4, None), again);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::data::{Class, DataCard, Dataset, Example, Labels, Sequence};
 use crate::gripper::Phase;
 use crate::objects::{EMPTY, catalogue};
 use crate::recording::{Store, StoreError, TrialId, TrialRow};
-use crate::scene::{PRESETS, Scene};
+use crate::scene::{Between, PRESETS, PoseSpread, Scene};
 use crate::sensing::model::SensorModel;
 use crate::sensing::{LayoutError, PressureArea, SensorLayout, Sensors, Signals};
 use crate::trial::Trial;
@@ -269,7 +269,8 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     let trial = store.load(row.id).map_err(|cause| DatasetError::Store { cause })?;
     let scene = Scene::from_toml(&trial.info.scene)
         .map_err(|error| DatasetError::Scene { id: row.id, cause: error.to_string() })?;
-    let preset = PRESETS.iter().find(|preset| preset.poses() == scene.pose).map(|preset| preset.name);
+    let drawn_as = PoseSpread { between: Between::default(), ..scene.pose.clone() };
+    let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
     let signals = view.signals(&trial, &scene).map_err(|cause| DatasetError::Layout { cause })?;
     Ok((signals, Origin::Simulated { preset, fixed: scene.object.fixed }))
 }

@@ -11,7 +11,7 @@ mod timing;
 
 pub use auto::Auto;
 pub use file::SceneError;
-pub use poses::{Faces, PRESETS, PosePreset, PoseSpread};
+pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
 pub use timing::{Clock, Timing};
 
 use crate::gripper::{Gripper, Programme};

@@ -13,13 +13,26 @@ pub struct PoseSpread {
     pub yaw_deg: f64,
     /// On which of its faces the object lies.
     pub faces: Faces,
+    /// Where the object lies in the next of several grasps.
+    pub between: Between,
 }
 
 impl Default for PoseSpread {
     /// Preset M.
     fn default() -> Self {
-        Self { shift: [0.005; 3], yaw_deg: 25.0, faces: Faces::Nominal }
+        Self { shift: [0.005; 3], yaw_deg: 25.0, faces: Faces::Nominal, between: Between::Reposed }
     }
+}
+
+/// What happens to the object between two grasps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Between {
+    /// It is put down anew.
+    #[default]
+    Reposed,
+    /// It stays as the fingers have left it; one that has fallen off its support is put down anew.
+    AsReleased,
 }
 
 /// On which of its faces an object lies.

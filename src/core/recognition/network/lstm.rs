@@ -97,6 +97,11 @@ impl LstmWorkspace {
         }
     }
 
+    #[cfg(test)]
+    pub(super) fn subnormal_gradients(&self) -> usize {
+        self.gates.iter().chain(&self.dh).chain(&self.dc).filter(|x| x.is_subnormal()).count()
+    }
+
     /// Hidden states after a step, [batch][units].
     pub(super) fn hidden(&self, step: usize) -> &[f32] {
         let state = self.batch * self.units;

@@ -158,6 +158,12 @@ impl Pass {
     pub fn scores(&self) -> &[f32] {
         &self.scores
     }
+
+    /// Numbers of the last backward pass that are so small that processors are slow on them.
+    #[cfg(test)]
+    pub(super) fn subnormal_gradients(&self) -> usize {
+        self.lstm.subnormal_gradients()
+    }
 }
 
 impl MacroLayer {

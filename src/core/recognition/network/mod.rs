@@ -4,6 +4,8 @@
 mod committee;
 mod gates;
 mod gemm;
+#[cfg(test)]
+mod gradients;
 mod lessons;
 mod lstm;
 mod macro_layer;
@@ -17,4 +19,4 @@ pub use macro_layer::{Batch, Block, LiveMacroLayer, MacroLayer, MacroShape, Pass
 pub use preparation::{Binner, Preparation, Scale, mirror};
 pub use recipe::Recipe;
 pub use tactile::TactileNetwork;
-pub use training::{Lesson, Lessons, Training, train};
+pub use training::{AdamW, Lesson, Lessons, Training, train};

@@ -148,10 +148,15 @@ fn shorten(gradient: &mut [f32], longest: f64) {
 
 /// Adam with weight decay apart from the gradient (Loshchilov and Hutter 2019), in PyTorch's form.
 #[derive(Clone, Debug)]
-struct AdamW {
+pub struct AdamW {
     mean: Vec<f32>,
     square: Vec<f32>,
     steps: i32,
+}
+
+/// Means that fade away are dropped before they become subnormal, on which processors are slow.
+fn audible(x: f32) -> f32 {
+    if x.abs() < f32::MIN_POSITIVE { 0.0 } else { x }
 }
 
 impl AdamW {
@@ -159,18 +164,20 @@ impl AdamW {
     const SQUARE_MEMORY: f32 = 0.999;
     const EPSILON: f32 = 1e-8;
 
-    fn new(parameters: usize) -> Self {
+    /// For so many parameters.
+    pub fn new(parameters: usize) -> Self {
         Self { mean: vec![0.0; parameters], square: vec![0.0; parameters], steps: 0 }
     }
 
-    fn step(&mut self, values: &mut [f32], gradient: &[f32], rate: f64, decay: f64) {
+    /// Moves values against a gradient.
+    pub fn step(&mut self, values: &mut [f32], gradient: &[f32], rate: f64, decay: f64) {
         self.steps += 1;
         let unbias = 1.0 / (1.0 - Self::MEMORY.powi(self.steps));
         let unbias_square = 1.0 / (1.0 - Self::SQUARE_MEMORY.powi(self.steps));
         let (rate, keep) = (rate as f32, 1.0 - (rate * decay) as f32);
         for (((value, g), mean), square) in values.iter_mut().zip(gradient).zip(&mut self.mean).zip(&mut self.square) {
-            *mean = Self::MEMORY * *mean + (1.0 - Self::MEMORY) * g;
-            *square = Self::SQUARE_MEMORY * *square + (1.0 - Self::SQUARE_MEMORY) * g * g;
+            *mean = audible(Self::MEMORY * *mean + (1.0 - Self::MEMORY) * g);
+            *square = audible(Self::SQUARE_MEMORY * *square + (1.0 - Self::SQUARE_MEMORY) * g * g);
             *value = keep * *value - rate * *mean * unbias / ((*square * unbias_square).sqrt() + Self::EPSILON);
         }
     }
