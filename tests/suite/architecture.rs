@@ -28,6 +28,7 @@ const SEEN_BY_RENDER: [&str; 3] = ["geometry", "palette", "drawing"];
 const TEST_FILES: &[&str] = &[
     "physics/closed_form.rs",
     "workers/sim_tests.rs",
+    "recognition/conformance.rs",
     "recognition/network/gradients.rs",
     "recognition/forest/peers.rs",
     "sensing/model/tests.rs",

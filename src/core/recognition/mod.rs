@@ -7,6 +7,8 @@
 //! Adding a recogniser is writing its file and one line in [`METHODS`].
 
 mod belief;
+#[cfg(test)]
+mod conformance;
 mod data;
 pub mod evaluation;
 mod features;
