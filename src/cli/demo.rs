@@ -39,7 +39,7 @@ pub(super) struct DemoArguments {
     /// Most grasps.
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     grasps: u32,
-    /// Probability from which on it is sure.
+    /// Probability from which on it is sure; 1 grasps on to the limit.
     #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = parse_threshold)]
     threshold: f64,
     /// A saved model; the one that comes with Palpate where it is left out.
@@ -63,8 +63,8 @@ pub(super) struct DemoArguments {
 }
 
 fn parse_threshold(text: &str) -> Result<f64, String> {
-    let parsed = text.parse().ok().filter(|p: &f64| (0.0..1.0).contains(p));
-    parsed.ok_or_else(|| "write a probability below one, as in 0.9".to_owned())
+    let parsed = text.parse().ok().filter(|p: &f64| (0.0..=1.0).contains(p));
+    parsed.ok_or_else(|| "write a probability from 0 to 1, as in 0.9".to_owned())
 }
 
 #[derive(Serialize)]

@@ -129,7 +129,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
-        Some(Command::Workshop(workshop)) => workshop::run(workshop)?,
+        Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,
         None => window(arguments.object.as_deref(), store)?,
     }
     Ok(ExitCode::SUCCESS)

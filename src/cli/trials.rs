@@ -5,10 +5,11 @@ use super::setup::open_store;
 use super::terminal::{file_name_of, say, say_json, table, warn};
 use palpate_core::grasping::GraspSummary;
 use palpate_core::recording::{
-    Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_contacts_csv, write_trial_csv,
+    Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_contacts_csv, write_signals_csv,
+    write_trial_csv,
 };
 use palpate_core::scene::Scene;
-use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
+use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};
 use palpate_core::trial::Trial;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -191,7 +192,42 @@ fn scene_of(trial: &Trial) -> Result<Scene, Failure> {
     Ok(Scene::from_toml(&trial.info.scene)?)
 }
 
+/// What `trials show --json` prints of a trial that was recorded elsewhere.
+#[derive(Serialize)]
+struct ShownImport {
+    id: TrialId,
+    rig: String,
+    object: String,
+    collection: Option<String>,
+    samples: usize,
+    duration_s: f64,
+    channels: Vec<String>,
+}
+
+fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Result<(), Failure> {
+    let info = store.load(id)?.info;
+    let shown = ShownImport {
+        id,
+        rig: info.rig,
+        object: info.object,
+        collection: info.collection,
+        samples: signals.len(),
+        duration_s: signals.t_s.last().copied().unwrap_or(0.0) - signals.t_s.first().copied().unwrap_or(0.0),
+        channels: signals.channels,
+    };
+    if json {
+        return say_json(&shown);
+    }
+    let from = shown.collection.as_deref().unwrap_or("nowhere");
+    say(format!("trial {id}: {} (imported, collection {from})", shown.object))?;
+    say(format!("{} samples over {:.2} s", shown.samples, shown.duration_s))?;
+    say(format!("channels {}", shown.channels.join(", ")))
+}
+
 fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
+    if let Some(signals) = store.readings(id)? {
+        return show_import(store, id, signals, json);
+    }
     let trial = store.load(id)?;
     let summary = GraspSummary::new(&trial, &scene_of(&trial)?);
     let shown = Shown {
@@ -239,13 +275,18 @@ fn export(
     }
     for id in ids {
         let trial = store.load(*id)?;
-        let scene = scene_of(&trial)?;
-        let sensors = Sensors::new(layout, &scene.gripper, area)?;
         let path = if as_file {
             out.to_owned()
         } else {
             out.join(format!("trial_{id}_{}.csv", file_name_of(&trial.info.object)))
         };
+        if let Some(signals) = store.readings(*id)? {
+            write_signals_csv(&path, &signals)?;
+            say(path.display())?;
+            continue;
+        }
+        let scene = scene_of(&trial)?;
+        let sensors = Sensors::new(layout, &scene.gripper, area)?;
         write_trial_csv(&path, &trial, &scene, &sensors)?;
         write_contacts_csv(&contacts_path(&path), &trial, &scene)?;
         say(path.display())?;

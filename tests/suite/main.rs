@@ -6,6 +6,7 @@
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
+//! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
 //!
@@ -21,6 +22,7 @@ mod cpu_renderer;
 mod determinism;
 mod files;
 mod golden;
+mod learning;
 mod panels;
 mod physics;
 mod pictures;

@@ -35,3 +35,22 @@ pub(crate) fn ran(output: &Output) -> Ran {
         err: String::from_utf8_lossy(&output.stderr).into_owned(),
     }
 }
+
+/// Runs something that must succeed and print JSON.
+pub(crate) fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let ran = run(folder, arguments);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    serde_json::from_str(&ran.out).unwrap()
+}
+
+/// Runs something that must fail with exit code 1, one `error:` line that holds `wanted`, and no panic.
+pub(crate) fn refused(folder: &Path, arguments: &[&str], wanted: &[&str]) {
+    let ran = run(folder, arguments);
+    assert_eq!(ran.code, Some(1), "{arguments:?}: {ran:?}");
+    assert!(ran.out.is_empty(), "{arguments:?}: {ran:?}");
+    assert!(!ran.err.contains("panicked"), "{arguments:?}: {ran:?}");
+    let error = ran.err.lines().find(|line| line.starts_with("error: ")).unwrap_or_default();
+    for part in wanted {
+        assert!(ran.err.contains(part) && !error.is_empty(), "{arguments:?} does not say \"{part}\": {ran:?}");
+    }
+}

@@ -4,16 +4,18 @@
 //!
 //! Objects lie as they are put down: z up, their long side along y, so that the fingers close across it along x.
 
+mod live_model;
 mod sixteen;
 mod thumbnails;
 mod tools;
 
 use super::Failure;
+use super::setup::open_store;
 use super::terminal::say;
 use palpate_core::geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
 use palpate_core::objects::{ShapeClass, SizeClass};
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tools::Parts;
 
 /// How the physics sees an object.
@@ -49,9 +51,15 @@ pub(super) struct WorkshopArguments {
     /// Draw the thumbnails of the objects that this program was built with, instead of the objects.
     #[arg(long)]
     thumbnails: bool,
+    /// Make the model that comes with the program, from grasps collected into the store, instead of the objects.
+    #[arg(long, conflicts_with = "thumbnails")]
+    model: bool,
 }
 
-pub(super) fn run(arguments: &WorkshopArguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &WorkshopArguments, store: Option<&Path>) -> Result<(), Failure> {
+    if arguments.model {
+        return live_model::make(&arguments.out, &mut open_store(store)?);
+    }
     if arguments.thumbnails {
         let count = thumbnails::draw_all(&arguments.out)?;
         return say(format!("{count} thumbnails in {}", arguments.out.display()));

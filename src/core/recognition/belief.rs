@@ -76,7 +76,7 @@ impl Rejection {
 /// When to stop grasping.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
-    /// Probability from which on the most likely class is taken as certain.
+    /// Probability from which on the most likely class is taken as certain; at one nothing ever is.
     pub threshold: f64,
     /// Most grasps.
     pub most_grasps: usize,
@@ -115,16 +115,16 @@ impl StopReason {
 impl StopRule {
     /// Whether to stop with a belief, and why; `None` to go on.
     pub fn judge(&self, belief: &Belief, rejection: Option<&Rejection>) -> Option<StopReason> {
-        let top = belief.now()?.top().1;
+        let sure = belief.now()?.top().1 >= self.threshold && self.threshold < 1.0;
         let unknown = rejection.is_some_and(|rejection| rejection.rejects(belief));
         if belief.grasps() >= self.most_grasps {
-            return Some(match (unknown, top >= self.threshold) {
+            return Some(match (unknown, sure) {
                 (true, _) => StopReason::Unknown,
                 (false, true) => StopReason::Sure,
                 (false, false) => StopReason::GraspLimit,
             });
         }
-        (top >= self.threshold && !unknown).then_some(StopReason::Sure)
+        (sure && !unknown).then_some(StopReason::Sure)
     }
 }
 

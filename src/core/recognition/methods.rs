@@ -97,19 +97,17 @@ impl Method {
 }
 
 /// All methods, the paper's own first.
-pub const METHODS: [Method; 20] = [
+pub const METHODS: [Method; 19] = [
     network!("ds-lstm", "DS-LSTM", "The paper's dual-stage LSTM: size and shape first, on one half of the data, then \
         the class, on the other half", Recipe::dual_stage()),
     network!("ids-lstm", "iDS-LSTM", "The paper's iterated DS-LSTM: the PMF of earlier grasps is fed back",
         Recipe::iterated()),
     network!("ds-lstm-cross", "DS-LSTM, cross-fitted", "The dual-stage LSTM with both stages on all data: stage two \
-        learns from what committees say of grasps they have not seen", Recipe::dual_stage().cross_fitted()),
+        learns from what first stages say of grasps they have not seen", Recipe::dual_stage().cross_fitted()),
     network!("ids-lstm-cross", "iDS-LSTM, cross-fitted", "The iterated DS-LSTM on all data, by cross-fitting; the live \
         model is of this kind", Recipe::iterated().cross_fitted()),
     network!("macro-layer", "Macro-layer", "The paper's recurrent macro-layer by itself: LSTM, fully connected, \
         dropout, fully connected", Recipe::macro_layer()),
-    network!("macro-layer-cross", "Macro-layer, committee", "As many macro-layers as there are parts, each without one \
-        part of the data", Recipe::macro_layer().cross_fitted()),
     network!("zuo", "Zuo et al.", "The four-layer network from which the paper starts: LSTM, dropout, fully connected",
         Recipe::zuo()),
     tabular!("decision-tree", "Decision tree", Single, "One tree on the course of all channels", DecisionTree),

@@ -6,7 +6,7 @@
 
 use crate::gripper::{BentFinger, Side};
 use crate::scene::Scene;
-use crate::sensing::Sensors;
+use crate::sensing::{Sensors, Signals};
 use crate::trial::{Frame, Trial};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -35,6 +35,18 @@ pub fn write_trial_csv(path: &Path, trial: &Trial, scene: &Scene, sensors: &Sens
         out.write_record(header(scene, sensors, trial))?;
         for frame in &trial.frames {
             out.write_record(row(frame, trial, scene, sensors))?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes a trial that was recorded elsewhere: time, then its channels as they came.
+pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError> {
+    write_file(path, |out| {
+        out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
+        for (sample, t) in signals.t_s.iter().enumerate() {
+            let values = signals.row(sample).iter().map(ToString::to_string);
+            out.write_record(std::iter::once(number(*t)).chain(values))?;
         }
         Ok(())
     })

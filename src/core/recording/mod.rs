@@ -9,7 +9,7 @@ mod store;
 mod store_error;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
-pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_trial_csv};
+pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use merge::Merged;
 pub use store::{Store, TrialId, TrialRow};

@@ -1,7 +1,7 @@
 //! What each stage learns from: prepared sequences, with what earlier stages and earlier grasps say laid beside them.
 
 use super::super::Pmf;
-use super::committee::Material;
+use super::calibrated::Material;
 use super::training::{Lesson, Lessons};
 use rand::{Rng, RngExt};
 
@@ -97,40 +97,12 @@ fn nearly_normal(random: &mut dyn Rng) -> f32 {
     2.0 * (even() + even() + even() - 1.5)
 }
 
-/// Pages with the answers as they are met in use, where nothing is known before.
-pub(super) struct Plain<'a> {
-    pub(super) book: &'a Book,
-    pub(super) log_prior: Vec<f32>,
-}
-
-impl<'a> Plain<'a> {
-    pub(super) fn new(book: &'a Book) -> Self {
-        let log_prior =
-            book.earlier.as_ref().map(|e| Pmf::uniform(e.classes).logarithms().map(|l| l as f32).collect());
-        Self { book, log_prior: log_prior.unwrap_or_default() }
-    }
-}
-
-impl Lessons for Plain<'_> {
-    fn count(&self) -> usize {
-        self.book.count()
-    }
-
-    fn draw(&self, k: usize, random: &mut dyn Rng, lesson: &mut Lesson) {
-        self.book.draw(k, random, lesson);
-    }
-}
-
-impl Material for Plain<'_> {
+impl Material for Book {
     fn inputs(&self, k: usize) -> &[f32] {
-        &self.book.pages[k]
+        &self.pages[k]
     }
 
     fn targets(&self, k: usize) -> &[usize] {
-        &self.book.targets[k]
-    }
-
-    fn log_prior(&self, _k: usize) -> &[f32] {
-        &self.log_prior
+        &self.targets[k]
     }
 }

@@ -198,6 +198,25 @@ impl MacroLayer {
         fits.then(|| Self { blocks: shape.blocks(), shape, values })
     }
 
+    /// The same network with more inputs, to which it is deaf at first.
+    pub fn with_inputs(&self, more: usize) -> Self {
+        let shape = MacroShape { inputs: self.shape.inputs + more, ..self.shape.clone() };
+        let mut values = Vec::with_capacity(shape.parameters());
+        for row in self.block("lstm.weight_ih").chunks_exact(self.shape.inputs) {
+            values.extend_from_slice(row);
+            values.extend(std::iter::repeat_n(0.0, more));
+        }
+        values.extend(self.blocks.iter().skip(1).flat_map(|block| &self.values[block.place.clone()]));
+        Self { blocks: shape.blocks(), shape, values }
+    }
+
+    /// The same network with a prior that is added to its outputs at a gain.
+    pub fn with_prior(&self, gain: f32) -> Self {
+        let shape = MacroShape { with_prior: true, ..self.shape.clone() };
+        let values = self.values.iter().copied().chain([gain]).collect();
+        Self { blocks: shape.blocks(), shape, values }
+    }
+
     /// Its sizes.
     pub fn shape(&self) -> &MacroShape {
         &self.shape

@@ -1,7 +1,7 @@
 //! Recurrent networks: the macro-layer of the paper on a kernel of our own, how it is trained, and the recognisers made
 //! of it.
 
-mod committee;
+mod calibrated;
 mod gates;
 mod gemm;
 #[cfg(test)]
@@ -14,9 +14,8 @@ mod recipe;
 mod tactile;
 mod training;
 
-pub use committee::Committee;
 pub use macro_layer::{Batch, Block, LiveMacroLayer, MacroLayer, MacroShape, Pass, ReadOut, Regular};
 pub use preparation::{Binner, Preparation, Scale, mirror};
 pub use recipe::Recipe;
 pub use tactile::TactileNetwork;
-pub use training::{AdamW, Lesson, Lessons, Training, train};
+pub use training::{AdamW, Lesson, Lessons, Training, train, train_on};

@@ -18,11 +18,10 @@ pub struct Recipe {
     pub two_stages: bool,
     /// Whether the PMF of earlier grasps is fed back.
     pub iterated: bool,
-    /// Parts of the data, each left out once, where networks are cross-fitted; also for the mock network from which
-    /// the iterated one learns.
+    /// Parts of the data. Where networks are cross-fitted each is left out once; otherwise one is, for calibration.
     pub parts: usize,
-    /// Whether both stages learn from all grasps, each from a committee's answers to grasps it has not seen; otherwise
-    /// each stage has one half of the grasps, as in the paper (section V-C).
+    /// Whether both stages learn from all grasps, the second from answers of first stages that had not seen them;
+    /// otherwise each stage has one half of the grasps, as in the paper (section V-C).
     pub cross_fitted: bool,
     /// Whether grasps are also shown with left and right exchanged.
     pub mirror: bool,
@@ -41,15 +40,15 @@ impl Recipe {
             hidden: 64,
             two_stages: false,
             iterated: false,
-            parts: 4,
+            parts: 3,
             cross_fitted: false,
             mirror: true,
-            noise: 0.15,
+            noise: 0.2,
             training: Training {
-                epochs: 150,
+                epochs: 180,
                 batch: 32,
                 learning_rate: 5e-3,
-                weight_decay: 0.2,
+                weight_decay: 0.1,
                 dropout: 0.5,
                 smoothing: 0.0,
                 early_read_outs: 10,
@@ -87,6 +86,13 @@ impl Recipe {
     /// The same network by cross-fitting.
     pub fn cross_fitted(self) -> Self {
         Self { cross_fitted: true, ..self }
+    }
+
+    /// How a network that has learned from single grasps goes on learning with what earlier grasps said: a little, and
+    /// gently.
+    pub(super) fn refining(&self) -> Training {
+        let base = &self.training;
+        Training { epochs: base.epochs.div_ceil(8), learning_rate: 0.1 * base.learning_rate, ..base.clone() }
     }
 
     /// With the settings that were asked for instead of its own, and shorter where that was asked for.

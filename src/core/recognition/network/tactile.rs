@@ -15,8 +15,8 @@ use super::super::belief::{Rejection, agreement};
 use super::super::data::{Dataset, Sequence};
 use super::super::model_file::{Arrays, ModelCard};
 use super::super::{FitError, Fitting, LiveRecogniser, Pmf, Properties, Recogniser, Verdict, check_enough};
-use super::committee::{Committee, HeldBack, LiveCommittee, Plan};
-use super::lessons::{Book, Earlier, Plain};
+use super::calibrated::{Calibrated, HeldBack, LiveCalibrated, Plan};
+use super::lessons::{Book, Earlier};
 use super::macro_layer::{MacroLayer, MacroShape};
 use super::preparation::{Binner, Preparation, mirror};
 use super::recipe::Recipe;
@@ -29,8 +29,8 @@ use std::ops::Range;
 #[derive(Clone, Debug)]
 pub struct TactileNetwork {
     learned: Learned,
-    stage_one: Option<Committee>,
-    stage_two: Committee,
+    stage_one: Option<Calibrated>,
+    stage_two: Calibrated,
     rejection: Rejection,
 }
 
@@ -40,28 +40,25 @@ struct Learned {
     recipe: Recipe,
     preparation: Preparation,
     /// Shapes and temperatures of the stages.
-    stage_one: Option<CommitteeCard>,
-    stage_two: CommitteeCard,
+    stage_one: Option<NetworkCard>,
+    stage_two: NetworkCard,
 }
 
-/// Everything about a committee but its weights.
+/// Everything about a network but its weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct CommitteeCard {
+struct NetworkCard {
     shape: MacroShape,
-    members: usize,
     temperatures: Vec<Vec<f32>>,
 }
 
-impl CommitteeCard {
-    fn of(committee: &Committee) -> Self {
-        Self {
-            shape: committee.shape().clone(),
-            members: committee.members.len(),
-            temperatures: committee.temperatures.clone(),
-        }
+impl NetworkCard {
+    fn of(network: &Calibrated) -> Self {
+        Self { shape: network.layer.shape().clone(), temperatures: network.temperatures.clone() }
     }
 }
 
+/// One in so many grasps is held back for calibration.
+const CALIBRATION: usize = 6;
 /// Share of known objects that may be taken for unknown.
 const REJECTED_SHARE: f64 = 0.02;
 /// Beliefs drawn to calibrate the rejection for each number of grasps.
@@ -72,7 +69,7 @@ const MOST_GRASPS: usize = 6;
 impl TactileNetwork {
     /// Fits a network as a recipe says.
     pub fn fit(data: &Dataset, recipe: Recipe, method: &'static str, fitting: &Fitting<'_>) -> Result<Self, FitError> {
-        // Every part must have grasps of every class, or a member would never have met it.
+        // Without a part that is held back, every class must still have a grasp.
         let halves = if recipe.two_stages && !recipe.cross_fitted { 2 } else { 1 };
         check_enough(data, 2 * halves)?;
         if recipe.two_stages && !data.labels.have_properties() {
@@ -82,20 +79,20 @@ impl TactileNetwork {
         let pages: Vec<Vec<f32>> = data.examples.iter().map(|e| work.preparation.inputs(&e.grasp)).collect();
         let everything: Vec<usize> = (0..pages.len()).collect();
         let (for_one, for_two) = if halves == 2 { work.halves() } else { (everything.clone(), everything) };
-        let end_of_one = if recipe.two_stages { if recipe.iterated { 0.33 } else { 0.5 } } else { 0.0 };
+        let end_of_one = if recipe.two_stages { if recipe.iterated { 0.4 } else { 0.6 } } else { 0.0 };
         let (stage_one, beside) = if recipe.two_stages {
-            let (committee, held_back) = work.fit_stage_one(&pages, &for_one, 0.0..end_of_one)?;
-            let beside = work.beside(&committee, &held_back, &pages, &for_one, &for_two);
-            (Some(committee), beside)
+            let (network, held_back) = work.fit_stage_one(&pages, &for_one, 0.0..end_of_one)?;
+            let beside = work.beside(&network, &held_back, &pages, &for_two);
+            (Some(network), beside)
         } else {
             (None, vec![Vec::new(); for_two.len()])
         };
-        let (stage_two, alone) = work.fit_stage_two(&pages, &for_two, &beside, end_of_one..1.0)?;
+        let (stage_two, alone) = work.fit_stage_two(&pages, &for_two, &beside, &(end_of_one..1.0))?;
         let rejection = calibrated_rejection(&alone, fitting.seed);
         let learned = Learned {
             preparation: work.preparation,
-            stage_one: stage_one.as_ref().map(CommitteeCard::of),
-            stage_two: CommitteeCard::of(&stage_two),
+            stage_one: stage_one.as_ref().map(NetworkCard::of),
+            stage_two: NetworkCard::of(&stage_two),
             recipe,
         };
         Ok(Self { learned, stage_one, stage_two, rejection })
@@ -113,25 +110,25 @@ impl TactileNetwork {
         let readings = learned.preparation.width();
         let properties = vec![labels.sizes.len(), labels.shapes.len()];
         let stage_one = match &learned.stage_one {
-            Some(own) => Some(read_committee(arrays, "stage_one", own, readings, &properties)?),
+            Some(own) => Some(read_network(arrays, "stage_one", own, readings, &properties)?),
             None => None,
         };
-        let beside = stage_one.as_ref().map_or(0, |committee| committee.shape().outputs());
+        let beside = stage_one.as_ref().map_or(0, |network| network.layer.shape().outputs());
         let before = if learned.recipe.iterated { labels.classes.len() } else { 0 };
         let classes = [labels.classes.len()];
-        let stage_two = read_committee(arrays, "stage_two", &learned.stage_two, readings + beside + before, &classes)?;
-        if stage_two.shape().with_prior != learned.recipe.iterated {
+        let stage_two = read_network(arrays, "stage_two", &learned.stage_two, readings + beside + before, &classes)?;
+        if stage_two.layer.shape().with_prior != learned.recipe.iterated {
             return Err("its second stage is not what its recipe says".to_owned());
         }
         Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone().unwrap_or_default() })
     }
 
     fn reader(&self) -> LiveTactile {
-        let classes = self.stage_two.shape().outputs();
+        let classes = self.stage_two.layer.shape().outputs();
         LiveTactile {
             binner: Binner::new(&self.learned.preparation),
-            stage_one: self.stage_one.as_ref().map(LiveCommittee::new),
-            stage_two: LiveCommittee::new(&self.stage_two),
+            stage_one: self.stage_one.as_ref().map(LiveCalibrated::new),
+            stage_two: LiveCalibrated::new(&self.stage_two),
             iterated: self.learned.recipe.iterated,
             before: Pmf::uniform(classes),
             log_before: Vec::new(),
@@ -142,34 +139,30 @@ impl TactileNetwork {
     }
 }
 
-fn read_committee(
+fn read_network(
     arrays: &Arrays,
     name: &str,
-    card: &CommitteeCard,
+    card: &NetworkCard,
     inputs: usize,
     groups: &[usize],
-) -> Result<Committee, String> {
+) -> Result<Calibrated, String> {
     let shape = &card.shape;
     let whole = shape.inputs == inputs
         && shape.groups == groups
         && (1..=4096).contains(&shape.units)
         && shape.hidden.is_none_or(|hidden| (1..=4096).contains(&hidden))
         && groups.iter().all(|classes| *classes > 0)
-        && (1..=100).contains(&card.members)
         && card.temperatures.len() == groups.len()
         && card.temperatures.iter().flatten().all(|t| t.is_finite() && *t > 0.0);
     if !whole {
         return Err(format!("the sizes of {name} do not fit the model's channels and labels"));
     }
-    let mut members = Vec::new();
-    for member in 0..card.members {
-        let mut values = Vec::new();
-        for block in shape.blocks() {
-            values.extend(arrays.get(&format!("{name}.{member}.{}", block.name), &block.shape)?);
-        }
-        members.push(MacroLayer::from_values(shape.clone(), values).ok_or("an array does not fit")?);
+    let mut values = Vec::new();
+    for block in shape.blocks() {
+        values.extend(arrays.get(&format!("{name}.{}", block.name), &block.shape)?);
     }
-    Ok(Committee { members, temperatures: card.temperatures.clone() })
+    let layer = MacroLayer::from_values(shape.clone(), values).ok_or("an array does not fit")?;
+    Ok(Calibrated { layer, temperatures: card.temperatures.clone() })
 }
 
 /// What fitting needs at every stage.
@@ -188,9 +181,9 @@ impl Work<'_> {
         (of(0), of(1))
     }
 
-    /// Parts for cross-fitting among some grasps.
-    fn parts(&self, grasps: &[usize]) -> Vec<usize> {
-        self.data.part(grasps).folds(self.recipe.parts, self.fitting.seed ^ 0xf01d)
+    /// Parts among some grasps, as even within each class as can be.
+    fn parts(&self, grasps: &[usize], parts: usize) -> Vec<usize> {
+        self.data.part(grasps).folds(parts, self.fitting.seed ^ 0xf01d)
     }
 
     fn shape(&self, inputs: usize, groups: Vec<usize>, with_prior: bool) -> MacroShape {
@@ -212,7 +205,7 @@ impl Work<'_> {
         pages: &[Vec<f32>],
         grasps: &[usize],
         share: Range<f64>,
-    ) -> Result<(Committee, HeldBack), FitError> {
+    ) -> Result<(Calibrated, HeldBack), FitError> {
         let labels = &self.data.labels;
         let properties = |k: usize| {
             let class = &labels.classes[self.data.examples[k].class];
@@ -229,46 +222,51 @@ impl Work<'_> {
             noise: self.recipe.noise,
             earlier: None,
         };
+        let middle = if self.recipe.cross_fitted { 0.5 * (share.start + share.end) } else { share.end };
         let plan = Plan {
             shape: self.shape(book.width, vec![labels.sizes.len(), labels.shapes.len()], false),
             training: &self.recipe.training,
-            folds: (&self.parts(&taught), self.recipe.parts),
-            cross_fitted: self.recipe.cross_fitted,
+            held_back: &self.parts(&taught, CALIBRATION),
             seed: self.fitting.seed.wrapping_mul(1000),
-            share,
+            share: share.start..middle,
         };
-        let (committee, of_taught) = Committee::fit(&plan, &Plain::new(&book), self.fitting)?;
+        let (network, _) = Calibrated::fit(&plan, &book, self.fitting)?;
         let mut held_back: HeldBack = vec![None; pages.len()];
-        for (k, scores) in taught.into_iter().zip(of_taught) {
-            held_back[k] = scores;
+        if self.recipe.cross_fitted {
+            let plan = Plan { share: middle..share.end, ..plan };
+            let parts = self.parts(&taught, self.recipe.parts);
+            let of_taught = Calibrated::cross_fit(&plan, (&parts, self.recipe.parts), &book, self.fitting)?;
+            for (k, scores) in taught.into_iter().zip(of_taught) {
+                held_back[k] = scores;
+            }
         }
-        Ok((committee, held_back))
+        Ok((network, held_back))
     }
 
     /// What stage one says of the grasps of stage two after every step, without having seen them: held-back answers
-    /// where it was cross-fitted, plain ones of grasps from the other half.
+    /// where it was cross-fitted, its own where they are of the other half, or of things without size and shape.
     fn beside(
         &self,
-        committee: &Committee,
+        network: &Calibrated,
         held_back: &HeldBack,
         pages: &[Vec<f32>],
-        for_one: &[usize],
         for_two: &[usize],
     ) -> Vec<Vec<f32>> {
-        let width = self.preparation.width();
-        let mut live = LiveCommittee::new(committee);
+        let (width, outputs) = (self.preparation.width(), network.layer.shape().outputs());
+        let mut live = LiveCalibrated::new(network);
+        let flat = |pmfs: Vec<Pmf>| -> Vec<f32> {
+            pmfs.iter().flat_map(|pmf| pmf.probabilities().iter().map(|p| *p as f32)).collect()
+        };
         let of_grasp = |k: &usize| -> Vec<f32> {
-            let flat = |pmfs: Vec<Pmf>| -> Vec<f32> {
-                pmfs.iter().flat_map(|pmf| pmf.probabilities().iter().map(|p| *p as f32)).collect()
-            };
-            let seen = for_one == for_two;
-            if let Some(scores) = held_back[*k].as_ref().filter(|_| seen) {
-                let outputs = committee.shape().outputs();
-                let rows = scores.chunks_exact(outputs).enumerate();
-                rows.flat_map(|(step, row)| flat(committee.honest(row, step))).collect()
-            } else {
-                live.reset();
-                pages[*k].chunks_exact(width).flat_map(|row| flat(live.step(row, &[]))).collect()
+            match held_back[*k].as_ref().filter(|_| self.recipe.cross_fitted) {
+                Some(scores) => {
+                    let rows = scores.chunks_exact(outputs).enumerate();
+                    rows.flat_map(|(step, row)| flat(network.honest(row, step))).collect()
+                }
+                None => {
+                    live.reset();
+                    pages[*k].chunks_exact(width).flat_map(|row| flat(live.step(row, &[]))).collect()
+                }
             }
         };
         for_two.iter().map(of_grasp).collect()
@@ -280,14 +278,14 @@ impl Work<'_> {
         pages: &[Vec<f32>],
         grasps: &[usize],
         beside: &[Vec<f32>],
-        share: Range<f64>,
-    ) -> Result<(Committee, Vec<(usize, Pmf)>), FitError> {
+        share: &Range<f64>,
+    ) -> Result<(Calibrated, Vec<(usize, Pmf)>), FitError> {
         let readings = self.preparation.width();
         let classes = self.data.labels.classes.len();
         let steps = |k: usize| pages[k].len() / readings;
         let added = grasps.iter().zip(beside).find(|(k, _)| steps(**k) > 0).map_or(0, |(k, b)| b.len() / steps(*k));
-        let folds = self.parts(grasps);
-        let book_with = |extra: usize, earlier: Option<Earlier>| {
+        let book_with = |beside_them: bool, before: Option<Earlier>| {
+            let (added, extra) = (if beside_them { added } else { 0 }, before.as_ref().map_or(0, |e| e.classes));
             let page = |(k, beside): (&usize, &Vec<f32>)| -> Vec<f32> {
                 let mut page = Vec::with_capacity(steps(*k) * (readings + added + extra));
                 for step in 0..steps(*k) {
@@ -304,52 +302,69 @@ impl Work<'_> {
                 mirror: self.mirror(added + extra),
                 readings,
                 noise: self.recipe.noise,
-                earlier,
+                earlier: before,
             }
         };
-        let plan = |inputs: usize, with_prior: bool, cross_fitted: bool, share: Range<f64>| Plan {
-            shape: self.shape(inputs, vec![classes], with_prior),
-            training: &self.recipe.training,
-            folds: (&folds, self.recipe.parts),
-            cross_fitted,
-            seed: self.fitting.seed.wrapping_mul(1000) + 500 + u64::from(with_prior) * 100,
-            share,
+        let recipe = self.recipe;
+        let refining = recipe.refining();
+        let at = |share_of_it: f64| share.start + share_of_it * (share.end - share.start);
+        let seed = self.fitting.seed.wrapping_mul(1000) + 500;
+        // On all data, stage two first learns from readings alone, and then what stage one adds to them; as in the
+        // paper, it learns from both at once.
+        let at_once = book_with(!recipe.cross_fitted, None);
+        let plan = Plan {
+            shape: self.shape(at_once.width, vec![classes], false),
+            training: &recipe.training,
+            held_back: &self.parts(grasps, CALIBRATION),
+            seed,
+            share: at(0.0)..at(if recipe.iterated { 0.45 } else { 0.9 }),
+        };
+        let (mut network, held_back) = Calibrated::fit(&plan, &at_once, self.fitting)?;
+        let complete = if recipe.cross_fitted && added > 0 {
+            let book = book_with(true, None);
+            network.layer = network.layer.with_inputs(added);
+            network.refine(&book, &refining, seed + 50, plan.share.end..plan.share.end + 0.05, self.fitting)?;
+            book
+        } else {
+            at_once.clone()
         };
         let truth = |n: usize| self.data.examples[grasps[n]].class;
-        let alone = |committee: &Committee, held_back: &HeldBack| -> Vec<(usize, Pmf)> {
+        let last_of = |network: &Calibrated, held_back: &HeldBack| -> Vec<(usize, Pmf)> {
             let last = |n: usize| {
                 let scores = held_back[n].as_ref()?;
                 let steps = scores.len() / classes;
-                let row = scores.get((steps.checked_sub(1)?) * classes..)?;
-                committee.honest(row, steps - 1).pop()
+                let row = scores.get(steps.checked_sub(1)? * classes..)?;
+                network.honest(row, steps - 1).pop()
             };
-            (0..grasps.len()).filter_map(|n| Some((truth(n), last(n)?))).collect()
+            (0..grasps.len()).filter_map(|n| Some((n, last(n)?))).collect()
         };
-        if !self.recipe.iterated {
-            let book = book_with(0, None);
-            let plan = plan(book.width, false, self.recipe.cross_fitted, share);
-            let (committee, held_back) = Committee::fit(&plan, &Plain::new(&book), self.fitting)?;
-            let alone = alone(&committee, &held_back);
-            return Ok((committee, alone));
+        let named = |alone: Vec<(usize, Pmf)>| alone.into_iter().map(|(n, pmf)| (truth(n), pmf)).collect();
+        if !recipe.iterated {
+            return Ok((network.clone(), named(last_of(&network, &held_back))));
         }
-        // The mock network of the paper (section V-E): what it says of grasps it has not seen stands for the grasps
-        // that came before.
-        let middle = 0.5 * (share.start + share.end);
-        let book = book_with(0, None);
-        let (mock, held_back) =
-            Committee::fit(&plan(book.width, false, true, share.start..middle), &Plain::new(&book), self.fitting)?;
-        let of_mock = alone(&mock, &held_back);
-        let same = |n: usize| (0..grasps.len()).filter(|m| *m != n && truth(*m) == truth(n)).collect();
-        let earlier = Earlier {
-            alone: of_mock.iter().map(|(_, pmf)| pmf.clone()).collect(),
-            same: (0..grasps.len()).map(same).collect(),
-            classes,
+        // The mock networks of the paper (section V-E): what they say of grasps they have not seen stands for the
+        // grasps that came before.
+        let mock = Plan {
+            shape: self.shape(complete.width, vec![classes], false),
+            share: at(0.5)..at(0.95),
+            seed: seed + 200,
+            ..plan.clone()
         };
-        let book = book_with(classes, Some(earlier));
-        let plan = plan(book.width, true, self.recipe.cross_fitted, middle..share.end);
-        let (committee, held_back) = Committee::fit(&plan, &Plain::new(&book), self.fitting)?;
-        let alone = alone(&committee, &held_back);
-        Ok((committee, alone))
+        let parts = self.parts(grasps, recipe.parts);
+        let of_mock = Calibrated::cross_fit(&mock, (&parts, recipe.parts), &complete, self.fitting)?;
+        let alone = last_of(&network, &of_mock);
+        let mut of_class = vec![Vec::new(); classes];
+        alone.iter().enumerate().for_each(|(place, (n, _))| of_class[truth(*n)].push(place));
+        let mut same = vec![Vec::new(); grasps.len()];
+        for (place, (n, _)) in alone.iter().enumerate() {
+            same[*n] = of_class[truth(*n)].iter().copied().filter(|other| *other != place).collect();
+        }
+        let earlier = Earlier { alone: alone.iter().map(|(_, pmf)| pmf.clone()).collect(), same, classes };
+        // It begins as the product of experts, and learns where to depart from it.
+        let gain = network.last_temperature();
+        network.layer = network.layer.with_inputs(classes).with_prior(gain);
+        network.refine(&book_with(true, Some(earlier)), &refining, seed + 100, at(0.95)..at(1.0), self.fitting)?;
+        Ok((network, named(alone)))
     }
 }
 
@@ -391,7 +406,7 @@ impl Recogniser for TactileNetwork {
             reader.push(t, row);
         }
         reader.finish().unwrap_or_else(|| Verdict {
-            pmf: before.cloned().unwrap_or_else(|| Pmf::uniform(self.stage_two.shape().outputs())),
+            pmf: before.cloned().unwrap_or_else(|| Pmf::uniform(self.stage_two.layer.shape().outputs())),
             properties: None,
         })
     }
@@ -403,19 +418,17 @@ impl Recogniser for TactileNetwork {
     fn arrays(&self) -> Arrays {
         let mut arrays = Arrays::default();
         let stages = [("stage_one", self.stage_one.as_ref()), ("stage_two", Some(&self.stage_two))];
-        for (name, committee) in stages {
-            for (member, layer) in committee.iter().flat_map(|c| &c.members).enumerate() {
-                for block in layer.shape().blocks() {
-                    let values = &layer.values()[block.place.clone()];
-                    arrays.put(format!("{name}.{member}.{}", block.name), &block.shape, values);
-                }
+        for (name, network) in stages.into_iter().filter_map(|(name, network)| Some((name, network?))) {
+            for block in network.layer.shape().blocks() {
+                let values = &network.layer.values()[block.place.clone()];
+                arrays.put(format!("{name}.{}", block.name), &block.shape, values);
             }
         }
         arrays
     }
 
     fn parameters(&self) -> usize {
-        let of = |committee: &Committee| committee.members.iter().map(|m| m.values().len()).sum::<usize>();
+        let of = |network: &Calibrated| network.layer.values().len();
         self.stage_one.as_ref().map_or(0, of) + of(&self.stage_two)
     }
 
@@ -431,8 +444,8 @@ impl Recogniser for TactileNetwork {
 /// Both stages, reading sample by sample.
 struct LiveTactile {
     binner: Binner,
-    stage_one: Option<LiveCommittee>,
-    stage_two: LiveCommittee,
+    stage_one: Option<LiveCalibrated>,
+    stage_two: LiveCalibrated,
     iterated: bool,
     before: Pmf,
     log_before: Vec<f32>,

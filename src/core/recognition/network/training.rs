@@ -75,8 +75,20 @@ pub fn train(
     seed: u64,
     go_on: &mut dyn FnMut(usize, f64) -> bool,
 ) -> MacroLayer {
+    let mut layer = MacroLayer::new(shape, &mut ChaCha8Rng::seed_from_u64(seed));
+    train_on(&mut layer, lessons, training, seed ^ 0x7ea1, go_on);
+    layer
+}
+
+/// Goes on training a network from where it is.
+pub fn train_on(
+    layer: &mut MacroLayer,
+    lessons: &dyn Lessons,
+    training: &Training,
+    seed: u64,
+    go_on: &mut dyn FnMut(usize, f64) -> bool,
+) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut layer = MacroLayer::new(shape, &mut random);
     let mut pass = Pass::new(layer.shape());
     let mut optimiser = AdamW::new(layer.values().len());
     let mut gradient = vec![0.0; layer.values().len()];
@@ -103,7 +115,6 @@ pub fn train(
             break;
         }
     }
-    layer
 }
 
 /// Lays lessons side by side, time-major, with their read-outs in the order of steps.

@@ -63,13 +63,17 @@ impl Svm {
         known: &mut std::collections::HashMap<Vec<u32>, usize>,
     ) -> Result<Machine, FitError> {
         let failed = |cause: String| FitError::Failed { cause };
-        let own: Vec<usize> = (0..rows.labels.len()).filter(|k| pair.contains(&rows.labels[*k])).collect();
+        let mut own: Vec<usize> = (0..rows.labels.len()).filter(|k| pair.contains(&rows.labels[*k])).collect();
+        // smartcore 0.7 cuts rows to as many columns as there are rows. So many copies of every row, each at its share
+        // of the cost, have the same solution.
+        let copies = rows.columns.div_ceil(own.len().max(1)).max(1);
+        own = own.repeat(copies);
         let row = |k: usize| &rows.values[k * rows.columns..(k + 1) * rows.columns];
         let table: Vec<Vec<f64>> = own.iter().map(|k| row(*k).iter().map(|x| f64::from(*x)).collect()).collect();
         let x = DenseMatrix::from_2d_vec(&table).map_err(|e| failed(e.to_string()))?;
         let y: Vec<i32> = own.iter().map(|k| if rows.labels[*k] == pair[1] { 1 } else { -1 }).collect();
         let settings = SVCParameters::default()
-            .with_c(COST)
+            .with_c(COST / copies as f64)
             .with_kernel(Kernels::rbf().with_gamma(self.gamma))
             .with_seed(Some(1));
         let fitted = SVC::fit(&x, &y, &settings).map_err(|e| failed(e.to_string()))?;

@@ -1,0 +1,206 @@
+//! From nothing to a recogniser on the command line: collect, train, evaluate, recognise; anybody's data; refusals.
+
+use crate::allocations::allocations_in;
+use crate::program::{json, refused, run};
+use palpate_core::objects::catalogue;
+use palpate_core::recognition::Source;
+use palpate_core::recognition::network::{LiveMacroLayer, MacroLayer, MacroShape};
+use palpate_core::recording::Store;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A table of grasps as somebody else would have it: two grips that differ in strength.
+fn csv(at: &Path, name: &str, trials: usize, labels: &[&str], properties: bool) {
+    let mut text = String::from(if properties { "trial,label,size,shape,t_s,grip,bend\n" } else { "trial,label,t_s,grip,bend\n" });
+    for trial in 0..trials {
+        let kind = trial % labels.len();
+        let words = if properties { ["tiny,cubic,", "large,spherical,"][kind % 2] } else { "" };
+        for k in 0..60 {
+            let t = f64::from(k) * 0.02;
+            let press = (t - 0.3).max(0.0) * (1.0 + kind as f64 * 2.0) + 0.01 * ((trial * 7 + k as usize) % 5) as f64;
+            writeln!(text, "{trial},{},{words}{t:.2},{press:.4},{:.4}", labels[kind], t * 3.0).unwrap();
+        }
+    }
+    std::fs::write(at.join(name), text).unwrap();
+}
+
+#[test]
+fn from_nothing_to_a_table_and_a_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let objects = "ball,smallcube,bigball,box";
+    let collected = json(at, &["collect", "--objects", objects, "--trials", "14", "--preset", "A", "--json"]);
+    assert_eq!(collected["stored"], 56);
+    let evaluate = ["evaluate", "--models", "ds-lstm,random-forest", "--train-trials", "8", "--quick", "--json"];
+    let rows = json(at, &evaluate);
+    let rows = rows.as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key}: {row}"));
+        assert!(number("macro_accuracy") > 0.5 && number("f1_macro") <= 1.0, "{row}");
+        assert!(number("train_cpu_s") > 0.0 && number("step_us") > 0.0);
+        let ends: Vec<f64> = row["ci95"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        assert!(ends[0] <= number("f1_macro") && number("f1_macro") <= ends[1], "{row}");
+        assert_eq!((&row["trials"], &row["data"]["preset"], &row["data"]["sensors"]), (&24.into(), &"A".into(), &"virtual".into()));
+    }
+    // Results do not depend on threads, but for times.
+    let again = json(at, &[&evaluate[..], &["--threads", "1"]].concat());
+    assert_eq!((&again[0]["f1_macro"], &again[1]["confusion"]), (&rows[0]["f1_macro"], &rows[1]["confusion"]));
+
+    let trained = json(at, &["train", "ids-lstm", "--quick", "--trials", "8", "--out", "models/own.safetensors", "--json"]);
+    assert_eq!(trained["channels"].as_array().unwrap().len(), 6);
+    assert!(at.join("models/own.json").is_file(), "the card stands beside it");
+    let said = json(at, &["recognise", "1", "2", "--model", "models/own.safetensors", "--together", "--json"]);
+    assert_eq!(said["trials"][0]["truth"], "ball");
+    let sum: f64 = said["together"]["pmf"].as_object().unwrap().values().map(|p| p.as_f64().unwrap()).sum();
+    assert!((sum - 1.0).abs() < 1e-9 && said["trials"][1]["stage_one"]["size"].is_string());
+    let judged = json(at, &["evaluate", "--models", "models/own.safetensors", "--json"]);
+    assert_eq!(judged[0]["trials"], 56);
+
+    // A model made for other sensors is refused by their names; one cut short is refused, and the store is unharmed.
+    let other = json(at, &["train", "macro-layer", "--quick", "--layout", "C2", "--out", "c2.safetensors", "--json"]);
+    assert_eq!(other["channels"][2], "pressure_left_proximal");
+    refused(at, &["evaluate", "--models", "c2.safetensors"], &["it needs pressure_left_proximal", "does not know pressure_left"]);
+    let bytes = std::fs::read(at.join("models/own.safetensors")).unwrap();
+    std::fs::write(at.join("cut.safetensors"), &bytes[..bytes.len() / 2]).unwrap();
+    refused(at, &["recognise", "1", "--model", "cut.safetensors"], &["cut.safetensors", "not a whole model"]);
+    refused(at, &["recognise", "1", "--model", "gone.safetensors"], &["gone.safetensors"]);
+    refused(at, &["recognise", "99"], &["no trial 99"]);
+    refused(at, &["train", "oracle"], &["no method \"oracle\"", "ds-lstm"]);
+    refused(at, &["train", "ds-lstm", "--set", "unitz=3"], &["unitz"]);
+    refused(at, &["train", "ds-lstm", "--layout", "C9"], &["C9"]);
+    refused(at, &["train", "ds-lstm", "--collection", "nope"], &["collection nope", "palpate collect"]);
+    refused(at, &["train", "svm", "--objects", "ball"], &["only one class, \"ball\""]);
+    refused(at, &["train", "ds-lstm", "--trials", "1"], &["only 1 grasps"]);
+}
+
+#[test]
+fn settings_are_searched_for_on_training_grasps() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    json(at, &["collect", "--objects", "ball,box", "--trials", "6", "--preset", "A", "--json"]);
+    let search = ["train", "macro-layer", "--quick", "--search", "--set", "epochs=5", "--set", "units=8", "--json", "--out", "m.safetensors"];
+    let trained = json(at, &search);
+    let tried = trained["search"].as_array().unwrap();
+    assert_eq!(tried.len(), 4, "two settings of two values; units were given");
+    assert!(tried.iter().all(|row| row["settings"]["epochs"] == 5 && row["f1_macro"].is_f64()));
+    let f1 = |k: usize| tried[k]["f1_macro"].as_f64().unwrap();
+    assert!(f1(0) >= f1(3), "best first");
+    let card: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(at.join("m.json")).unwrap()).unwrap();
+    assert_eq!(card["metrics"]["search"].as_array().unwrap().len(), 4, "the card tells what was tried");
+    assert_eq!(card["settings"]["recipe"]["training"]["dropout"], tried[0]["settings"]["dropout"]);
+}
+
+#[test]
+fn anybodys_grasps_are_taken_in_and_learned() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    csv(at, "mine.csv", 24, &["mug", "sponge"], true);
+    let imported = run(at, &["trials", "import", "mine.csv"]);
+    assert!(imported.code == Some(0) && imported.out.contains("24 trial(s) added as collection mine"), "{imported:?}");
+    let again = run(at, &["trials", "import", "mine.csv"]);
+    assert!(again.out.contains("0 trial(s) added as collection mine, 24 were here already"), "{again:?}");
+    let shown = run(at, &["trials", "show", "1"]);
+    assert!(shown.code == Some(0) && shown.out.contains("mug") && shown.out.contains("grip, bend"), "{shown:?}");
+    let exported = run(at, &["trials", "export", "1", "--out", "back.csv"]);
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    assert!(std::fs::read_to_string(at.join("back.csv")).unwrap().starts_with("t_s,grip,bend\n0,0,0\n"));
+    let rows = json(at, &["evaluate", "--models", "ds-lstm,knn", "--train-trials", "8", "--quick", "--json"]);
+    assert!(rows.as_array().unwrap().iter().all(|row| row["macro_accuracy"].as_f64().unwrap() > 0.9), "{rows}");
+    assert_eq!(rows[0]["data"]["object"], "recorded");
+    refused(at, &["recognise", "1"], &["it needs curvature_left", "does not know grip"]);
+
+    // Simulated and imported trials do not mix, and are told apart by collection.
+    json(at, &["collect", "--objects", "ball,box", "--trials", "2", "--json"]);
+    refused(at, &["train", "knn"], &["do not have the same channels", "--collection"]);
+    assert_eq!(run(at, &["train", "knn", "--collection", "mine", "--out", "knn.safetensors"]).code, Some(0));
+
+    // Without sizes and shapes there is no first stage to learn.
+    csv(at, "bare.csv", 12, &["nut", "bolt", "washer"], false);
+    assert_eq!(run(at, &["trials", "import", "bare.csv"]).code, Some(0));
+    refused(at, &["train", "ds-lstm", "--collection", "bare"], &["no class of these data has any"]);
+    let model = ["train", "macro-layer", "--collection", "bare", "--quick", "--out", "bare.safetensors"];
+    assert_eq!(run(at, &model).code, Some(0));
+}
+
+#[test]
+fn bad_tables_are_refused_and_nothing_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    csv(at, "mine.csv", 4, &["mug", "sponge"], false);
+    assert_eq!(run(at, &["trials", "import", "mine.csv"]).code, Some(0));
+    let write = |name: &str, text: &str| std::fs::write(at.join(name), text).unwrap();
+    write("columns.csv", "grasp,class,time,grip\n1,mug,0,1\n");
+    refused(at, &["trials", "import", "columns.csv"], &["columns.csv", "t_s", "label"]);
+    write("words.csv", "trial,label,t_s,grip\n1,mug,0,1\n1,mug,0.1,much\n");
+    refused(at, &["trials", "import", "words.csv"], &["words.csv", "line 3", "much"]);
+    write("endless.csv", "trial,label,t_s,grip\n1,mug,0,1\n1,mug,0.1,inf\n");
+    refused(at, &["trials", "import", "endless.csv"], &["line 3", "inf"]);
+    write("empty.csv", "");
+    refused(at, &["trials", "import", "empty.csv"], &["empty.csv"]);
+    refused(at, &["trials", "import", "gone.csv"], &["gone.csv"]);
+    // Gaps and unequal lengths are mended, and said.
+    write("gaps.csv", "trial,label,t_s,grip\n1,mug,0,1\n1,mug,0.1,nan\n1,mug,0.2,3\n2,pen,0,1\n2,pen,0.1,2\n2,pen,0.2,2\n2,pen,0.3,2\n");
+    let mended = run(at, &["trials", "import", "gaps.csv"]);
+    assert!(mended.code == Some(0) && mended.err.contains("warning: "), "{mended:?}");
+    let store = Store::open(&at.join("trials.sqlite")).unwrap();
+    assert_eq!(store.list(false).unwrap().len(), 6, "what was there is there, and the mended two");
+    let readings = store.readings(5).unwrap().unwrap();
+    assert_eq!(readings.values, [1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn no_pose_of_a_test_seed_is_in_the_training_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for seed in ["1", "2"] {
+        json(at, &["collect", "--objects", "ball", "--trials", "30", "--seed", seed, "--json"]);
+    }
+    let rows = Store::open(&at.join("trials.sqlite")).unwrap().list(false).unwrap();
+    let seeds: std::collections::BTreeSet<u64> = rows.iter().map(|row| row.seed).collect();
+    assert_eq!(seeds.len(), 60, "no pose is met twice");
+    let collections: std::collections::BTreeSet<Option<String>> = rows.iter().map(|r| r.collection.clone()).collect();
+    assert_eq!(collections.len(), 2);
+    let first = rows[0].collection.clone();
+    let store = Store::open(&at.join("trials.sqlite")).unwrap();
+    let source = Source { collection: first, ..Source::default() };
+    let data = source.read(&store, &Default::default(), &mut |_, _| ()).unwrap();
+    assert_eq!(data.examples.len(), 30);
+}
+
+#[test]
+fn the_demo_goes_on_until_it_is_sure_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let story = json(at, &["demo", "--object", "box", "--seed", "3", "--no-pictures", "--no-store", "--json"]);
+    assert_eq!(story["truth"], "box");
+    let grasps = story["grasps"].as_array().unwrap();
+    let last = grasps.last().unwrap()["pmf"].as_object().unwrap();
+    let decided = story["decided"].as_str().unwrap();
+    let (top, p) = last.iter().map(|(n, p)| (n, p.as_f64().unwrap())).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    match story["stopped_because"].as_str().unwrap() {
+        "sure" => assert!(p >= 0.9 && top == decided, "{story}"),
+        "grasp-limit" => assert!(grasps.len() == 4 && p < 0.9 && top == decided, "{story}"),
+        other => assert!(other == "unknown" && decided == "unknown", "{story}"),
+    }
+    for grasp in &grasps[..grasps.len() - 1] {
+        let most = grasp["pmf"].as_object().unwrap().values().map(|p| p.as_f64().unwrap()).fold(0.0, f64::max);
+        assert!(most < 0.9, "it would have been sure earlier: {grasp}");
+    }
+    assert!(catalogue().len() + 1 == last.len() && story["stage_one"]["size"].is_string());
+    let told = run(at, &["demo", "--object", "box", "--seed", "3", "--no-pictures", "--no-store"]);
+    assert!(told.code == Some(0) && told.out.contains("Most likely:") && told.out.contains("It feels "), "{told:?}");
+    assert_eq!(run(at, &["demo", "--threshold", "1.5"]).code, Some(2));
+    refused(at, &["demo", "--model", "gone.safetensors"], &["gone.safetensors"]);
+}
+
+#[test]
+fn a_live_step_allocates_nothing() {
+    let shape = MacroShape { inputs: 6, units: 32, hidden: Some(16), groups: vec![5], with_prior: false };
+    let layer = MacroLayer::new(shape, &mut ChaCha8Rng::seed_from_u64(1));
+    let mut live = LiveMacroLayer::new(&layer);
+    let (count, sum) = allocations_in(|| (0..100).map(|k| live.step(&[k as f32 * 0.01; 6], &[])[0]).sum::<f32>());
+    assert!(count == 0 && sum.is_finite(), "{count} allocations");
+}
