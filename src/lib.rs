@@ -7,7 +7,8 @@
 //!        |
 //!   palpate_core   physics: state -> next state        (the convex step, written beside its equations)
 //!        |         rig -> grasping -> trial -> store   (raw frames, append-only)
-//!        |         trial + layout -> channels          (curvature, pressure, force)
+//!        |         trial + layout -> channels          (curvature, pressure, force; perfect sensors or real ones)
+//!        |         channels -> verdict -> belief       (stage one: size, shape; stage two: class; the next grasp?)
 //!        |         frame + view -> DrawList            (plain data, no graphics card)
 //!        |
 //!   palpate_render DrawList -> pixels                  (wgpu, the same in window, test and file)
@@ -22,9 +23,11 @@
 //! 3. [`palpate_core::grasping::grasp`], which runs a programme on a [`palpate_core::rig::Rig`] and returns a
 //!    [`palpate_core::trial::Trial`].
 //! 4. [`palpate_core::sensing::Sensors`], which reads channels off its frames.
-//! 5. [`palpate_core::picture::Stage`], which turns a frame into a [`palpate_core::drawing::DrawList`], and
+//! 5. [`palpate_core::recognition`], which answers them, and [`palpate_core::grasping::Identification`], which adds up
+//!    grasp after grasp until it is clear what is in the hand.
+//! 6. [`palpate_core::picture::Stage`], which turns a frame into a [`palpate_core::drawing::DrawList`], and
 //!    [`palpate_render::Renderer`], which draws that.
-//! 6. [`palpate_core::workers::SimWorker`], the thread in which all this happens live, and [`app::Workbench`], which
+//! 7. [`palpate_core::workers::SimWorker`], the thread in which all this happens live, and [`app::Workbench`], which
 //!    shows it.
 //!
 //! # Where to add what
@@ -38,6 +41,7 @@
 //! | a setting | a field of a struct below [`palpate_core::scene::Scene`], and its range in `scene/check.rs` |
 //! | a sensor layout | a line in `src/core/sensing/layout.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
+//! | a recogniser | a file in `src/core/recognition/` and a line in [`palpate_core::recognition::METHODS`] |
 //! | a rig | a file in `src/core/rig/` that implements [`palpate_core::rig::Rig`] |
 //! | a file format for objects | `src/core/objects/load.rs` |
 //!

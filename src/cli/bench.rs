@@ -64,9 +64,10 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
             networks(&rows, *json)?;
             if *json { Ok(()) } else { say("CPU time of one thread; PyTorch: python tests/peers/lstm_step.py") }
         }
-        What::Live { runs, json } => {
-            networks(&FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs))), *json)
-        }
+        What::Live { runs, json } => networks(
+            &FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs))),
+            *json,
+        ),
     }
 }
 

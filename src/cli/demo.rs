@@ -243,8 +243,12 @@ fn tell(number: usize, told: &Told, known: &[String]) -> Result<(), Failure> {
     }
     let mut likely: Vec<(&String, &f64)> = told.pmf.iter().collect();
     likely.sort_by(|a, b| b.1.total_cmp(a.1));
-    let first: Vec<String> =
-        likely.iter().take(3).filter(|(_, p)| **p >= 0.005).map(|(name, p)| format!("{name} {:.0} %", 100.0 * **p)).collect();
+    let first: Vec<String> = likely
+        .iter()
+        .take(3)
+        .filter(|(_, p)| **p >= 0.005)
+        .map(|(name, p)| format!("{name} {:.0} %", 100.0 * **p))
+        .collect();
     say(format!("  Most likely: {}.", first.join(", ")))
 }
 
@@ -256,7 +260,10 @@ fn conclude(story: &Story, stopped: StopReason) -> Result<(), Failure> {
     match stopped {
         StopReason::Sure => say(format!("After {grasps} it is sure: {}, {right} ({}).", story.decided, story.truth))?,
         StopReason::GraspLimit => {
-            say(format!("After {grasps} it may not try again. Best guess: {}, {right} ({}).", story.decided, story.truth))?;
+            say(format!(
+                "After {grasps} it may not try again. Best guess: {}, {right} ({}).",
+                story.decided, story.truth
+            ))?;
         }
         StopReason::Unknown => {
             say(format!("After {grasps} it says: unknown. The grasps agree on none of the objects it knows."))?;

@@ -77,9 +77,9 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     bar.finish_and_clear();
     let mut rows = if methods.is_empty() { Vec::new() } else { rows? };
     for (name, model) in &models {
-        let test = test.relabelled(&model.card.labels).ok_or_else(|| {
-            format!("{name} does not know all objects of these trials; choose some with --objects")
-        })?;
+        let test = test
+            .relabelled(&model.card.labels)
+            .ok_or_else(|| format!("{name} does not know all objects of these trials; choose some with --objects"))?;
         let comparison = Comparison { train: &train, test: &test, ..comparison };
         rows.push(comparison.of_fitted(name, model)?);
     }
@@ -146,9 +146,8 @@ fn tell(
             ]
         })
         .collect();
-    let header = [
-        "model", "F1", "95 %", "accuracy", "F1 of 3", "F1 of 5", "size F1", "shape F1", "ECE", "train s", "us/sample",
-    ];
+    let header =
+        ["model", "F1", "95 %", "accuracy", "F1 of 3", "F1 of 5", "size F1", "shape F1", "ECE", "train s", "us/sample"];
     table(&header, &cells)?;
     say("\nF1 and accuracy are means over the classes in percent; \"of 3\" is after three grasps of the same object.")
 }
@@ -158,7 +157,11 @@ fn tell_controls(controls: &Controls) -> Result<(), Failure> {
         let percent = [i.estimate, i.low, i.high].map(|x| format!("{:.1}", 100.0 * x));
         format!("{what:<28}{} ({} to {})", percent[0], percent[1], percent[2])
     };
-    say(format!("\ncontrols of {}, macro-accuracy in percent; chance is {:.1}", controls.method, 100.0 * controls.chance))?;
+    say(format!(
+        "\ncontrols of {}, macro-accuracy in percent; chance is {:.1}",
+        controls.method,
+        100.0 * controls.chance
+    ))?;
     say(line("labels shuffled", controls.shuffled_labels))?;
     say(line("as it is", controls.plain))?;
     say(line("told the size and shape", controls.true_size_and_shape))

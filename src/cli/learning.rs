@@ -47,12 +47,8 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        let source = Source {
-            collection: self.collection.clone(),
-            objects: self.objects.clone(),
-            without_empty,
-            most_of_each,
-        };
+        let source =
+            Source { collection: self.collection.clone(), objects: self.objects.clone(), without_empty, most_of_each };
         let bar = progress_bar("reading trials")?;
         let data = source.read(store, &self.view(), &mut |done, of| {
             bar.set_length(of as u64);

@@ -106,10 +106,9 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         model.check_channels(&data.channels)?;
         let grasp = &data.examples[0].grasp;
         let alone = model.recogniser.recognise(grasp, None);
-        let with = belief.now().map_or_else(
-            || alone.pmf.clone(),
-            |before| model.recogniser.recognise(grasp, Some(before)).pmf,
-        );
+        let with = belief
+            .now()
+            .map_or_else(|| alone.pmf.clone(), |before| model.recogniser.recognise(grasp, Some(before)).pmf);
         belief.add(with, alone.pmf.clone());
         let (class, probability) = alone.pmf.top();
         let stage_one = StageOne::of(&alone, labels);

@@ -5,8 +5,7 @@ use super::setup::open_store;
 use super::terminal::{file_name_of, say, say_json, table, warn};
 use palpate_core::grasping::GraspSummary;
 use palpate_core::recording::{
-    Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_contacts_csv, write_signals_csv,
-    write_trial_csv,
+    Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_contacts_csv, write_signals_csv, write_trial_csv,
 };
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};

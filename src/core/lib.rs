@@ -5,7 +5,8 @@
 //! A **finger** is a chain of N joints, bent by **line pressure** in its chamber; its inner side is a soft **pad** tiled
 //! with **taxels**. Two fingers make a gripper. A **scene** says what is grasped and how; a **grasp** closes, holds and
 //! releases; what was sampled meanwhile is a **trial**. A **layout** (C1 .. C8) says which **channels** of curvature,
-//! pressure and force are derived from a trial.
+//! pressure and force are derived from a trial. A recogniser answers them: **stage one** says size and shape, stage two
+//! gives a **PMF** over classes, and what successive grasps of one object come to is a **belief**.
 //!
 //! # The map, lowest layer first
 //!
@@ -20,13 +21,14 @@
 //! | 3 | [`trial`] | plain frames and trials |
 //! | 4 | [`scene`] | the scene file: everything a user may set |
 //! | 5 | [`physics`] | the convex implicit step, contact, placement, resting faces, and a simulation on a clock of whole ticks |
-//! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames |
+//! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames; what real sensors make of them |
 //! | 7 | [`rig`] | a gripper that can be told a pressure and read: simulated, or replayed |
-//! | 8 | [`recording`] | the SQLite store, CSV |
-//! | 9 | [`grasping`] | one grasp on any rig, random poses, data sets, a grasp in a few numbers |
-//! | 10 | [`study`] | measurements as functions |
-//! | 11 | [`picture`] | scene and frame to [`drawing::DrawList`] |
-//! | 12 | [`workers`] | named threads: commands in, snapshots and rows out |
+//! | 8 | [`recording`] | the SQLite store, CSV in and out |
+//! | 9 | [`recognition`] | PMFs, the macro-layer on a kernel of our own, DS-LSTM and iDS-LSTM, rivals, metrics, models on disk |
+//! | 10 | [`grasping`] | one grasp on any rig, random poses, data sets, grasp after grasp until it is clear what is held |
+//! | 11 | [`study`] | measurements and comparisons as functions |
+//! | 12 | [`picture`] | scene and frame to [`drawing::DrawList`] |
+//! | 13 | [`workers`] | named threads: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
 //!

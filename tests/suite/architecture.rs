@@ -41,7 +41,10 @@ const HOMES: &[(&str, &[&str])] = &[
     ("candle_nn", &["src/core/recognition/rivals/convolution.rs", "src/core/study/network_cost.rs"]),
     ("bytemuck", &["src/render", "src/core/geometry", "src/core/recording"]),
     ("clap", &["src/cli"]),
-    ("cpu_time", &["src/cli", "src/core/study", "src/core/recognition/evaluation.rs", "src/core/recognition/methods.rs"]),
+    (
+        "cpu_time",
+        &["src/cli", "src/core/study", "src/core/recognition/evaluation.rs", "src/core/recognition/methods.rs"],
+    ),
     ("csv", &["src/core/recording"]),
     ("directories", &["src/core/recording"]),
     ("eframe", &["src/app"]),

@@ -5,7 +5,6 @@ use palpate_core::objects::catalogue;
 use palpate_core::recording::Store;
 use serde_json::Value;
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -181,7 +180,8 @@ fn the_bench_reports_rows() {
 fn the_demo_tells_the_same_story_for_the_same_seed() {
     let folder = folder();
     let story = |out: &str| {
-        let fixed = ["demo", "--seed", "5", "--grasps", "2", "--threshold", "1", "--no-store", "--no-pictures", "--json"];
+        let fixed =
+            ["demo", "--seed", "5", "--grasps", "2", "--threshold", "1", "--no-store", "--no-pictures", "--json"];
         json(folder.path(), &[&fixed[..], &["--out", out]].concat())
     };
     let (first, second) = (story("a"), story("b"));

@@ -13,7 +13,8 @@ use std::path::Path;
 
 /// A table of grasps as somebody else would have it: two grips that differ in strength.
 fn csv(at: &Path, name: &str, trials: usize, labels: &[&str], properties: bool) {
-    let mut text = String::from(if properties { "trial,label,size,shape,t_s,grip,bend\n" } else { "trial,label,t_s,grip,bend\n" });
+    let mut text =
+        String::from(if properties { "trial,label,size,shape,t_s,grip,bend\n" } else { "trial,label,t_s,grip,bend\n" });
     for trial in 0..trials {
         let kind = trial % labels.len();
         let words = if properties { ["tiny,cubic,", "large,spherical,"][kind % 2] } else { "" };
@@ -43,13 +44,17 @@ fn from_nothing_to_a_table_and_a_model() {
         assert!(number("train_cpu_s") > 0.0 && number("step_us") > 0.0);
         let ends: Vec<f64> = row["ci95"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
         assert!(ends[0] <= number("f1_macro") && number("f1_macro") <= ends[1], "{row}");
-        assert_eq!((&row["trials"], &row["data"]["preset"], &row["data"]["sensors"]), (&24.into(), &"A".into(), &"virtual".into()));
+        assert_eq!(
+            (&row["trials"], &row["data"]["preset"], &row["data"]["sensors"]),
+            (&24.into(), &"A".into(), &"virtual".into())
+        );
     }
     // Results do not depend on threads, but for times.
     let again = json(at, &[&evaluate[..], &["--threads", "1"]].concat());
     assert_eq!((&again[0]["f1_macro"], &again[1]["confusion"]), (&rows[0]["f1_macro"], &rows[1]["confusion"]));
 
-    let trained = json(at, &["train", "ids-lstm", "--quick", "--trials", "8", "--out", "models/own.safetensors", "--json"]);
+    let trained =
+        json(at, &["train", "ids-lstm", "--quick", "--trials", "8", "--out", "models/own.safetensors", "--json"]);
     assert_eq!(trained["channels"].as_array().unwrap().len(), 6);
     assert!(at.join("models/own.json").is_file(), "the card stands beside it");
     let said = json(at, &["recognise", "1", "2", "--model", "models/own.safetensors", "--together", "--json"]);
@@ -62,7 +67,11 @@ fn from_nothing_to_a_table_and_a_model() {
     // A model made for other sensors is refused by their names; one cut short is refused, and the store is unharmed.
     let other = json(at, &["train", "macro-layer", "--quick", "--layout", "C2", "--out", "c2.safetensors", "--json"]);
     assert_eq!(other["channels"][2], "pressure_left_proximal");
-    refused(at, &["evaluate", "--models", "c2.safetensors"], &["it needs pressure_left_proximal", "does not know pressure_left"]);
+    refused(
+        at,
+        &["evaluate", "--models", "c2.safetensors"],
+        &["it needs pressure_left_proximal", "does not know pressure_left"],
+    );
     let bytes = std::fs::read(at.join("models/own.safetensors")).unwrap();
     std::fs::write(at.join("cut.safetensors"), &bytes[..bytes.len() / 2]).unwrap();
     refused(at, &["recognise", "1", "--model", "cut.safetensors"], &["cut.safetensors", "not a whole model"]);
@@ -81,7 +90,19 @@ fn settings_are_searched_for_on_training_grasps() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     json(at, &["collect", "--objects", "ball,box", "--trials", "6", "--preset", "A", "--json"]);
-    let search = ["train", "macro-layer", "--quick", "--search", "--set", "epochs=5", "--set", "units=8", "--json", "--out", "m.safetensors"];
+    let search = [
+        "train",
+        "macro-layer",
+        "--quick",
+        "--search",
+        "--set",
+        "epochs=5",
+        "--set",
+        "units=8",
+        "--json",
+        "--out",
+        "m.safetensors",
+    ];
     let trained = json(at, &search);
     let tried = trained["search"].as_array().unwrap();
     assert_eq!(tried.len(), 4, "two settings of two values; units were given");
@@ -142,7 +163,10 @@ fn bad_tables_are_refused_and_nothing_is_lost() {
     refused(at, &["trials", "import", "empty.csv"], &["empty.csv"]);
     refused(at, &["trials", "import", "gone.csv"], &["gone.csv"]);
     // Gaps and unequal lengths are mended, and said.
-    write("gaps.csv", "trial,label,t_s,grip\n1,mug,0,1\n1,mug,0.1,nan\n1,mug,0.2,3\n2,pen,0,1\n2,pen,0.1,2\n2,pen,0.2,2\n2,pen,0.3,2\n");
+    write(
+        "gaps.csv",
+        "trial,label,t_s,grip\n1,mug,0,1\n1,mug,0.1,nan\n1,mug,0.2,3\n2,pen,0,1\n2,pen,0.1,2\n2,pen,0.2,2\n2,pen,0.3,2\n",
+    );
     let mended = run(at, &["trials", "import", "gaps.csv"]);
     assert!(mended.code == Some(0) && mended.err.contains("warning: "), "{mended:?}");
     let store = Store::open(&at.join("trials.sqlite")).unwrap();

@@ -37,7 +37,7 @@ pub(crate) fn ran(output: &Output) -> Ran {
 }
 
 /// Runs something that must succeed and print JSON.
-pub(crate) fn json(folder: &Path, arguments: &[&str]) -> Value {
+pub(crate) fn json(folder: &Path, arguments: &[&str]) -> serde_json::Value {
     let ran = run(folder, arguments);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     serde_json::from_str(&ran.out).unwrap()

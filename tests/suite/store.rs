@@ -16,7 +16,21 @@ use std::time::Duration;
 fn busy_program(store: &Path, after_lines: usize) -> (Child, impl Sized) {
     let mut command = palpate(store);
     let folder = store.parent().unwrap();
-    command.args(["demo", "--object", "ball", "--seed", "1", "--grasps", "100", "--threshold", "1", "--no-pictures", "--out"]).arg(folder);
+    command
+        .args([
+            "demo",
+            "--object",
+            "ball",
+            "--seed",
+            "1",
+            "--grasps",
+            "100",
+            "--threshold",
+            "1",
+            "--no-pictures",
+            "--out",
+        ])
+        .arg(folder);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     assert_eq!(lines.by_ref().take(after_lines).filter(Result::is_ok).count(), after_lines);
@@ -87,7 +101,19 @@ fn two_programs_record_into_one_store() {
     let path = folder.path().join("shared.sqlite");
     let grasps = |object: &str| {
         let mut command = palpate(&path);
-        command.args(["demo", "--object", object, "--seed", "1", "--grasps", "6", "--threshold", "1", "--no-pictures", "--json"]);
+        command.args([
+            "demo",
+            "--object",
+            object,
+            "--seed",
+            "1",
+            "--grasps",
+            "6",
+            "--threshold",
+            "1",
+            "--no-pictures",
+            "--json",
+        ]);
         command.stdout(Stdio::null()).spawn().unwrap()
     };
     let (mut first, mut second) = (grasps("ball"), grasps("cube"));

@@ -28,8 +28,7 @@ pub(super) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut sets = Vec::new();
     for (trials, seed) in TRIALS.into_iter().zip(SEEDS) {
-        let plan =
-            CollectionPlan { scene: scene.clone(), objects: all_objects(), trials, seed, shard: Shard::WHOLE };
+        let plan = CollectionPlan { scene: scene.clone(), objects: all_objects(), trials, seed, shard: Shard::WHOLE };
         let bar = progress_bar("collecting")?;
         let report = collect(&plan, store, threads, &mut |progress| {
             bar.set_length(u64::from(progress.of));
@@ -49,9 +48,8 @@ pub(super) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
     let fitting = Fitting { seed: 1, quick: false, settings, progress: &progress, stop: &interrupted };
     let mut model = method.train(&train, &fitting)?;
     bar.finish_and_clear();
-    let objects: Vec<usize> = (0..test.examples.len())
-        .filter(|k| test.labels.classes[test.examples[*k].class].size.is_some())
-        .collect();
+    let objects: Vec<usize> =
+        (0..test.examples.len()).filter(|k| test.labels.classes[test.examples[*k].class].size.is_some()).collect();
     let objects = test.part(&objects);
     let stop = StopRule::default();
     let comparison =

@@ -3,7 +3,8 @@
 use super::evaluation::{MOST_GRASPS, answer, evaluate, product_of_experts, rounds};
 use super::metrics::{Bootstrap, Confusion};
 use super::{
-    Class, DataCard, Dataset, Example, FitError, Fitting, Labels, METHODS, Method, Model, ModelError, Sequence, StopRule,
+    Class, DataCard, Dataset, Example, FitError, Fitting, Labels, METHODS, Method, Model, ModelError, Sequence,
+    StopRule,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,8 +21,7 @@ fn quick(seed: u64) -> Fitting<'static> {
 pub(super) fn made_up(of_each: usize, seed: u64) -> Dataset {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let class = |name: &str, size, shape| Class { name: name.to_owned(), size: Some(size), shape: Some(shape) };
-    let classes =
-        vec![class("ball", 1, 1), class("brick", 1, 0), class("cube", 0, 0), class("marble", 0, 1)];
+    let classes = vec![class("ball", 1, 1), class("brick", 1, 0), class("cube", 0, 0), class("marble", 0, 1)];
     let words = |list: &[&str]| list.iter().map(|w| (*w).to_owned()).collect();
     let labels = Labels { classes, sizes: words(&["tiny", "large"]), shapes: words(&["cubic", "spherical"]) };
     let mut examples = Vec::new();
@@ -123,7 +123,12 @@ fn answers_grow_surer_with_grasps_and_are_judged() {
     let followed = rounds(recogniser, &test, &answers, 1);
     assert!(followed.iter().all(|round| round.belief.grasps() == MOST_GRASPS));
     let independent = product_of_experts(&test, &answers, 1);
-    assert!(followed.iter().zip(&independent).all(|(a, b)| a.truth == b.truth && a.belief.steps()[0] == b.belief.steps()[0]));
+    assert!(
+        followed
+            .iter()
+            .zip(&independent)
+            .all(|(a, b)| a.truth == b.truth && a.belief.steps()[0] == b.belief.steps()[0])
+    );
     let bootstrap = Bootstrap { resamples: 200, seed: 1 };
     let evaluation =
         evaluate(recogniser, &test, &answers, &followed, StopRule::default(), &bootstrap).expect("has trials");

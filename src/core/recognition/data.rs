@@ -107,7 +107,11 @@ impl DataCard {
     pub fn described(&self) -> String {
         let mut parts = Vec::new();
         parts.extend(self.preset.as_ref().map(|preset| format!("preset {preset}")));
-        parts.push(if self.object == "recorded" { "recorded grasps".to_owned() } else { format!("object {}", self.object) });
+        parts.push(if self.object == "recorded" {
+            "recorded grasps".to_owned()
+        } else {
+            format!("object {}", self.object)
+        });
         parts.extend(self.sensors.as_ref().map(|sensors| format!("{sensors} sensors")));
         parts.extend(self.layout.clone());
         parts.join(", ")

@@ -3,8 +3,8 @@
 use super::data::Dataset;
 use super::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval};
 use super::{Belief, Pmf, Recogniser, StopReason, StopRule, Verdict};
-use rand::seq::SliceRandom;
 use rand::SeedableRng;
+use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 

@@ -106,7 +106,8 @@ impl Features {
         let mut row = Vec::with_capacity(self.width());
         let count = grasp.len().max(1) as f32;
         let last = grasp.len().saturating_sub(1);
-        let at = |sample: usize, channel: usize| grasp.values.get(sample * self.channels + channel).copied().unwrap_or(0.0);
+        let at =
+            |sample: usize, channel: usize| grasp.values.get(sample * self.channels + channel).copied().unwrap_or(0.0);
         for channel in 0..self.channels {
             let values = || (0..grasp.len()).map(|sample| at(sample, channel));
             let mean = values().sum::<f32>() / count;

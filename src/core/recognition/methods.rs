@@ -50,9 +50,7 @@ macro_rules! network {
             kind: Kind::Network,
             about: $about,
             recipe: Some(|| $recipe),
-            fit: |data, fitting| {
-                Ok(Box::new(TactileNetwork::fit(data, $recipe.adjusted(fitting)?, $title, fitting)?))
-            },
+            fit: |data, fitting| Ok(Box::new(TactileNetwork::fit(data, $recipe.adjusted(fitting)?, $title, fitting)?)),
             load: |card, arrays| Ok(Box::new(TactileNetwork::load(card, arrays)?)),
         }
     };
@@ -98,18 +96,46 @@ impl Method {
 
 /// All methods, the paper's own first.
 pub const METHODS: [Method; 19] = [
-    network!("ds-lstm", "DS-LSTM", "The paper's dual-stage LSTM: size and shape first, on one half of the data, then \
-        the class, on the other half", Recipe::dual_stage()),
-    network!("ids-lstm", "iDS-LSTM", "The paper's iterated DS-LSTM: the PMF of earlier grasps is fed back",
-        Recipe::iterated()),
-    network!("ds-lstm-cross", "DS-LSTM, cross-fitted", "The dual-stage LSTM with both stages on all data: stage two \
-        learns from what first stages say of grasps they have not seen", Recipe::dual_stage().cross_fitted()),
-    network!("ids-lstm-cross", "iDS-LSTM, cross-fitted", "The iterated DS-LSTM on all data, by cross-fitting; the live \
-        model is of this kind", Recipe::iterated().cross_fitted()),
-    network!("macro-layer", "Macro-layer", "The paper's recurrent macro-layer by itself: LSTM, fully connected, \
-        dropout, fully connected", Recipe::macro_layer()),
-    network!("zuo", "Zuo et al.", "The four-layer network from which the paper starts: LSTM, dropout, fully connected",
-        Recipe::zuo()),
+    network!(
+        "ds-lstm",
+        "DS-LSTM",
+        "The paper's dual-stage LSTM: size and shape first, on one half of the data, then \
+        the class, on the other half",
+        Recipe::dual_stage()
+    ),
+    network!(
+        "ids-lstm",
+        "iDS-LSTM",
+        "The paper's iterated DS-LSTM: the PMF of earlier grasps is fed back",
+        Recipe::iterated()
+    ),
+    network!(
+        "ds-lstm-cross",
+        "DS-LSTM, cross-fitted",
+        "The dual-stage LSTM with both stages on all data: stage two \
+        learns from what first stages say of grasps they have not seen",
+        Recipe::dual_stage().cross_fitted()
+    ),
+    network!(
+        "ids-lstm-cross",
+        "iDS-LSTM, cross-fitted",
+        "The iterated DS-LSTM on all data, by cross-fitting; the live \
+        model is of this kind",
+        Recipe::iterated().cross_fitted()
+    ),
+    network!(
+        "macro-layer",
+        "Macro-layer",
+        "The paper's recurrent macro-layer by itself: LSTM, fully connected, \
+        dropout, fully connected",
+        Recipe::macro_layer()
+    ),
+    network!(
+        "zuo",
+        "Zuo et al.",
+        "The four-layer network from which the paper starts: LSTM, dropout, fully connected",
+        Recipe::zuo()
+    ),
     tabular!("decision-tree", "Decision tree", Single, "One tree on the course of all channels", DecisionTree),
     tabular!("knn", "KNN", Single, "Seven nearest neighbours on the course of all channels", Neighbours),
     tabular!("svm", "SVM", Single, "Support vectors with a Gaussian kernel on the course of all channels", Svm),
@@ -126,12 +152,28 @@ pub const METHODS: [Method; 19] = [
     },
     tabular!("random-forest", "Random forest", Ensemble, "200 trees on the course of all channels", RandomForest),
     tabular!("bagged-trees", "Bagged trees", Ensemble, "100 bagged trees on the course of all channels", BaggedTrees),
-    tabular!("gradient-boosting", "Gradient boosting", Ensemble, "100 rounds of regression trees on the softmax \
-        deviance", GradientBoosting),
-    tabular!("rusboost", "RUSBoost (M2)", Ensemble, "AdaBoost.M2 over rounds with as many grasps of each class",
-        RusBoostM2),
-    tabular!("rusboost-samme", "RUSBoost (SAMME)", Ensemble, "The same in the SAMME form of imbalanced-learn",
-        RusBoostSamme),
+    tabular!(
+        "gradient-boosting",
+        "Gradient boosting",
+        Ensemble,
+        "100 rounds of regression trees on the softmax \
+        deviance",
+        GradientBoosting
+    ),
+    tabular!(
+        "rusboost",
+        "RUSBoost (M2)",
+        Ensemble,
+        "AdaBoost.M2 over rounds with as many grasps of each class",
+        RusBoostM2
+    ),
+    tabular!(
+        "rusboost-samme",
+        "RUSBoost (SAMME)",
+        Ensemble,
+        "The same in the SAMME form of imbalanced-learn",
+        RusBoostSamme
+    ),
     tabular!("measures-svm", "Measures + SVM", Further, "Support vectors on hand-made measures", MeasuresSvm),
     tabular!("measures-forest", "Measures + forest", Further, "A random forest on hand-made measures", MeasuresForest),
     Method {

@@ -117,7 +117,8 @@ impl Model {
         if own == channels {
             return Ok(());
         }
-        let only = |a: &[String], b: &[String]| -> Vec<String> { a.iter().filter(|c| !b.contains(c)).cloned().collect() };
+        let only =
+            |a: &[String], b: &[String]| -> Vec<String> { a.iter().filter(|c| !b.contains(c)).cloned().collect() };
         let (missing, extra) = (only(own, channels), only(channels, own));
         let mut parts = Vec::new();
         if !missing.is_empty() {
@@ -152,7 +153,8 @@ impl Model {
 
     /// Reads a model from a file.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
-        let unreadable = |cause: std::io::Error| ModelError::Unreadable { path: path.to_owned(), cause: cause.to_string() };
+        let unreadable =
+            |cause: std::io::Error| ModelError::Unreadable { path: path.to_owned(), cause: cause.to_string() };
         let size = std::fs::metadata(path).map_err(unreadable)?.len();
         if size > LARGEST_FILE {
             let cause = format!("it has {size} bytes");
@@ -165,7 +167,8 @@ impl Model {
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
         let bad = |cause: String| ModelError::Malformed { name: name.to_owned(), cause };
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| bad(e.to_string()))?;
-        let card = header.metadata().as_ref().and_then(|m| m.get(CARD_KEY)).ok_or_else(|| bad("it has no card".into()))?;
+        let card =
+            header.metadata().as_ref().and_then(|m| m.get(CARD_KEY)).ok_or_else(|| bad("it has no card".into()))?;
         let card: ModelCard = serde_json::from_str(card).map_err(|e| bad(format!("its card: {e}")))?;
         let tensors = candle_core::safetensors::load_buffer(bytes, &Device::Cpu).map_err(|e| bad(e.to_string()))?;
         let Some(method) = method(&card.method) else {

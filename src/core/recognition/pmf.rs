@@ -27,7 +27,8 @@ impl Pmf {
     /// Weights made to sum to one; weights that are negative or no numbers count as none, and where nothing is left
     /// all classes are equally likely.
     pub fn from_weights(weights: impl IntoIterator<Item = f64>) -> Self {
-        let mut weights: Vec<f64> = weights.into_iter().map(|w| if w > 0.0 && w.is_finite() { w } else { 0.0 }).collect();
+        let mut weights: Vec<f64> =
+            weights.into_iter().map(|w| if w > 0.0 && w.is_finite() { w } else { 0.0 }).collect();
         let sum: f64 = weights.iter().sum();
         if sum > 0.0 && sum.is_finite() {
             weights.iter_mut().for_each(|w| *w /= sum);
@@ -122,7 +123,9 @@ mod tests {
 
     #[test]
     fn strange_weights_still_sum_to_one() {
-        for weights in [vec![f64::NAN, 1.0], vec![0.0; 3], vec![f64::INFINITY, 2.0], vec![-1.0, 4.0], vec![1e308, 1e308]] {
+        for weights in
+            [vec![f64::NAN, 1.0], vec![0.0; 3], vec![f64::INFINITY, 2.0], vec![-1.0, 4.0], vec![1e308, 1e308]]
+        {
             let pmf = Pmf::from_weights(weights);
             assert!((pmf.probabilities().iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }

@@ -64,7 +64,9 @@ pub enum DatasetError {
         cause: String,
     },
     /// No trial fits.
-    #[error("no trial in the store fits{about}; `palpate collect` makes some, `palpate trials list` shows what is there")]
+    #[error(
+        "no trial in the store fits{about}; `palpate collect` makes some, `palpate trials list` shows what is there"
+    )]
     Nothing {
         /// What was asked for.
         about: String,
@@ -126,7 +128,8 @@ fn labels(named: BTreeMap<String, Option<(String, String)>>) -> Labels {
 
 impl Source {
     fn takes(&self, row: &TrialRow) -> bool {
-        let in_collection = |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
+        let in_collection =
+            |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
         row.state == "complete"
             && row.sound
             && self.collection.as_ref().is_none_or(in_collection)
@@ -284,9 +287,11 @@ impl View {
         let clean = sensors.signals(trial);
         let end = trial.frames.iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         // Poses of different objects may share a seed; their noise should not.
-        let seed = trial.info.object.bytes().fold(trial.info.seed, |seed, byte| {
-            (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
+        let seed = trial
+            .info
+            .object
+            .bytes()
+            .fold(trial.info.seed, |seed, byte| (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
         Ok(self.sensors.apply(&clean, seed).until(end))
     }
 }

@@ -98,7 +98,9 @@ impl Comparison<'_> {
         std::thread::scope(|scope| {
             for _ in 0..threads.clamp(1, methods.len().max(1)) {
                 scope.spawn(|| {
-                    while let Some((n, method)) = Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|n| Some((n, methods.get(n)?))) {
+                    while let Some((n, method)) =
+                        Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|n| Some((n, methods.get(n)?)))
+                    {
                         let judged = self.of_method(method);
                         if let Ok(judged) = &judged {
                             tell(&judged.row);
@@ -124,9 +126,8 @@ impl Comparison<'_> {
             progress: &|_| (),
             stop: self.interrupted,
         };
-        let model = method
-            .train(self.train, &fitting)
-            .map_err(|cause| ComparisonError::Fit { method: method.key, cause })?;
+        let model =
+            method.train(self.train, &fitting).map_err(|cause| ComparisonError::Fit { method: method.key, cause })?;
         self.of_model(method.key, method.title, &model)
     }
 
@@ -142,9 +143,15 @@ impl Comparison<'_> {
         let seed = self.seed ^ 0x6ea5;
         let followed = rounds(recogniser, self.test, &answers, seed);
         let independent = product_of_experts(self.test, &answers, seed);
-        let evaluation =
-            evaluate(recogniser, self.test, &answers, &followed, self.stop, &Bootstrap { seed, ..Bootstrap::default() })
-                .ok_or(ComparisonError::NoTest)?;
+        let evaluation = evaluate(
+            recogniser,
+            self.test,
+            &answers,
+            &followed,
+            self.stop,
+            &Bootstrap { seed, ..Bootstrap::default() },
+        )
+        .ok_or(ComparisonError::NoTest)?;
         let classes = self.test.labels.classes.len();
         let row = ComparisonRow {
             model: name.to_owned(),
@@ -167,8 +174,10 @@ impl Comparison<'_> {
         let f1 = |decided: &[Option<usize>], trials: &[usize]| {
             Confusion::from_pairs(classes, trials.iter().map(|k| (truth[*k], decided[*k])))?.macro_f1()
         };
-        let p_values: Vec<f64> =
-            others.iter().map(|o| McNemar::of(&truth, &o.decided, &first.decided).map_or(1.0, |m| m.p_value())).collect();
+        let p_values: Vec<f64> = others
+            .iter()
+            .map(|o| McNemar::of(&truth, &o.decided, &first.decided).map_or(1.0, |m| m.p_value()))
+            .collect();
         let adjusted = holm(&p_values);
         let bootstrap = Bootstrap { resamples: 1000, seed: self.seed };
         for ((other, mcnemar_p), mcnemar_p_holm) in others.iter_mut().zip(p_values).zip(adjusted) {
@@ -255,9 +264,7 @@ pub fn fed_back_against_independent(classes: usize, fed_back: &[Round], independ
     };
     let bootstrap = Bootstrap { resamples: 1000, seed: 0 };
     (0..most)
-        .filter_map(|grasps| {
-            bootstrap.difference(&truth, |t| f1(fed_back, grasps, t), |t| f1(independent, grasps, t))
-        })
+        .filter_map(|grasps| bootstrap.difference(&truth, |t| f1(fed_back, grasps, t), |t| f1(independent, grasps, t)))
         .collect()
 }
 

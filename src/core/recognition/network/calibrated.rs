@@ -147,7 +147,12 @@ impl Plan<'_> {
 }
 
 /// Passes progress on, and stops where that is asked for.
-fn following<'a>(fitting: &'a Fitting<'_>, from: f64, share: f64, epochs: usize) -> impl FnMut(usize, f64) -> bool + 'a {
+fn following<'a>(
+    fitting: &'a Fitting<'_>,
+    from: f64,
+    share: f64,
+    epochs: usize,
+) -> impl FnMut(usize, f64) -> bool + 'a {
     move |epoch, _| {
         (fitting.progress)(from + share * (epoch + 1) as f64 / epochs.max(1) as f64);
         fitting.check().is_ok()
@@ -207,7 +212,8 @@ fn fit_temperatures(answered: &[(&[f32], &[usize])], groups: &[usize]) -> Vec<Ve
             })
             .collect();
         from += classes;
-        of_groups.push((0..steps.max(1)).map(|step| joined(&knots, (step as f64 + 0.5) / steps.max(1) as f64)).collect());
+        of_groups
+            .push((0..steps.max(1)).map(|step| joined(&knots, (step as f64 + 0.5) / steps.max(1) as f64)).collect());
     }
     of_groups
 }

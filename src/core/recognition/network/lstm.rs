@@ -184,14 +184,7 @@ impl LiveLstm {
         add_row_product(x, &self.w, &mut state.gates);
         add_row_product(&state.h, &self.u, &mut state.gates);
         std::mem::swap(&mut state.c, &mut state.c_before);
-        step_forward(
-            self.units,
-            &mut state.gates,
-            &state.c_before,
-            &mut state.c,
-            &mut state.tanh_c,
-            &mut state.h,
-        );
+        step_forward(self.units, &mut state.gates, &state.c_before, &mut state.c, &mut state.tanh_c, &mut state.h);
     }
 }
 

@@ -6,8 +6,8 @@
 //! recognition, logarithms of the probabilities before can be added to the outputs through a learned gain, so that the
 //! network begins as the product of experts and learns where to depart from it.
 
-use super::gemm::{Matrix, multiply};
 use super::gates;
+use super::gemm::{Matrix, multiply};
 use super::lstm::{LiveLstm, LiveState, LstmGradients, LstmWeights, LstmWorkspace};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};

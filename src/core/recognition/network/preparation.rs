@@ -244,3 +244,58 @@ pub fn mirror(channels: &[String]) -> Option<Vec<usize>> {
     };
     channels.iter().map(other).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::conformance::made_up;
+    use super::*;
+
+    #[test]
+    fn inputs_have_no_mean_and_unit_deviation() {
+        let data = made_up(10, 1);
+        let preparation = Preparation::fit(&data, 10.0);
+        assert!(preparation.is_sound());
+        let rows: Vec<f32> = data.examples.iter().flat_map(|e| preparation.inputs(&e.grasp)).collect();
+        let width = preparation.width();
+        for input in 0..width {
+            let values: Vec<f64> = rows.iter().skip(input).step_by(width).map(|x| f64::from(*x)).collect();
+            let count = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / count;
+            let deviation = (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
+            assert!(mean.abs() < 1e-3 && deviation < 1.001, "input {input}: {mean} {deviation}");
+            assert!(input >= width / 2 || deviation > 0.999, "scaled values: {deviation}");
+        }
+    }
+
+    #[test]
+    fn readings_are_averaged_over_even_steps_whatever_their_rate() {
+        let ramp = |hz: f32| {
+            let t_s: Vec<f32> = (1..=(2.0 * hz) as usize).map(|k| k as f32 / hz).collect();
+            let values = t_s.iter().map(|t| t - 0.5 / hz).collect();
+            Sequence { t_s, values }
+        };
+        let (fine, coarse) = (Binner::plain(5.0, 1).whole(&ramp(100.0)), Binner::plain(5.0, 1).whole(&ramp(50.0)));
+        assert_eq!((fine.len(), coarse.len()), (10, 10));
+        assert!(fine.iter().zip(&coarse).all(|(a, b)| (a - b).abs() < 1e-4), "{fine:?} {coarse:?}");
+        assert!((fine[0] - 0.1).abs() < 1e-4, "the mean over the first fifth of a second: {}", fine[0]);
+    }
+
+    #[test]
+    fn wide_channels_are_compressed_and_dead_ones_silenced() {
+        let mut wide: Vec<f32> = (0..1000).map(|k| 10f32.powf(k as f32 / 250.0)).collect();
+        let scale = fitted(&mut wide);
+        assert!(scale.knee > 0.0, "four decades");
+        let mut dead = vec![7.0; 100];
+        let scale = fitted(&mut dead);
+        assert_eq!((scale.knee, scale.apply(7.0), scale.apply(1e30)), (0.0, 0.0, 0.0));
+        let mut even: Vec<f32> = (0..100).map(|k| k as f32).collect();
+        assert_eq!(fitted(&mut even).knee, 0.0);
+    }
+
+    #[test]
+    fn mirrors_pair_the_fingers() {
+        let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
+        assert_eq!(mirror(&names(&["bend_left", "bend_right", "grip_right", "grip_left"])), Some(vec![1, 0, 3, 2]));
+        assert_eq!(mirror(&names(&["bend_left", "grip"])), None);
+    }
+}

@@ -68,8 +68,7 @@ impl Recipe {
     /// A plain LSTM: one layer and its read-out at the end, nothing else.
     pub fn plain_lstm() -> Self {
         let base = Self::macro_layer();
-        let training =
-            Training { dropout: 0.0, early_read_outs: 0, weight_decay: 0.01, ..base.training.clone() };
+        let training = Training { dropout: 0.0, early_read_outs: 0, weight_decay: 0.01, ..base.training.clone() };
         Self { hidden: 0, mirror: false, noise: 0.0, training, ..base }
     }
 

@@ -108,7 +108,12 @@ pub fn train_on(
             let loss = layer.loss(&batch, regular, &mut random, &mut gradient, &mut pass);
             sum += loss * group.len() as f64;
             shorten(&mut gradient, training.longest_gradient);
-            optimiser.step(layer.values_mut(), &gradient, training.rate(taken as f64 / steps as f64), training.weight_decay);
+            optimiser.step(
+                layer.values_mut(),
+                &gradient,
+                training.rate(taken as f64 / steps as f64),
+                training.weight_decay,
+            );
             taken += 1;
         }
         if !go_on(epoch, sum / order.len().max(1) as f64) {

@@ -122,9 +122,7 @@ fn page(learned: &Learned, grasp: &Sequence) -> Vec<f32> {
     let width = learned.preparation.width();
     let inputs = learned.preparation.inputs(grasp);
     let rows = inputs.len() / width.max(1);
-    let at = |step: usize, input: usize| {
-        rows.checked_sub(1).map_or(0.0, |last| inputs[step.min(last) * width + input])
-    };
+    let at = |step: usize, input: usize| rows.checked_sub(1).map_or(0.0, |last| inputs[step.min(last) * width + input]);
     (0..width).flat_map(|input| (0..learned.steps).map(move |step| at(step, input))).collect()
 }
 

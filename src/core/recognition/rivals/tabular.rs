@@ -92,8 +92,12 @@ impl Tabular {
             return Err(FitError::Setting { name: name.clone(), cause });
         }
         let features = Features::fit(kind.features(), data);
-        let mut rows =
-            Rows { values: Vec::new(), columns: features.width(), labels: Vec::new(), classes: data.labels.classes.len() };
+        let mut rows = Rows {
+            values: Vec::new(),
+            columns: features.width(),
+            labels: Vec::new(),
+            classes: data.labels.classes.len(),
+        };
         for example in &data.examples {
             for row in [Some(features.row(&example.grasp)), features.mirrored(&example.grasp)].into_iter().flatten() {
                 rows.values.extend(row);
@@ -184,7 +188,8 @@ fn fit_model(rows: &Rows, kind: TabularKind, fitting: &Fitting<'_>) -> Result<(R
         TabularKind::BaggedTrees => forest(ForestSettings::bagged_trees()),
         TabularKind::GradientBoosting => {
             let base = GradientBoostingSettings::default();
-            let tree = TreeSettings { min_leaf: 10, features: super::super::forest::FeatureSampling::Sqrt, ..base.tree };
+            let tree =
+                TreeSettings { min_leaf: 10, features: super::super::forest::FeatureSampling::Sqrt, ..base.tree };
             let settings = GradientBoostingSettings { seed, rounds: count(base.rounds), tree, ..base };
             let words = format!("{settings:?}");
             Ok((RowModel::Boosting(GradientBoosting::fit(&examples, &settings).map_err(failed)?), words))
