@@ -130,13 +130,16 @@ fn switches_take_away_no_more_than_their_own() {
     let felt = read(PhysicalLike { threshold: true, ..off }, "force_left");
     assert!(felt.iter().zip(&full).all(|(f, all)| if *all < 0.15 { *f == 0.0 } else { f == all }));
     let cut = read(PhysicalLike { saturation: true, ..off }, "force_left");
-    assert!(cut.iter().zip(&full).all(|(c, all)| (c - all.min(1.0)).abs() < 1e-6));
+    assert!(cut.iter().zip(&full).all(|(c, all)| (c - all.min(PhysicalLike::OFF.full_force as f32)).abs() < 1e-6));
 }
 
 #[test]
 fn a_pressed_pad_knows_three_levels() {
     let read = SensorModel::PhysicalLike.apply(&grasp(), 7);
-    for (name, full) in [("force_left", 1.0), ("force_right", 1.0), ("pressure_left", 2e4), ("pressure_right", 2e4)] {
+    let (force, pressure) = (PhysicalLike::OFF.full_force as f32, PhysicalLike::OFF.full_pressure as f32);
+    let channels =
+        [("force_left", force), ("force_right", force), ("pressure_left", pressure), ("pressure_right", pressure)];
+    for (name, full) in channels {
         let values = column(&read, name);
         let idle = values.iter().filter(|&&v| v < 0.05 * full).count();
         let saturated = values.iter().filter(|&&v| v > 0.98 * full).count();
