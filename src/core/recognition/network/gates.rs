@@ -14,7 +14,8 @@ pub(super) fn exp(x: f32) -> f32 {
     // Rounds to the nearest integer by pushing the fraction out of the mantissa.
     const ROUNDER: f32 = 12_582_912.0;
     let x = x.clamp(-87.0, 88.0);
-    let n = (x * std::f32::consts::LOG2_E + ROUNDER) - ROUNDER;
+    let rounded = x * std::f32::consts::LOG2_E + ROUNDER;
+    let n = rounded - ROUNDER;
     // ln 2 in two parts, so that the remainder keeps its digits.
     let r = x - n * 0.693_359_4;
     let r = r + n * 2.121_944_4e-4;
@@ -24,7 +25,8 @@ pub(super) fn exp(x: f32) -> f32 {
     p = p * r + 4.166_579_6e-2;
     p = p * r + 0.166_666_65;
     p = p * r + 0.5;
-    let power = f32::from_bits(((n as i32 + 127) << 23) as u32);
+    // Next to the rounder neighbouring numbers are one apart, so that n also stands in the lowest bits.
+    let power = f32::from_bits(rounded.to_bits().wrapping_sub(ROUNDER.to_bits()).wrapping_add(127) << 23);
     (p * r * r + r + 1.0) * power
 }
 
@@ -65,6 +67,15 @@ dispatched! {
     (units: usize, gates: &mut [f32], c_before: &[f32], c: &mut [f32], tanh_c: &mut [f32], h: &mut [f32])
 }
 
+/// Units that are computed side by side: local arrays of this width, which no other memory can overlap, are what lets
+/// the compiler use whole vectors.
+const LANES: usize = 16;
+
+#[inline(always)]
+fn lanes(f: impl Fn(usize) -> f32) -> [f32; LANES] {
+    std::array::from_fn(f)
+}
+
 #[inline(always)]
 fn forward_body(units: usize, gates: &mut [f32], c_before: &[f32], c: &mut [f32], tanh_c: &mut [f32], h: &mut [f32]) {
     let rows = gates.chunks_exact_mut(4 * units).zip(c_before.chunks_exact(units));
@@ -73,14 +84,27 @@ fn forward_body(units: usize, gates: &mut [f32], c_before: &[f32], c: &mut [f32]
         let (i, rest) = gates.split_at_mut(units);
         let (f, rest) = rest.split_at_mut(units);
         let (g, o) = rest.split_at_mut(units);
-        let (o, c_before) = (&mut o[..units], &c_before[..units]);
-        for j in 0..units {
-            let (input, forget) = (sigmoid(i[j]), sigmoid(f[j]));
-            let (candidate, output) = (tanh(g[j]), sigmoid(o[j]));
-            (i[j], f[j], g[j], o[j]) = (input, forget, candidate, output);
-            c[j] = forget * c_before[j] + input * candidate;
-            tanh_c[j] = tanh(c[j]);
-            h[j] = output * tanh_c[j];
+        let ((i, i_rest), (f, f_rest)) = (i.as_chunks_mut::<LANES>(), f.as_chunks_mut::<LANES>());
+        let ((g, g_rest), (o, o_rest)) = (g.as_chunks_mut::<LANES>(), o.as_chunks_mut::<LANES>());
+        let ((before, before_rest), (c, c_rest)) = (c_before.as_chunks::<LANES>(), c.as_chunks_mut::<LANES>());
+        let ((t, t_rest), (h, h_rest)) = (tanh_c.as_chunks_mut::<LANES>(), h.as_chunks_mut::<LANES>());
+        let sums = i.iter_mut().zip(f).zip(g.iter_mut().zip(o));
+        let states = before.iter().zip(c).zip(t.iter_mut().zip(h));
+        for (((i, f), (g, o)), ((before, c), (t, h))) in sums.zip(states) {
+            let (input, forget) = (lanes(|k| sigmoid(i[k])), lanes(|k| sigmoid(f[k])));
+            let (candidate, output) = (lanes(|k| tanh(g[k])), lanes(|k| sigmoid(o[k])));
+            let cell = lanes(|k| forget[k] * before[k] + input[k] * candidate[k]);
+            let bent = lanes(|k| tanh(cell[k]));
+            (*i, *f, *g, *o, *c, *t) = (input, forget, candidate, output, cell, bent);
+            *h = lanes(|k| output[k] * bent[k]);
+        }
+        for k in 0..i_rest.len() {
+            let (input, forget) = (sigmoid(i_rest[k]), sigmoid(f_rest[k]));
+            let (candidate, output) = (tanh(g_rest[k]), sigmoid(o_rest[k]));
+            (i_rest[k], f_rest[k], g_rest[k], o_rest[k]) = (input, forget, candidate, output);
+            c_rest[k] = forget * before_rest[k] + input * candidate;
+            t_rest[k] = tanh(c_rest[k]);
+            h_rest[k] = output * t_rest[k];
         }
     }
 }
@@ -100,7 +124,8 @@ fn backward_body(units: usize, gates: &mut [f32], c_before: &[f32], tanh_c: &[f3
         let (i, rest) = gates.split_at_mut(units);
         let (f, rest) = rest.split_at_mut(units);
         let (g, o) = rest.split_at_mut(units);
-        let (o, c_before) = (&mut o[..units], &c_before[..units]);
+        let (i, f, g, o) = (&mut i[..units], &mut f[..units], &mut g[..units], &mut o[..units]);
+        let (c_before, tanh_c, dh, dc) = (&c_before[..units], &tanh_c[..units], &dh[..units], &mut dc[..units]);
         for j in 0..units {
             let (input, forget, candidate, output) = (i[j], f[j], g[j], o[j]);
             let (t, dh) = (tanh_c[j], audible(dh[j]));
