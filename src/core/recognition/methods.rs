@@ -73,8 +73,13 @@ macro_rules! tabular {
 impl Method {
     /// Fits it to data and writes the card.
     pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, FitError> {
-        let start = cpu_time::ThreadTime::now();
-        let recogniser = (self.fit)(data, fitting)?;
+        // A pool of one thread: candle would spread over all cores and be slower for it, and its time is told whole.
+        let failed = |e: rayon::ThreadPoolBuildError| FitError::Failed { cause: e.to_string() };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(failed)?;
+        let (recogniser, train_cpu_s) = pool.install(|| {
+            let start = cpu_time::ThreadTime::now();
+            (self.fit)(data, fitting).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
+        })?;
         let card = ModelCard {
             method: self.key.to_owned(),
             channels: data.channels.clone(),
@@ -86,7 +91,7 @@ impl Method {
             seed: fitting.seed,
             quick: fitting.quick,
             parameters: recogniser.parameters(),
-            train_cpu_s: start.elapsed().as_secs_f64(),
+            train_cpu_s,
             metrics: serde_json::Value::Null,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };

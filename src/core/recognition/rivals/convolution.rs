@@ -79,11 +79,8 @@ impl Convolution {
         let steps = lengths[lengths.len() / 2].max(1);
         let epochs = if fitting.quick { EPOCHS / 6 } else { EPOCHS };
         let learned = Learned { preparation, channels: CHANNELS, steps, epochs };
-        // candle spreads over all cores, and is slower for it with networks this small.
-        let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let failed = |cause: String| FitError::Failed { cause };
-        let pool = one_thread.map_err(|e| failed(e.to_string()))?;
-        let tensors = pool.install(|| train(data, &learned, fitting)).map_err(|e| failed(e.to_string()))?;
+        let tensors = train(data, &learned, fitting).map_err(|e| failed(e.to_string()))?;
         fitting.check()?;
         let classes = data.labels.classes.len();
         Self::assemble(learned, tensors, classes).map_err(|e| failed(e.to_string()))
