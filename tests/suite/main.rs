@@ -7,6 +7,7 @@
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `panels`: the window by its labels, and small pictures of its panels.
+//! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
 //!
 //! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
@@ -25,4 +26,6 @@ mod panels;
 mod physics;
 mod pictures;
 mod program;
+mod recognition_panel;
+mod scripted;
 mod store;
