@@ -15,6 +15,8 @@ pub enum Action {
     SetScene(Box<Scene>),
     /// Grasp this object: a built-in name or a file.
     OpenObject(String),
+    /// Grasp another of the built-in objects, whichever comes next at random.
+    NextObject,
     /// Ask for a file to open.
     PickFile,
     /// Write the scene into a file.
@@ -29,6 +31,8 @@ pub enum Action {
     SetForces(bool),
     /// The stretch of time that all plots show (s); `None` for the whole grasp.
     SetTimeWindow(Option<[f64; 2]>),
+    /// Tell, or keep hidden, what is in the hand in truth.
+    ShowTruth(bool),
     /// The key sheet on or off.
     ShowKeys(bool),
     /// Write the 3-D view into a PNG file.

@@ -25,12 +25,15 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Act
     ui.horizontal_centered(|ui| {
         ui.label(RichText::new("Palpate").heading().strong());
         badge(ui, "SIMULATED", veil(colours.accent, 0.22), colour(colours.text));
-        if let Some(object) = context.snapshot.and_then(|s| s.object.as_deref()) {
+        let object = context.snapshot.and_then(|s| s.object.as_deref());
+        if let Some(object) = object.filter(|_| context.view.truth_shown) {
             ui.label(&object.title);
         }
         if let Some(snapshot) = context.snapshot {
             let status = &snapshot.status;
-            ui.weak(format!("grasp {} of {}", status.grasp_of_round.max(1), status.grasps));
+            // With a model a round ends as soon as it is clear what is in the hand.
+            let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
+            ui.weak(format!("grasp {} {of} {}", status.grasp_of_round.max(1), status.grasps));
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui.button("?").on_hover_text("Keys (F1)").clicked() {
@@ -116,7 +119,7 @@ fn recording(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
     }
     let mut grasps = status.grasps.max(1);
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
-    if ui.add(drag).on_hover_text("Grasps before it stops; all but the first in random poses").changed() {
+    if ui.add(drag).on_hover_text("Most grasps before it stops; all but the first in random poses").changed() {
         actions.push(Action::Simulation(Command::SetGrasps(grasps)));
     }
 }

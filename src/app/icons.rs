@@ -11,6 +11,14 @@ pub(super) enum Icon {
     Step,
     Sun,
     Moon,
+    Eye,
+    Check,
+    Cross,
+}
+
+/// An icon by itself, in the middle of a place.
+pub(super) fn sign(ui: &Ui, icon: Icon, place: Rect, ink: Color32) {
+    paint(ui, icon, place, ink, Color32::TRANSPARENT);
 }
 
 /// A button that bears an icon, and a name for screen readers and tests.
@@ -52,6 +60,20 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, ink: Color32, ground: Color32) {
             for k in 0..8 {
                 let ray = Vec2::angled(std::f32::consts::TAU * k as f32 / 8.0);
                 painter.line_segment([middle + ray * 5.6, middle + ray * 8.0], Stroke::new(1.5, ink));
+            }
+        }
+        Icon::Eye => {
+            painter.add(Shape::ellipse_stroke(middle, vec2(8.0, 5.0), Stroke::new(1.5, ink)));
+            painter.circle_filled(middle, 2.4, ink);
+        }
+        Icon::Check => {
+            let corners = [vec2(-5.5, 0.5), vec2(-1.5, 4.5), vec2(6.0, -4.5)].map(|corner| middle + corner);
+            painter.line(corners.to_vec(), Stroke::new(2.2, ink));
+        }
+        Icon::Cross => {
+            for tilt in [1.0, -1.0] {
+                let arm = vec2(4.5, 4.5 * tilt);
+                painter.line_segment([middle - arm, middle + arm], Stroke::new(2.2, ink));
             }
         }
         Icon::Moon => {

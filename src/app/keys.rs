@@ -24,7 +24,7 @@ const fn key(
 }
 
 /// All keys. Those with more modifiers come first, so that they win.
-pub(super) const ALL: [Binding; 18] = [
+pub(super) const ALL: [Binding; 19] = [
     key(Modifiers::NONE, Key::Space, "play or pause", |c| {
         let playing = c.snapshot?.status.playing;
         Some(Action::Simulation(if playing { Command::Pause } else { Command::Play }))
@@ -33,6 +33,7 @@ pub(super) const ALL: [Binding; 18] = [
     key(Modifiers::NONE, Key::Backspace, "back to the start", |_| Some(Action::Simulation(Command::Reset))),
     key(Modifiers::NONE, Key::Minus, "slower", |c| next_speed(c, -1)),
     key(Modifiers::NONE, Key::Equals, "faster", |c| next_speed(c, 1)),
+    key(Modifiers::NONE, Key::N, "next object", |_| Some(Action::NextObject)),
     key(Modifiers::COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(Action::PickFile)),
     key(Modifiers::COMMAND, Key::S, "save the scene", |_| Some(Action::SaveScene)),
     key(Modifiers::COMMAND, Key::P, "save a picture of the 3-D view", |_| Some(Action::SavePicture)),

@@ -13,6 +13,7 @@ mod panels;
 mod plots;
 mod startup;
 mod theme;
+mod tiling;
 mod traces;
 mod view_state;
 mod viewport;
@@ -25,6 +26,7 @@ pub use view_state::ViewState;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
+use palpate_core::recognition::shipped_model;
 use palpate_core::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -64,6 +66,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             scene: options.scene,
             store: options.store,
             view,
+            model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

@@ -16,6 +16,8 @@ pub struct ViewState {
     pub camera: Camera,
     /// Force arrows are drawn.
     pub forces: bool,
+    /// What is in the hand in truth is told in words.
+    pub truth_shown: bool,
     /// Which panels are where; panes are the names of panels.
     pub layout: Tree<String>,
     /// The stretch of time that all plots show (s); `None` for the whole grasp.
@@ -37,6 +39,7 @@ impl Default for ViewState {
             theme: Theme::Dark,
             camera: Camera::default(),
             forces: true,
+            truth_shown: true,
             layout: panels::default_layout(),
             time_window: None,
             keys_shown: false,

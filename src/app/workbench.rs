@@ -5,18 +5,19 @@ use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
 use super::panels::{self, PanelContext, PanelKind};
 use super::theme::{self, colour};
+use super::tiling::{Tiling, panel_frame};
 use super::traces::Traces;
 use super::view_state::ViewState;
 use super::viewport::Viewport;
 use super::{bars, keys};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_notify::Toasts;
-use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 use glam::Vec2;
 use palpate_core::drawing::Camera;
+use palpate_core::grasping::ObjectDeck;
 use palpate_core::objects::{EMPTY, anchored, catalogue, thumbnail};
-use palpate_core::palette::Theme;
 use palpate_core::picture::PictureView;
+use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::workers::{Command, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake};
@@ -35,6 +36,8 @@ pub struct WorkbenchSetup<'a> {
     pub store: PathBuf,
     /// How the user looked at things last time.
     pub view: ViewState,
+    /// Recognises what is in the hand; or why it cannot be had, which is told, and everything else works.
+    pub model: Result<Arc<Model>, String>,
     /// Whether the first grasp runs by itself.
     pub playing: bool,
     /// Asks for the window to be drawn again; called from other threads.
@@ -45,8 +48,10 @@ pub struct WorkbenchSetup<'a> {
 
 /// Sensor layout of the live traces: the paper's simplest, with force.
 const LIVE_LAYOUT: &str = "C1+F";
-/// Grasps that are made before it stops: as many as the iterated recognition needs at most.
+/// Grasps that are made before it stops, unless it is sure earlier: the paper's plateau is at three to four.
 const GRASPS: u32 = 4;
+/// Names the sequence of objects that come when any other may.
+const DECK_SEED: u64 = 1;
 /// Pixels per point of saved pictures.
 const PICTURE_SCALE: f32 = 2.0;
 
@@ -69,6 +74,8 @@ pub struct Workbench {
     framed: Option<Camera>,
     /// The object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
+    /// What comes next when anything may.
+    deck: ObjectDeck,
 }
 
 /// Messages that are kept.
@@ -84,6 +91,7 @@ impl Workbench {
             store: setup.store,
             recording: true,
             grasps: GRASPS,
+            model: setup.model.as_ref().ok().cloned(),
             playing: setup.playing,
             wake: Arc::clone(&setup.wake),
         })
@@ -97,7 +105,7 @@ impl Workbench {
             view.layout = panels::default_layout();
         }
         theme::apply(ctx, view.theme);
-        Ok(Self {
+        let mut workbench = Self {
             worker,
             wake: setup.wake,
             scene: setup.scene,
@@ -111,7 +119,12 @@ impl Workbench {
             messages: VecDeque::new(),
             framed: None,
             seen: None,
-        })
+            deck: ObjectDeck::new(DECK_SEED),
+        };
+        if let Err(cause) = setup.model {
+            workbench.tell(Message::Error(format!("nothing will be recognised: {cause}")));
+        }
+        Ok(workbench)
     }
 
     /// How the user looks at things, to be remembered.
@@ -276,6 +289,11 @@ impl Workbench {
             }
             Action::SetScene(scene) => self.set_scene(*scene),
             Action::OpenObject(source) => self.open(&source),
+            Action::NextObject => {
+                let next = self.deck.next(&self.scene.object.source);
+                self.open(next);
+                self.apply(ctx, Action::Simulation(Command::Play));
+            }
             Action::PickFile => self.ask(Ask::Object),
             Action::SaveScene => self.ask(Ask::SaveScene),
             Action::SavePicture => self.ask(Ask::SavePicture),
@@ -291,6 +309,7 @@ impl Workbench {
             }
             Action::SetForces(forces) => self.view.forces = forces,
             Action::SetTimeWindow(window) => self.view.time_window = window,
+            Action::ShowTruth(shown) => self.view.truth_shown = shown,
             Action::ShowKeys(shown) => self.view.keys_shown = shown,
             Action::ResetLayout => self.view.layout = panels::default_layout(),
             Action::Tell(message) => self.tell(message),
@@ -421,93 +440,4 @@ fn drop_hint(ctx: &egui::Context) {
     let font = egui::FontId::proportional(22.0);
     let text = "Drop a URDF, OBJ, STL or scene file to grasp it";
     painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
-}
-
-/// Ground and margin of a panel.
-fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {
-    let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
-    Frame::new().fill(colour(theme.colours().background)).inner_margin(margin)
-}
-
-/// How panels stand beside each other.
-struct Tiling<'a, 'b> {
-    context: &'a PanelContext<'b>,
-    actions: &'a mut Vec<Action>,
-}
-
-impl Tiling<'_, '_> {
-    fn theme(&self) -> Theme {
-        self.context.view.theme
-    }
-}
-
-impl Behavior<String> for Tiling<'_, '_> {
-    fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
-        panels::named(pane).map_or(pane.as_str(), |panel| panel.title).into()
-    }
-
-    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut String) -> UiResponse {
-        let Some(panel) = panels::named(pane) else { return UiResponse::None };
-        panel_frame(panel, self.theme()).show(ui, |ui| {
-            ui.set_min_size(ui.available_size());
-            (panel.ui)(ui, self.context, self.actions);
-        });
-        UiResponse::None
-    }
-
-    fn simplification_options(&self) -> SimplificationOptions {
-        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
-    }
-
-    fn gap_width(&self, _style: &egui::Style) -> f32 {
-        2.0
-    }
-
-    fn min_size(&self) -> f32 {
-        70.0
-    }
-
-    fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
-        26.0
-    }
-
-    fn tab_bar_color(&self, _visuals: &egui::Visuals) -> egui::Color32 {
-        colour(self.theme().colours().raised)
-    }
-
-    fn tab_bg_color(
-        &self,
-        _visuals: &egui::Visuals,
-        _tiles: &Tiles<String>,
-        _tile: TileId,
-        state: &TabState,
-    ) -> egui::Color32 {
-        let colours = self.theme().colours();
-        colour(if state.active { colours.background } else { colours.raised })
-    }
-
-    fn tab_text_color(
-        &self,
-        _visuals: &egui::Visuals,
-        _tiles: &Tiles<String>,
-        _tile: TileId,
-        state: &TabState,
-    ) -> egui::Color32 {
-        let colours = self.theme().colours();
-        colour(if state.active { colours.text } else { colours.quiet_text })
-    }
-
-    fn tab_outline_stroke(
-        &self,
-        _visuals: &egui::Visuals,
-        _tiles: &Tiles<String>,
-        _tile: TileId,
-        _state: &TabState,
-    ) -> egui::Stroke {
-        egui::Stroke::NONE
-    }
-
-    fn tab_bar_hline_stroke(&self, _visuals: &egui::Visuals) -> egui::Stroke {
-        egui::Stroke::NONE
-    }
 }

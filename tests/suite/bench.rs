@@ -1,8 +1,10 @@
 //! A workbench without a window, for tests: it stands still until told, so that pictures and numbers repeat.
 
+use crate::scripted;
 use egui_kittest::{Harness, TestRenderer};
 use palpate::app::{Action, PanelKind, ViewState, Workbench, WorkbenchSetup};
 use palpate_core::palette::Theme;
+use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::workers::{Command, Snapshot};
 use std::sync::Arc;
@@ -17,11 +19,14 @@ pub(crate) struct BenchSetup {
     /// Draw this panel alone instead of the whole window.
     pub(crate) panel: Option<&'static PanelKind>,
     pub(crate) render_state: Option<egui_wgpu::RenderState>,
+    /// What recognises, or why nothing does.
+    pub(crate) model: Result<Arc<Model>, String>,
 }
 
 impl Default for BenchSetup {
     fn default() -> Self {
-        Self { object: "lemon", theme: Theme::Dark, size: [1280.0, 820.0], panel: None, render_state: None }
+        let model = Ok(scripted::model());
+        Self { object: "lemon", theme: Theme::Dark, size: [1280.0, 820.0], panel: None, render_state: None, model }
     }
 }
 
@@ -39,7 +44,7 @@ impl Bench {
         let (wake, woken) = channel();
         let mut scene = Scene::default();
         setup.object.clone_into(&mut scene.object.source);
-        let BenchSetup { theme, panel, render_state, size, .. } = setup;
+        let BenchSetup { theme, panel, render_state, size, model, .. } = setup;
         let draw = move |ui: &mut egui::Ui, workbench: &mut Option<Workbench>| {
             let ctx = ui.ctx().clone();
             let workbench = workbench.get_or_insert_with(|| {
@@ -48,6 +53,7 @@ impl Bench {
                     scene: scene.clone(),
                     store: path.clone(),
                     view: ViewState { theme, ..ViewState::default() },
+                    model: model.clone(),
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.

@@ -8,6 +8,7 @@
 //! - `command_line`: exit codes, messages, JSON.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `panels`: the window by its labels, and small pictures of its panels.
+//! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
 //!
 //! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
@@ -27,4 +28,6 @@ mod panels;
 mod physics;
 mod pictures;
 mod program;
+mod recognition_panel;
+mod scripted;
 mod store;

@@ -137,6 +137,8 @@ fn values_beyond_a_field_s_range_are_left_alone() {
 #[test]
 fn scene_settings_reach_the_simulation() {
     let mut bench = whole_window();
+    bench.harness.get_by_label("Scene").click();
+    bench.harness.run_steps(2);
     bench.harness.get_by_role_and_label(Role::ComboBox, "held").click();
     bench.harness.run_steps(3);
     bench.harness.get_by_label("fixed in place").click();

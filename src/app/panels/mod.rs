@@ -7,6 +7,7 @@ mod grasp;
 mod line_pressure;
 mod objects;
 mod pressure;
+mod recognition;
 mod scene;
 mod view3d;
 
@@ -46,13 +47,14 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 8] = [
+pub const ALL: [PanelKind; 9] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
     PanelKind { name: "pressure", title: "Pressure", ui: pressure::ui },
     PanelKind { name: "force", title: "Force", ui: force::ui },
     PanelKind { name: "line", title: "Line pressure", ui: line_pressure::ui },
+    PanelKind { name: "recognition", title: "Recognition", ui: recognition::ui },
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
 ];
@@ -62,19 +64,18 @@ pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
     ALL.iter().find(|panel| panel.name == name)
 }
 
-/// Objects on the left, the view over two plots in the middle, the grasp over its scene on the right.
+/// What is grasped on the left, the view over two plots in the middle, what comes out of it on the right.
 pub(super) fn default_layout() -> Tree<String> {
     let mut tiles = Tiles::default();
     let mut pane = |name: &str| tiles.insert_pane(name.to_owned());
     let (objects, view, curvature) = (pane("objects"), pane("view"), pane("curvature"));
     let (pressure, force, line) = (pane("pressure"), pane("force"), pane("line"));
-    let (grasp, scene) = (pane("grasp"), pane("scene"));
+    let (recognition, grasp, scene) = (pane("recognition"), pane("grasp"), pane("scene"));
     let [view, curvature] = [vec![view], vec![curvature]].map(|panes| tiles.insert_tab_tile(panes));
     let loads = tiles.insert_tab_tile(vec![pressure, force, line]);
-    let [objects, grasp, scene] = [vec![objects], vec![grasp], vec![scene]].map(|panes| tiles.insert_tab_tile(panes));
+    let [left, right] = [vec![objects, scene], vec![recognition, grasp]].map(|panes| tiles.insert_tab_tile(panes));
     let middle = insert_linear(&mut tiles, LinearDir::Vertical, &[(view, 0.58), (curvature, 0.21), (loads, 0.21)]);
-    let right = insert_linear(&mut tiles, LinearDir::Vertical, &[(grasp, 0.50), (scene, 0.50)]);
-    let root = insert_linear(&mut tiles, LinearDir::Horizontal, &[(objects, 0.19), (middle, 0.58), (right, 0.23)]);
+    let root = insert_linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.185), (middle, 0.555), (right, 0.26)]);
     Tree::new(egui::Id::unique("workbench"), root, tiles)
 }
 

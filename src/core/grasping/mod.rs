@@ -2,12 +2,14 @@
 //! grasp until it is clear what is in the hand.
 
 mod collect;
+mod deck;
 mod identify;
 mod poses;
 mod run;
 mod summary;
 
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
+pub use deck::ObjectDeck;
 pub use identify::{Identification, IdentificationView, IdentifyError};
 pub use poses::{PoseSampler, jittered};
 pub use run::{GraspRun, grasp, prepare};

@@ -1,7 +1,7 @@
 //! What travels between the simulation's thread and whoever watches it: commands in, snapshots, rows and notices out.
 
-use crate::grasping::GraspSummary;
-use crate::objects::ObjectClass;
+use crate::grasping::{GraspSummary, IdentificationView};
+use crate::objects::{EMPTY, ObjectClass};
 use crate::picture::Stage;
 use crate::recording::TrialId;
 use crate::scene::Scene;
@@ -28,8 +28,10 @@ pub enum Command {
     Reset,
     /// Seconds of simulation per second on the wall.
     SetSpeed(f64),
-    /// How many grasps to make before stopping.
+    /// How many grasps to make before stopping; with a model, at most.
     SetGrasps(u32),
+    /// From which probability on a class is taken as certain; brought inside of [`super::THRESHOLDS`].
+    SetThreshold(f64),
     /// Whether trials are stored.
     SetRecording(bool),
     /// Pull at the object with this force (N, world axes); zero lets go.
@@ -118,7 +120,7 @@ pub struct Status {
     pub actual_speed: f64,
     /// Which grasp of this round, from 1.
     pub grasp_of_round: u32,
-    /// Grasps in a round.
+    /// Grasps in a round; with a model the most.
     pub grasps: u32,
     /// Length of a trial (s).
     pub duration: f64,
@@ -156,4 +158,15 @@ pub struct Snapshot {
     pub status: Status,
     /// The last grasp that ended.
     pub last: Option<Arc<FinishedGrasp>>,
+    /// What is recognised; absent without a model, and where it cannot read this gripper.
+    pub identification: Option<Arc<IdentificationView>>,
+    /// Why nothing is recognised in this scene, where there is a model.
+    pub recognition_off: Option<Arc<str>>,
+}
+
+impl Snapshot {
+    /// What is in the hand in truth, by the name that classes have.
+    pub fn truth(&self) -> &str {
+        self.object.as_ref().map_or(EMPTY, |object| &object.name)
+    }
 }

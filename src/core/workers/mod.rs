@@ -4,7 +4,7 @@
 //! ```text
 //!  UI                         "sim"                          "recorder"
 //!  Command ----bounded--->    runs the grasp, keeps pace     
-//!  <--newest Snapshot-----    publishes                      writes the store
+//!  <--newest Snapshot-----    recognises, publishes          writes the store
 //!  <--every TraceRow------    derives         frames ----->  a chunk each second
 //!  <--Notice--------------                    <------------  Notice
 //! ```
@@ -12,14 +12,21 @@
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
+mod held_object;
 mod latest;
+mod listener;
+#[cfg(test)]
+mod listener_tests;
 mod messages;
+mod pace;
 mod recorder;
+mod session;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
 
 pub use latest::Latest;
+pub use listener::THRESHOLDS;
 pub use messages::{Command, FinishedGrasp, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
 pub use recorder::{Recorder, RecorderNotice};
 pub use sim::{SimWorker, SimWorkerSetup};

@@ -3,6 +3,7 @@
 use super::{Command, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, TraceRow, Wake};
 use crate::grasping::grasp;
 use crate::objects::EMPTY;
+use crate::recognition::Model;
 use crate::recording::Store;
 use crate::scene::Scene;
 use crate::sensing::SensorLayout;
@@ -12,24 +13,29 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-struct Watched {
-    worker: SimWorker,
+pub(super) struct Watched {
+    pub(super) worker: SimWorker,
     woken: Receiver<()>,
 }
 
 fn start(scene: Scene, store: PathBuf, grasps: u32) -> Watched {
+    start_with(None, scene, store, grasps)
+}
+
+pub(super) fn start_with(model: Option<Model>, scene: Scene, store: PathBuf, grasps: u32) -> Watched {
     let (wake, woken) = channel();
     let wake: Wake = Arc::new(move || {
         // The test may have stopped listening.
         let _heard = wake.send(());
     });
     let layout = SensorLayout::named("C1").expect("in the catalogue");
-    let setup = SimWorkerSetup { scene, layout, store, recording: true, grasps, playing: true, wake };
+    let model = model.map(Arc::new);
+    let setup = SimWorkerSetup { scene, layout, store, recording: true, grasps, model, playing: true, wake };
     Watched { worker: SimWorker::start(setup).expect("starts"), woken }
 }
 
 impl Watched {
-    fn tell(&self, command: Command) {
+    pub(super) fn tell(&self, command: Command) {
         self.worker.send(command).expect("room");
     }
 
@@ -48,7 +54,7 @@ impl Watched {
     }
 
     /// Waits, as long as it keeps waking us, until the snapshot is as wanted.
-    fn until(&self, wanted: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
+    pub(super) fn until(&self, wanted: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
         loop {
             if let Some(snapshot) = self.worker.snapshot().filter(|s| wanted(s)) {
                 return snapshot;
@@ -58,7 +64,7 @@ impl Watched {
     }
 }
 
-fn ball() -> Scene {
+pub(super) fn ball() -> Scene {
     let mut scene = Scene::default();
     "ball".clone_into(&mut scene.object.source);
     scene.timing.duration_s = 1.6;

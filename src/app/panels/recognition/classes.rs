@@ -1,0 +1,120 @@
+//! A bar for each class, always in the same order, and the threshold as a line across all of them that can be dragged.
+
+use super::words::{newest, percent, ranked, title};
+use super::{EASE_S, Part, fitted, labelled, put};
+use crate::app::actions::Action;
+use crate::app::theme::colour;
+use egui::{Align2, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use palpate_core::recognition::Pmf;
+use palpate_core::workers::{Command, THRESHOLDS};
+
+/// Distance from the line of the threshold within which it can be taken hold of (points).
+const GRIP: f32 = 6.0;
+
+/// Where things stand within a line (points).
+#[derive(Clone, Copy)]
+struct Columns {
+    bars: [f32; 2],
+    line: f32,
+}
+
+/// Draws so many lines, each so high.
+pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f32)) {
+    let labels = &part.view.labels;
+    let pmf = newest(part.view);
+    let shown = shown_classes(labels.classes.len(), lines, pmf);
+    let rest = labels.classes.len() - shown.len();
+    let width = ui.available_width();
+    let left = ui.cursor().left();
+    let names = (0.40 * width).min(104.0);
+    let columns = Columns { bars: [left + names + 4.0, left + width - 46.0], line };
+    let gap = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
+    let top = ui.cursor().top();
+    for class in &shown {
+        class_ui(ui, part, *class, pmf, columns);
+    }
+    let bottom = ui.cursor().top();
+    if rest > 0 {
+        let left_over: f64 = pmf.map_or(0.0, |pmf| 1.0 - shown.iter().map(|k| pmf.probabilities()[*k]).sum::<f64>());
+        let text = format!("and {rest} others, {}", percent(left_over));
+        let (rect, response) = labelled(ui, vec2(width, line), &text);
+        response.on_hover_text("Make the panel larger to see all of them");
+        let quiet = colour(part.colours().quiet_text);
+        put(ui, fitted(ui, text, 11.5, width, quiet), rect, Align2::LEFT_CENTER);
+    }
+    ui.spacing_mut().item_spacing.y = gap;
+    threshold_ui(ui, part, columns, [top, bottom]);
+}
+
+/// All classes or, where there are fewer lines, the most likely ones, with one line left for how many are missing.
+fn shown_classes(classes: usize, lines: usize, pmf: Option<&Pmf>) -> Vec<usize> {
+    if classes <= lines {
+        return (0..classes).collect();
+    }
+    let mut shown = pmf.map_or_else(|| (0..classes).collect(), ranked);
+    shown.truncate(lines.saturating_sub(1));
+    shown.sort_unstable();
+    shown
+}
+
+fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, columns: Columns) {
+    let colours = part.colours();
+    let name = title(&part.view.labels, class);
+    let p = pmf.map_or(0.0, |pmf| pmf.probabilities()[class]);
+    let leads = pmf.is_some_and(|pmf| pmf.top().0 == class);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), columns.line), Sense::hover());
+    let spoken = format!("{name} {}", percent(p));
+    response.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
+    let ink = colour(if leads { colours.text } else { colours.quiet_text });
+    let [from, to] = columns.bars;
+    put(ui, fitted(ui, name, 12.5, from - 4.0 - rect.left(), ink), rect, Align2::LEFT_CENTER);
+    let track =
+        Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, 0.18 * columns.line));
+    ui.painter().rect_filled(track, 2.0, colour(colours.raised));
+    let share = ui.ctx().animate_value_with_time(ui.scope_id().with(("class", class)), p as f32, EASE_S);
+    let fill = if leads { colours.accent } else { colours.background.mix(colours.quiet_text, 0.7) };
+    if share > 0.003 {
+        ui.painter().rect_filled(track.with_max_x(from + (to - from) * share), 2.0, colour(fill));
+    }
+    // A column of "0 %" says nothing that the empty bars do not.
+    if p >= 0.01 {
+        put(ui, fitted(ui, percent(p), 12.5, rect.right() - to - 4.0, ink), rect, Align2::RIGHT_CENTER);
+    }
+}
+
+/// The line across the bars.
+fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom]: [f32; 2]) {
+    let [from, to] = columns.bars;
+    let threshold = part.view.rule.threshold;
+    let x = from + (to - from) * threshold as f32;
+    let grip = Rect::from_min_max(pos2(x - GRIP, top), pos2(x + GRIP, bottom));
+    // Reached by keyboard through the number below; here for the mouse.
+    let response =
+        ui.interact(grip, ui.scope_id().with("threshold"), Sense::DRAG).on_hover_cursor(CursorIcon::ResizeHorizontal);
+    response.widget_info(|| WidgetInfo::labeled(Role::Splitter, true, "Threshold"));
+    let held = response.hovered() || response.dragged();
+    let ink = colour(part.colours().text);
+    ui.painter().vline(x, top..=bottom, Stroke::new(if held { 2.5 } else { 1.5 }, ink));
+    if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+        let wanted = f64::from((pointer.x - from) / (to - from)).clamp(*THRESHOLDS.start(), *THRESHOLDS.end());
+        // Whole percents, but finer near certainty.
+        let steps = if wanted > 0.99 { 1e3 } else { 1e2 };
+        let wanted = (wanted * steps).round() / steps;
+        if wanted != threshold {
+            part.actions.push(Action::Simulation(Command::SetThreshold(wanted)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_there_is_little_room_the_likeliest_stay_in_their_order() {
+        let pmf = Pmf::from_weights([0.1, 0.4, 0.0, 0.3, 0.2]);
+        assert_eq!(shown_classes(5, 5, Some(&pmf)), [0, 1, 2, 3, 4]);
+        assert_eq!(shown_classes(5, 4, Some(&pmf)), [1, 3, 4]);
+        assert_eq!(shown_classes(5, 4, None), [0, 1, 2]);
+    }
+}

@@ -1,0 +1,364 @@
+//! What is in the hand, as far as can be felt: the answer in large letters and why it stands, size and shape, a bar for
+//! each class with the threshold across them, and the grasps so far.
+
+mod classes;
+mod strip;
+mod words;
+
+use super::PanelContext;
+use crate::app::actions::Action;
+use crate::app::icons::{self, Icon};
+use crate::app::theme::{colour, veil};
+use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use palpate_core::grasping::IdentificationView;
+use palpate_core::recognition::Pmf;
+use palpate_core::workers::{Command, Snapshot, THRESHOLDS};
+use std::sync::Arc;
+use words::{Headline, newest, percent, reason, title_of};
+
+/// Time that bars take to follow a new answer (s).
+const EASE_S: f32 = 0.12;
+/// Numbers that change faster than this cannot be read (s).
+const CALM_S: f64 = 0.1;
+/// Smallest letters (points).
+const LEAST_LETTERS: f32 = 8.5;
+
+/// Heights of the parts, and sizes of letters (points).
+struct Measures {
+    headline: f32,
+    reason: f32,
+    reason_letters: f32,
+    truth: f32,
+    properties: f32,
+    class: f32,
+    strip: f32,
+    button: f32,
+    gap: f32,
+}
+
+const ROOMY: Measures = Measures {
+    headline: 44.0,
+    reason: 38.0,
+    reason_letters: 13.5,
+    truth: 26.0,
+    properties: 24.0,
+    class: 20.0,
+    strip: 50.0,
+    button: 36.0,
+    gap: 7.0,
+};
+
+/// For a panel in a small window.
+const TIGHT: Measures = Measures {
+    headline: 30.0,
+    reason: 44.0,
+    reason_letters: 11.5,
+    truth: 24.0,
+    properties: 22.0,
+    class: 16.0,
+    strip: 42.0,
+    button: 30.0,
+    gap: 4.0,
+};
+
+/// Height of the line with the threshold (points).
+const THRESHOLD_LINE: f32 = 24.0;
+/// Classes that are shown however little room there is; beyond that the panel scrolls.
+const LEAST_CLASSES: usize = 4;
+
+impl Measures {
+    fn fitting(room: egui::Vec2) -> &'static Self {
+        if room.x < 250.0 || room.y < 560.0 { &TIGHT } else { &ROOMY }
+    }
+
+    /// How many lines there are for classes, and how high each is.
+    fn lines(&self, height: f32, classes: usize, has_properties: bool) -> (usize, f32) {
+        let properties = if has_properties { 2.0 * self.properties + self.gap } else { 0.0 };
+        let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
+        let room = height - parts - properties - 7.0 * self.gap;
+        // All of them, if need be in lines as low as those of a small window.
+        let line = (room / classes.max(1) as f32).floor().clamp(TIGHT.class, self.class);
+        let lines = (room / line).floor().max(0.0) as usize;
+        (lines.clamp(LEAST_CLASSES + 1, classes.max(LEAST_CLASSES + 1)), line)
+    }
+}
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let Some(snapshot) = context.snapshot else {
+        ui.weak("Waiting for the first grasp ..");
+        return;
+    };
+    let room = ui.available_size();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let measures = Measures::fitting(room);
+        ui.spacing_mut().item_spacing.y = measures.gap;
+        match &snapshot.identification {
+            Some(view) => {
+                let view = calmed(ui, view);
+                let mut part = Part { context, snapshot, view: &view, measures, actions };
+                part.headline_ui(ui);
+                part.truth_ui(ui);
+                part.properties_ui(ui);
+                let has_properties = !view.labels.sizes.is_empty();
+                let lines = measures.lines(room.y, view.labels.classes.len(), has_properties);
+                classes::ui(ui, &mut part, lines);
+                part.threshold_ui(ui);
+                strip::ui(ui, &part);
+            }
+            None => off_ui(ui, snapshot),
+        }
+        let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
+        let next = egui::Button::new("Next object").fill(fill);
+        let hint = "Grasp another of the sixteen, drawn at random (N)";
+        if ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint).clicked() {
+            actions.push(Action::NextObject);
+        }
+    });
+}
+
+fn off_ui(ui: &mut Ui, snapshot: &Snapshot) {
+    ui.heading("Recognition is off");
+    match &snapshot.recognition_off {
+        Some(why) => ui.label(why.as_ref()),
+        None => ui.label("There is no model to recognise with. Grasps are simulated and stored all the same."),
+    };
+}
+
+/// The newest answer, but no more than ten different ones a second.
+fn calmed(ui: &Ui, view: &Arc<IdentificationView>) -> Arc<IdentificationView> {
+    let (id, now) = (ui.scope_id().with("calmed"), ui.input(|i| i.time));
+    let shown: Option<(f64, Arc<IdentificationView>)> = ui.data(|data| data.get_temp(id));
+    if let Some((since, shown)) = shown {
+        let same_grasp = view.listening && shown.listening && shown.verdict.is_some() && view.rule == shown.rule;
+        if same_grasp && view.beliefs.len() == shown.beliefs.len() && view.verdict.is_some() && now - since < CALM_S {
+            ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(CALM_S));
+            return shown;
+        }
+    }
+    ui.data_mut(|data| data.insert_temp(id, (now, Arc::clone(view))));
+    Arc::clone(view)
+}
+
+/// What every part of the panel draws from.
+struct Part<'a, 'b> {
+    context: &'a PanelContext<'b>,
+    snapshot: &'a Snapshot,
+    view: &'a IdentificationView,
+    measures: &'static Measures,
+    actions: &'a mut Vec<Action>,
+}
+
+impl Part<'_, '_> {
+    fn colours(&self) -> palpate_core::palette::ThemeColours {
+        self.context.view.theme.colours()
+    }
+
+    /// The picture of a class where there is one, else an empty frame.
+    fn thumbnail(&self, ui: &Ui, class: &str, place: Rect) {
+        match self.context.thumbnails.get(class) {
+            Some(texture) => egui::Image::new(texture).corner_radius(3.0).paint_at(ui, place),
+            None => {
+                let stroke = egui::Stroke::new(1.5, colour(self.colours().border));
+                ui.painter().rect_stroke(place.shrink(1.0), 3.0, stroke, egui::StrokeKind::Inside);
+            }
+        }
+    }
+
+    /// The answer, its probability, and why it goes on or has stopped.
+    fn headline_ui(&self, ui: &mut Ui) {
+        let (colours, measures) = (self.colours(), self.measures);
+        let headline = Headline::of(self.view);
+        let (text, p) = headline.text(&self.view.labels);
+        let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));
+        let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.headline), &spoken);
+        let ink = colour(match headline {
+            Headline::Decided(..) => colours.accent,
+            Headline::Unknown => colours.warning,
+            Headline::Leading(..) => colours.text,
+            Headline::Waiting | Headline::Feeling => colours.quiet_text,
+        });
+        let mut left = rect.left();
+        if let Headline::Leading(class, _) | Headline::Decided(class, _) = headline {
+            let side = measures.headline - 4.0;
+            let place = Rect::from_min_size(pos2(left, rect.top() + 2.0), vec2(side, side));
+            self.thumbnail(ui, &self.view.labels.classes[class].name, place);
+            left += side + 8.0;
+        }
+        let large = 0.75 * measures.headline;
+        let number = p.map(|p| fitted(ui, percent(p), large, 0.4 * rect.width(), ink));
+        let room = rect.right() - left - number.as_ref().map_or(0.0, |n| n.size().x + 8.0);
+        put(ui, fitted(ui, text, large, room, ink), rect.with_min_x(left), Align2::LEFT_CENTER);
+        if let Some(number) = number {
+            put(ui, number, rect, Align2::RIGHT_CENTER);
+        }
+        let why = reason(self.view, &self.snapshot.status);
+        let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
+        let font = FontId::proportional(measures.reason_letters);
+        let lines = ui.painter().layout(why, font, colour(colours.quiet_text), rect.width());
+        put(ui, lines, rect, Align2::LEFT_TOP);
+    }
+
+    /// Whether it is right: the simulation knows. Set apart from everything that was felt.
+    fn truth_ui(&mut self, ui: &mut Ui) {
+        let colours = self.colours();
+        let shown = self.context.view.truth_shown;
+        let right = words::is_right(self.view, self.snapshot.truth()).filter(|_| shown);
+        let title = self.snapshot.object.as_ref().map_or_else(|| title_of(self.snapshot.truth()), |o| o.title.clone());
+        let (text, spoken, sign) = match right {
+            Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
+            Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
+            None => {
+                let text = if shown { "told once it has decided" } else { "hidden" };
+                (text.to_owned(), format!("Truth: {text}"), None)
+            }
+        };
+        let size = vec2(ui.available_width(), self.measures.truth);
+        let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
+        ui.painter().rect_filled(rect, 4.0, colour(colours.raised));
+        let eye = Rect::from_min_max(pos2(rect.right() - 28.0, rect.top()), rect.max);
+        let row = Rect::from_min_max(rect.min, eye.left_bottom()).shrink2(vec2(6.0, 0.0));
+        ui.interact(row, ui.scope_id().with("truth"), Sense::hover())
+            .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
+        let label = fitted(ui, "truth".to_owned(), 11.5, row.width(), colour(colours.quiet_text));
+        let mut left = row.left() + label.size().x + 8.0;
+        put(ui, label, row, Align2::LEFT_CENTER);
+        if let Some((icon, ink)) = sign {
+            icons::sign(
+                ui,
+                icon,
+                Rect::from_center_size(pos2(left + 7.0, row.center().y), vec2(14.0, 14.0)),
+                colour(ink),
+            );
+            left += 20.0;
+        }
+        let ink = if sign.is_some() { colours.text } else { colours.quiet_text };
+        put(ui, fitted(ui, text, 13.5, row.right() - left, colour(ink)), row.with_min_x(left), Align2::LEFT_CENTER);
+        let hint = "Tell, or keep hidden, what is in the hand in truth";
+        let toggle = ui.interact(eye, ui.scope_id().with("show the truth"), Sense::click()).on_hover_text(hint);
+        toggle.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, "Show the truth"));
+        focus_ring(ui, &toggle, eye);
+        let lit = if toggle.hovered() || toggle.has_focus() { colours.text } else { colours.quiet_text };
+        icons::sign(ui, Icon::Eye, eye, colour(lit));
+        if !shown {
+            ui.painter()
+                .line_segment([eye.center() + vec2(-7.0, 6.0), eye.center() + vec2(7.0, -6.0)], (2.0, colour(lit)));
+        }
+        if toggle.clicked() {
+            self.actions.push(Action::ShowTruth(!shown));
+        }
+    }
+
+    /// Stage one: size and shape.
+    fn properties_ui(&self, ui: &mut Ui) {
+        let labels = &self.view.labels;
+        if labels.sizes.is_empty() || labels.shapes.is_empty() {
+            return;
+        }
+        // An empty hand has neither.
+        let leader = newest(self.view).map(|pmf| &labels.classes[pmf.top().0]);
+        let has_any = leader.is_some_and(|class| class.size.is_some() || class.shape.is_some());
+        let properties = self.view.verdict.as_ref().and_then(|v| v.properties.as_ref()).filter(|_| has_any);
+        self.property_ui(ui, "size", &labels.sizes, properties.map(|p| &p.size));
+        self.property_ui(ui, "shape", &labels.shapes, properties.map(|p| &p.shape));
+    }
+
+    /// A bar with as many equal segments as there are answers, each filled as far as it is probable.
+    fn property_ui(&self, ui: &mut Ui, name: &str, answers: &[String], pmf: Option<&Pmf>) {
+        let colours = self.colours();
+        let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), self.measures.properties), Sense::hover());
+        let named = if rect.width() < 250.0 { 0.0 } else { 44.0 };
+        if named > 0.0 {
+            let text = fitted(ui, name.to_owned(), 11.5, named, colour(colours.quiet_text));
+            put(ui, text, rect, Align2::LEFT_CENTER);
+        }
+        let width = (rect.width() - named) / answers.len() as f32;
+        let best = pmf.map(|pmf| pmf.top().0);
+        for (k, answer) in answers.iter().enumerate() {
+            let place = Rect::from_min_size(
+                pos2(rect.left() + named + width * k as f32, rect.top()),
+                vec2(width, rect.height()),
+            );
+            let cell = place.shrink2(vec2(1.0, 0.0));
+            let p = pmf.map(|pmf| pmf.probabilities()[k]);
+            let spoken = p.map_or_else(|| answer.clone(), |p| format!("{answer} {}", percent(p)));
+            ui.interact(cell, ui.scope_id().with((name, k)), Sense::hover())
+                .on_hover_text(format!("{name}: {spoken}"))
+                .widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
+            let share = ui.ctx().animate_value_with_time(
+                ui.scope_id().with((name, k, "share")),
+                p.unwrap_or(0.0) as f32,
+                EASE_S,
+            );
+            ui.painter().rect_filled(cell, 3.0, colour(colours.raised));
+            let filled = cell.with_max_x(cell.left() + cell.width() * share);
+            let is_best = best == Some(k);
+            ui.painter().rect_filled(
+                filled,
+                3.0,
+                if is_best { veil(colours.accent, 0.45) } else { veil(colours.quiet_text, 0.30) },
+            );
+            let ink = colour(if is_best { colours.text } else { colours.quiet_text });
+            let inside = cell.shrink2(vec2(4.0, 0.0));
+            let number = p.map(|p| fitted(ui, percent(p), 11.5, inside.width(), ink));
+            let word = fitted(ui, answer.clone(), 11.5, inside.width(), ink);
+            match number.filter(|number| number.size().x + word.size().x + 4.0 <= inside.width()) {
+                Some(number) => {
+                    put(ui, word, inside, Align2::LEFT_CENTER);
+                    put(ui, number, inside, Align2::RIGHT_CENTER);
+                }
+                None => put(ui, word, inside, Align2::CENTER_CENTER),
+            }
+        }
+    }
+
+    /// The threshold as a number, for those who do not drag its line.
+    fn threshold_ui(&mut self, ui: &mut Ui) {
+        let size = vec2(ui.available_width(), THRESHOLD_LINE);
+        ui.allocate_ui_with_layout(size, egui::Layout::left_to_right(egui::Align::Center), |ui| {
+            ui.set_min_size(size);
+            let label = ui.weak("sure from");
+            let [least, most] = [THRESHOLDS.start(), THRESHOLDS.end()].map(|p| p * 100.0);
+            let mut threshold = self.view.rule.threshold * 100.0;
+            let drag =
+                egui::DragValue::new(&mut threshold).range(least..=most).speed(0.25).max_decimals(1).suffix(" %");
+            let hint = "Probability from which on a class is taken as certain; its line can be dragged, too";
+            if ui.add(drag).labelled_by(label.id).on_hover_text(hint).changed() {
+                self.actions.push(Action::Simulation(Command::SetThreshold(threshold / 100.0)));
+            }
+        });
+    }
+}
+
+/// Room for something drawn, with the words that a screen reader reads.
+fn labelled(ui: &mut Ui, size: egui::Vec2, spoken: &str) -> (Rect, Response) {
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, spoken));
+    (rect, response)
+}
+
+/// A line of text as large as wanted, or as much smaller as the width asks; what is still too long is cut off with dots.
+fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
+    let lay = |text: String, letters: f32| ui.painter().layout_no_wrap(text, FontId::proportional(letters), ink);
+    let whole = lay(text.clone(), letters);
+    if whole.size().x <= width {
+        return whole;
+    }
+    let smaller = (letters * width / whole.size().x * 0.97).floor().clamp(LEAST_LETTERS.min(letters), letters);
+    let mut job = egui::text::LayoutJob::simple_singleline(text, FontId::proportional(smaller), ink);
+    job.wrap = egui::text::TextWrapping::truncate_at_width(width.max(1.0));
+    ui.painter().layout_job(job)
+}
+
+/// Paints a text at the given side of a place.
+fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
+    let at = align.align_size_within_rect(text.size(), place).min;
+    ui.painter().galley(at, text, Color32::PLACEHOLDER);
+}
+
+/// Shows where the keyboard is.
+fn focus_ring(ui: &Ui, response: &Response, place: Rect) {
+    if response.has_focus() {
+        let stroke = ui.visuals().selection.stroke;
+        ui.painter().rect_stroke(place.shrink(1.0), 3.0, stroke, egui::StrokeKind::Inside);
+    }
+}

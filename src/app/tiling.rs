@@ -1,0 +1,97 @@
+//! How panels stand beside each other.
+
+use super::actions::Action;
+use super::panels::{self, PanelContext, PanelKind};
+use super::theme::colour;
+use egui::{Frame, Margin, Ui};
+use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
+use palpate_core::palette::Theme;
+
+/// Ground and margin of a panel.
+pub(super) fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {
+    let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
+    Frame::new().fill(colour(theme.colours().background)).inner_margin(margin)
+}
+
+/// What panels may read and where they put what they ask for, while all of them are drawn.
+pub(super) struct Tiling<'a, 'b> {
+    pub(super) context: &'a PanelContext<'b>,
+    pub(super) actions: &'a mut Vec<Action>,
+}
+
+impl Tiling<'_, '_> {
+    fn theme(&self) -> Theme {
+        self.context.view.theme
+    }
+}
+
+impl Behavior<String> for Tiling<'_, '_> {
+    fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
+        panels::named(pane).map_or(pane.as_str(), |panel| panel.title).into()
+    }
+
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut String) -> UiResponse {
+        let Some(panel) = panels::named(pane) else { return UiResponse::None };
+        panel_frame(panel, self.theme()).show(ui, |ui| {
+            ui.set_min_size(ui.available_size());
+            (panel.ui)(ui, self.context, self.actions);
+        });
+        UiResponse::None
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
+    }
+
+    fn gap_width(&self, _style: &egui::Style) -> f32 {
+        2.0
+    }
+
+    fn min_size(&self) -> f32 {
+        70.0
+    }
+
+    fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
+        26.0
+    }
+
+    fn tab_bar_color(&self, _visuals: &egui::Visuals) -> egui::Color32 {
+        colour(self.theme().colours().raised)
+    }
+
+    fn tab_bg_color(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<String>,
+        _tile: TileId,
+        state: &TabState,
+    ) -> egui::Color32 {
+        let colours = self.theme().colours();
+        colour(if state.active { colours.background } else { colours.raised })
+    }
+
+    fn tab_text_color(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<String>,
+        _tile: TileId,
+        state: &TabState,
+    ) -> egui::Color32 {
+        let colours = self.theme().colours();
+        colour(if state.active { colours.text } else { colours.quiet_text })
+    }
+
+    fn tab_outline_stroke(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<String>,
+        _tile: TileId,
+        _state: &TabState,
+    ) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+
+    fn tab_bar_hline_stroke(&self, _visuals: &egui::Visuals) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+}

@@ -1,0 +1,181 @@
+//! Live recognition in the window: by its labels, and in small pictures.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::cpu_renderer::CpuRenderer;
+use crate::golden::compare;
+use egui::accesskit::Role;
+use egui::{Key, Rect};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use image::RgbaImage;
+use palpate::app::{ALL_PANELS, Action, PanelKind};
+use palpate_core::palette::Theme;
+use palpate_core::recognition::StopReason;
+use palpate_core::workers::{Command, Snapshot};
+
+fn panel() -> &'static PanelKind {
+    ALL_PANELS.iter().find(|panel| panel.name == "recognition").unwrap()
+}
+
+fn bench(setup: BenchSetup) -> Bench {
+    Bench::new(setup, CpuRenderer::default())
+}
+
+/// The panel as large as in a window of the first size.
+fn alone(theme: Theme) -> Bench {
+    bench(BenchSetup { theme, size: [330.0, 708.0], panel: Some(panel()), ..BenchSetup::default() })
+}
+
+fn beliefs(snapshot: &Snapshot) -> usize {
+    snapshot.identification.as_ref().map_or(0, |view| view.beliefs.len())
+}
+
+/// Lets a round of grasps run to its end.
+fn run_out(bench: &mut Bench) {
+    bench.tell(Action::Simulation(Command::SetSpeed(64.0)));
+    bench.tell(Action::Simulation(Command::Play));
+    bench.until(|snapshot| snapshot.status.finished);
+    bench.harness.run_steps(3);
+}
+
+fn says(bench: &Bench, label: &str) -> bool {
+    bench.harness.query_all_by_label(label).next().is_some()
+}
+
+#[test]
+fn a_grasp_is_followed_until_it_is_sure() {
+    let mut bench = alone(Theme::Dark);
+    assert!(says(&bench, "Ready") && says(&bench, "it begins with the grasp: press play"));
+    bench.advance_to(0.5);
+    assert!(says(&bench, "Feeling .."));
+    bench.advance_to(2.6);
+    assert!(says(&bench, "Lemon, 61 %") && says(&bench, "grasp 1 of at most 4; it is sure from 90 % on"));
+    assert!(says(&bench, "large 95 %") && says(&bench, "spherical 86 %"));
+    assert!(says(&bench, "Tomato 24 %") && says(&bench, "Empty hand 0 %"));
+    assert!(says(&bench, "Grasp 1, going on: Lemon 61 %") && says(&bench, "Grasp 2: to come"));
+    assert!(says(&bench, "Truth: told once it has decided"));
+    bench.tell(Action::Simulation(Command::SetSpeed(64.0)));
+    bench.tell(Action::Simulation(Command::Play));
+    bench.until(|s| beliefs(s) == 1 && s.identification.as_ref().is_some_and(|view| !view.listening));
+    assert!(
+        says(&bench, "one more grasp: lemon 61 %, tomato 24 %") || beliefs(&bench.workbench().snapshot().unwrap()) > 1
+    );
+    run_out(&mut bench);
+    let end = bench.workbench().snapshot().unwrap();
+    let view = end.identification.clone().unwrap();
+    assert_eq!((view.decided(), view.decision), (Some("lemon"), Some(StopReason::Sure)));
+    assert!(says(&bench, "Right: Lemon") && says(&bench, "Grasp 4: not needed"));
+}
+
+#[test]
+fn the_panel_in_every_state_and_both_themes() {
+    let states: [(&str, fn(&mut Bench)); 5] = [
+        ("ready", |_| ()),
+        ("feeling", |bench| bench.advance_to(0.9)),
+        ("first", |bench| bench.advance_to(2.6)),
+        ("right", run_out),
+        ("wrong", |bench| {
+            bench.tell(Action::OpenObject("case".to_owned()));
+            bench.until(|s| s.truth() == "case");
+            run_out(bench);
+        }),
+    ];
+    for (name, reach) in states {
+        let [dark, light] = Theme::ALL.map(|theme| {
+            let mut bench = alone(theme);
+            reach(&mut bench);
+            bench.harness.run_steps(3);
+            bench.harness.render().unwrap()
+        });
+        let mut pair = RgbaImage::new(dark.width() + light.width(), dark.height());
+        image::imageops::replace(&mut pair, &dark, 0, 0);
+        image::imageops::replace(&mut pair, &light, i64::from(dark.width()), 0);
+        compare(&format!("recognition_{name}"), &pair, "the CPU renderer of the tests");
+    }
+}
+
+#[test]
+fn the_threshold_follows_its_line_and_its_number() {
+    let mut bench = alone(Theme::Dark);
+    bench.advance_to(2.6);
+    let line = bench.harness.get_by_label("Threshold").rect().center();
+    bench.harness.drag_at(line);
+    bench.harness.step();
+    bench.harness.hover_at(line - egui::vec2(40.0, 0.0));
+    bench.harness.step();
+    bench.harness.drop_at(line - egui::vec2(40.0, 0.0));
+    let threshold = |s: &Snapshot| s.identification.as_ref().unwrap().rule.threshold;
+    let lower = threshold(&bench.until(|s| threshold(s) < 0.89));
+    assert!(lower > 0.5 && (lower * 100.0).fract().min(1.0 - (lower * 100.0).fract()) < 1e-6, "{lower}");
+    let number = bench.harness.get_by_label("sure from");
+    assert!(number.accesskit_node().role() == Role::Label || number.accesskit_node().role() == Role::SpinButton);
+}
+
+#[test]
+fn another_object_comes_by_button_and_by_key() {
+    let mut bench = bench(BenchSetup::default());
+    bench.harness.get_by_label("Next object").click();
+    let first = bench.until(|s| s.truth() != "lemon");
+    assert!(first.status.playing && beliefs(&first) == 0 && first.status.grasp_of_round == 1);
+    bench.harness.key_press(Key::N);
+    let second = bench.until(|s| s.truth() != first.truth());
+    assert!(second.status.playing && second.truth() != "lemon");
+}
+
+#[test]
+fn the_truth_can_be_hidden() {
+    let mut bench = bench(BenchSetup::default());
+    run_out(&mut bench);
+    assert!(says(&bench, "Right: Lemon"));
+    bench.harness.get_by_label("Show the truth").click();
+    bench.harness.run_steps(3);
+    assert!(!says(&bench, "Right: Lemon") && says(&bench, "Truth: hidden"));
+}
+
+#[test]
+fn without_a_model_everything_else_works_and_it_says_so() {
+    let mut bench = bench(BenchSetup { model: Err("it is broken".to_owned()), ..BenchSetup::default() });
+    assert!(bench.workbench().messages().iter().any(|text| text.contains("it is broken")));
+    assert!(says(&bench, "Recognition is off"));
+    bench.tell(Action::Simulation(Command::SetGrasps(2)));
+    run_out(&mut bench);
+    assert_eq!(bench.workbench().snapshot().unwrap().grasp, 2);
+}
+
+#[test]
+fn an_empty_hand_is_an_answer_like_others() {
+    let mut bench = bench(BenchSetup { object: "empty", ..BenchSetup::default() });
+    run_out(&mut bench);
+    assert!(says(&bench, "Wrong: Empty hand"), "the script says lemon");
+}
+
+#[test]
+fn nothing_is_cut_off_or_covered_in_the_smallest_window() {
+    let mut bench = bench(BenchSetup { size: [720.0, 480.0], ..BenchSetup::default() });
+    run_out(&mut bench);
+    let whole = Rect::from_min_max(egui::pos2(500.0, 66.0), egui::pos2(720.0, 436.0));
+    let labels = [
+        "Right: Lemon",
+        "Show the truth",
+        "tiny 4 %",
+        "large 95 %",
+        "cubic 4 %",
+        "cylindrical 8 %",
+        "spherical 86 %",
+        "sure from",
+        "Grasp 1: Lemon 61 %",
+        "Grasp 4: not needed",
+        "Next object",
+    ];
+    let mut places: Vec<(&str, Rect)> = Vec::new();
+    for label in labels {
+        let Some(node) = bench.harness.query_all_by_label(label).next() else { panic!("no \"{label}\"") };
+        let place = node.rect();
+        assert!(whole.contains_rect(place), "{label} at {place} is cut off");
+        for (other, there) in &places {
+            assert!(!there.shrink(0.5).intersects(place), "{label} covers {other}");
+        }
+        places.push((label, place));
+    }
+    let others = bench.harness.query_all_by_label_contains("others,").next().expect("some classes do not fit");
+    assert!(whole.contains_rect(others.rect()));
+}
