@@ -103,7 +103,7 @@ fn parse_settings(written: &[String]) -> Result<serde_json::Map<String, serde_js
     let parse = |text: &String| -> Result<(String, serde_json::Value), Failure> {
         let (name, value) = text.split_once('=').ok_or_else(|| format!("write --set NAME=VALUE, not \"{text}\""))?;
         let value = serde_json::from_str(value.trim())
-            .map_err(|_| format!("setting {name}: \"{value}\" is no number, true or false"))?;
+            .map_err(|_unread| format!("setting {name}: \"{value}\" is no number, true or false"))?;
         Ok((name.trim().to_owned(), value))
     };
     written.iter().map(parse).collect()

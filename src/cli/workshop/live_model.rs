@@ -38,7 +38,7 @@ pub(super) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
         let source = Source { collection: Some(report?.collection), ..Source::default() };
         sets.push(source.read(store, &View::default(), &mut |_, _| ())?);
     }
-    let [train, test]: [Dataset; 2] = sets.try_into().map_err(|_| "two data sets were asked for")?;
+    let [train, test]: [Dataset; 2] = sets.try_into().map_err(|_others| "two data sets were asked for")?;
     let method = method(METHOD).ok_or("the method is gone")?;
     let settings = serde_json::json!({ "epochs": EPOCHS }).as_object().cloned().unwrap_or_default();
     let interrupted = AtomicBool::new(false);

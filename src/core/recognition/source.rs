@@ -100,11 +100,11 @@ pub fn labels_of_catalogue() -> Labels {
         let class = built_in.class();
         (built_in.name.clone(), Some((class.size.name().to_owned(), class.shape.name().to_owned())))
     });
-    labels(all.chain([(EMPTY.to_owned(), None)]).collect())
+    labels(&all.chain([(EMPTY.to_owned(), None)]).collect())
 }
 
 /// Labels from names and, where known, their size and shape.
-fn labels(named: BTreeMap<String, Option<(String, String)>>) -> Labels {
+fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
     // The paper's words come first, in its order; others follow by name.
     let listed = |known: &[&str], pick: &dyn Fn(&(String, String)) -> String| -> Vec<String> {
         let found: BTreeSet<String> = named.values().flatten().map(pick).collect();
@@ -211,7 +211,7 @@ impl Source {
             named.entry(row.object.clone()).or_insert_with(|| known_properties(row));
             read.push((row.id, row.object.clone(), sequence_of(&signals)));
         }
-        let labels = labels(named);
+        let labels = labels(&named);
         let example = |(id, object, grasp): (TrialId, String, Sequence)| {
             Some(Example { id, class: labels.class(&object)?, grasp: Arc::new(grasp) })
         };

@@ -1,7 +1,7 @@
 //! Gradient boosting on the multinomial deviance (Friedman 2001, algorithm 6, L_K-TreeBoost).
 //!
 //! Scores F_k begin at the log of the classes' shares. In every round, with p = softmax(F), a regression tree per class
-//! is grown on the residuals r = [class is k] - p_k of all classes at once, and every leaf takes one Newton step
+//! is grown on the residuals r = `[class is k]` - p_k of all classes at once, and every leaf takes one Newton step
 //!
 //!   F_k += learning rate · (K - 1) / K · sum(w r) / sum(w p_k (1 - p_k)).
 

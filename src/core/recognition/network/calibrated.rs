@@ -20,7 +20,7 @@ pub(super) struct Calibrated {
 
 /// What is learned from, with random access to the sequences as they are answered: without augmentation.
 pub(super) trait Material: Lessons + Sync {
-    /// Inputs of a sequence as they will be met later, [steps][inputs].
+    /// Inputs of a sequence as they will be met later, `[steps][inputs]`.
     fn inputs(&self, k: usize) -> &[f32];
 
     /// True class in each group.
@@ -39,7 +39,7 @@ pub(super) struct Plan<'a> {
     pub(super) share: Range<f64>,
 }
 
-/// Scores at every step, [steps][outputs], of grasps by networks that have not seen them; none where there is none.
+/// Scores at every step, `[steps][outputs]`, of grasps by networks that have not seen them; none where there is none.
 pub(super) type HeldBack = Vec<Option<Vec<f32>>>;
 
 /// Some of the lessons.
@@ -178,7 +178,7 @@ fn honest(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>], step: usi
         .collect()
 }
 
-/// Scores of one sequence after each of its steps, [steps][outputs].
+/// Scores of one sequence after each of its steps, `[steps][outputs]`.
 fn scores_at_every_step(layer: &MacroLayer, x: &[f32]) -> Vec<f32> {
     let mut live = LiveMacroLayer::new(layer);
     x.chunks_exact(layer.shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()

@@ -61,8 +61,8 @@ macro_rules! dispatched {
 }
 
 dispatched! {
-    /// One time step forward for a batch. `gates` [batch][4 units] comes in as sums and leaves as activations;
-    /// `c_before`, `c`, `tanh_c`, `h` are [batch][units].
+    /// One time step forward for a batch. `gates` `[batch][4 units]` comes in as sums and leaves as activations;
+    /// `c_before`, `c`, `tanh_c`, `h` are `[batch][units]`.
     step_forward, forward_body,
     (units: usize, gates: &mut [f32], c_before: &[f32], c: &mut [f32], tanh_c: &mut [f32], h: &mut [f32])
 }
@@ -145,7 +145,7 @@ fn audible(x: f32) -> f32 {
 }
 
 dispatched! {
-    /// sums += x w, where `w` is [inputs][outputs]: one row of a product, four inputs at a time.
+    /// sums += x w, where `w` is `[inputs][outputs]`: one row of a product, four inputs at a time.
     add_row_product, row_product_body, (x: &[f32], w: &[f32], sums: &mut [f32])
 }
 
@@ -198,7 +198,8 @@ mod tests {
         let units = 13;
         let before: Vec<f32> = (0..2 * units).map(|_| next()).collect();
         let sums: Vec<f32> = (0..8 * units).map(|_| 3.0 * next()).collect();
-        let run = |forward: fn(usize, &mut [f32], &[f32], &mut [f32], &mut [f32], &mut [f32])| {
+        type Forward = fn(usize, &mut [f32], &[f32], &mut [f32], &mut [f32], &mut [f32]);
+        let run = |forward: Forward| {
             let mut gates = sums.clone();
             let mut outs = [(); 3].map(|()| vec![0.0; 2 * units]);
             let [c, t, h] = &mut outs;

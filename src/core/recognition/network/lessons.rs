@@ -10,7 +10,7 @@ use rand::{Rng, RngExt};
 pub(super) struct Book {
     /// Inputs per step.
     pub(super) width: usize,
-    /// [steps][width] of each grasp.
+    /// `[steps][width]` of each grasp.
     pub(super) pages: Vec<Vec<f32>>,
     /// True class in each group.
     pub(super) targets: Vec<Vec<usize>>,

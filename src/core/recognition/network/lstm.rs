@@ -1,7 +1,7 @@
 //! A long short-term memory layer: forward over whole batches, back-propagation through time, and single live steps, all
 //! in one workspace that is allocated once.
 //!
-//! Arrays are time-major, [steps][batch][..]. Weights have PyTorch's shapes and gate order (input, forget, candidate,
+//! Arrays are time-major, `[steps][batch][..]`. Weights have PyTorch's shapes and gate order (input, forget, candidate,
 //! output); its two biases, which only ever appear as their sum, are one here.
 
 use super::gates::{add_row_product, step_backward, step_forward};
@@ -10,11 +10,11 @@ use super::gemm::{Matrix, multiply};
 /// Weights of a layer, or their gradients, in someone else's memory.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LstmWeights<'a> {
-    /// Input weights, [4 units][inputs].
+    /// Input weights, `[4 units][inputs]`.
     pub(super) w: &'a [f32],
-    /// Recurrent weights, [4 units][units].
+    /// Recurrent weights, `[4 units][units]`.
     pub(super) u: &'a [f32],
-    /// Biases, [4 units].
+    /// Biases, `[4 units]`.
     pub(super) b: &'a [f32],
 }
 
@@ -33,13 +33,13 @@ pub(super) struct LstmWorkspace {
     units: usize,
     steps: usize,
     batch: usize,
-    /// Sums, then activations, then gradients of the sums, [steps][batch][4 units].
+    /// Sums, then activations, then gradients of the sums, `[steps][batch][4 units]`.
     gates: Vec<f32>,
-    /// Hidden states, from the zero before the first step, [steps + 1][batch][units].
+    /// Hidden states, from the zero before the first step, `[steps + 1][batch][units]`.
     h: Vec<f32>,
     /// Cell states, as above.
     c: Vec<f32>,
-    /// tanh of the cell states after each step, [steps][batch][units].
+    /// tanh of the cell states after each step, `[steps][batch][units]`.
     tanh_c: Vec<f32>,
     dh: Vec<f32>,
     dc: Vec<f32>,
@@ -76,7 +76,7 @@ impl LstmWorkspace {
         self.dc.resize(state, 0.0);
     }
 
-    /// Runs a batch of sequences `x` [steps][batch][inputs] from a state of zeros.
+    /// Runs a batch of sequences `x` `[steps][batch][inputs]` from a state of zeros.
     pub(super) fn forward(&mut self, weights: LstmWeights<'_>, x: &[f32], steps: usize, batch: usize) {
         self.resize(steps, batch);
         let (units, state) = (self.units, batch * self.units);
@@ -102,14 +102,14 @@ impl LstmWorkspace {
         self.gates.iter().chain(&self.dh).chain(&self.dc).filter(|x| x.is_subnormal()).count()
     }
 
-    /// Hidden states after a step, [batch][units].
+    /// Hidden states after a step, `[batch][units]`.
     pub(super) fn hidden(&self, step: usize) -> &[f32] {
         let state = self.batch * self.units;
         &self.h[(step + 1) * state..(step + 2) * state]
     }
 
     /// Back through the batch that was last run forward. `read_out` adds the loss's gradient with respect to the
-    /// hidden states after a step, [batch][units], to what it is given.
+    /// hidden states after a step, `[batch][units]`, to what it is given.
     pub(super) fn backward(
         &mut self,
         weights: LstmWeights<'_>,
@@ -148,9 +148,9 @@ impl LstmWorkspace {
 #[derive(Clone, Debug)]
 pub(super) struct LiveLstm {
     units: usize,
-    /// [inputs][4 units].
+    /// `[inputs][4 units]`.
     w: Vec<f32>,
-    /// [units][4 units].
+    /// `[units][4 units]`.
     u: Vec<f32>,
     b: Vec<f32>,
 }
@@ -189,7 +189,7 @@ impl LiveLstm {
 }
 
 impl LiveState {
-    /// Hidden state, [units].
+    /// Hidden state, `[units]`.
     pub(super) fn hidden(&self) -> &[f32] {
         &self.h
     }

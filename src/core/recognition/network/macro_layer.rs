@@ -89,7 +89,7 @@ pub struct MacroLayer {
 /// A batch of sequences, and where each is read out.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Inputs, [steps][sequences][inputs]; sequences that end early are padded with anything finite.
+    /// Inputs, `[steps][sequences][inputs]`; sequences that end early are padded with anything finite.
     pub x: Vec<f32>,
     /// Steps of the longest sequence.
     pub steps: usize,
@@ -97,9 +97,9 @@ pub struct Batch {
     pub sequences: usize,
     /// Where outputs are wanted.
     pub read_outs: Vec<ReadOut>,
-    /// True class per sequence and group, [sequences][groups]; only for training.
+    /// True class per sequence and group, `[sequences][groups]`; only for training.
     pub targets: Vec<usize>,
-    /// Logarithms of the probabilities before, [sequences][outputs]; only with a prior.
+    /// Logarithms of the probabilities before, `[sequences][outputs]`; only with a prior.
     pub log_prior: Vec<f32>,
 }
 
@@ -127,15 +127,15 @@ pub struct Regular {
 #[derive(Clone, Debug)]
 pub struct Pass {
     lstm: LstmWorkspace,
-    /// Hidden states at the read-outs, [read-outs][units].
+    /// Hidden states at the read-outs, `[read-outs][units]`.
     read: Vec<f32>,
     d_read: Vec<f32>,
-    /// Outputs of the first fully connected layer, [read-outs][hidden].
+    /// Outputs of the first fully connected layer, `[read-outs][hidden]`.
     hidden: Vec<f32>,
     d_hidden: Vec<f32>,
     /// What became of each of them: zero, or the factor of dropout.
     mask: Vec<f32>,
-    /// Scores, then their gradients, [read-outs][outputs].
+    /// Scores, then their gradients, `[read-outs][outputs]`.
     scores: Vec<f32>,
 }
 
@@ -154,7 +154,7 @@ impl Pass {
         }
     }
 
-    /// Scores (logits) of the last forward pass, [read-outs][outputs].
+    /// Scores (logits) of the last forward pass, `[read-outs][outputs]`.
     pub fn scores(&self) -> &[f32] {
         &self.scores
     }
@@ -288,7 +288,7 @@ impl MacroLayer {
         }
     }
 
-    /// Scores (logits) at the read-outs of a batch, [read-outs][outputs], in `pass`.
+    /// Scores (logits) at the read-outs of a batch, `[read-outs][outputs]`, in `pass`.
     pub fn score(&self, batch: &Batch, pass: &mut Pass) {
         self.forward(batch, None, pass);
     }
@@ -416,10 +416,10 @@ pub struct LiveMacroLayer {
     shape: MacroShape,
     lstm: LiveLstm,
     state: LiveState,
-    /// [units][hidden]
+    /// `[units][hidden]`
     w1: Vec<f32>,
     b1: Vec<f32>,
-    /// [hidden][outputs]
+    /// `[hidden][outputs]`
     w2: Vec<f32>,
     b2: Vec<f32>,
     gain: f32,

@@ -83,7 +83,7 @@ impl Preparation {
             && self.course.len() == self.factors.len()
     }
 
-    /// Inputs of a whole sequence, [steps][width].
+    /// Inputs of a whole sequence, `[steps][width]`.
     pub fn inputs(&self, sequence: &Sequence) -> Vec<f32> {
         Binner::new(self).whole(sequence)
     }

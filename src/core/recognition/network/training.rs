@@ -19,7 +19,7 @@ pub trait Lessons {
 /// One sequence and what it is.
 #[derive(Clone, Debug, Default)]
 pub struct Lesson {
-    /// Inputs, [steps][inputs].
+    /// Inputs, `[steps][inputs]`.
     pub x: Vec<f32>,
     /// True class in each group.
     pub targets: Vec<usize>,

@@ -51,7 +51,7 @@ impl Network {
         })
     }
 
-    /// Scores [batch][classes] of sequences [batch][inputs][steps].
+    /// Scores `[batch][classes]` of sequences `[batch][inputs][steps]`.
     fn forward(&self, x: &Tensor) -> Result<Tensor> {
         let (batch, _, steps) = x.dims3()?;
         let x = self.first.forward(x)?.relu()?;
@@ -114,7 +114,7 @@ impl Convolution {
     }
 }
 
-/// Inputs of a grasp, [inputs][steps], cut or held to a fixed length.
+/// Inputs of a grasp, `[inputs][steps]`, cut or held to a fixed length.
 fn page(learned: &Learned, grasp: &Sequence) -> Vec<f32> {
     let width = learned.preparation.width();
     let inputs = learned.preparation.inputs(grasp);
@@ -169,7 +169,7 @@ fn train(data: &Dataset, learned: &Learned, fitting: &Fitting<'_>) -> Result<Has
         }
     }
     let named = variables.data().lock();
-    let named = named.map_err(|_| candle_core::Error::Msg("the variables are locked".to_owned()))?;
+    let named = named.map_err(|_poisoned| candle_core::Error::Msg("the variables are locked".to_owned()))?;
     Ok(named.iter().map(|(name, var)| (name.clone(), var.as_tensor().detach())).collect())
 }
 
@@ -177,7 +177,7 @@ fn train(data: &Dataset, learned: &Learned, fitting: &Fitting<'_>) -> Result<Has
 fn seed_weights(variables: &VarMap, random: &mut ChaCha8Rng) -> Result<()> {
     use rand::RngExt as _;
     let named = variables.data().lock();
-    let named = named.map_err(|_| candle_core::Error::Msg("the variables are locked".to_owned()))?;
+    let named = named.map_err(|_poisoned| candle_core::Error::Msg("the variables are locked".to_owned()))?;
     let mut order: Vec<&String> = named.keys().collect();
     order.sort();
     for name in order {

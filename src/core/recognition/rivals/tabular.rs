@@ -241,7 +241,8 @@ fn tree_arrays(arrays: &Arrays) -> Result<Vec<(String, Array)>, String> {
             candle_core::DType::F32 => Array::F32(arrays.get_f32(name)?),
             candle_core::DType::F64 => Array::F64(arrays.get_f64(name)?),
             _ => {
-                let narrow = |x: i64| i32::try_from(x).map_err(|_| format!("array {name} holds too large a number"));
+                let narrow =
+                    |x: i64| i32::try_from(x).map_err(|_large| format!("array {name} holds too large a number"));
                 Array::I32(arrays.get_integers(name)?.into_iter().map(narrow).collect::<Result<_, _>>()?)
             }
         };

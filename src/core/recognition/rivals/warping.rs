@@ -85,7 +85,7 @@ fn scaled(preparation: &Preparation, grasp: &Sequence) -> Vec<f32> {
     preparation.inputs(grasp).chunks_exact(width.max(1)).flat_map(|row| row[..channels].to_vec()).collect()
 }
 
-/// Least sum of squared distances along a path through both sequences, [steps][channels].
+/// Least sum of squared distances along a path through both sequences, `[steps][channels]`.
 fn warped_distance(a: &[f32], b: &[f32], channels: usize, band: usize) -> f32 {
     let (rows, columns) = (a.len() / channels.max(1), b.len() / channels.max(1));
     if rows == 0 || columns == 0 {
