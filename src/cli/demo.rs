@@ -266,8 +266,10 @@ fn conclude(story: &Story, stopped: StopReason) -> Result<(), Failure> {
             ))?;
         }
         StopReason::Unknown => {
-            say(format!("After {grasps} it says: unknown. The grasps agree on none of the objects it knows."))?;
-            say(format!("It was: {}.", story.truth))?;
+            let known = story.grasps.last().is_some_and(|g| g.pmf.contains_key(&story.truth));
+            let right = if known { "which is wrong" } else { "which is right: it has never felt one" };
+            say(format!("After {grasps} it says: unknown, {right} ({}).", story.truth))?;
+            say("The grasps agree on none of the objects it knows.")?;
         }
     }
     let pictures: Vec<String> =
