@@ -112,7 +112,8 @@ impl Workbench {
             unsent: false,
             view,
             traces: Traces::default(),
-            toasts: Toasts::default().with_anchor(egui_notify::Anchor::BottomRight).with_margin(egui::vec2(12.0, 56.0)),
+            // Not over what is recognised.
+            toasts: Toasts::default().with_anchor(egui_notify::Anchor::BottomLeft).with_margin(egui::vec2(12.0, 56.0)),
             thumbnails: load_thumbnails(ctx),
             driver,
             answers: channel(),

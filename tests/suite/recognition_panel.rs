@@ -114,11 +114,11 @@ fn the_threshold_follows_its_line_and_its_number() {
 fn another_object_comes_by_button_and_by_key() {
     let mut bench = bench(BenchSetup::default());
     bench.harness.get_by_label("Next object").click();
-    let first = bench.until(|s| s.truth() != "lemon");
-    assert!(first.status.playing && beliefs(&first) == 0 && first.status.grasp_of_round == 1);
+    let first = bench.until(|s| s.truth() != "lemon" && s.status.playing);
+    assert!(beliefs(&first) == 0 && first.status.grasp_of_round == 1);
     bench.harness.key_press(Key::N);
-    let second = bench.until(|s| s.truth() != first.truth());
-    assert!(second.status.playing && second.truth() != "lemon");
+    let second = bench.until(|s| s.truth() != first.truth() && s.status.playing);
+    assert!(second.truth() != "lemon", "everyone else gets a turn first");
 }
 
 #[test]

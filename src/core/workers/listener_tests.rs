@@ -213,3 +213,17 @@ fn a_model_that_reads_other_channels_says_so_once_for_each_scene() {
         watched.worker.notices().filter(|n| matches!(n, Notice::Warning(w) if w.contains("temperature"))).count();
     assert_eq!(told, 2);
 }
+
+#[test]
+fn the_model_that_comes_with_the_program_answers_while_the_first_grasp_goes_on() {
+    let folder = folder();
+    let watched = watch(crate::recognition::shipped_model().ok(), &folder, 1);
+    watched.tell(Command::Pause);
+    watched.until(|s| !s.status.playing);
+    watched.tell(Command::SetSpeed(1.0));
+    watched.tell(Command::Reset);
+    watched.tell(Command::Play);
+    let early = watched.until(|s| s.identification.as_ref().is_some_and(|view| view.verdict.is_some()));
+    let verdict = early.identification.as_ref().and_then(|view| view.verdict.clone()).expect("just seen");
+    assert!(verdict.properties.is_some() && early.frame.t < 0.5, "{} s", early.frame.t);
+}

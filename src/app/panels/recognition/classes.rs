@@ -1,7 +1,7 @@
 //! A bar for each class, always in the same order, and the threshold as a line across all of them that can be dragged.
 
 use super::words::{newest, percent, ranked, title};
-use super::{EASE_S, Part, fitted, labelled, put};
+use super::{Part, eased, fitted, labelled, put};
 use crate::app::actions::Action;
 use crate::app::theme::colour;
 use egui::{Align2, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
@@ -71,7 +71,7 @@ fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, c
     let track =
         Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, 0.18 * columns.line));
     ui.painter().rect_filled(track, 2.0, colour(colours.raised));
-    let share = ui.ctx().animate_value_with_time(ui.scope_id().with(("class", class)), p as f32, EASE_S);
+    let share = eased(ui, ui.scope_id().with(("class", class)), pmf.map(|_| p));
     let fill = if leads { colours.accent } else { colours.background.mix(colours.quiet_text, 0.7) };
     if share > 0.003 {
         ui.painter().rect_filled(track.with_max_x(from + (to - from) * share), 2.0, colour(fill));
@@ -95,20 +95,30 @@ fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom
     let held = response.hovered() || response.dragged();
     let ink = colour(part.colours().text);
     ui.painter().vline(x, top..=bottom, Stroke::new(if held { 2.5 } else { 1.5 }, ink));
+    ui.painter().circle_filled(pos2(x, bottom), if held { 5.0 } else { 4.0 }, ink);
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
-        let wanted = f64::from((pointer.x - from) / (to - from)).clamp(*THRESHOLDS.start(), *THRESHOLDS.end());
-        // Whole percents, but finer near certainty.
-        let steps = if wanted > 0.99 { 1e3 } else { 1e2 };
-        let wanted = (wanted * steps).round() / steps;
+        let wanted = stepped(f64::from((pointer.x - from) / (to - from)));
         if wanted != threshold {
             part.actions.push(Action::Simulation(Command::SetThreshold(wanted)));
         }
     }
 }
 
+/// A threshold in whole percents or, where the next one would be out of reach, in tenths.
+pub(super) fn stepped(threshold: f64) -> f64 {
+    let within = threshold.clamp(*THRESHOLDS.start(), *THRESHOLDS.end());
+    let steps = if within > 0.99 { 1e3 } else { 1e2 };
+    (within * steps).round() / steps
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn thresholds_come_in_steps_and_leave_room_for_doubt() {
+        assert_eq!([0.2, 0.8983, 0.99, 0.9962, 1.0, 7.0].map(stepped), [0.5, 0.9, 0.99, 0.996, 0.999, 0.999]);
+    }
 
     #[test]
     fn where_there_is_little_room_the_likeliest_stay_in_their_order() {

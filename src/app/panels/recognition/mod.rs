@@ -2,19 +2,19 @@
 //! each class with the threshold across them, and the grasps so far.
 
 mod classes;
+mod properties;
 mod strip;
 mod words;
 
 use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::icons::{self, Icon};
-use crate::app::theme::{colour, veil};
+use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_core::grasping::IdentificationView;
-use palpate_core::recognition::Pmf;
 use palpate_core::workers::{Command, Snapshot, THRESHOLDS};
 use std::sync::Arc;
-use words::{Headline, newest, percent, reason, title_of};
+use words::{Headline, percent, reason, title_of};
 
 /// Time that bars take to follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -37,12 +37,12 @@ struct Measures {
 }
 
 const ROOMY: Measures = Measures {
-    headline: 44.0,
+    headline: 50.0,
     reason: 38.0,
     reason_letters: 13.5,
     truth: 26.0,
     properties: 24.0,
-    class: 20.0,
+    class: 21.0,
     strip: 50.0,
     button: 36.0,
     gap: 7.0,
@@ -98,7 +98,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
                 let mut part = Part { context, snapshot, view: &view, measures, actions };
                 part.headline_ui(ui);
                 part.truth_ui(ui);
-                part.properties_ui(ui);
+                properties::ui(ui, &part);
                 let has_properties = !view.labels.sizes.is_empty();
                 let lines = measures.lines(room.y, view.labels.classes.len(), has_properties);
                 classes::ui(ui, &mut part, lines);
@@ -194,8 +194,9 @@ impl Part<'_, '_> {
         let why = reason(self.view, &self.snapshot.status);
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
         let font = FontId::proportional(measures.reason_letters);
-        let lines = ui.painter().layout(why, font, colour(colours.quiet_text), rect.width());
-        put(ui, lines, rect, Align2::LEFT_TOP);
+        // A number keeps its unit.
+        let lines = ui.painter().layout(why.replace(" %", "\u{a0}%"), font, colour(colours.quiet_text), rect.width());
+        put(ui, lines, rect, Align2::LEFT_CENTER);
     }
 
     /// Whether it is right: the simulation knows. Set apart from everything that was felt.
@@ -248,69 +249,6 @@ impl Part<'_, '_> {
         }
     }
 
-    /// Stage one: size and shape.
-    fn properties_ui(&self, ui: &mut Ui) {
-        let labels = &self.view.labels;
-        if labels.sizes.is_empty() || labels.shapes.is_empty() {
-            return;
-        }
-        // An empty hand has neither.
-        let leader = newest(self.view).map(|pmf| &labels.classes[pmf.top().0]);
-        let has_any = leader.is_some_and(|class| class.size.is_some() || class.shape.is_some());
-        let properties = self.view.verdict.as_ref().and_then(|v| v.properties.as_ref()).filter(|_| has_any);
-        self.property_ui(ui, "size", &labels.sizes, properties.map(|p| &p.size));
-        self.property_ui(ui, "shape", &labels.shapes, properties.map(|p| &p.shape));
-    }
-
-    /// A bar with as many equal segments as there are answers, each filled as far as it is probable.
-    fn property_ui(&self, ui: &mut Ui, name: &str, answers: &[String], pmf: Option<&Pmf>) {
-        let colours = self.colours();
-        let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), self.measures.properties), Sense::hover());
-        let named = if rect.width() < 250.0 { 0.0 } else { 44.0 };
-        if named > 0.0 {
-            let text = fitted(ui, name.to_owned(), 11.5, named, colour(colours.quiet_text));
-            put(ui, text, rect, Align2::LEFT_CENTER);
-        }
-        let width = (rect.width() - named) / answers.len() as f32;
-        let best = pmf.map(|pmf| pmf.top().0);
-        for (k, answer) in answers.iter().enumerate() {
-            let place = Rect::from_min_size(
-                pos2(rect.left() + named + width * k as f32, rect.top()),
-                vec2(width, rect.height()),
-            );
-            let cell = place.shrink2(vec2(1.0, 0.0));
-            let p = pmf.map(|pmf| pmf.probabilities()[k]);
-            let spoken = p.map_or_else(|| answer.clone(), |p| format!("{answer} {}", percent(p)));
-            ui.interact(cell, ui.scope_id().with((name, k)), Sense::hover())
-                .on_hover_text(format!("{name}: {spoken}"))
-                .widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
-            let share = ui.ctx().animate_value_with_time(
-                ui.scope_id().with((name, k, "share")),
-                p.unwrap_or(0.0) as f32,
-                EASE_S,
-            );
-            ui.painter().rect_filled(cell, 3.0, colour(colours.raised));
-            let filled = cell.with_max_x(cell.left() + cell.width() * share);
-            let is_best = best == Some(k);
-            ui.painter().rect_filled(
-                filled,
-                3.0,
-                if is_best { veil(colours.accent, 0.45) } else { veil(colours.quiet_text, 0.30) },
-            );
-            let ink = colour(if is_best { colours.text } else { colours.quiet_text });
-            let inside = cell.shrink2(vec2(4.0, 0.0));
-            let number = p.map(|p| fitted(ui, percent(p), 11.5, inside.width(), ink));
-            let word = fitted(ui, answer.clone(), 11.5, inside.width(), ink);
-            match number.filter(|number| number.size().x + word.size().x + 4.0 <= inside.width()) {
-                Some(number) => {
-                    put(ui, word, inside, Align2::LEFT_CENTER);
-                    put(ui, number, inside, Align2::RIGHT_CENTER);
-                }
-                None => put(ui, word, inside, Align2::CENTER_CENTER),
-            }
-        }
-    }
-
     /// The threshold as a number, for those who do not drag its line.
     fn threshold_ui(&mut self, ui: &mut Ui) {
         let size = vec2(ui.available_width(), THRESHOLD_LINE);
@@ -319,11 +257,17 @@ impl Part<'_, '_> {
             let label = ui.weak("sure from");
             let [least, most] = [THRESHOLDS.start(), THRESHOLDS.end()].map(|p| p * 100.0);
             let mut threshold = self.view.rule.threshold * 100.0;
-            let drag =
-                egui::DragValue::new(&mut threshold).range(least..=most).speed(0.25).max_decimals(1).suffix(" %");
+            let plain =
+                |percents: f64, _: std::ops::RangeInclusive<usize>| format!("{}", (percents * 10.0).round() / 10.0);
+            let drag = egui::DragValue::new(&mut threshold)
+                .range(least..=most)
+                .speed(0.25)
+                .max_decimals(1)
+                .custom_formatter(plain)
+                .suffix(" %");
             let hint = "Probability from which on a class is taken as certain; its line can be dragged, too";
             if ui.add(drag).labelled_by(label.id).on_hover_text(hint).changed() {
-                self.actions.push(Action::Simulation(Command::SetThreshold(threshold / 100.0)));
+                self.actions.push(Action::Simulation(Command::SetThreshold(classes::stepped(threshold / 100.0))));
             }
         });
     }
@@ -347,6 +291,14 @@ fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<
     let mut job = egui::text::LayoutJob::simple_singleline(text, FontId::proportional(smaller), ink);
     job.wrap = egui::text::TextWrapping::truncate_at_width(width.max(1.0));
     ui.painter().layout_job(job)
+}
+
+/// A share as it is drawn: it follows what is said within [`EASE_S`]. It jumps where nothing is said, and where pictures
+/// come so seldom that it would only lag.
+fn eased(ui: &Ui, id: egui::Id, p: Option<f64>) -> f32 {
+    let seldom = ui.input(|i| i.unstable_dt) > 0.5 * EASE_S;
+    let time = if p.is_none() || seldom { 0.0 } else { EASE_S };
+    ui.ctx().animate_value_with_time(id, p.unwrap_or(0.0) as f32, time)
 }
 
 /// Paints a text at the given side of a place.

@@ -1,7 +1,7 @@
 //! The grasps so far, side by side: what each led to, how sure it was, and the one that goes on.
 
 use super::words::{percent, ranked, title};
-use super::{EASE_S, Part, fitted, put};
+use super::{Part, eased, fitted, put};
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 use palpate_core::recognition::Pmf;
@@ -89,8 +89,7 @@ fn shares_ui(ui: &Ui, part: &Part<'_, '_>, number: usize, pmf: &Pmf, cell: Rect)
     let fills = [veil(colours.accent, 0.38), veil(colours.quiet_text, 0.22)];
     let mut level = cell.bottom();
     for (rank, (class, fill)) in ranked(pmf).into_iter().zip(fills).enumerate() {
-        let p = pmf.probabilities()[class] as f32;
-        let share = ui.ctx().animate_value_with_time(ui.scope_id().with(("share", number, rank)), p, EASE_S);
+        let share = eased(ui, ui.scope_id().with(("share", number, rank)), Some(pmf.probabilities()[class]));
         let top = (level - cell.height() * share).max(cell.top());
         ui.painter().rect_filled(Rect::from_x_y_ranges(cell.x_range(), top..=level), 2.0, fill);
         level = top;

@@ -103,6 +103,11 @@ pub(super) fn percent(p: f64) -> String {
     if tenths > 990.0 { format!("{:.1} %", tenths / 10.0) } else { format!("{:.0} %", (tenths / 10.0).floor()) }
 }
 
+/// The same without decimals, where there is little room.
+pub(super) fn whole_percent(p: f64) -> String {
+    percent(p.min(0.99))
+}
+
 /// The two most likely classes: `lemon 61 %, tomato 30 %`.
 fn leaders(labels: &Labels, pmf: &Pmf) -> String {
     let two = ranked(pmf).into_iter().take(2);

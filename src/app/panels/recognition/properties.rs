@@ -1,0 +1,83 @@
+//! Stage one: size and shape, as bars with as many equal segments as there are answers.
+
+use super::words::{newest, whole_percent};
+use super::{Part, eased, fitted, put};
+use crate::app::theme::colour;
+use egui::{Align2, Color32, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
+use palpate_core::recognition::Pmf;
+
+/// Height of the line that shows how probable an answer is (points).
+const UNDERLINE: f32 = 4.0;
+/// Room for the name of a property (points); in a narrow panel its answers speak for themselves.
+const NAME: f32 = 36.0;
+const NARROW: f32 = 250.0;
+/// Size of letters (points).
+const LETTERS: f32 = 11.0;
+
+pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
+    let labels = &part.view.labels;
+    if !labels.have_properties() {
+        return;
+    }
+    // An empty hand has neither, but that is not known before the grasp is over.
+    let leader = newest(part.view).map(|pmf| &labels.classes[pmf.top().0]);
+    let has_any = part.view.listening || leader.is_some_and(|class| class.size.is_some() || class.shape.is_some());
+    let properties = part.view.verdict.as_ref().and_then(|v| v.properties.as_ref()).filter(|_| has_any);
+    property_ui(ui, part, "size", &labels.sizes, properties.map(|p| &p.size));
+    property_ui(ui, part, "shape", &labels.shapes, properties.map(|p| &p.shape));
+}
+
+fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String], pmf: Option<&Pmf>) {
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), part.measures.properties), Sense::hover());
+    let named = if rect.width() < NARROW { 0.0 } else { NAME };
+    if named > 0.0 {
+        let quiet = colour(part.colours().quiet_text);
+        put(ui, fitted(ui, name.to_owned(), 11.5, named, quiet), rect, Align2::LEFT_CENTER);
+    }
+    let width = (rect.width() - named) / answers.len().max(1) as f32;
+    // All of them bear their numbers, or none does.
+    let needed =
+        |answer: &String| fitted(ui, format!("{answer} 99 %"), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
+    let numbered = answers.iter().map(needed).fold(0.0, f32::max) <= width - 10.0;
+    let best = pmf.map(|pmf| pmf.top().0);
+    for (k, answer) in answers.iter().enumerate() {
+        let corner = pos2(rect.left() + named + width * k as f32, rect.top());
+        let place = Rect::from_min_size(corner, vec2(width, rect.height())).shrink2(vec2(2.0, 0.0));
+        let p = pmf.map(|pmf| pmf.probabilities()[k]);
+        let spoken = p.map_or_else(|| answer.clone(), |p| format!("{answer} {}", whole_percent(p)));
+        ui.interact(place, ui.scope_id().with((name, k)), Sense::hover())
+            .on_hover_text(format!("{name}: {spoken}"))
+            .widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
+        let share = eased(ui, ui.scope_id().with((name, k, "share")), p);
+        segment_ui(ui, part, place, Segment { answer, p, share, numbered, leads: best == Some(k) });
+    }
+}
+
+struct Segment<'a> {
+    answer: &'a str,
+    p: Option<f64>,
+    /// The probability as it is drawn.
+    share: f32,
+    /// Has room for a number.
+    numbered: bool,
+    leads: bool,
+}
+
+fn segment_ui(ui: &Ui, part: &Part<'_, '_>, place: Rect, segment: Segment<'_>) {
+    let colours = part.colours();
+    ui.painter().rect_filled(place, 3.0, colour(colours.raised));
+    let fill = if segment.leads { colours.accent } else { colours.background.mix(colours.quiet_text, 0.7) };
+    let line = Rect::from_min_max(pos2(place.left(), place.bottom() - UNDERLINE), place.max);
+    let filled = line.with_max_x(line.left() + line.width() * segment.share);
+    ui.painter().rect_filled(filled, 1.5, colour(fill));
+    let ink = colour(if segment.leads { colours.text } else { colours.quiet_text });
+    let inside = place.shrink2(vec2(3.0, 0.0)).with_max_y(line.top());
+    let word = fitted(ui, segment.answer.to_owned(), LETTERS, inside.width(), ink);
+    match segment.p.filter(|_| segment.numbered) {
+        Some(p) => {
+            put(ui, word, inside, Align2::LEFT_CENTER);
+            put(ui, fitted(ui, whole_percent(p), LETTERS, inside.width(), ink), inside, Align2::RIGHT_CENTER);
+        }
+        None => put(ui, word, inside, Align2::CENTER_CENTER),
+    }
+}
