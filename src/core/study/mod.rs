@@ -5,9 +5,7 @@ mod network_cost;
 mod physics_cost;
 mod search;
 
-pub use comparison::{
-    Comparison, ComparisonError, ComparisonRow, Controls, Difference, fed_back_against_independent, in_table_order,
-};
+pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost};
 pub use search::{SearchRow, search};
