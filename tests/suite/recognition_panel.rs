@@ -68,7 +68,8 @@ fn a_grasp_is_followed_until_it_is_sure() {
 
 #[test]
 fn the_panel_in_every_state_and_both_themes() {
-    let states: [(&str, fn(&mut Bench)); 5] = [
+    type Reach = fn(&mut Bench);
+    let states: [(&str, Reach); 5] = [
         ("ready", |_| ()),
         ("feeling", |bench| bench.advance_to(0.9)),
         ("first", |bench| bench.advance_to(2.6)),

@@ -1,13 +1,15 @@
 //! A bar for each class, always in the same order, and the threshold as a line across all of them that can be dragged.
 
 use super::words::{newest, percent, ranked, title};
-use super::{Part, eased, fitted, labelled, put};
+use super::{LEAST_LETTERS, Part, eased, fitted, labelled, put};
 use crate::app::actions::Action;
 use crate::app::theme::colour;
-use egui::{Align2, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_core::recognition::Pmf;
 use palpate_core::workers::{Command, THRESHOLDS};
 
+/// Size of letters where there is room (points).
+const LETTERS: f32 = 12.5;
 /// Distance from the line of the threshold within which it can be taken hold of (points).
 const GRIP: f32 = 6.0;
 
@@ -16,6 +18,8 @@ const GRIP: f32 = 6.0;
 struct Columns {
     bars: [f32; 2],
     line: f32,
+    /// Size of letters, the same for all names.
+    letters: f32,
 }
 
 /// Draws so many lines, each so high.
@@ -27,7 +31,10 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f3
     let width = ui.available_width();
     let left = ui.cursor().left();
     let names = (0.40 * width).min(104.0);
-    let columns = Columns { bars: [left + names + 4.0, left + width - 46.0], line };
+    let width_of = |class| fitted(ui, title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
+    let longest = (0..labels.classes.len()).map(width_of).fold(1.0, f32::max);
+    let letters = LETTERS * (names / longest).min(1.0);
+    let columns = Columns { bars: [left + names + 4.0, left + width - 46.0], line, letters };
     let gap = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
     let top = ui.cursor().top();
     for class in &shown {
@@ -67,7 +74,12 @@ fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, c
     response.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
     let ink = colour(if leads { colours.text } else { colours.quiet_text });
     let [from, to] = columns.bars;
-    put(ui, fitted(ui, name, 12.5, from - 4.0 - rect.left(), ink), rect, Align2::LEFT_CENTER);
+    put(
+        ui,
+        fitted(ui, name, columns.letters.max(LEAST_LETTERS), from - 2.0 - rect.left(), ink),
+        rect,
+        Align2::LEFT_CENTER,
+    );
     let track =
         Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, 0.18 * columns.line));
     ui.painter().rect_filled(track, 2.0, colour(colours.raised));
@@ -78,7 +90,7 @@ fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, c
     }
     // A column of "0 %" says nothing that the empty bars do not.
     if p >= 0.01 {
-        put(ui, fitted(ui, percent(p), 12.5, rect.right() - to - 4.0, ink), rect, Align2::RIGHT_CENTER);
+        put(ui, fitted(ui, percent(p), LETTERS, rect.right() - to - 4.0, ink), rect, Align2::RIGHT_CENTER);
     }
 }
 

@@ -49,7 +49,7 @@ fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String],
             .on_hover_text(format!("{name}: {spoken}"))
             .widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
         let share = eased(ui, ui.scope_id().with((name, k, "share")), p);
-        segment_ui(ui, part, place, Segment { answer, p, share, numbered, leads: best == Some(k) });
+        segment_ui(ui, part, place, &Segment { answer, p, share, numbered, leads: best == Some(k) });
     }
 }
 
@@ -63,7 +63,7 @@ struct Segment<'a> {
     leads: bool,
 }
 
-fn segment_ui(ui: &Ui, part: &Part<'_, '_>, place: Rect, segment: Segment<'_>) {
+fn segment_ui(ui: &Ui, part: &Part<'_, '_>, place: Rect, segment: &Segment<'_>) {
     let colours = part.colours();
     ui.painter().rect_filled(place, 3.0, colour(colours.raised));
     let fill = if segment.leads { colours.accent } else { colours.background.mix(colours.quiet_text, 0.7) };
