@@ -104,6 +104,15 @@ impl Fitting<'_> {
     pub fn check(&self) -> Result<(), FitError> {
         if self.stop.load(Ordering::Relaxed) { Err(FitError::Stopped) } else { Ok(()) }
     }
+
+    /// Fails where settings were given to a method that has none.
+    pub(crate) fn refuse_settings(&self) -> Result<(), FitError> {
+        let refused = |name: &String| {
+            let cause = "this method has none that can be changed".to_owned();
+            Err(FitError::Setting { name: name.clone(), cause })
+        };
+        self.settings.keys().next().map_or(Ok(()), refused)
+    }
 }
 
 /// Why a recogniser could not be fitted.

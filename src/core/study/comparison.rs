@@ -121,14 +121,19 @@ impl Comparison<'_> {
         Ok(self.compared(judged))
     }
 
-    fn of_method(&self, method: &'static Method) -> Result<Judged, ComparisonError> {
-        let fitting = Fitting {
+    /// The method's own settings; nobody follows the progress.
+    fn fitting(&self) -> Fitting<'_> {
+        Fitting {
             seed: self.seed,
             quick: self.quick,
             settings: serde_json::Map::new(),
             progress: &|_| (),
             stop: self.interrupted,
-        };
+        }
+    }
+
+    fn of_method(&self, method: &'static Method) -> Result<Judged, ComparisonError> {
+        let fitting = self.fitting();
         let model =
             method.train(self.train, &fitting).map_err(|cause| ComparisonError::Fit { method: method.key, cause })?;
         self.of_model(method.key, method.title, &model)
@@ -195,13 +200,7 @@ impl Comparison<'_> {
     /// The controls of a fair comparison: a method that learned from shuffled labels, which must not know more than
     /// chance, and one that is told the true size and shape, which nothing that has to find them can pass.
     pub fn controls(&self, method: &'static Method) -> Result<Controls, ComparisonError> {
-        let fitting = Fitting {
-            seed: self.seed,
-            quick: self.quick,
-            settings: serde_json::Map::new(),
-            progress: &|_| (),
-            stop: self.interrupted,
-        };
+        let fitting = self.fitting();
         let failed = |cause| ComparisonError::Fit { method: method.key, cause };
         let shuffled = method.train(&self.train.with_shuffled_labels(self.seed), &fitting).map_err(failed)?;
         let classes = self.test.labels.classes.len();

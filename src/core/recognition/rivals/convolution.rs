@@ -68,10 +68,7 @@ impl Convolution {
     /// Fits the network.
     pub(in super::super) fn fit(data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Self, FitError> {
         check_enough(data, 2)?;
-        if let Some(name) = fitting.settings.keys().next() {
-            let cause = "this method has none that can be changed".to_owned();
-            return Err(FitError::Setting { name: name.clone(), cause });
-        }
+        fitting.refuse_settings()?;
         let preparation = Preparation::fit(data, RATE_HZ);
         let mut lengths: Vec<usize> =
             data.examples.iter().map(|e| preparation.inputs(&e.grasp).len() / preparation.width().max(1)).collect();

@@ -87,10 +87,7 @@ impl Tabular {
     /// Fits a model; grasps are also shown with left and right exchanged, as to the networks.
     pub(in super::super) fn fit(data: &Dataset, kind: TabularKind, fitting: &Fitting<'_>) -> Result<Self, FitError> {
         check_enough(data, 2)?;
-        if let Some(name) = fitting.settings.keys().next() {
-            let cause = "this method has none that can be changed".to_owned();
-            return Err(FitError::Setting { name: name.clone(), cause });
-        }
+        fitting.refuse_settings()?;
         let features = Features::fit(kind.features(), data);
         let mut rows = Rows {
             values: Vec::new(),

@@ -35,10 +35,7 @@ impl Warping {
     /// Remembers all grasps.
     pub(in super::super) fn fit(data: &Dataset, fitting: &Fitting<'_>) -> Result<Self, FitError> {
         check_enough(data, 1)?;
-        if let Some(name) = fitting.settings.keys().next() {
-            let cause = "this method has none that can be changed".to_owned();
-            return Err(FitError::Setting { name: name.clone(), cause });
-        }
+        fitting.refuse_settings()?;
         let preparation = Preparation::fit(data, RATE_HZ);
         let pages = data.examples.iter().map(|e| scaled(&preparation, &e.grasp)).collect();
         let mirror = super::super::network::mirror(&data.channels);
