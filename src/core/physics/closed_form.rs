@@ -23,20 +23,21 @@ struct Run {
     model: Model,
     state: State,
     ws: Workspace,
+    h: f64,
 }
 
 impl Run {
     fn new(scene: &Scene, object: Option<&ObjectModel>, h: f64) -> Self {
         let placement = Placement::new(scene, object);
-        let model = Model::new(scene, object, &placement, h);
+        let model = Model::new(scene, object, &placement);
         let state = State::new(&model, &placement);
         let ws = Workspace::new(&model);
-        Self { model, state, ws }
+        Self { model, state, ws, h }
     }
 
     fn steps(&mut self, count: usize, drive: &Drive) {
         for _ in 0..count {
-            let report = step(&self.model, &mut self.state, &mut self.ws, drive).expect("finite");
+            let report = step(&self.model, &mut self.state, &mut self.ws, drive, self.h).expect("finite");
             assert!(report.converged);
         }
     }
@@ -103,7 +104,7 @@ fn a_cantilever_rings_at_its_modes() {
             let mut scene = bare(joints);
             scene.gripper.finger.back = 0.0;
             scene.gripper.pad.thickness = 1e-4; // a thin beam: no rotary inertia beyond that of its segments
-            let model = Model::new(&scene, None, &Placement::new(&scene, None), 1e-3);
+            let model = Model::new(&scene, None, &Placement::new(&scene, None));
             let modes = lowest_modes(&model);
             [(modes[0], 1.8751), (modes[1], 4.6941)].map(|(got, beta)| got / want(beta, &scene.gripper.finger) - 1.0)
         })
@@ -195,9 +196,10 @@ fn a_ball_on_a_thin_linear_pad_is_a_winkler_foundation() {
     scene.gripper.mount.offset = [0.1 - radius + depth, 0.0, 0.0];
     let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius }, 500.0, 0.0);
     let mut run = Run::new(&scene, Some(&ball), 1e-3);
+    run.ws.step.h = run.h;
     lay_out(&run.model, &run.state, &mut run.ws);
     detect(&run.model, &run.state, &mut run.ws);
-    let force: f64 = run.ws.contacts.iter().map(|c| c.force(run.model.step).0 * -c.normal.x).sum();
+    let force: f64 = run.ws.contacts.iter().map(|c| c.force(run.ws.step).0 * -c.normal.x).sum();
     let pad = &scene.gripper.pad;
     let want = std::f64::consts::PI * radius * pad.modulus * depth * depth / pad.thickness;
     assert!((force / want - 1.0).abs() < 0.02, "{force} instead of {want}");
@@ -329,7 +331,7 @@ fn a_resting_object_sinks_as_far_as_the_scene_allows() {
         assert!((0.0..=1.1 * scene.support.sink).contains(&sunk), "{mass} kg sank {sunk} m");
         let creep = (run.state.body.position - start).truncate().length();
         assert!(creep < 1e-9, "{mass} kg crept {creep} m");
-        let carried: f64 = run.ws.contacts.iter().map(|c| c.force(run.model.step).0).sum();
+        let carried: f64 = run.ws.contacts.iter().map(|c| c.force(run.ws.step).0).sum();
         assert!((carried / (mass * scene.world.gravity) - 1.0).abs() < 1e-5);
     }
 }
@@ -342,7 +344,7 @@ fn without_friction_nothing_is_dragged() {
     let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.025 }, 400.0, 0.6);
     let mut run = Run::new(&scene, Some(&ball), 1.0 / 300.0);
     run.steps(600, &torque(0.05));
-    let forces: Vec<_> = run.ws.contacts.iter().map(|c| c.force(run.model.step)).collect();
+    let forces: Vec<_> = run.ws.contacts.iter().map(|c| c.force(run.ws.step)).collect();
     assert!(forces.iter().any(|(normal, _)| *normal > 0.01));
     assert!(forces.iter().all(|(_, tangential)| tangential.length() < 1e-12));
 }
@@ -360,7 +362,7 @@ fn strong_friction_stays_in_its_cone() {
             run.steps(1, &torque(1e-4 * f64::from(k.min(600))));
             let (mut used, mut allowed) = (0.0, 0.0);
             for c in run.ws.contacts.iter().filter(|c| c.acting != Acting::Object && c.against == Against::Object) {
-                let (normal, tangential) = c.force(run.model.step);
+                let (normal, tangential) = c.force(run.ws.step);
                 used += tangential.length();
                 allowed += c.mu * normal;
             }
@@ -392,7 +394,7 @@ fn thin_things_are_not_crossed() {
             let mut touched = false;
             for k in 0..ticks {
                 run.steps(1, &torque(0.12 * (2.0 * k as f64 / ticks as f64).min(1.0)));
-                touched |= run.ws.contacts.iter().any(|c| c.force(run.model.step).0 > 0.01);
+                touched |= run.ws.contacts.iter().any(|c| c.force(run.ws.step).0 > 0.01);
             }
             assert!(touched, "{name} was never felt at h = {h}");
             let deepest = run.ws.contacts.iter().map(|c| c.compression).fold(0.0, f64::max);
@@ -425,6 +427,6 @@ fn an_object_born_inside_a_finger_leaves_gently() {
 fn numbers_out_of_range_are_reported_with_the_body() {
     let mut run = Run::new(&bare(10), None, 1e-3);
     run.state.velocity[13] = f64::NAN;
-    let error = step(&run.model, &mut run.state, &mut run.ws, &Drive::default()).expect_err("NaN");
+    let error = step(&run.model, &mut run.state, &mut run.ws, &Drive::default(), run.h).expect_err("NaN");
     assert!(error.to_string().contains("right finger"), "{error}");
 }

@@ -34,6 +34,7 @@ struct Hit {
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
 pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
     workspace.contacts.clear();
+    let h = workspace.step.h;
     let object = model.body.as_ref().map(|body| Solid::new(body, state));
     let (linear, angular) = state.body_velocity(model);
     for finger in 0..2 {
@@ -46,9 +47,9 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
             let link_velocity = workspace.spatial[link];
             let speed =
                 link_velocity.linear_at(middle - workspace.reference).length() + link_velocity.angular.length() * reach;
-            let against_world = margin(model, speed);
+            let against_world = margin(h, speed);
             let object_speed = linear.length() + object.as_ref().map_or(0.0, |o| angular.length() * o.body.radius);
-            let against_object = margin(model, speed + object_speed);
+            let against_object = margin(h, speed + object_speed);
             let near_object = object.as_ref().filter(|o| o.distance(middle) < reach + against_object);
             let near_world =
                 !model.environment.is_empty() && model.environment.distance(middle) < reach + against_world;
@@ -64,13 +65,13 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
         && !model.environment.is_empty()
     {
         let speed = linear.length() + angular.length() * body.radius;
-        detect_resting(model, state, workspace, body, margin(model, speed));
+        detect_resting(model, state, workspace, body, margin(h, speed));
     }
 }
 
 /// Gap up to which contacts are kept, given the speed of approach (m).
-fn margin(model: &Model, speed: f64) -> f64 {
-    STILL_MARGIN + model.step.h * (SPEED_MARGIN + SPEED_FACTOR * speed)
+fn margin(h: f64, speed: f64) -> f64 {
+    STILL_MARGIN + h * (SPEED_MARGIN + SPEED_FACTOR * speed)
 }
 
 /// What one segment may touch, and how far away it may still be.
@@ -124,7 +125,7 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
             stiffness: strand.stiffness,
             height: strand.height,
             mu,
-            limit: mu * state.lag[site],
+            limit: mu * state.expected_impulse(site, workspace.step.h),
             shear: shear - hit.normal * hit.normal.dot(shear),
             velocity: DVec3::ZERO,
             change: DVec3::ZERO,
@@ -243,6 +244,7 @@ impl Ray {
 
 /// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
 fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
+    let h = workspace.step.h;
     let environment = &model.environment;
     if environment.distance(state.body.position) > body.radius + margin {
         return;
@@ -263,7 +265,7 @@ fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body:
             stiffness: body.support_stiffness,
             height: 1.0,
             mu: body.support_friction,
-            limit: body.support_friction * state.lag[site],
+            limit: body.support_friction * state.expected_impulse(site, h),
             shear: shear - normal * normal.dot(shear),
             velocity: DVec3::ZERO,
             change: DVec3::ZERO,

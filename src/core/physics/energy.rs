@@ -9,20 +9,20 @@ use super::workspace::Workspace;
 
 /// Kinetic energy, bending of the joints, compression and shear of the skin, and height in gravity (J).
 pub(super) fn mechanical_energy(model: &Model, state: &State) -> f64 {
+    // At h = 0, A is the inertia alone.
     let mut ws = Workspace::new(model);
     lay_out(model, state, &mut ws);
     gather_dynamics(model, state, &mut ws, &Drive::default());
     segment_velocities(model, &state.velocity, &mut ws);
     detect(model, state, &mut ws);
-    let (n, h) = (model.chain.joints, model.step.h);
+    let n = model.chain.joints;
     let mut energy = 0.0;
     for finger in 0..2 {
         let rates = &state.velocity[finger * n..(finger + 1) * n];
         let matrix = &ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
-        let implicit = h * model.chain.damping + h * h * model.chain.stiffness;
         for i in 0..n {
             let row: f64 = matrix[i * n..(i + 1) * n].iter().zip(rates).map(|(a, b)| a * b).sum();
-            energy += 0.5 * rates[i] * (row - implicit * rates[i]);
+            energy += 0.5 * rates[i] * row;
             let q = state.q[finger * n + i];
             let beyond = (q.abs() - model.chain.angle_limit).max(0.0);
             energy += 0.5 * (model.chain.stiffness * q * q + model.chain.limit_stiffness * beyond * beyond);

@@ -1,7 +1,6 @@
 //! The constant description that a step reads: everything the scene says, resolved to numbers, in the gripper frame.
 
 use super::chain::ChainModel;
-use super::contact::ContactStep;
 use super::environment::Environment;
 use super::placement::Placement;
 use super::strands::Strands;
@@ -14,7 +13,8 @@ use glam::{DMat3, DVec3};
 /// Constants of a simulation. Built once, never changed; a step is a function of it and a [`super::State`].
 #[derive(Clone, Debug)]
 pub struct Model {
-    pub(super) step: ContactStep,
+    /// Dissipation of the pads, d (s/m).
+    pub(super) dissipation: f64,
     pub(super) chain: ChainModel,
     pub(super) planes: [FingerPlane; 2],
     pub(super) strands: Strands,
@@ -62,8 +62,8 @@ pub(super) struct Body {
 const RESTING_POINTS: f64 = 3.0;
 
 impl Model {
-    /// Resolves a scene. `h` is the step (s); the scene's own clock gives it in trials, tests choose it freely.
-    pub fn new(scene: &Scene, object: Option<&ObjectModel>, placement: &Placement, h: f64) -> Self {
+    /// Resolves a scene.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>, placement: &Placement) -> Self {
         let gripper = &scene.gripper;
         let surface_friction = |object: &ObjectModel| scene.object.friction.value().unwrap_or(object.friction);
         let on_object = object.map_or(0.0, |o| (gripper.pad.friction * surface_friction(o)).sqrt());
@@ -82,7 +82,7 @@ impl Model {
             support_friction: (surface_friction(object) * scene.support.friction).sqrt(),
         });
         Self {
-            step: ContactStep { h, dissipation: gripper.pad.dissipation },
+            dissipation: gripper.pad.dissipation,
             chain: ChainModel::new(&gripper.finger, &gripper.pad),
             planes: Side::BOTH.map(|side| gripper.plane(side)),
             strands: Strands::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
@@ -125,10 +125,5 @@ impl Model {
 
     pub(super) fn resting_points(&self) -> usize {
         self.body.as_ref().map_or(0, |body| body.resting.0.len())
-    }
-
-    /// Step length, h (s).
-    pub fn step_length(&self) -> f64 {
-        self.step.h
     }
 }

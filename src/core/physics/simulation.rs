@@ -57,7 +57,7 @@ impl Simulation {
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
         let placement = Placement::new(scene, object);
         let clock = scene.timing.clock(scene.solver.accuracy);
-        let model = Model::new(scene, object, &placement, clock.step());
+        let model = Model::new(scene, object, &placement);
         let simulation = Self {
             state: State::new(&model, &placement),
             workspace: Workspace::new(&model),
@@ -107,7 +107,8 @@ impl Simulation {
     /// Takes one step.
     pub fn advance(&mut self) -> Result<StepReport, SimulationError> {
         let drive = Drive { torque: self.actuation.torque(self.line_bar), ..self.pulls };
-        let report = step::step(&self.model, &mut self.state, &mut self.workspace, &drive)
+        let h = self.clock.step();
+        let report = step::step(&self.model, &mut self.state, &mut self.workspace, &drive, h)
             .map_err(|cause| SimulationError { tick: self.tick, seconds: self.clock.seconds(self.tick), cause })?;
         self.tick += 1;
         self.totals.newton += u64::from(report.newton_iterations);
@@ -170,7 +171,7 @@ impl Simulation {
                 continue;
             };
             let (side, strand) = (contact.site as usize / strands.all.len(), contact.site as usize % strands.all.len());
-            let (normal, tangential) = contact.force(self.model.step);
+            let (normal, tangential) = contact.force(self.workspace.step);
             if strand >= strands.on_pad || normal <= 0.0 {
                 continue;
             }
@@ -193,7 +194,7 @@ impl Simulation {
     pub fn object_wrench(&self) -> (DVec3, DVec3) {
         let mut total = Spatial::default();
         for contact in &self.workspace.contacts {
-            let (normal, tangential) = contact.force(self.model.step);
+            let (normal, tangential) = contact.force(self.workspace.step);
             let on_acting = contact.normal * normal + tangential;
             let on_object = match (contact.acting, contact.against) {
                 (Acting::Object, _) => on_acting,
@@ -210,7 +211,7 @@ impl Simulation {
     pub fn contact_extremes(&self) -> (f64, f64) {
         let mut extremes = (0.0f64, 0.0f64);
         for contact in &self.workspace.contacts {
-            let (normal, tangential) = contact.force(self.model.step);
+            let (normal, tangential) = contact.force(self.workspace.step);
             if matches!(contact.acting, Acting::Segment(_)) {
                 extremes.0 = extremes.0.max(contact.compression);
             }
@@ -225,7 +226,7 @@ impl Simulation {
     fn static_residual(&self) -> f64 {
         let (model, ws) = (&self.model, &self.workspace);
         let torque = self.actuation.torque(self.line_bar);
-        if torque == 0.0 {
+        if torque == 0.0 || self.tick == 0 {
             return 0.0;
         }
         let n = model.chain.joints;
@@ -237,13 +238,13 @@ impl Simulation {
         let mut largest = 0.0f64;
         for k in 0..2 * n {
             // At rest r holds h (torque - k q - gravity).
-            let known = scratch.rhs[k] / model.step.h;
+            let known = scratch.rhs[k] / ws.step.h;
             let from_contacts: f64 = ws
                 .contacts
                 .iter()
                 .filter_map(|contact| match contact.acting {
                     Acting::Segment(link) if beyond_joint(link as usize, k, n) => {
-                        let (normal, tangential) = contact.force(model.step);
+                        let (normal, tangential) = contact.force(ws.step);
                         let linear = contact.normal * normal + tangential;
                         Some(ws.columns[k].dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
                     }

@@ -44,8 +44,9 @@ pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut 
                 return report;
             }
             passes += 1;
+            let step = ws.step;
             for contact in &mut ws.contacts {
-                contact.relag(model.step);
+                contact.relag(step);
             }
             continue;
         }
@@ -161,7 +162,7 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
         *wrench = PerLink { object: Spatial::default(), world: Spatial::default() };
     }
     for contact in &ws.contacts {
-        let linear = contact.gradient(model.step, contact.velocity);
+        let linear = contact.gradient(ws.step, contact.velocity);
         let wrench = Spatial { linear, angular: contact.arm.cross(linear) };
         match (contact.acting, contact.against) {
             (Acting::Segment(link), Against::Object) => {
@@ -186,7 +187,7 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
             let link = &ws.wrenches[finger * (n + 1) + i + 1];
             beyond = beyond.plus(&link.object).plus(&link.world);
             on_object = on_object.plus(&link.object.scaled(-1.0));
-            let limit = model.step.h * model.chain.limit_torque(q[k] + model.step.h * velocity[k]).0;
+            let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
             let from_contacts = ws.columns[k].dot(&beyond) + limit;
             ws.gradient[k] += from_contacts;
             contact_size += from_contacts * from_contacts / diagonal(model, ws, k);
@@ -230,7 +231,7 @@ fn diagonal(model: &Model, ws: &Workspace, k: usize) -> f64 {
 }
 
 fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
-    let on_object = sum_blocks(model, ws);
+    let on_object = sum_blocks(ws);
     let n = model.chain.joints;
     let couples = model.free_body().is_some();
     for finger in 0..2 {
@@ -248,7 +249,7 @@ fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) 
             for j in 0..=i {
                 row[j] = matrix[j] + ws.columns[finger * n + j].dot(&moved);
             }
-            row[i] += model.step.h * model.step.h * model.chain.limit_torque(q[k] + model.step.h * velocity[k]).1;
+            row[i] += ws.step.h * ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).1;
             if couples {
                 beyond_object.add(&link.object);
                 let moved = beyond_object.times(&ws.columns[k]);
@@ -275,13 +276,13 @@ fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) 
 }
 
 /// Sums contact Hessians per segment; returns the sum that acts on the object.
-fn sum_blocks(model: &Model, ws: &mut Workspace) -> Block {
+fn sum_blocks(ws: &mut Workspace) -> Block {
     for block in &mut ws.blocks {
         *block = PerLink { object: Block::ZERO, world: Block::ZERO };
     }
     let mut on_object = Block::ZERO;
     for contact in &ws.contacts {
-        let hessian = contact.hessian(model.step);
+        let hessian = contact.hessian(ws.step);
         match (contact.acting, contact.against) {
             (Acting::Segment(link), Against::Object) => {
                 ws.blocks[link as usize].object.add_at(&hessian, contact.arm);
@@ -310,10 +311,10 @@ fn line_search(model: &Model, q: &[f64], velocity: &[f64], ws: &Workspace, steps
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let quadratic = dot(&ws.direction, &ws.a_direction);
     let linear = dot(&ws.direction, &ws.a_velocity) - dot(&ws.direction, &ws.rhs);
-    let h = model.step.h;
+    let h = ws.step.h;
     let mut slope_at = |share: f64| -> f64 {
         *steps += 1;
-        let along = |c: &Contact| c.gradient(model.step, c.velocity + c.change * share).dot(c.change);
+        let along = |c: &Contact| c.gradient(ws.step, c.velocity + c.change * share).dot(c.change);
         let contacts: f64 = ws.contacts.iter().map(along).sum();
         let limits: f64 = (0..model.joint_count())
             .map(|k| {

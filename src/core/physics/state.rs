@@ -19,6 +19,8 @@ pub struct State {
     pub(super) shear: Vec<DVec3>,
     /// Normal impulse in the last step (N s).
     pub(super) lag: Vec<f64>,
+    /// Length of that step (s); zero before the first.
+    pub(super) lag_h: f64,
 }
 
 impl State {
@@ -37,6 +39,7 @@ impl State {
             body,
             shear: vec![DVec3::ZERO; model.sites()],
             lag: vec![0.0; model.sites()],
+            lag_h: 0.0,
         }
     }
 
@@ -48,6 +51,12 @@ impl State {
         Some(model.world_from_gripper * gripper_from_object)
     }
 
+    /// Normal impulse to expect at a place of contact in a step of `h` (s): that of the last step, at the same force.
+    pub(super) fn expected_impulse(&self, site: usize, h: f64) -> f64 {
+        // Steps of equal length give a factor of exactly one.
+        if self.lag_h > 0.0 { self.lag[site] * (h / self.lag_h) } else { 0.0 }
+    }
+
     /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.
     pub(super) fn body_velocity(&self, model: &Model) -> (DVec3, DVec3) {
         match self.velocity.get(model.joint_count()..) {
@@ -56,13 +65,12 @@ impl State {
         }
     }
 
-    /// Moves joints and object by one step at the current velocities.
+    /// Moves joints and object by one step of `h` (s) at the current velocities.
     ///
     /// A turning object keeps its angular momentum L = I w while I turns with it: w+ = I+^-1 I w. To first order in h
     /// that is the gyroscopic torque, but the spin can never exceed |L| over the least moment of inertia, however
     /// long the step: an explicit torque flung light splinters out of the range of numbers.
-    pub(super) fn integrate(&mut self, model: &Model) {
-        let h = model.step.h;
+    pub(super) fn integrate(&mut self, model: &Model, h: f64) {
         for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
             *q += h * rate;
         }

@@ -44,9 +44,16 @@ pub struct Drive {
     pub object_force: DVec3,
 }
 
-/// Advances the state by one step. On failure the state is not to be used any
+/// Advances the state by one step of `h` (s), which may differ from step to step. On failure the state is not to be used any
 /// more; whoever wants the last good one keeps the last frame.
-pub fn step(model: &Model, state: &mut State, ws: &mut Workspace, drive: &Drive) -> Result<StepReport, NotFinite> {
+pub fn step(
+    model: &Model,
+    state: &mut State,
+    ws: &mut Workspace,
+    drive: &Drive,
+    h: f64,
+) -> Result<StepReport, NotFinite> {
+    ws.step.h = h;
     lay_out(model, state, ws);
     gather_dynamics(model, state, ws, drive);
     segment_velocities(model, &state.velocity, ws);
@@ -56,7 +63,7 @@ pub fn step(model: &Model, state: &mut State, ws: &mut Workspace, drive: &Drive)
         return Err(NotFinite { body });
     }
     let friction_residual = remember_contacts(model, state, ws);
-    state.integrate(model);
+    state.integrate(model, h);
     match state.not_finite(model) {
         Some(body) => Err(NotFinite { body }),
         None => Ok(StepReport {
@@ -89,7 +96,7 @@ pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
 
 /// Fills A and r.
 pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, drive: &Drive) {
-    let (n, h) = (model.chain.joints, model.step.h);
+    let (n, h) = (model.chain.joints, ws.step.h);
     for finger in 0..2 {
         let joints = finger * n..(finger + 1) * n;
         let segments = &ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
@@ -131,21 +138,22 @@ const FELT_FRICTION: f64 = 0.01;
 fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace) -> f64 {
     state.shear.fill(DVec3::ZERO);
     state.lag.fill(0.0);
+    state.lag_h = ws.step.h;
     let (mut mismatch, mut total) = (0.0, 0.0);
     for contact in &ws.contacts {
         let site = contact.site as usize;
-        let shear = contact.final_shear(model.step);
+        let shear = contact.final_shear(ws.step);
         state.shear[site] = match contact.acting {
             Acting::Segment(link) => segment_axes_of(model, ws, link).transpose() * shear,
             Acting::Object => shear,
         };
         let v_n = contact.normal.dot(contact.velocity);
-        state.lag[site] = contact.normal_impulse(model.step, v_n).0;
-        let (missed, truth) = contact.lag_mismatch(model.step);
+        state.lag[site] = contact.normal_impulse(ws.step, v_n).0;
+        let (missed, truth) = contact.lag_mismatch(ws.step);
         mismatch += missed;
         total += truth;
     }
-    mismatch / total.max(FELT_FRICTION * model.step.h)
+    mismatch / total.max(FELT_FRICTION * ws.step.h)
 }
 
 /// Axes of a segment in the gripper frame, as columns: along, across, inward.

@@ -1,6 +1,6 @@
 //! Scratch memory of a step: allocated once, overwritten every step, never saved.
 
-use super::contact::Contact;
+use super::contact::{Contact, ContactStep};
 use super::model::Model;
 use super::skyline::Skyline;
 use crate::gripper::SegmentPose;
@@ -78,6 +78,8 @@ pub(super) struct PerLink<T> {
 /// Scratch memory; see the fields for what each stage leaves.
 #[derive(Clone, Debug)]
 pub struct Workspace {
+    /// Length of the step that is being taken, or was taken last.
+    pub(super) step: ContactStep,
     // layout
     /// Segments of both fingers in their planes.
     pub(super) segments: Vec<SegmentPose>,
@@ -109,12 +111,13 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Memory for the largest step the model can take.
+    /// Memory for a step of the model; its length is set as it is taken.
     pub fn new(model: &Model) -> Self {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
         let zero = PerLink { object: Spatial::default(), world: Spatial::default() };
         let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {
+            step: ContactStep { h: 0.0, dissipation: model.dissipation },
             segments: vec![SegmentPose::default(); links],
             reference: DVec3::ZERO,
             columns: vec![Spatial::default(); 2 * n],
