@@ -100,7 +100,7 @@ impl Method {
 }
 
 /// All methods, the paper's own first.
-pub const METHODS: [Method; 19] = [
+pub const METHODS: [Method; 20] = [
     network!(
         "ds-lstm",
         "DS-LSTM",
@@ -134,6 +134,12 @@ pub const METHODS: [Method; 19] = [
         "The paper's recurrent macro-layer by itself: LSTM, fully connected, \
         dropout, fully connected",
         Recipe::macro_layer()
+    ),
+    network!(
+        "committee",
+        "Committee",
+        "Four macro-layers that began from other weights and answer together",
+        Recipe::committee()
     ),
     network!(
         "zuo",

@@ -1,5 +1,7 @@
-//! A macro-layer with temperatures that make its probabilities honest at every step, fitted on answers to grasps it had
-//! not seen.
+//! A macro-layer, or a committee of several that began from other weights, with temperatures that make its
+//! probabilities honest at every step, fitted on answers to grasps it had not seen. A committee's scores are the means
+//! of its members', and its temperatures are those of the means: members that are honest each for themselves are too
+//! modest together.
 //!
 //! A first network learns without a sixth of the grasps and answers them, then the one that is kept learns from
 //! everything. Cross-fitting besides leaves out each of several larger parts once, so that every grasp has answers from
@@ -10,10 +12,11 @@ use super::macro_layer::{LiveMacroLayer, MacroLayer, MacroShape};
 use super::training::{Lesson, Lessons, Training, train, train_on};
 use std::ops::Range;
 
-/// A network and its temperatures.
+/// Networks and their temperatures.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Calibrated {
-    pub(super) layer: MacroLayer,
+    /// At least one, all of one shape.
+    pub(super) members: Vec<MacroLayer>,
     /// One temperature per group and step; the last holds for later steps.
     pub(super) temperatures: Vec<Vec<f32>>,
 }
@@ -31,6 +34,8 @@ pub(super) trait Material: Lessons + Sync {
 #[derive(Clone, Debug)]
 pub(super) struct Plan<'a> {
     pub(super) shape: MacroShape,
+    /// How many networks.
+    pub(super) members: usize,
     pub(super) training: &'a Training,
     /// For each lesson a number; those of number zero are held back for calibration.
     pub(super) held_back: &'a [usize],
@@ -68,20 +73,20 @@ impl Calibrated {
         let (middle, seed) = (0.5 * (plan.share.start + plan.share.end), plan.seed);
         let first = Plan { share: plan.share.start..middle, ..plan.clone() };
         let fold_of = plan.held_back;
-        let layer = first.learn(material, fitting, seed, &|k| fold_of[k] != 0)?;
+        let members = first.learn(material, fitting, seed, &|k| fold_of[k] != 0)?;
         let mut held_back: HeldBack = vec![None; material.count()];
         for (k, held) in held_back.iter_mut().enumerate().filter(|(k, _)| fold_of[*k] == 0) {
-            *held = Some(scores_at_every_step(&layer, material.inputs(k)));
+            *held = Some(scores_at_every_step(&members, material.inputs(k)));
         }
         let second = Plan { share: middle..plan.share.end, ..plan.clone() };
-        let layer = second.learn(material, fitting, seed + 1, &|_| true)?;
+        let members = second.learn(material, fitting, seed + 1, &|_| true)?;
         let answered: Vec<(&[f32], &[usize])> = held_back
             .iter()
             .enumerate()
             .filter_map(|(k, held)| Some((held.as_deref()?, material.targets(k))))
             .collect();
         let temperatures = fit_temperatures(&answered, &plan.shape.groups);
-        Ok((Self { layer, temperatures }, held_back))
+        Ok((Self { members, temperatures }, held_back))
     }
 
     /// Scores of every grasp by a network that has learned from the other parts only.
@@ -96,9 +101,9 @@ impl Calibrated {
         for part in 0..parts {
             let from = plan.share.start + share * part as f64;
             let one = Plan { share: from..from + share, ..plan.clone() };
-            let layer = one.learn(material, fitting, plan.seed + 10 + part as u64, &|k| part_of[k] != part)?;
+            let members = one.learn(material, fitting, plan.seed + 10 + part as u64, &|k| part_of[k] != part)?;
             for (k, held) in held_back.iter_mut().enumerate().filter(|(k, _)| part_of[*k] == part) {
-                *held = Some(scores_at_every_step(&layer, material.inputs(k)));
+                *held = Some(scores_at_every_step(&members, material.inputs(k)));
             }
         }
         Ok(held_back)
@@ -113,14 +118,29 @@ impl Calibrated {
         share: Range<f64>,
         fitting: &Fitting<'_>,
     ) -> Result<(), FitError> {
-        let mut go_on = following(fitting, share.start, share.end - share.start, training.epochs);
-        train_on(&mut self.layer, material, training, seed, &mut go_on);
-        fitting.check()
+        let of_each = (share.end - share.start) / self.members.len() as f64;
+        for (member, layer) in self.members.iter_mut().enumerate() {
+            let from = share.start + of_each * member as f64;
+            let mut go_on = following(fitting, from, of_each, training.epochs);
+            train_on(layer, material, training, seed_of(seed, member), &mut go_on);
+            fitting.check()?;
+        }
+        Ok(())
+    }
+
+    /// Sizes of every member.
+    pub(super) fn shape(&self) -> &MacroShape {
+        self.members[0].shape()
+    }
+
+    /// Changes every member.
+    pub(super) fn change(&mut self, change: impl Fn(&MacroLayer) -> MacroLayer) {
+        self.members.iter_mut().for_each(|layer| *layer = change(layer));
     }
 
     /// Honest probabilities from scores after a step, one PMF per group.
     pub(super) fn honest(&self, scores: &[f32], step: usize) -> Vec<Pmf> {
-        honest(scores, &self.layer.shape().groups, &self.temperatures, step)
+        honest(scores, &self.shape().groups, &self.temperatures, step)
     }
 
     /// Temperature of the first group at the end.
@@ -130,20 +150,29 @@ impl Calibrated {
 }
 
 impl Plan<'_> {
-    /// Learns from some of the material.
+    /// Every member learns from some of the material.
     fn learn(
         &self,
         material: &dyn Material,
         fitting: &Fitting<'_>,
         seed: u64,
         keeps: &dyn Fn(usize) -> bool,
-    ) -> Result<MacroLayer, FitError> {
+    ) -> Result<Vec<MacroLayer>, FitError> {
         let lessons = Without { material, kept: (0..material.count()).filter(|k| keeps(*k)).collect() };
-        let share = self.share.end - self.share.start;
-        let mut go_on = following(fitting, self.share.start, share, self.training.epochs);
-        let layer = train(self.shape.clone(), &lessons, self.training, seed, &mut go_on);
-        fitting.check().map(|()| layer)
+        let share = (self.share.end - self.share.start) / self.members.max(1) as f64;
+        let learned = |member: usize| {
+            let from = self.share.start + share * member as f64;
+            let mut go_on = following(fitting, from, share, self.training.epochs);
+            let layer = train(self.shape.clone(), &lessons, self.training, seed_of(seed, member), &mut go_on);
+            fitting.check().map(|()| layer)
+        };
+        (0..self.members.max(1)).map(learned).collect()
     }
+}
+
+/// Members differ by their seeds alone.
+fn seed_of(seed: u64, member: usize) -> u64 {
+    seed.wrapping_add(1_000_003 * member as u64)
 }
 
 /// Passes progress on, and stops where that is asked for.
@@ -179,9 +208,9 @@ fn honest(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>], step: usi
 }
 
 /// Scores of one sequence after each of its steps, `[steps][outputs]`.
-fn scores_at_every_step(layer: &MacroLayer, x: &[f32]) -> Vec<f32> {
-    let mut live = LiveMacroLayer::new(layer);
-    x.chunks_exact(layer.shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()
+fn scores_at_every_step(members: &[MacroLayer], x: &[f32]) -> Vec<f32> {
+    let mut live = LiveCommittee::new(members);
+    x.chunks_exact(members[0].shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()
 }
 
 /// Stretches of a grasp over which one temperature is fitted.
@@ -242,10 +271,35 @@ fn best_temperature(rows: &[(&[f32], usize)]) -> f64 {
     (0..TRIED).map(candidate).min_by(|a, b| loss(*a).total_cmp(&loss(*b))).unwrap_or(1.0)
 }
 
-/// A calibrated network that reads one sample at a time.
+/// Members that read one sample at a time.
+#[derive(Clone, Debug)]
+struct LiveCommittee {
+    members: Vec<LiveMacroLayer>,
+    mean: Vec<f32>,
+}
+
+impl LiveCommittee {
+    fn new(members: &[MacroLayer]) -> Self {
+        let outputs = members.first().map_or(0, |layer| layer.shape().outputs());
+        Self { members: members.iter().map(LiveMacroLayer::new).collect(), mean: vec![0.0; outputs] }
+    }
+
+    /// Mean scores after a sample.
+    fn step(&mut self, x: &[f32], log_prior: &[f32]) -> &[f32] {
+        let share = 1.0 / self.members.len().max(1) as f32;
+        self.mean.fill(0.0);
+        for member in &mut self.members {
+            let scores = member.step(x, log_prior);
+            self.mean.iter_mut().zip(scores).for_each(|(mean, score)| *mean += share * score);
+        }
+        &self.mean
+    }
+}
+
+/// Calibrated networks that read one sample at a time.
 #[derive(Clone, Debug)]
 pub(super) struct LiveCalibrated {
-    layer: LiveMacroLayer,
+    committee: LiveCommittee,
     groups: Vec<usize>,
     temperatures: Vec<Vec<f32>>,
     step: usize,
@@ -254,21 +308,21 @@ pub(super) struct LiveCalibrated {
 impl LiveCalibrated {
     pub(super) fn new(network: &Calibrated) -> Self {
         Self {
-            layer: LiveMacroLayer::new(&network.layer),
-            groups: network.layer.shape().groups.clone(),
+            committee: LiveCommittee::new(&network.members),
+            groups: network.shape().groups.clone(),
             temperatures: network.temperatures.clone(),
             step: 0,
         }
     }
 
     pub(super) fn reset(&mut self) {
-        self.layer.reset();
+        self.committee.members.iter_mut().for_each(LiveMacroLayer::reset);
         self.step = 0;
     }
 
     /// Takes in one sample; gives one honest PMF per group.
     pub(super) fn step(&mut self, x: &[f32], log_prior: &[f32]) -> Vec<Pmf> {
-        let answers = honest(self.layer.step(x, log_prior), &self.groups, &self.temperatures, self.step);
+        let answers = honest(self.committee.step(x, log_prior), &self.groups, &self.temperatures, self.step);
         self.step += 1;
         answers
     }

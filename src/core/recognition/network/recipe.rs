@@ -14,6 +14,9 @@ pub struct Recipe {
     pub units: usize,
     /// Width of the first fully connected layer; zero leaves it out.
     pub hidden: usize,
+    /// Networks of each stage that begin from other weights and answer together.
+    #[serde(default = "one")]
+    pub members: usize,
     /// Whether size and shape are learned first and handed on to the second stage.
     pub two_stages: bool,
     /// Whether the PMF of earlier grasps is fed back.
@@ -31,6 +34,14 @@ pub struct Recipe {
     pub training: Training,
 }
 
+/// Networks that can answer together.
+pub(super) const MOST_MEMBERS: usize = 20;
+
+/// Members where a file does not say.
+pub(super) fn one() -> usize {
+    1
+}
+
 impl Recipe {
     /// The macro-layer by itself (Fig. 2a).
     pub fn macro_layer() -> Self {
@@ -38,6 +49,7 @@ impl Recipe {
             rate_hz: 8.0,
             units: 128,
             hidden: 64,
+            members: 1,
             two_stages: false,
             iterated: false,
             parts: 3,
@@ -56,6 +68,11 @@ impl Recipe {
                 longest_gradient: 1.0,
             },
         }
+    }
+
+    /// Several macro-layers that answer together.
+    pub fn committee() -> Self {
+        Self { members: 4, ..Self::macro_layer() }
     }
 
     /// Zuo et al.'s four layers, from which the paper starts: fewer units, no first fully connected layer, more
@@ -112,6 +129,7 @@ impl Recipe {
             recipe.units = recipe.units.min(32);
             recipe.hidden = recipe.hidden.min(32);
             recipe.parts = recipe.parts.min(2);
+            recipe.members = recipe.members.min(2);
             recipe.training.epochs = recipe.training.epochs.min(40);
         }
         recipe.check()?;
@@ -132,6 +150,7 @@ impl Recipe {
         within("rate_hz", f64::from(self.rate_hz), 0.1, 1000.0)?;
         within("units", self.units as f64, 1.0, 4096.0)?;
         within("hidden", self.hidden as f64, 0.0, 4096.0)?;
+        within("members", self.members as f64, 1.0, MOST_MEMBERS as f64)?;
         within("parts", self.parts as f64, 2.0, 20.0)?;
         within("noise", f64::from(self.noise), 0.0, 10.0)?;
         within("epochs", training.epochs as f64, 1.0, 100_000.0)?;

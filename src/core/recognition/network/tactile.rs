@@ -19,7 +19,7 @@ use super::calibrated::{Calibrated, HeldBack, LiveCalibrated, Plan};
 use super::lessons::{Book, Earlier};
 use super::macro_layer::{MacroLayer, MacroShape};
 use super::preparation::{Binner, Preparation, mirror};
-use super::recipe::Recipe;
+use super::recipe::{MOST_MEMBERS, Recipe};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -48,12 +48,18 @@ struct Learned {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct NetworkCard {
     shape: MacroShape,
+    #[serde(default = "super::recipe::one")]
+    members: usize,
     temperatures: Vec<Vec<f32>>,
 }
 
 impl NetworkCard {
     fn of(network: &Calibrated) -> Self {
-        Self { shape: network.layer.shape().clone(), temperatures: network.temperatures.clone() }
+        Self {
+            shape: network.shape().clone(),
+            members: network.members.len(),
+            temperatures: network.temperatures.clone(),
+        }
     }
 }
 
@@ -113,18 +119,18 @@ impl TactileNetwork {
             Some(own) => Some(read_network(arrays, "stage_one", own, readings, &properties)?),
             None => None,
         };
-        let beside = stage_one.as_ref().map_or(0, |network| network.layer.shape().outputs());
+        let beside = stage_one.as_ref().map_or(0, |network| network.shape().outputs());
         let before = if learned.recipe.iterated { labels.classes.len() } else { 0 };
         let classes = [labels.classes.len()];
         let stage_two = read_network(arrays, "stage_two", &learned.stage_two, readings + beside + before, &classes)?;
-        if stage_two.layer.shape().with_prior != learned.recipe.iterated {
+        if stage_two.shape().with_prior != learned.recipe.iterated {
             return Err("its second stage is not what its recipe says".to_owned());
         }
         Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone().unwrap_or_default() })
     }
 
     fn reader(&self) -> LiveTactile {
-        let classes = self.stage_two.layer.shape().outputs();
+        let classes = self.stage_two.shape().outputs();
         LiveTactile {
             binner: Binner::new(&self.learned.preparation),
             stage_one: self.stage_one.as_ref().map(LiveCalibrated::new),
@@ -149,6 +155,7 @@ fn read_network(
     let shape = &card.shape;
     let whole = shape.inputs == inputs
         && shape.groups == groups
+        && (1..=MOST_MEMBERS).contains(&card.members)
         && (1..=4096).contains(&shape.units)
         && shape.hidden.is_none_or(|hidden| (1..=4096).contains(&hidden))
         && groups.iter().all(|classes| *classes > 0)
@@ -157,12 +164,20 @@ fn read_network(
     if !whole {
         return Err(format!("the sizes of {name} do not fit the model's channels and labels"));
     }
-    let mut values = Vec::new();
-    for block in shape.blocks() {
-        values.extend(arrays.get(&format!("{name}.{}", block.name), &block.shape)?);
-    }
-    let layer = MacroLayer::from_values(shape.clone(), values).ok_or("an array does not fit")?;
-    Ok(Calibrated { layer, temperatures: card.temperatures.clone() })
+    let read = |member: usize| -> Result<MacroLayer, String> {
+        let mut values = Vec::new();
+        for block in shape.blocks() {
+            values.extend(arrays.get(&array_name(name, member, block.name), &block.shape)?);
+        }
+        MacroLayer::from_values(shape.clone(), values).ok_or("an array does not fit".to_owned())
+    };
+    let members: Result<Vec<MacroLayer>, String> = (0..card.members).map(read).collect();
+    Ok(Calibrated { members: members?, temperatures: card.temperatures.clone() })
+}
+
+/// Names an array in a file; those of a single network carry no number.
+fn array_name(stage: &str, member: usize, block: &str) -> String {
+    if member == 0 { format!("{stage}.{block}") } else { format!("{stage}.{}.{block}", member + 1) }
 }
 
 /// What fitting needs at every stage.
@@ -225,6 +240,7 @@ impl Work<'_> {
         let middle = if self.recipe.cross_fitted { 0.5 * (share.start + share.end) } else { share.end };
         let plan = Plan {
             shape: self.shape(book.width, vec![labels.sizes.len(), labels.shapes.len()], false),
+            members: self.recipe.members,
             training: &self.recipe.training,
             held_back: &self.parts(&taught, CALIBRATION),
             seed: self.fitting.seed.wrapping_mul(1000),
@@ -252,7 +268,7 @@ impl Work<'_> {
         pages: &[Vec<f32>],
         for_two: &[usize],
     ) -> Vec<Vec<f32>> {
-        let (width, outputs) = (self.preparation.width(), network.layer.shape().outputs());
+        let (width, outputs) = (self.preparation.width(), network.shape().outputs());
         let mut live = LiveCalibrated::new(network);
         let flat = |pmfs: Vec<Pmf>| -> Vec<f32> {
             pmfs.iter().flat_map(|pmf| pmf.probabilities().iter().map(|p| *p as f32)).collect()
@@ -314,6 +330,7 @@ impl Work<'_> {
         let at_once = book_with(!recipe.cross_fitted, None);
         let plan = Plan {
             shape: self.shape(at_once.width, vec![classes], false),
+            members: recipe.members,
             training: &recipe.training,
             held_back: &self.parts(grasps, CALIBRATION),
             seed,
@@ -322,7 +339,7 @@ impl Work<'_> {
         let (mut network, held_back) = Calibrated::fit(&plan, &at_once, self.fitting)?;
         let complete = if recipe.cross_fitted && added > 0 {
             let book = book_with(true, None);
-            network.layer = network.layer.with_inputs(added);
+            network.change(|layer| layer.with_inputs(added));
             network.refine(&book, &refining, seed + 50, plan.share.end..plan.share.end + 0.05, self.fitting)?;
             book
         } else {
@@ -362,7 +379,7 @@ impl Work<'_> {
         let earlier = Earlier { alone: alone.iter().map(|(_, pmf)| pmf.clone()).collect(), same, classes };
         // It begins as the product of experts, and learns where to depart from it.
         let gain = network.last_temperature();
-        network.layer = network.layer.with_inputs(classes).with_prior(gain);
+        network.change(|layer| layer.with_inputs(classes).with_prior(gain));
         network.refine(&book_with(true, Some(earlier)), &refining, seed + 100, at(0.95)..at(1.0), self.fitting)?;
         Ok((network, named(alone)))
     }
@@ -406,7 +423,7 @@ impl Recogniser for TactileNetwork {
             reader.push(t, row);
         }
         reader.finish().unwrap_or_else(|| Verdict {
-            pmf: before.cloned().unwrap_or_else(|| Pmf::uniform(self.stage_two.layer.shape().outputs())),
+            pmf: before.cloned().unwrap_or_else(|| Pmf::uniform(self.stage_two.shape().outputs())),
             properties: None,
         })
     }
@@ -419,16 +436,18 @@ impl Recogniser for TactileNetwork {
         let mut arrays = Arrays::default();
         let stages = [("stage_one", self.stage_one.as_ref()), ("stage_two", Some(&self.stage_two))];
         for (name, network) in stages.into_iter().filter_map(|(name, network)| Some((name, network?))) {
-            for block in network.layer.shape().blocks() {
-                let values = &network.layer.values()[block.place.clone()];
-                arrays.put(format!("{name}.{}", block.name), &block.shape, values);
+            for (member, layer) in network.members.iter().enumerate() {
+                for block in layer.shape().blocks() {
+                    let values = &layer.values()[block.place.clone()];
+                    arrays.put(array_name(name, member, block.name), &block.shape, values);
+                }
             }
         }
         arrays
     }
 
     fn parameters(&self) -> usize {
-        let of = |network: &Calibrated| network.layer.values().len();
+        let of = |network: &Calibrated| network.members.iter().map(|layer| layer.values().len()).sum();
         self.stage_one.as_ref().map_or(0, of) + of(&self.stage_two)
     }
 
