@@ -88,7 +88,7 @@ fn networks(rows: &[NetworkCost], json: bool) -> Result<(), Failure> {
 fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
     let mut rows: Vec<CostRow> = Vec::new();
     for scene in &bench_scenes()? {
-        for accuracy in Accuracy::ALL {
+        for accuracy in Accuracy::NAMED {
             if accuracy != Accuracy::Reference || reference {
                 rows.push(physics_cost(scene, accuracy, usize::from(runs)));
             }
@@ -102,7 +102,7 @@ fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
         .map(|row| {
             vec![
                 row.scene.to_owned(),
-                row.accuracy.to_owned(),
+                row.accuracy.clone(),
                 format!("{:.3}", row.step_s * 1e3),
                 format!("{:.2}", row.cpu_ms_median),
                 format!("{:.2}", row.us_per_step),

@@ -47,7 +47,7 @@ struct Report {
     #[serde(flatten)]
     summary: GraspSummary,
     seed: u64,
-    accuracy: &'static str,
+    accuracy: String,
     /// CPU time of the simulation alone (ms).
     cpu_ms: f64,
     /// CPU time of loading the object (ms).
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         write_trial_csv(path, &trial, &scene, &sensors)?;
         write_contacts_csv(&contacts_path(path), &trial, &scene)?;
     }
-    let accuracy = scene.solver.accuracy.name();
+    let accuracy = scene.solver.accuracy.to_string();
     let summary = GraspSummary::new(&trial, &scene);
     let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, trial_id };
     if arguments.json {

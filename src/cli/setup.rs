@@ -12,8 +12,9 @@ pub(super) struct SceneArguments {
     /// A scene file (TOML); every key may be left out. `palpate grasp --print-scene` shows all keys.
     #[arg(long, value_name = "FILE")]
     pub(super) scene: Option<PathBuf>,
-    /// How accurately motion is computed: draft, standard or reference.
-    #[arg(long, value_name = "NAME", value_parser = parse_accuracy)]
+    /// How accurately motion is computed: draft, standard, reference, or a tolerance such as 1e-4: the largest error of a
+    /// step in joint angles (rad), and in fingertips and the object over the finger's length.
+    #[arg(long, value_name = "NAME|TOL")]
     pub(super) accuracy: Option<Accuracy>,
     /// Hold the object in place instead of letting it rest freely.
     #[arg(long)]
@@ -25,11 +26,6 @@ pub(super) struct SceneArguments {
     /// Set any key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
-}
-
-fn parse_accuracy(text: &str) -> Result<Accuracy, String> {
-    let found = Accuracy::ALL.into_iter().find(|a| a.name() == text);
-    found.ok_or_else(|| "choose draft, standard or reference".to_owned())
 }
 
 fn parse_preset(text: &str) -> Result<PosePreset, String> {

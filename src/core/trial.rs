@@ -69,9 +69,17 @@ pub struct Quality {
     pub converged: bool,
     /// Solver steps taken.
     pub steps: u64,
-    /// Steps that missed the tolerance.
+    /// Steps taken again, shorter, because their estimated error was above the scene's tolerance.
+    pub rejected_steps: u64,
+    /// Steps of the least length whose estimated error was above it nevertheless.
+    pub missed_steps: u64,
+    /// The shortest step (s); zero in trials from before it was recorded.
+    pub least_step_s: f64,
+    /// Convex minimisations, those of rejected steps included; zero in trials from before it was recorded.
+    pub solves: u64,
+    /// Steps that missed the solver's tolerance.
     pub unconverged_steps: u64,
-    /// Mean Newton iterations per step.
+    /// Mean Newton iterations per minimisation; at fixed Euler steps that is per step.
     pub newton_mean: f64,
     /// Most Newton iterations in one step.
     pub newton_max: u32,
@@ -88,6 +96,10 @@ impl Default for Quality {
             finite: true,
             converged: true,
             steps: 0,
+            rejected_steps: 0,
+            missed_steps: 0,
+            least_step_s: 0.0,
+            solves: 0,
             unconverged_steps: 0,
             newton_mean: 0.0,
             newton_max: 0,

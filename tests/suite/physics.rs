@@ -22,7 +22,7 @@ fn every_object_is_grasped_fixed_and_free() {
         for (fixed, accuracy) in [(false, Accuracy::Standard), (true, Accuracy::Standard), (false, Accuracy::Draft)] {
             scene.object.fixed = fixed;
             scene.solver.accuracy = accuracy;
-            let what = format!("{}, fixed {fixed}, {}", built_in.name, accuracy.name());
+            let what = format!("{}, fixed {fixed}, {accuracy}", built_in.name);
             let trial = grasp(&scene, object.as_ref(), 0);
             let summary = GraspSummary::new(&trial, &scene);
             assert!(summary.finite && summary.converged, "{what}: {:?}", summary.quality);

@@ -128,6 +128,14 @@ impl<R: Rig> GraspRun<R> {
             let (missed, steps) = (quality.unconverged_steps, quality.steps);
             self.info.warnings.push(format!("{missed} of {steps} steps missed the solver's tolerance"));
         }
+        if quality.missed_steps > 0 {
+            let (missed, steps, least) = (quality.missed_steps, quality.steps, quality.least_step_s * 1e6);
+            let tolerance = scene.solver.accuracy;
+            self.info.warnings.push(format!(
+                "{missed} of {steps} steps missed the accuracy {tolerance}, though they were as short as steps get ({least:.1} \
+                 µs): try a larger tolerance"
+            ));
+        }
         if let Some(t) = fingers_cross(scene, &self.frames) {
             let text =
                 format!("the fingers pass through each other from {t:.2} s: contact between them is not simulated");

@@ -10,7 +10,8 @@
 //! step, so that no stiffness, however large, makes a step unstable.
 //!
 //! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
-//! a touch costs), `solve` (the minimisation), `step` (all of it in order), [`Simulation`] (steps in time).
+//! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
+//! long), [`Simulation`] (a grasp in time).
 
 mod chain;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod contact;
 mod detect;
 mod energy;
 mod environment;
+mod integrator;
 mod model;
 mod placement;
 mod resting;
@@ -27,13 +29,16 @@ mod skyline;
 mod solve;
 mod state;
 mod step;
+mod stepper;
+#[cfg(test)]
+mod stepper_tests;
 mod strands;
 mod workspace;
 
 pub use model::Model;
 pub use placement::Placement;
 pub use resting::{natural_rotations, random_rotation};
-pub use simulation::{Simulation, SimulationError};
+pub use simulation::{Refinement, Simulation, SimulationError};
 pub use state::State;
 pub use step::{Drive, NotFinite, StepReport, step};
 pub use workspace::Workspace;

@@ -2,11 +2,13 @@
 
 use super::contact::Acting;
 use super::detect::detect;
+use super::integrator::Surroundings;
 use super::model::Model;
 use super::placement::Placement;
 use super::solve::segment_velocities;
 use super::state::State;
 use super::step::{self, Drive, StepReport, segment_axes_of};
+use super::stepper::Stepper;
 use super::workspace::{Spatial, Workspace};
 use crate::geometry::Pose;
 use crate::gripper::{Actuation, Phase};
@@ -15,7 +17,8 @@ use crate::scene::{Clock, Scene};
 use crate::trial::{Frame, Quality, TaxelLoad};
 use glam::DVec3;
 
-/// A gripper and an object being simulated. One tick of the clock is one solver step.
+/// A gripper and an object being simulated. One tick of the clock is one solver step or, under a tolerance, as many as
+/// it takes.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     model: Model,
@@ -28,16 +31,23 @@ pub struct Simulation {
     phase: Phase,
     /// Forces from outside; the torque in it is not used.
     pulls: Drive,
-    totals: Totals,
+    stepper: Stepper,
 }
 
-/// Sums over all steps so far.
-#[derive(Clone, Copy, Debug, Default)]
-struct Totals {
-    newton: u64,
-    newton_max: u32,
-    unconverged: u64,
-    friction_residual: f64,
+/// How much more finely than its scene asks for a simulation is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// Factor on the number of steps, at fixed steps.
+    pub steps: u32,
+    /// Factor on the tolerance, where there is one.
+    pub tolerance: f64,
+}
+
+impl Refinement {
+    /// As the scene says.
+    pub const NONE: Self = Self { steps: 1, tolerance: 1.0 };
+    /// Half the step, or a tenth of the tolerance: what an error is estimated from.
+    pub const COMPANION: Self = Self { steps: 2, tolerance: 0.1 };
 }
 
 /// A simulation that had to stop.
@@ -55,11 +65,20 @@ pub struct SimulationError {
 impl Simulation {
     /// Sets up a scene at rest; placement comes with what had to be moved to make room.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
+        Self::refined(scene, object, Refinement::NONE)
+    }
+
+    /// The same, computed more finely than the scene asks for.
+    pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let placement = Placement::new(scene, object);
-        let clock = scene.timing.clock(scene.solver.accuracy);
+        let solver = &scene.solver;
+        let clock = scene.timing.clock(solver.accuracy).refined(refinement.steps);
         let model = Model::new(scene, object, &placement);
+        let state = State::new(&model, &placement);
+        let tolerance = solver.accuracy.tolerance().map(|tolerance| tolerance * refinement.tolerance);
+        let stepper = Stepper::new(&model, &state, solver.method(), tolerance, clock.step());
         let simulation = Self {
-            state: State::new(&model, &placement),
+            state,
             workspace: Workspace::new(&model),
             model,
             clock,
@@ -68,7 +87,7 @@ impl Simulation {
             line_bar: 0.0,
             phase: Phase::Close,
             pulls: Drive::default(),
-            totals: Totals::default(),
+            stepper,
         };
         (simulation, placement)
     }
@@ -93,6 +112,12 @@ impl Simulation {
         &self.state
     }
 
+    /// For tests that start from a pose of their own.
+    #[cfg(test)]
+    pub(super) fn state_mut(&mut self) -> &mut State {
+        &mut self.state
+    }
+
     /// Sets the line pressure (bar) from now on.
     pub fn command(&mut self, bar: f64, phase: Phase) {
         self.line_bar = bar;
@@ -104,17 +129,27 @@ impl Simulation {
         self.pulls.object_force = self.model.world_from_gripper.inverse().direction(force);
     }
 
-    /// Takes one step.
+    /// Advances by one tick; reports its last step.
     pub fn advance(&mut self) -> Result<StepReport, SimulationError> {
+        self.advance_by(1)
+    }
+
+    /// Advances by some ticks, within which nothing is sampled or commanded; reports the last step.
+    pub fn advance_by(&mut self, ticks: u64) -> Result<StepReport, SimulationError> {
         let drive = Drive { torque: self.actuation.torque(self.line_bar), ..self.pulls };
-        let h = self.clock.step();
-        let report = step::step(&self.model, &mut self.state, &mut self.workspace, &drive, h)
-            .map_err(|cause| SimulationError { tick: self.tick, seconds: self.clock.seconds(self.tick), cause })?;
-        self.tick += 1;
-        self.totals.newton += u64::from(report.newton_iterations);
-        self.totals.newton_max = self.totals.newton_max.max(report.newton_iterations);
-        self.totals.unconverged += u64::from(!report.converged);
-        self.totals.friction_residual = self.totals.friction_residual.max(report.friction_residual);
+        let at_once = if self.stepper.is_controlled() { ticks } else { 1 };
+        let mut report = StepReport::default();
+        for _ in 0..ticks / at_once.max(1) {
+            let mut within = Surroundings { model: &self.model, ws: &mut self.workspace, drive: &drive };
+            let span = at_once as f64 * self.clock.step();
+            let taken = self.stepper.cover(&mut within, &mut self.state, span);
+            report = taken.map_err(|cause| SimulationError {
+                tick: self.tick,
+                seconds: self.clock.seconds(self.tick),
+                cause,
+            })?;
+            self.tick += at_once;
+        }
         Ok(report)
     }
 
@@ -150,14 +185,19 @@ impl Simulation {
 
     /// Statistics of the steps so far; the static residual is that of this moment.
     pub fn quality(&self) -> Quality {
+        let totals = &self.stepper.totals;
         Quality {
             finite: true,
-            converged: self.totals.unconverged == 0,
-            steps: self.tick,
-            unconverged_steps: self.totals.unconverged,
-            newton_mean: self.totals.newton as f64 / self.tick.max(1) as f64,
-            newton_max: self.totals.newton_max,
-            friction_residual: self.totals.friction_residual,
+            converged: totals.unconverged == 0,
+            steps: totals.steps,
+            rejected_steps: totals.rejected,
+            missed_steps: totals.missed,
+            least_step_s: totals.shortest.unwrap_or_default(),
+            solves: totals.solves,
+            unconverged_steps: totals.unconverged,
+            newton_mean: totals.newton as f64 / totals.solves.max(1) as f64,
+            newton_max: totals.newton_max,
+            friction_residual: totals.friction_residual,
             static_residual: self.static_residual(),
         }
     }

@@ -3,6 +3,7 @@
 use super::model::Model;
 use super::placement::Placement;
 use crate::geometry::Pose;
+use crate::gripper::SegmentPose;
 use glam::{DQuat, DVec3};
 
 /// State of both fingers, the object, and the skin at every place of contact.
@@ -49,6 +50,59 @@ impl State {
         let gripper_from_object =
             Pose { position: self.body.position - self.body.rotation * body.centre, rotation: self.body.rotation };
         Some(model.world_from_gripper * gripper_from_object)
+    }
+
+    /// Becomes another state of the same model, without allocating.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        let Self { q, velocity, body, shear, lag, lag_h } = other;
+        self.q.copy_from_slice(q);
+        self.velocity.copy_from_slice(velocity);
+        self.body = *body;
+        self.shear.copy_from_slice(shear);
+        self.lag.copy_from_slice(lag);
+        self.lag_h = *lag_h;
+    }
+
+    /// Goes on in a straight line, by `share` of the way from `start` to here. Normal impulses are no path and stay.
+    pub(super) fn go_on_from(&mut self, start: &Self, share: f64) {
+        for (now, before) in self.q.iter_mut().zip(&start.q).chain(self.velocity.iter_mut().zip(&start.velocity)) {
+            *now += share * (*now - before);
+        }
+        self.body.position += (self.body.position - start.body.position) * share;
+        let turn = rotation_vector(self.body.rotation * start.body.rotation.inverse());
+        self.body.rotation = (DQuat::from_scaled_axis(turn * share) * self.body.rotation).normalize();
+        for (site, (now, before)) in self.shear.iter_mut().zip(&start.shear).enumerate() {
+            // Skin that has just been touched has no shear to go on from.
+            if self.lag[site] > 0.0 && start.lag[site] > 0.0 {
+                *now += (*now - *before) * share;
+            }
+        }
+    }
+
+    /// How far apart two states are: the largest difference of joint angles and of the object's orientation (rad), of
+    /// fingertips and of the object's position as shares of a finger's length. The segments are scratch memory.
+    pub(super) fn distance(
+        &self,
+        other: &Self,
+        model: &Model,
+        own_segments: &mut [SegmentPose],
+        other_segments: &mut [SegmentPose],
+    ) -> f64 {
+        let n = model.chain.joints;
+        let length: f64 = model.chain.lengths.iter().sum();
+        let mut largest = self.q.iter().zip(&other.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        for finger in 0..2 {
+            let joints = finger * n..(finger + 1) * n;
+            let own = model.chain.bend(&self.q[joints.clone()], own_segments);
+            let tip = model.chain.bend(&other.q[joints], other_segments);
+            largest = largest.max((own - tip).length() / length);
+        }
+        if model.free_body().is_some() {
+            let turn = rotation_vector(self.body.rotation * other.body.rotation.inverse());
+            let way = self.body.position - other.body.position;
+            largest = largest.max(way.length() / length).max(turn.length());
+        }
+        largest
     }
 
     /// Normal impulse to expect at a place of contact in a step of `h` (s): that of the last step, at the same force.
@@ -98,4 +152,10 @@ impl State {
         let sound = self.body.is_finite() && linear.is_finite() && angular.is_finite();
         (!sound).then(|| "the object".to_owned())
     }
+}
+
+/// Axis times angle of a rotation (rad), the short way round.
+fn rotation_vector(rotation: DQuat) -> DVec3 {
+    let short = if rotation.w < 0.0 { -rotation } else { rotation };
+    short.to_scaled_axis()
 }

@@ -25,6 +25,19 @@ pub struct StepReport {
     pub friction_residual: f64,
 }
 
+impl StepReport {
+    /// Of two steps in a row: sums, the worse of both, and the contacts of the second.
+    pub(super) fn followed_by(&self, next: &Self) -> Self {
+        Self {
+            newton_iterations: self.newton_iterations + next.newton_iterations,
+            line_search_steps: self.line_search_steps + next.line_search_steps,
+            converged: self.converged && next.converged,
+            contacts: next.contacts,
+            friction_residual: self.friction_residual.max(next.friction_residual),
+        }
+    }
+}
+
 /// A step that must not be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{body} left the range of numbers; the samples before it are kept. Try a smaller time step or softer contact")]

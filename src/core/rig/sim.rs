@@ -3,7 +3,7 @@
 use super::{Event, Rig, RigError};
 use crate::gripper::Phase;
 use crate::objects::ObjectModel;
-use crate::physics::{Placement, Simulation};
+use crate::physics::{Placement, Refinement, Simulation};
 use crate::scene::Scene;
 use crate::trial::{Frame, Quality};
 use glam::DVec3;
@@ -21,7 +21,12 @@ pub struct SimRig {
 impl SimRig {
     /// A scene at rest, and where everything was put.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
-        let (simulation, placement) = Simulation::new(scene, object);
+        Self::refined(scene, object, Refinement::NONE)
+    }
+
+    /// The same, computed more finely than the scene asks for.
+    pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
+        let (simulation, placement) = Simulation::refined(scene, object, refinement);
         let rig = Self { simulation, asked: None, phase: Phase::Close, static_residual: None };
         (rig, placement)
     }
@@ -59,7 +64,9 @@ impl Rig for SimRig {
                 self.asked = Some(actuation_tick);
                 return Ok(Event::ActuationDue { tick: actuation_tick });
             }
-            self.simulation.advance()?;
+            // Nothing happens before the nearer of the next sample and the next change of pressure.
+            let until = |period: u32| u64::from(period) - tick % u64::from(period);
+            self.simulation.advance_by(until(clock.ticks_per_sample).min(until(clock.ticks_per_actuation)))?;
             if self.simulation.tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
                 return Ok(Event::Sampled(self.simulation.frame()));
             }

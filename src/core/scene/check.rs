@@ -1,7 +1,7 @@
 //! Ranges. Every number a scene holds is checked once, here, and refused with its key, its value and the range.
 
 use super::timing::{FASTEST_COMMON_HZ, MOST_TICKS};
-use super::{Auto, Scene, SceneError};
+use super::{Accuracy, Auto, Scene, SceneError};
 use std::ops::RangeInclusive;
 
 /// Collects the first value out of range.
@@ -134,6 +134,9 @@ impl Scene {
             ranges.refuse("timing.sample_hz", &rates, format!("rates that meet below {FASTEST_COMMON_HZ} Hz"));
         }
         let solver = &self.solver;
+        if let Some(tolerance) = solver.accuracy.tolerance() {
+            ranges.number("solver.accuracy", tolerance, Accuracy::TOLERANCES);
+        }
         ranges.number("solver.tolerance", solver.tolerance, 1e-14..=1e-2);
         ranges.count("solver.max_iterations", solver.max_iterations, 1..=10_000);
         ranges.count("solver.relag_passes", solver.relag_passes, 0..=100);

@@ -3,12 +3,14 @@
 //! A scene file is TOML; each table below is a table there, and every key may be left out. See
 //! [`Scene::from_toml`] for reading and [`Scene::to_toml`] for the whole list with its defaults.
 
+mod accuracy;
 mod auto;
 mod check;
 mod file;
 mod poses;
 mod timing;
 
+pub use accuracy::{Accuracy, Integrator, Method};
 pub use auto::Auto;
 pub use file::SceneError;
 pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
@@ -117,8 +119,10 @@ pub struct Support {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Solver {
-    /// Named choice of the time step.
+    /// A named time step, or a tolerance to which steps are chosen.
     pub accuracy: Accuracy,
+    /// How steps are taken.
+    pub integrator: Integrator,
     /// Newton stops when the scaled gradient falls below this share of the forces at play.
     pub tolerance: f64,
     /// Newton iterations after which a step is reported as not converged.
@@ -127,41 +131,6 @@ pub struct Solver {
     pub relag_passes: u32,
     /// Lattice spacing of baked distances (m); `auto` chooses by the object's size.
     pub distance_cell: Auto,
-}
-
-/// Named choices of the time step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Accuracy {
-    /// At most 1/150 s: hold values, quick looks, large data sets.
-    Draft,
-    /// At most 1/300 s.
-    Standard,
-    /// At most 1/9600 s: what the others are measured against.
-    Reference,
-}
-
-impl Accuracy {
-    /// All of them, coarsest first.
-    pub const ALL: [Self; 3] = [Self::Draft, Self::Standard, Self::Reference];
-
-    /// The name used in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Draft => "draft",
-            Self::Standard => "standard",
-            Self::Reference => "reference",
-        }
-    }
-
-    /// Steps per second that are taken at least.
-    pub fn least_hz(self) -> u32 {
-        match self {
-            Self::Draft => 150,
-            Self::Standard => 300,
-            Self::Reference => 9600,
-        }
-    }
 }
 
 /// The world around.
@@ -201,10 +170,18 @@ impl Default for Support {
     }
 }
 
+impl Solver {
+    /// The method that steps are taken by.
+    pub fn method(&self) -> Method {
+        self.integrator.method(self.accuracy)
+    }
+}
+
 impl Default for Solver {
     fn default() -> Self {
         Self {
             accuracy: Accuracy::Standard,
+            integrator: Integrator::Auto,
             tolerance: 1e-6,
             max_iterations: 100,
             relag_passes: 1, // zero leaves the friction cone violated up to tenfold at 10 ms, two cost 20 % more

@@ -1,4 +1,4 @@
-//! Time is counted in whole ticks. One tick is one solver step; every sample and every actuation step falls on a
+//! Time is counted in whole ticks. One tick is one solver step, or a span that a tolerance divides; every sample and every actuation step falls on a
 //! tick, so the rate is a multiple of lcm(sample_hz, actuation_hz): 150 Hz for the paper's 75 and 10 Hz.
 
 use super::Accuracy;
@@ -25,7 +25,7 @@ impl Default for Timing {
 /// A tick rate on which samples and actuation both fall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
-    /// Solver steps per second.
+    /// Ticks per second.
     pub ticks_per_second: u32,
     /// Ticks from one sample to the next.
     pub ticks_per_sample: u32,
@@ -48,7 +48,7 @@ impl Timing {
         a / greatest_common_divisor(a, b) * b
     }
 
-    /// The clock for a named accuracy. Sample k (from 0) is taken at t = (k + 1) / sample_hz, after the step.
+    /// The clock for an accuracy. Sample k (from 0) is taken at t = (k + 1) / sample_hz, after the step.
     pub fn clock(&self, accuracy: Accuracy) -> Clock {
         let common = self.common_hz().min(u64::from(FASTEST_COMMON_HZ)) as u32;
         let steps = accuracy.least_hz().div_ceil(common);
@@ -63,7 +63,18 @@ impl Timing {
 }
 
 impl Clock {
-    /// Length of one step, h (s).
+    /// The same with `factor` times as many ticks.
+    #[must_use]
+    pub fn refined(&self, factor: u32) -> Self {
+        Self {
+            ticks_per_second: self.ticks_per_second * factor,
+            ticks_per_sample: self.ticks_per_sample * factor,
+            ticks_per_actuation: self.ticks_per_actuation * factor,
+            samples: self.samples,
+        }
+    }
+
+    /// Length of one tick (s): the step h, or the span within which a tolerance chooses steps.
     pub fn step(&self) -> f64 {
         1.0 / f64::from(self.ticks_per_second)
     }

@@ -27,7 +27,7 @@ pub struct CostRow {
     /// Which scene.
     pub scene: &'static str,
     /// Which accuracy.
-    pub accuracy: &'static str,
+    pub accuracy: String,
     /// Step length (s).
     pub step_s: f64,
     /// CPU time of one trial (ms): the median over the runs.
@@ -88,7 +88,7 @@ pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize) -> Cost
     let quality = quality.unwrap_or_default();
     CostRow {
         scene: bench.name,
-        accuracy: accuracy.name(),
+        accuracy: accuracy.to_string(),
         step_s: clock.step(),
         cpu_ms_median: median * 1e3,
         us_per_step: median * 1e6 / clock.total_ticks() as f64,

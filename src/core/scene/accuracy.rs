@@ -1,0 +1,185 @@
+//! How accurately motion is computed: a named time step, or a tolerance; and by which method.
+
+use serde::de::{Error as _, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt::{self, Display};
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+/// A named time step, or a tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Accuracy {
+    /// Steps of at most 1/150 s: hold values, quick looks, large data sets.
+    Draft,
+    /// At most 1/300 s.
+    Standard,
+    /// At most 1/9600 s: what the others are measured against.
+    Reference,
+    /// Steps are chosen so that the estimated error of each stays below this: of joint angles and of the object's turn
+    /// (rad), and of fingertips and the object's position as shares of the finger's length. Errors of a whole grasp are
+    /// sums of these, less what springs and friction forget.
+    Tolerance(f64),
+}
+
+impl Accuracy {
+    /// The named ones, coarsest first.
+    pub const NAMED: [Self; 3] = [Self::Draft, Self::Standard, Self::Reference];
+    /// The tolerances there are: the largest never binds, the least is what the default Newton tolerance can serve.
+    pub const TOLERANCES: RangeInclusive<f64> = 1e-9..=1e-1;
+
+    /// The tolerance, where there is one.
+    pub fn tolerance(self) -> Option<f64> {
+        match self {
+            Self::Draft | Self::Standard | Self::Reference => None,
+            Self::Tolerance(tolerance) => Some(tolerance),
+        }
+    }
+
+    /// Ticks per second that are taken at least. A tolerance needs no more than samples and actuation do.
+    pub fn least_hz(self) -> u32 {
+        match self {
+            Self::Draft => 150,
+            Self::Standard => 300,
+            Self::Reference => 9600,
+            Self::Tolerance(_) => 1,
+        }
+    }
+}
+
+/// The name used in files and on the command line, or the tolerance.
+impl Display for Accuracy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Draft => f.write_str("draft"),
+            Self::Standard => f.write_str("standard"),
+            Self::Reference => f.write_str("reference"),
+            Self::Tolerance(tolerance) => write!(f, "{tolerance:e}"),
+        }
+    }
+}
+
+impl FromStr for Accuracy {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::NAMED.into_iter().find(|accuracy| accuracy.to_string() == text);
+        let tolerance = || text.parse().ok().filter(|t| Self::TOLERANCES.contains(t)).map(Self::Tolerance);
+        named.or_else(tolerance).ok_or_else(|| {
+            let (least, largest) = (Self::TOLERANCES.start(), Self::TOLERANCES.end());
+            format!("choose draft, standard, reference, or a tolerance between {least:e} and {largest}")
+        })
+    }
+}
+
+impl Serialize for Accuracy {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.tolerance() {
+            Some(tolerance) => serializer.serialize_f64(tolerance),
+            None => serializer.collect_str(self),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Accuracy {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct AccuracyVisitor;
+        impl Visitor<'_> for AccuracyVisitor {
+            type Value = Accuracy;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"draft\", \"standard\", \"reference\" or a tolerance")
+            }
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Accuracy, E> {
+                text.parse().map_err(|cause| E::custom(format!("accuracy \"{text}\" is not known; {cause}")))
+            }
+            // Ranges are checked with those of all other numbers.
+            fn visit_f64<E: serde::de::Error>(self, tolerance: f64) -> Result<Accuracy, E> {
+                Ok(Accuracy::Tolerance(tolerance))
+            }
+            fn visit_i64<E: serde::de::Error>(self, whole: i64) -> Result<Accuracy, E> {
+                Ok(Accuracy::Tolerance(whole as f64))
+            }
+        }
+        deserializer.deserialize_any(AccuracyVisitor).map_err(D::Error::custom)
+    }
+}
+
+/// How steps are taken, as a scene says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Integrator {
+    /// Euler at named time steps, SDIRK2 under a tolerance.
+    Auto,
+    /// Implicit Euler, one convex minimisation per step.
+    Euler,
+    /// A singly diagonally implicit Runge-Kutta method of second order, two minimisations per step.
+    Sdirk2,
+}
+
+impl Integrator {
+    /// What `auto` comes to at an accuracy.
+    pub fn method(self, accuracy: Accuracy) -> Method {
+        match (self, accuracy.tolerance()) {
+            (Self::Euler, _) | (Self::Auto, None) => Method::Euler,
+            (Self::Sdirk2, _) | (Self::Auto, Some(_)) => Method::Sdirk2,
+        }
+    }
+}
+
+/// A method of integration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Implicit Euler.
+    Euler,
+    /// Two implicit stages, after Alexander (1977).
+    Sdirk2,
+}
+
+impl Method {
+    /// Order of convergence where motion is smooth.
+    pub fn order(self) -> i32 {
+        match self {
+            Self::Euler => 1,
+            Self::Sdirk2 => 2,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn names_and_tolerances_are_read_and_written() {
+        for accuracy in Accuracy::NAMED.into_iter().chain([Accuracy::Tolerance(3e-5)]) {
+            assert_eq!(accuracy.to_string().parse(), Ok(accuracy));
+            let mut scene = Scene::default();
+            scene.solver.accuracy = accuracy;
+            assert_eq!(Scene::from_toml(&scene.to_toml()), Ok(scene));
+        }
+        for wrong in ["perfect", "0", "-1e-3", "0.2", "nan", ""] {
+            let cause = wrong.parse::<Accuracy>().expect_err(wrong);
+            assert!(cause.contains("draft") && cause.contains("1e-9"), "{cause}");
+        }
+    }
+
+    #[test]
+    fn scenes_take_both_and_refuse_the_rest() {
+        let with = |setting: &str| Scene::default().with_settings(&[setting.to_owned()]);
+        let accuracy = |setting: &str| with(setting).map(|scene| scene.solver.accuracy);
+        assert_eq!(accuracy("solver.accuracy=draft"), Ok(Accuracy::Draft));
+        assert_eq!(accuracy("solver.accuracy=1e-4"), Ok(Accuracy::Tolerance(1e-4)));
+        assert!(accuracy("solver.accuracy=1").expect_err("too large").to_string().contains("solver.accuracy"));
+        assert!(accuracy("solver.accuracy=best").expect_err("unknown").to_string().contains("reference"));
+        assert!(with("solver.integrator=rk4").expect_err("unknown").to_string().contains("sdirk2"));
+    }
+
+    #[test]
+    fn a_tolerance_brings_the_second_order_method_unless_told_otherwise() {
+        let tolerance = Accuracy::Tolerance(1e-4);
+        assert_eq!(Integrator::Auto.method(Accuracy::Standard), Method::Euler);
+        assert_eq!(Integrator::Auto.method(tolerance), Method::Sdirk2);
+        assert_eq!(Integrator::Euler.method(tolerance), Method::Euler);
+        assert_eq!(Integrator::Sdirk2.method(Accuracy::Draft), Method::Sdirk2);
+    }
+}
