@@ -4,6 +4,7 @@
 //! Panels are given a read-only [`PanelContext`] and push [`Action`]s; [`Workbench`] alone applies them. The
 //! simulation runs in its own thread (see [`palpate_core::workers`]); nothing here steps physics or waits for a disk.
 
+mod accuracy_dial;
 mod actions;
 mod bars;
 mod files;

@@ -7,9 +7,9 @@ use super::theme::{colour, veil};
 use super::traces::GraspTrace;
 use egui::{Color32, Ui};
 use egui_plot::{
-    AxisHints, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine,
+    AxisHints, FilledArea, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine,
 };
-use palpate_core::palette::Trace;
+use palpate_core::palette::{Theme, Trace};
 use palpate_core::units::three_digits;
 
 /// Takes the value of one row out of a trace; `None` where it is undefined.
@@ -25,6 +25,8 @@ pub(super) struct Curve {
     pub(super) dashed: bool,
     /// Takes its values out of a trace.
     pub(super) values: TraceValue,
+    /// Half the width of the numerical error band about it, in the same unit; `None` where there is none.
+    pub(super) half_width: TraceValue,
 }
 
 /// A plot of some curves.
@@ -41,6 +43,8 @@ pub(super) struct TimePlot<'a> {
 
 /// Faintness of the grasps before the current one.
 const EARLIER: f32 = 0.28;
+/// Opacity of an error band.
+const BAND: f32 = 0.3;
 /// Narrowest stretch of time that can be shown (s).
 const NARROWEST: f64 = 0.05;
 
@@ -84,6 +88,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
             add_curves(plot_ui, trace, plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0, false);
         }
         if let Some(trace) = context.traces.current() {
+            add_bands(plot_ui, trace, plot, theme);
             add_curves(plot_ui, trace, plot, |c| colour(c.trace.colour(theme)), 1.8, true);
             if let Some(now) = trace.t.last() {
                 plot_ui.vline(VLine::new("", *now).color(veil(theme.colours().quiet_text, 0.5)).width(1.0));
@@ -185,6 +190,22 @@ fn add_curves(
                 .style(style)
                 .allow_hover(named),
         );
+    }
+}
+
+/// Shades the numerical error band about each curve.
+fn add_bands(plot_ui: &mut egui_plot::PlotUi<'_>, trace: &GraspTrace, plot: &TimePlot<'_>, theme: Theme) {
+    for curve in &plot.curves {
+        let points: Vec<[f64; 3]> = (0..trace.t.len())
+            .filter_map(|k| {
+                let (value, half) = ((curve.values)(trace, k)?, (curve.half_width)(trace, k)?);
+                (value.is_finite() && half.is_finite()).then(|| [trace.t[k], value - half, value + half])
+            })
+            .collect();
+        let [t, low, high] = [0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect::<Vec<f64>>());
+        if t.len() > 1 {
+            plot_ui.add(FilledArea::new("", &t, &low, &high).fill_color(veil(curve.trace.colour(theme), BAND)));
+        }
     }
 }
 

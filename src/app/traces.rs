@@ -17,6 +17,8 @@ pub struct GraspTrace {
     pub line_bar: Vec<f64>,
     /// Channel by channel, NaN where undefined.
     pub channels: Vec<Vec<f32>>,
+    /// Estimated numerical errors, channel by channel; empty without a companion.
+    pub errors: Vec<Vec<f32>>,
 }
 
 /// The traces of the last grasps, oldest first.
@@ -33,7 +35,8 @@ impl Traces {
                 self.grasps.pop_front();
             }
             let channels = vec![Vec::new(); row.values.len()];
-            self.grasps.push_back(GraspTrace { grasp: row.grasp, channels, ..GraspTrace::default() });
+            let errors = vec![Vec::new(); row.errors.len()];
+            self.grasps.push_back(GraspTrace { grasp: row.grasp, channels, errors, ..GraspTrace::default() });
         }
         let Some(last) = self.grasps.back_mut() else { return };
         last.t.push(row.t);
@@ -41,6 +44,9 @@ impl Traces {
         // A changed layout has other channels; a trace never mixes two.
         for (channel, value) in last.channels.iter_mut().zip(row.values.iter()) {
             channel.push(*value);
+        }
+        for (channel, error) in last.errors.iter_mut().zip(row.errors.iter()) {
+            channel.push(*error);
         }
     }
 
@@ -70,7 +76,13 @@ mod tests {
         for grasp in 1..=6 {
             for k in 0..3 {
                 let t = f64::from(k) * 0.1;
-                traces.push(&TraceRow { grasp, t, line_bar: 0.5, values: Box::new([grasp as f32, f32::NAN]) });
+                traces.push(&TraceRow {
+                    grasp,
+                    t,
+                    line_bar: 0.5,
+                    values: Box::new([grasp as f32, f32::NAN]),
+                    errors: Box::default(),
+                });
             }
         }
         assert_eq!(traces.current().map(|t| (t.grasp, t.t.len())), Some((6, 3)));

@@ -20,7 +20,9 @@ use palpate_core::picture::PictureView;
 use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
-use palpate_core::workers::{Command, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake};
+use palpate_core::workers::{
+    Command, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake,
+};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -138,6 +140,11 @@ impl Workbench {
         self.worker.snapshot()
     }
 
+    /// What the accuracy of the last scene that was measured costs and leaves.
+    pub fn accuracy(&self) -> Option<Arc<MeasuredAccuracy>> {
+        self.worker.accuracy()
+    }
+
     /// What the user was told last, oldest first.
     pub fn messages(&self) -> &VecDeque<String> {
         &self.messages
@@ -159,7 +166,8 @@ impl Workbench {
         let mut actions = Vec::new();
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
         let mut layout = std::mem::replace(&mut self.view.layout, egui_tiles::Tree::empty(egui::Id::unique("drawing")));
-        let context = self.panel_context(snapshot.as_deref());
+        let accuracy = self.worker.accuracy();
+        let context = self.panel_context(snapshot.as_deref(), accuracy.as_deref());
         actions.extend(keys::pressed(&ctx, &context));
         let colours = self.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
@@ -186,7 +194,8 @@ impl Workbench {
         let mut actions = Vec::new();
         panel_frame(panel, self.view.theme).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            (panel.ui)(ui, &self.panel_context(snapshot.as_deref()), &mut actions);
+            let accuracy = self.worker.accuracy();
+            (panel.ui)(ui, &self.panel_context(snapshot.as_deref(), accuracy.as_deref()), &mut actions);
         });
         for action in actions {
             self.apply(&ctx, action);
@@ -208,9 +217,14 @@ impl Workbench {
         self.seen = Some(source.clone());
     }
 
-    fn panel_context<'a>(&'a self, snapshot: Option<&'a Snapshot>) -> PanelContext<'a> {
+    fn panel_context<'a>(
+        &'a self,
+        snapshot: Option<&'a Snapshot>,
+        accuracy: Option<&'a MeasuredAccuracy>,
+    ) -> PanelContext<'a> {
         PanelContext {
             snapshot,
+            accuracy,
             scene: &self.scene,
             traces: &self.traces,
             view: &self.view,

@@ -5,7 +5,9 @@ use super::terminal::{say, say_json, table};
 use palpate_core::scene::Accuracy;
 use palpate_core::study::{
     CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost,
+    physics_truth,
 };
+use palpate_core::units::three_digits;
 
 /// Arguments of `palpate bench`.
 #[derive(Debug, clap::Args)]
@@ -49,6 +51,9 @@ enum What {
     },
 }
 
+/// Tolerances that stand in the table beside the named accuracies.
+const TOLERANCES: [f64; 3] = [1e-3, 1e-4, 1e-5];
+
 /// Channels of C1, and of a layout with a pressure sensor on every joint.
 const FEW_AND_MANY: [usize; 2] = [4, 22];
 
@@ -87,11 +92,12 @@ fn networks(rows: &[NetworkCost], json: bool) -> Result<(), Failure> {
 
 fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
     let mut rows: Vec<CostRow> = Vec::new();
+    let accuracies = Accuracy::NAMED.into_iter().filter(|accuracy| *accuracy != Accuracy::Reference || reference);
+    let accuracies: Vec<Accuracy> = accuracies.chain(TOLERANCES.map(Accuracy::Tolerance)).collect();
     for scene in &bench_scenes()? {
-        for accuracy in Accuracy::NAMED {
-            if accuracy != Accuracy::Reference || reference {
-                rows.push(physics_cost(scene, accuracy, usize::from(runs)));
-            }
+        let truth = physics_truth(scene);
+        for accuracy in &accuracies {
+            rows.push(physics_cost(scene, *accuracy, usize::from(runs), Some(&truth)));
         }
     }
     if json {
@@ -110,10 +116,25 @@ fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
                 row.newton_max.to_string(),
                 row.unconverged_steps.to_string(),
                 format!("{:.0}", row.times_real_time),
+                row.error.map_or(String::new(), |error| three_digits(error.curvature_per_m * 1e3)),
+                row.error.map_or(String::new(), |error| three_digits(error.force_n * 1e3)),
             ]
         })
         .collect();
-    let header = ["scene", "accuracy", "step ms", "CPU ms", "us/step", "Newton", "most", "missed", "x real time"];
+    let header = [
+        "scene",
+        "accuracy",
+        "step ms",
+        "CPU ms",
+        "us/step",
+        "Newton",
+        "most",
+        "missed",
+        "x real time",
+        "1/km off",
+        "mN off",
+    ];
     table(&header, &cells)?;
-    say(format!("one 4 s grasp each; median of {runs} runs, CPU time of one thread"))
+    say(format!("one 4 s grasp each; median of {runs} runs, CPU time of one thread"))?;
+    say("off: root mean square error in curvature and force against a tolerance of 1e-7")
 }

@@ -3,10 +3,11 @@
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json, warn};
-use palpate_core::grasping::{GraspSummary, grasp, jittered};
+use palpate_core::grasping::{ErrorNorms, GraspSummary, error_band, grasp, jittered};
 use palpate_core::recording::{TrialId, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
+use palpate_core::study::error_sensors;
 use palpate_core::units::{mm, three_digits};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -30,6 +31,9 @@ pub(super) struct GraspArguments {
     /// Divide force by the convex hull of the contacts, as the paper does, instead of the participation area.
     #[arg(long)]
     hull: bool,
+    /// Estimate the numerical error from a companion that computes the same grasp more finely.
+    #[arg(long)]
+    error_band: bool,
     /// Do not keep the trial in the store.
     #[arg(long)]
     no_store: bool,
@@ -52,6 +56,9 @@ struct Report {
     cpu_ms: f64,
     /// CPU time of loading the object (ms).
     load_cpu_ms: f64,
+    /// Half-widths of the numerical error band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_band: Option<ErrorNorms>,
     trial_id: Option<TrialId>,
 }
 
@@ -74,6 +81,9 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     let start = cpu_time::ThreadTime::now();
     let trial = grasp(&scene, object.as_ref(), seed);
     let cpu_ms = start.elapsed().as_secs_f64() * 1e3;
+    let error_band = error_sensors(&scene)
+        .filter(|_| arguments.error_band)
+        .map(|sensors| error_band(&trial, &scene, object.as_ref(), &sensors).norms(&trial, &sensors));
     let trial_id = if arguments.no_store { None } else { Some(open_store(store)?.insert(&trial)?) };
     if let Some(path) = &arguments.out {
         write_trial_csv(path, &trial, &scene, &sensors)?;
@@ -81,7 +91,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     }
     let accuracy = scene.solver.accuracy.to_string();
     let summary = GraspSummary::new(&trial, &scene);
-    let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, trial_id };
+    let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, error_band, trial_id };
     if arguments.json {
         say_json(&report)?;
     } else {
@@ -123,15 +133,34 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
     }
     let quality = &summary.quality;
     say(format!(
-        "solver        {} steps, {:.2} Newton iterations each (most {}), {}",
+        "solver        {} steps, {:.2} Newton iterations in each solve (most {}), {}",
         quality.steps,
         quality.newton_mean,
         quality.newton_max,
         if summary.converged { "all converged" } else { "not all converged" },
     ))?;
+    if scene.solver.accuracy.tolerance().is_some() {
+        let (rejected, solves, least) = (quality.rejected_steps, quality.solves, quality.least_step_s * 1e3);
+        say(format!(
+            "error control {rejected} steps taken again shorter, {solves} solves, shortest step {least:.3} ms"
+        ))?;
+    }
+    if let Some(error) = &report.error_band {
+        tell_error(error)?;
+    }
     say(format!("cost          {:.1} ms CPU for {duration} s at accuracy {}", report.cpu_ms, report.accuracy))?;
     match report.trial_id {
         Some(id) => say(format!("stored        trial {id}")),
         None => Ok(()),
     }
+}
+
+fn tell_error(error: &ErrorNorms) -> Result<(), Failure> {
+    let part = |name: &str, size: f64, unit: &str, share: f64| {
+        let (size, percent) = (three_digits(size), three_digits(share * 100.0));
+        say(format!("{name:<13} ±{size} {unit}, {percent} % of the range [rms of the numerical error band]"))
+    };
+    part("curvature", error.curvature_per_m, "1/m", error.curvature_share)?;
+    part("pressure", error.pressure_pa * 1e-3, "kPa", error.pressure_share)?;
+    part("force", error.force_n, "N", error.force_share)
 }

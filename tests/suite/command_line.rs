@@ -108,9 +108,13 @@ fn wrong_names_and_files_are_refused_in_words() {
 fn wrong_use_exits_with_2() {
     let folder = folder();
     let at = folder.path();
-    for arguments in
-        [&["grasp", "ball", "--accuracy", "perfect"][..], &["fly"], &["snapshot"], &["trials", "show", "x"]]
-    {
+    for arguments in [
+        &["grasp", "ball", "--accuracy", "perfect"][..],
+        &["grasp", "--accuracy", "2"],
+        &["fly"],
+        &["snapshot"],
+        &["trials", "show", "x"],
+    ] {
         let ran = run(at, arguments);
         assert_eq!(ran.code, Some(2), "{ran:?}");
         assert!(ran.err.contains("error:"), "{ran:?}");
@@ -174,6 +178,29 @@ fn the_bench_reports_rows() {
         }
         assert!(row["accuracy"].is_string());
     }
+    // Finer is nearer to the truth, and costs more steps.
+    let row = |accuracy: &str| rows.iter().find(|r| r["scene"] == "sphere_fixed" && r["accuracy"] == accuracy).unwrap();
+    let off = |accuracy: &str| row(accuracy)["error"]["curvature_per_m"].as_f64().unwrap();
+    assert!(off("draft") > off("standard") && off("standard") > off("1e-4") && off("1e-4") > off("1e-5"));
+    assert!(row("1e-5")["step_s"].as_f64().unwrap() < row("1e-3")["step_s"].as_f64().unwrap());
+}
+
+#[test]
+fn a_grasp_to_a_tolerance_tells_its_error() {
+    let folder = folder();
+    let at = folder.path();
+    let grasp =
+        |accuracy: &str| json(at, &["grasp", "ball", "--accuracy", accuracy, "--error-band", "--json", "--no-store"]);
+    let (draft, fine) = (grasp("draft"), grasp("1e-5"));
+    for key in ["curvature_per_m", "curvature_share", "pressure_pa", "pressure_share", "force_n", "force_share"] {
+        let value = |report: &Value| report["error_band"][key].as_f64().unwrap();
+        assert!(value(&fine) > 0.0 && value(&fine) < value(&draft), "{key}");
+    }
+    assert_eq!(fine["accuracy"], "1e-5");
+    assert!(fine["quality"]["rejected_steps"].as_u64().unwrap() > 0 && fine["quality"]["missed_steps"] == 0);
+    let told = run(at, &["grasp", "ball", "--set", "solver.accuracy=1e-3", "--error-band", "--no-store"]);
+    assert!(told.code == Some(0) && told.out.contains("shortest step") && told.out.contains("±"), "{told:?}");
+    refused(at, &["grasp", "ball", "--set", "solver.accuracy=7"], &["solver.accuracy = 7", "0.1"]);
 }
 
 #[test]

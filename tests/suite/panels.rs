@@ -12,6 +12,9 @@ use palpate::app::{ALL_PANELS, Action};
 use palpate_core::objects::catalogue;
 use palpate_core::palette::Theme;
 use palpate_core::scene::Accuracy;
+use palpate_core::units::three_digits;
+use palpate_core::workers::{Command, MeasuredAccuracy};
+use std::sync::Arc;
 
 fn bench(setup: BenchSetup) -> Bench {
     Bench::new(setup, CpuRenderer::default())
@@ -30,11 +33,15 @@ fn every_panel_in_both_themes() {
             bench.advance_to(2.6);
             bench.harness.render().unwrap()
         });
-        let mut pair = RgbaImage::new(dark.width() + light.width(), dark.height());
-        image::imageops::replace(&mut pair, &dark, 0, 0);
-        image::imageops::replace(&mut pair, &light, i64::from(dark.width()), 0);
-        compare(&format!("panel_{}", panel.name), &pair, "the CPU renderer of the tests");
+        compare(&format!("panel_{}", panel.name), &side_by_side(&dark, &light), "the CPU renderer of the tests");
     }
+}
+
+fn side_by_side(left: &RgbaImage, right: &RgbaImage) -> RgbaImage {
+    let mut pair = RgbaImage::new(left.width() + right.width(), left.height());
+    image::imageops::replace(&mut pair, left, 0, 0);
+    image::imageops::replace(&mut pair, right, i64::from(left.width()), 0);
+    pair
 }
 
 #[test]
@@ -143,8 +150,6 @@ fn scene_settings_reach_the_simulation() {
     bench.harness.run_steps(3);
     bench.harness.get_by_label("fixed in place").click();
     bench.until(|s| s.scene.object.fixed);
-    bench.harness.get_by_label("Accuracy").click();
-    bench.harness.run_steps(4);
     bench.harness.get_by_role_and_label(Role::ComboBox, "time step").click();
     bench.harness.run_steps(3);
     bench.harness.get_by_label("draft, 1/150 s").click();
@@ -152,6 +157,55 @@ fn scene_settings_reach_the_simulation() {
     bench.harness.get_by_label("Defaults").click();
     let back = bench.until(|s| !s.scene.object.fixed);
     assert_eq!((back.scene.solver.accuracy, back.scene.object.source.as_str()), (Accuracy::Standard, "lemon"));
+}
+
+#[test]
+fn turning_the_accuracy_dial_moves_both_numbers() {
+    let mut bench = whole_window();
+    bench.harness.get_by_label("Scene").click();
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_role(Role::Slider).is_none(), "no tolerance at a fixed step");
+    let standard = measured(&mut bench);
+    bench.harness.get_by_role_and_label(Role::ComboBox, "time step").click();
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("to a tolerance").click();
+    bench.until(|s| s.scene.solver.accuracy == Accuracy::Tolerance(1e-4));
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_role_and_label(Role::Slider, "tolerance").is_some());
+    let tolerance = measured(&mut bench);
+    assert!(tolerance.cost.error.curvature_per_m < 0.7 * standard.cost.error.curvature_per_m);
+    assert!(tolerance.cost.cpu_ms > standard.cost.cpu_ms);
+    let cost = format!("{} ms CPU", three_digits(tolerance.cost.cpu_ms));
+    assert!(bench.harness.query_by_label(&cost).is_some(), "{cost} is not on the screen");
+    bench.harness.get_by_role_and_label(Role::CheckBox, "error band").click();
+    bench.until(|s| s.status.error_band);
+    bench.advance_to(0.4);
+    bench.harness.get_by_role_and_label(Role::CheckBox, "error band").click();
+    bench.until(|s| !s.status.error_band && s.frame.t == 0.0);
+}
+
+/// What the gauge says of the scene that is being grasped.
+fn measured(bench: &mut Bench) -> Arc<MeasuredAccuracy> {
+    let scene = bench.workbench().snapshot().unwrap().scene.clone();
+    let found = (0..3000).find_map(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        bench.workbench().accuracy().filter(|measured| measured.scene == *scene)
+    });
+    bench.harness.run_steps(2);
+    found.expect("measured in half a minute")
+}
+
+#[test]
+fn error_bands_are_drawn_about_the_traces() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "force").unwrap();
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let mut bench = bench(BenchSetup { theme, size: [300.0, 240.0], panel: Some(panel), ..BenchSetup::default() });
+        bench.tell(Action::Simulation(Command::SetErrorBand(true)));
+        bench.until(|s| s.status.error_band);
+        bench.advance_to(2.6);
+        bench.harness.render().unwrap()
+    });
+    compare("panel_force_band", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
 
 #[test]

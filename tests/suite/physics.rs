@@ -89,9 +89,18 @@ fn a_held_object_does_not_creep() {
 
 #[test]
 fn a_step_allocates_nothing() {
-    for (name, fixed) in [("lemon", false), ("box", false), ("case", true), (EMPTY, false)] {
+    let tolerance = Accuracy::Tolerance(1e-4);
+    for (name, fixed, accuracy) in [
+        ("lemon", false, Accuracy::Standard),
+        ("box", false, Accuracy::Standard),
+        ("case", true, Accuracy::Standard),
+        (EMPTY, false, Accuracy::Standard),
+        ("lemon", false, tolerance),
+        ("ball", true, tolerance),
+    ] {
         let (mut scene, object) = scene_of(name);
         scene.object.fixed = fixed;
+        scene.solver.accuracy = accuracy;
         let (mut simulation, _) = Simulation::new(&scene, object.as_ref());
         let mut touching = 0;
         for _ in 0..simulation.clock().total_ticks() {

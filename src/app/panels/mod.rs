@@ -17,13 +17,15 @@ use super::view_state::ViewState;
 use egui::Ui;
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use palpate_core::scene::Scene;
-use palpate_core::workers::Snapshot;
+use palpate_core::workers::{MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
 
 /// What panels may read.
 pub struct PanelContext<'a> {
     /// The newest state of the simulation; absent until the first object is loaded.
     pub snapshot: Option<&'a Snapshot>,
+    /// What the accuracy of the last scene that was measured costs and leaves.
+    pub accuracy: Option<&'a MeasuredAccuracy>,
     /// The scene as the user has set it.
     pub scene: &'a Scene,
     /// Traces of the last grasps.

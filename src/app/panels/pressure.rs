@@ -3,6 +3,7 @@
 use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::plots::{Curve, TimePlot, show};
+use palpate_core::grasping::band_half_width;
 use palpate_core::gripper::Side;
 use palpate_core::palette::Trace;
 use palpate_core::sensing::{Channel, Quantity};
@@ -22,6 +23,9 @@ pub(super) fn curves_of(context: &PanelContext<'_>, quantity: Quantity, factor: 
             trace: trace_of(channel),
             dashed: channel.side == Side::Right,
             values: Box::new(move |trace, k| trace.channels.get(index)?.get(k).map(|value| f64::from(*value) * factor)),
+            half_width: Box::new(move |trace, k| {
+                band_half_width(&trace.t, trace.errors.get(index)?, k).map(|half| half * factor)
+            }),
         })
         .collect()
 }

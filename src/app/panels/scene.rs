@@ -1,10 +1,11 @@
 //! The scene's main settings. Each change begins the grasp anew; everything else can be set in a scene file.
 
 use super::PanelContext;
+use crate::app::accuracy_dial::{self, choice};
 use crate::app::actions::Action;
-use egui::{CollapsingHeader, ComboBox, DragValue, Grid, ScrollArea, Ui};
+use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_core::gripper::{Finger, PadLaw};
-use palpate_core::scene::{Accuracy, Auto, Scene, SupportKind};
+use palpate_core::scene::{Auto, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let mut scene = context.scene.clone();
@@ -12,7 +13,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         section(ui, "Object", true, |ui| object_ui(ui, &mut scene, context));
         section(ui, "Gripper pose", true, |ui| pose_ui(ui, &mut scene));
         section(ui, "Programme", true, |ui| programme_ui(ui, &mut scene));
-        section(ui, "Accuracy", false, |ui| solver_ui(ui, &mut scene));
+        section(ui, "Accuracy", true, |ui| solver_ui(ui, &mut scene, context, actions));
         section(ui, "Finger", false, |ui| finger_ui(ui, &mut scene));
         section(ui, "Pad", false, |ui| pad_ui(ui, &mut scene));
         section(ui, "Support", false, |ui| support_ui(ui, &mut scene));
@@ -65,21 +66,6 @@ impl Number<'_> {
         }
         ui.end_row();
     }
-}
-
-fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
-    let label = ui.label(name);
-    let shown = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
-    ComboBox::from_id_salt(name)
-        .selected_text(shown)
-        .show_ui(ui, |ui| {
-            for (each, text) in all {
-                ui.selectable_value(value, *each, *text);
-            }
-        })
-        .response
-        .labelled_by(label.id);
-    ui.end_row();
 }
 
 /// A number that may be left to Palpate.
@@ -148,13 +134,8 @@ fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
         .ui(ui, &mut scene.timing.duration_s);
 }
 
-fn solver_ui(ui: &mut Ui, scene: &mut Scene) {
-    let names = [
-        (Accuracy::Draft, "draft, 1/150 s"),
-        (Accuracy::Standard, "standard, 1/300 s"),
-        (Accuracy::Reference, "reference, 1/9600 s"),
-    ];
-    choice(ui, "time step", &mut scene.solver.accuracy, &names);
+fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    accuracy_dial::rows(ui, scene, context, actions);
     let label = ui.label("sampling");
     ui.add(
         DragValue::new(&mut scene.timing.sample_hz).range(1..=1000).clamp_existing_to_range(false).suffix("\u{2009}Hz"),

@@ -3,6 +3,7 @@
 
 mod collect;
 mod deck;
+mod error_band;
 mod identify;
 mod poses;
 mod run;
@@ -10,7 +11,8 @@ mod summary;
 
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
 pub use deck::ObjectDeck;
+pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use identify::{Identification, IdentificationView, IdentifyError};
 pub use poses::{PoseSampler, jittered};
-pub use run::{GraspRun, grasp, prepare};
+pub use run::{GraspRun, grasp, prepare, prepare_companion};
 pub use summary::{GraspSummary, HoldSummary};

@@ -2,6 +2,7 @@
 
 use crate::gripper::{BentFinger, Programme, Side};
 use crate::objects::ObjectModel;
+use crate::physics::Refinement;
 use crate::rig::{Event, Rig, SimRig};
 use crate::scene::Scene;
 use crate::trial::{Frame, Trial, TrialInfo};
@@ -18,7 +19,16 @@ pub struct GraspRun<R> {
 
 /// Sets up a simulated grasp. `seed` is recorded; it does not change the scene (see [`super::jittered`]).
 pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRig> {
-    let (rig, placement) = SimRig::new(scene, object);
+    prepare_refined(scene, object, seed, Refinement::NONE)
+}
+
+/// The same grasp computed more finely, sampled at the same times: what the error of the other is estimated from.
+pub fn prepare_companion(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRig> {
+    prepare_refined(scene, object, seed, Refinement::COMPANION)
+}
+
+fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refinement: Refinement) -> GraspRun<SimRig> {
+    let (rig, placement) = SimRig::refined(scene, object, refinement);
     let mut warnings = object.map(|o| o.warnings.clone()).unwrap_or_default();
     warnings.extend(placement.warnings);
     warnings.extend(programme_warnings(scene));

@@ -37,7 +37,7 @@ pub struct Simulation {
 /// How much more finely than its scene asks for a simulation is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {
-    /// Factor on the number of steps, at fixed steps.
+    /// Factor on the number of steps; under a tolerance, on the fewest.
     pub steps: u32,
     /// Factor on the tolerance, where there is one.
     pub tolerance: f64,
@@ -46,7 +46,7 @@ pub struct Refinement {
 impl Refinement {
     /// As the scene says.
     pub const NONE: Self = Self { steps: 1, tolerance: 1.0 };
-    /// Half the step, or a tenth of the tolerance: what an error is estimated from.
+    /// Half the step, or a tenth of the tolerance at half the longest step: what an error is estimated from.
     pub const COMPANION: Self = Self { steps: 2, tolerance: 0.1 };
 }
 
@@ -76,7 +76,9 @@ impl Simulation {
         let model = Model::new(scene, object, &placement);
         let state = State::new(&model, &placement);
         let tolerance = solver.accuracy.tolerance().map(|tolerance| tolerance * refinement.tolerance);
-        let stepper = Stepper::new(&model, &state, solver.method(), tolerance, clock.step());
+        // No step can be longer than from sample to sample; a finer simulation takes more.
+        let longest = f64::from(clock.ticks_per_sample) * clock.step() / f64::from(refinement.steps);
+        let stepper = Stepper::new(&model, &state, solver.method(), tolerance, longest);
         let simulation = Self {
             state,
             workspace: Workspace::new(&model),

@@ -45,6 +45,8 @@ struct Control {
     tolerance: f64,
     /// Length that the next step should have (s).
     wanted: f64,
+    /// No step is longer (s).
+    longest: f64,
     /// No step is made shorter because of its error (s).
     least: f64,
     /// The step taken whole.
@@ -54,7 +56,7 @@ struct Control {
     segments: [Vec<SegmentPose>; 2],
 }
 
-/// The shortest step as a share of a tick: 1/150 s becomes 6.5 µs.
+/// The shortest step as a share of the longest: 1/75 s becomes 13 µs.
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// The next step is planned to have this share of the tolerance's error, to the power of 1 / (p + 1).
 const SAFETY: f64 = 0.9;
@@ -63,12 +65,13 @@ const FASTEST_GROWTH: f64 = 4.0;
 const FASTEST_SHRINKING: f64 = 0.2;
 
 impl Stepper {
-    /// Under a tolerance the shortest step is a share of the tick (s).
-    pub(super) fn new(model: &Model, state: &State, method: Method, tolerance: Option<f64>, tick: f64) -> Self {
+    /// Under a tolerance no step is longer than `longest` (s), and the shortest is a share of it.
+    pub(super) fn new(model: &Model, state: &State, method: Method, tolerance: Option<f64>, longest: f64) -> Self {
         let control = tolerance.map(|tolerance| Control {
             tolerance,
-            wanted: tick,
-            least: tick * LEAST_SHARE,
+            wanted: longest,
+            longest,
+            least: longest * LEAST_SHARE,
             whole: state.clone(),
             origin: state.clone(),
             segments: [(); 2].map(|()| vec![SegmentPose::default(); model.chain.joints + 1]),
@@ -123,12 +126,13 @@ impl Totals {
 impl Control {
     /// The wanted length, made so that what is `left` (s) is not cut into a long step and a tiny one.
     fn next_length(&self, left: f64) -> f64 {
-        if self.wanted >= left {
+        let wanted = self.wanted.min(self.longest);
+        if wanted >= left {
             left
-        } else if 2.0 * self.wanted > left {
+        } else if 2.0 * wanted > left {
             0.5 * left
         } else {
-            self.wanted
+            wanted
         }
     }
 

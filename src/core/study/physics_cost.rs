@@ -1,12 +1,15 @@
-//! What a grasp costs: CPU time of one whole trial on one thread, for scenes from a fixed ball to a baked mesh.
+//! What a grasp costs: CPU time of one whole trial on one thread, and its error against a far finer one, for scenes from a
+//! fixed ball to a baked mesh.
 //!
 //! Times are those of the thread, not of the wall clock, and the median of several runs, so that a busy machine
 //! disturbs them little. Numbers to compare on one machine, not to assert in a test.
 
+use super::accuracy_cost::error_sensors;
 use crate::geometry::Primitive;
-use crate::grasping::prepare;
+use crate::grasping::{ErrorNorms, grasp, prepare};
 use crate::objects::{ObjectError, ObjectModel};
 use crate::scene::{Accuracy, Scene};
+use crate::trial::Trial;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -28,7 +31,7 @@ pub struct CostRow {
     pub scene: &'static str,
     /// Which accuracy.
     pub accuracy: String,
-    /// Step length (s).
+    /// Step length (s); under a tolerance the mean.
     pub step_s: f64,
     /// CPU time of one trial (ms): the median over the runs.
     pub cpu_ms_median: f64,
@@ -42,6 +45,27 @@ pub struct CostRow {
     pub unconverged_steps: u64,
     /// Simulated time over CPU time.
     pub times_real_time: f64,
+    /// How far it is from the truth.
+    pub error: Option<ErrorNorms>,
+}
+
+/// A tolerance that is far below what is compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth of
+/// that of steps of 1/300 s.
+const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
+
+/// The grasp of a scene that errors are measured against.
+pub fn physics_truth(bench: &BenchScene) -> Trial {
+    let mut scene = bench.scene();
+    scene.solver.accuracy = TRUTH;
+    grasp(&scene, Some(&bench.object), 0)
+}
+
+impl BenchScene {
+    fn scene(&self) -> Scene {
+        let mut scene = Scene::default();
+        scene.object.fixed = self.fixed;
+        scene
+    }
 }
 
 /// The scenes: closed-form distances fixed and free, a union of primitives, and a baked mesh.
@@ -68,33 +92,37 @@ pub fn bench_scenes() -> Result<Vec<BenchScene>, ObjectError> {
     Ok(scenes)
 }
 
-/// Times `runs` trials of a scene.
-pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize) -> CostRow {
-    let mut scene = Scene::default();
-    scene.object.fixed = bench.fixed;
+/// Times `runs` trials of a scene, and holds the last against the truth where that is given.
+pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: Option<&Trial>) -> CostRow {
+    let mut scene = bench.scene();
     scene.solver.accuracy = accuracy;
-    let clock = scene.timing.clock(accuracy);
     let mut times = Vec::new();
-    let mut quality = None;
+    let mut last = None;
     for _ in 0..runs.max(1) {
         let mut run = prepare(&scene, Some(&bench.object), 0);
         let start = cpu_time::ThreadTime::now();
         while run.next_frame().is_some() {}
         times.push(start.elapsed().as_secs_f64());
-        quality = Some(run.finish(&scene).info.quality);
+        last = Some(run.finish(&scene));
     }
     times.sort_by(f64::total_cmp);
     let median = times[times.len() / 2];
-    let quality = quality.unwrap_or_default();
+    let quality = last.as_ref().map(|trial| trial.info.quality.clone()).unwrap_or_default();
+    let error = last.zip(truth).and_then(|(trial, truth)| {
+        let sensors = error_sensors(&scene)?;
+        Some(ErrorNorms::between(&trial, truth, &sensors))
+    });
+    let steps = quality.steps.max(1) as f64;
     CostRow {
         scene: bench.name,
         accuracy: accuracy.to_string(),
-        step_s: clock.step(),
+        step_s: scene.timing.duration_s / steps,
         cpu_ms_median: median * 1e3,
-        us_per_step: median * 1e6 / clock.total_ticks() as f64,
+        us_per_step: median * 1e6 / steps,
         newton_mean: quality.newton_mean,
         newton_max: quality.newton_max,
         unconverged_steps: quality.unconverged_steps,
         times_real_time: scene.timing.duration_s / median,
+        error,
     }
 }

@@ -6,6 +6,7 @@ use crate::picture::Stage;
 use crate::recording::TrialId;
 use crate::scene::Scene;
 use crate::sensing::Channel;
+use crate::study::AccuracyCost;
 use crate::trial::Frame;
 use glam::DVec3;
 use std::sync::Arc;
@@ -34,6 +35,8 @@ pub enum Command {
     SetThreshold(f64),
     /// Whether trials are stored.
     SetRecording(bool),
+    /// Whether a companion runs along for the numerical error band; the grasp begins anew.
+    SetErrorBand(bool),
     /// Pull at the object with this force (N, world axes); zero lets go.
     Pull(DVec3),
     /// End the thread.
@@ -86,6 +89,17 @@ pub struct TraceRow {
     pub line_bar: f64,
     /// One value per channel of the snapshot's list; NaN where undefined.
     pub values: Box<[f32]>,
+    /// Estimated numerical error of each value, in its unit; empty without a companion.
+    pub errors: Box<[f32]>,
+}
+
+/// What the accuracy of a scene costs and leaves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredAccuracy {
+    /// The scene, in the pose it is written with.
+    pub scene: Scene,
+    /// CPU time, and the estimated error.
+    pub cost: AccuracyCost,
 }
 
 /// What is known of the object in the hand.
@@ -126,6 +140,8 @@ pub struct Status {
     pub duration: f64,
     /// Trials are being stored.
     pub recording: bool,
+    /// A companion runs along for the numerical error band.
+    pub error_band: bool,
 }
 
 /// A grasp that has ended.

@@ -7,11 +7,15 @@
 //!  <--newest Snapshot-----    recognises, publishes          writes the store
 //!  <--every TraceRow------    derives         frames ----->  a chunk each second
 //!  <--Notice--------------                    <------------  Notice
+//!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
+mod companion;
+mod current;
+mod gauge;
 mod held_object;
 mod latest;
 mod listener;
@@ -27,6 +31,8 @@ mod sim_tests;
 
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
-pub use messages::{Command, FinishedGrasp, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
+pub use messages::{
+    Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
+};
 pub use recorder::{Recorder, RecorderNotice};
 pub use sim::{SimWorker, SimWorkerSetup};

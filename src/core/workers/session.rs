@@ -1,20 +1,22 @@
 //! The simulation's thread: it owns the rig, keeps pace with the clock on the wall, and publishes what it sees.
 
+use super::companion::Companion;
+use super::current::Current;
+use super::gauge::Gauge;
 use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
 use super::listener::Listener;
-use super::messages::{Command, FinishedGrasp, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake};
+use super::messages::{
+    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
+};
 use super::pace::Pace;
 use super::recorder::{Recorder, RecorderNotice};
 use super::sim::SimWorkerSetup;
-use crate::grasping::{GraspRun, GraspSummary, PoseSampler, prepare};
+use crate::grasping::{GraspSummary, PoseSampler, prepare};
 use crate::objects::EMPTY;
 use crate::picture::Stage;
-use crate::rig::SimRig;
 use crate::scene::Scene;
 use crate::sensing::{Channel, PressureArea, SensorLayout, Sensors};
-use crate::trial::Frame;
-use glam::DVec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError};
@@ -30,6 +32,7 @@ const LATEST: f64 = 0.25;
 /// Where results go.
 pub(super) struct Outlets {
     pub(super) snapshots: Arc<Latest<Snapshot>>,
+    pub(super) accuracy: Arc<Latest<MeasuredAccuracy>>,
     pub(super) rows: SyncSender<TraceRow>,
     pub(super) rows_lost: Arc<AtomicBool>,
     pub(super) loading: Arc<AtomicBool>,
@@ -45,24 +48,12 @@ impl Outlets {
     }
 }
 
-/// The grasp that is going on.
-struct Current {
-    run: GraspRun<SimRig>,
-    scene: Arc<Scene>,
-    stage: Arc<Stage>,
-    sensors: Sensors,
-    frame: Arc<Frame>,
-    /// Warnings at its beginning; those that come later are told at its end.
-    told: usize,
-    /// The user has pulled at the object.
-    pulled: bool,
-    ended: bool,
-}
-
 /// Everything the thread owns.
 pub(super) struct Session {
     outlets: Outlets,
     recorder: Option<Recorder>,
+    /// Absent where its thread could not be started.
+    gauge: Option<Gauge>,
     listener: Option<Listener>,
     layout: SensorLayout,
     nominal: Scene,
@@ -104,9 +95,11 @@ impl Session {
                 None
             }
         };
+        let gauge = Gauge::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
         let grasps = setup.grasps.max(1);
         let mut session = Self {
             recorder,
+            gauge,
             listener: setup.model.map(|model| Listener::new(model, grasps)),
             layout: setup.layout,
             nominal: setup.scene,
@@ -227,6 +220,12 @@ impl Session {
                     self.drop_recording();
                 }
             }
+            Command::SetErrorBand(shown) => {
+                if std::mem::replace(&mut self.status.error_band, shown) != shown {
+                    self.own_pose_done = false;
+                    self.begin_round();
+                }
+            }
             Command::Pull(force) => {
                 if let Some(current) = self.current.as_mut().filter(|c| force.is_finite() && !c.ended) {
                     current.pull(force);
@@ -309,6 +308,9 @@ impl Session {
             Ok(sensors) => sensors,
             Err(error) => return self.outlets.tell(Notice::Failed(error.to_string())),
         };
+        if let Some(gauge) = self.gauge.as_mut().filter(|_| !again) {
+            gauge.measure(&scene, model.clone());
+        }
         let mut run = prepare(&scene, model.as_deref(), seed);
         if !again {
             for warning in &run.info().warnings {
@@ -331,7 +333,10 @@ impl Session {
         let frame = Arc::new(run.rig_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
         let (told, scene) = (run.info().warnings.len(), Arc::new(scene));
-        self.current = Some(Current { run, scene, stage, sensors, frame, told, pulled: false, ended: false });
+        let channels = sensors.channels().len();
+        let companion = self.status.error_band.then(|| Companion::new(&scene, model.as_deref(), seed, channels));
+        self.current =
+            Some(Current { run, companion, scene, stage, sensors, frame, told, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
         self.publish();
     }
@@ -405,8 +410,10 @@ impl Session {
         if let Some(listener) = &mut self.listener {
             listener.push(&frame);
         }
-        let values = current.sensors.read(&frame).into_iter().map(|v| v.map_or(f32::NAN, |v| v as f32)).collect();
-        let row = TraceRow { grasp: self.grasp, t: frame.t, line_bar: frame.line_bar, values };
+        let read = current.sensors.read(&frame);
+        let errors = current.companion.as_mut().map(|c| c.errors(frame.t, &read, &current.sensors)).unwrap_or_default();
+        let values = read.into_iter().map(|v| v.map_or(f32::NAN, |v| v as f32)).collect();
+        let row = TraceRow { grasp: self.grasp, t: frame.t, line_bar: frame.line_bar, values, errors };
         current.frame = Arc::new(frame);
         if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
             self.outlets.rows_lost.store(true, Ordering::Relaxed);
@@ -482,18 +489,5 @@ impl Session {
             recognition_off: self.listener.as_ref().and_then(Listener::why_off),
         }));
         (self.outlets.wake)();
-    }
-}
-
-impl Current {
-    /// Pulls at the object; a trial that was meddled with says so.
-    fn pull(&mut self, force: DVec3) {
-        if force != DVec3::ZERO && !self.pulled {
-            self.pulled = true;
-            let t = self.frame.t;
-            self.run
-                .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
-        }
-        self.run.rig_mut().pull_object(force);
     }
 }

@@ -1,7 +1,7 @@
 //! The handle on the simulation's thread: commands go in, snapshots, trace rows and notices come out.
 
 use super::latest::Latest;
-use super::messages::{Command, NotSent, Notice, Snapshot, TraceRow, Wake};
+use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, Snapshot, TraceRow, Wake};
 use super::session::{Outlets, Session};
 use crate::recognition::Model;
 use crate::scene::Scene;
@@ -43,6 +43,7 @@ const MOST_ROWS: usize = 9000;
 pub struct SimWorker {
     commands: SyncSender<Command>,
     snapshots: Arc<Latest<Snapshot>>,
+    accuracy: Arc<Latest<MeasuredAccuracy>>,
     rows: Receiver<TraceRow>,
     rows_lost: Arc<AtomicBool>,
     loading: Arc<AtomicBool>,
@@ -57,9 +58,11 @@ impl SimWorker {
         let (row_sender, rows) = sync_channel(MOST_ROWS);
         let (notice_sender, notices) = channel();
         let snapshots = Arc::new(Latest::default());
+        let accuracy = Arc::new(Latest::default());
         let [rows_lost, loading] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let outlets = Outlets {
             snapshots: Arc::clone(&snapshots),
+            accuracy: Arc::clone(&accuracy),
             rows: row_sender,
             rows_lost: Arc::clone(&rows_lost),
             loading: Arc::clone(&loading),
@@ -79,7 +82,7 @@ impl SimWorker {
                 last_words.1();
             }
         })?;
-        Ok(Self { commands, snapshots, rows, rows_lost, loading, notices, thread: Some(thread) })
+        Ok(Self { commands, snapshots, accuracy, rows, rows_lost, loading, notices, thread: Some(thread) })
     }
 
     /// Sends a command.
@@ -93,6 +96,11 @@ impl SimWorker {
     /// The newest snapshot; absent until the first scene has been loaded.
     pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
         self.snapshots.get()
+    }
+
+    /// What the accuracy of the last scene that was measured costs and leaves.
+    pub fn accuracy(&self) -> Option<Arc<MeasuredAccuracy>> {
+        self.accuracy.get()
     }
 
     /// Trace rows since the last call, in order.

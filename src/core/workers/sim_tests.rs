@@ -5,7 +5,7 @@ use crate::grasping::grasp;
 use crate::objects::EMPTY;
 use crate::recognition::Model;
 use crate::recording::Store;
-use crate::scene::Scene;
+use crate::scene::{Accuracy, Scene};
 use crate::sensing::SensorLayout;
 use glam::DVec3;
 use std::path::PathBuf;
@@ -175,4 +175,42 @@ fn scenes_that_are_passed_over_leave_nothing_in_the_store() {
     }
     drop(watched);
     assert!(Store::open(&path).expect("opens").list(true).expect("lists").is_empty());
+}
+
+#[test]
+fn a_companion_brings_errors_and_the_gauge_both_numbers() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("trials.sqlite");
+    let watched = start(ball(), path.clone(), 1);
+    watched.tell(Command::SetErrorBand(true));
+    watched.tell(Command::SetSpeed(64.0));
+    watched.until(|s| s.status.error_band && s.status.finished);
+    let rows: Vec<TraceRow> = watched.worker.rows().collect();
+    let banded: Vec<&TraceRow> = rows.iter().filter(|row| row.grasp == rows[rows.len() - 1].grasp).collect();
+    assert_eq!(banded.len(), 120);
+    assert!(banded.iter().all(|row| row.errors.len() == row.values.len()));
+    let largest = banded.iter().map(|row| row.errors[0]).fold(0.0, f32::max);
+    assert!(largest > 1e-3 && largest < 1.0, "{largest} 1/m");
+    let before = loop {
+        match watched.worker.accuracy() {
+            Some(measured) => break measured,
+            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the gauge is alive"),
+        }
+    };
+    assert_eq!(before.scene, ball());
+    let mut finer = ball();
+    finer.solver.accuracy = Accuracy::Tolerance(1e-5);
+    watched.tell(Command::SetScene(Box::new(finer.clone())));
+    let after = loop {
+        match watched.worker.accuracy().filter(|measured| measured.scene == finer) {
+            Some(measured) => break measured,
+            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the gauge is alive"),
+        }
+    };
+    assert!(after.cost.error.curvature_per_m < 0.5 * before.cost.error.curvature_per_m);
+    assert!(after.cost.cpu_ms > 0.0 && after.cost.times_real_time > 0.0);
+    drop(watched);
+    let store = Store::open(&path).expect("opens");
+    let object = ball().load_object().expect("loads");
+    assert!(store.load(1).expect("whole") == grasp(&ball(), object.as_ref(), 0), "the trial is the same");
 }

@@ -1,0 +1,119 @@
+//! The accuracy dial: a named time step or a tolerance, and beside it what it costs and what error it leaves.
+
+use super::actions::Action;
+use super::panels::PanelContext;
+use egui::{RichText, Slider, Ui};
+use palpate_core::scene::{Accuracy, Integrator, Scene};
+use palpate_core::units::three_digits;
+use palpate_core::workers::Command;
+
+/// Where the slider stands when a tolerance is first asked for.
+const FIRST_TOLERANCE: f64 = 1e-4;
+/// What the slider spans: above, the longest step is as far as from sample to sample; below, a grasp takes longer to
+/// compute than it lasts.
+const SLIDER: std::ops::RangeInclusive<f64> = 1e-7..=1e-2;
+
+/// The rows of the dial, in a grid of two columns.
+pub(super) fn rows(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    steps_row(ui, scene);
+    tolerance_row(ui, scene);
+    method_row(ui, scene);
+    band_row(ui, context, actions);
+    measured_rows(ui, context);
+}
+
+fn steps_row(ui: &mut Ui, scene: &mut Scene) {
+    let accuracy = &mut scene.solver.accuracy;
+    let tolerance = accuracy.tolerance().unwrap_or(FIRST_TOLERANCE);
+    let all = [
+        (Accuracy::Draft, "draft, 1/150 s"),
+        (Accuracy::Standard, "standard, 1/300 s"),
+        (Accuracy::Reference, "reference, 1/9600 s"),
+        (Accuracy::Tolerance(tolerance), "to a tolerance"),
+    ];
+    choice(ui, "time step", accuracy, &all);
+}
+
+fn tolerance_row(ui: &mut Ui, scene: &mut Scene) {
+    let Some(mut tolerance) = scene.solver.accuracy.tolerance() else { return };
+    let label = ui.label("tolerance").on_hover_text(
+        "Largest estimated error of one step: joint angles and turn of the object in radians, fingertips and object as \
+         shares of the finger's length",
+    );
+    let slider = Slider::new(&mut tolerance, SLIDER)
+        .logarithmic(true)
+        .clamping(egui::SliderClamping::Edits)
+        .custom_formatter(|value, _| format!("{value:.0e}"))
+        .custom_parser(|text| text.trim().parse().ok());
+    if ui.add(slider).labelled_by(label.id).changed() {
+        // One digit is as fine as a tolerance is meant.
+        let rounded = format!("{tolerance:.0e}").parse().unwrap_or(tolerance);
+        scene.solver.accuracy = Accuracy::Tolerance(rounded);
+    }
+    ui.end_row();
+}
+
+fn method_row(ui: &mut Ui, scene: &mut Scene) {
+    let all = [
+        (Integrator::Auto, "automatic"),
+        (Integrator::Euler, "Euler, 1st order"),
+        (Integrator::Sdirk2, "SDIRK2, 2nd order"),
+    ];
+    choice(ui, "method", &mut scene.solver.integrator, &all);
+}
+
+fn band_row(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let mut shown = context.snapshot.is_some_and(|snapshot| snapshot.status.error_band);
+    let label = ui.label("error band").on_hover_text(
+        "A finer simulation runs along; the plots show how far the curves may be from the exact solution. Begins the \
+         grasp anew",
+    );
+    if ui.add(egui::Checkbox::without_text(&mut shown)).labelled_by(label.id).changed() {
+        actions.push(Action::Simulation(Command::SetErrorBand(shown)));
+    }
+    ui.end_row();
+}
+
+/// What the accuracy costs and leaves, once it has been measured.
+fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
+    let measured = context.accuracy.filter(|measured| measured.scene == *context.scene);
+    let mut row = |name: &str, value: Option<String>, hover: &str| {
+        ui.label(name).on_hover_text(hover);
+        match value {
+            Some(text) => ui.label(RichText::new(text).monospace()),
+            None => ui.weak("measuring .."),
+        };
+        ui.end_row();
+    };
+    let cost = measured.map(|m| &m.cost);
+    row(
+        "cost",
+        cost.map(|c| format!("{} ms CPU", three_digits(c.cpu_ms))),
+        "CPU time of one whole grasp on one thread",
+    );
+    row("", cost.map(|c| format!("{}× real time", three_digits(c.times_real_time))), "Simulated time over CPU time");
+    let hover = "Estimated numerical error over the grasp, root mean square of the band's half-width";
+    let error = |size: f64, unit: &str, share: f64| {
+        format!("±{} {unit}, {} %", three_digits(size), three_digits(share * 100.0))
+    };
+    let errors = cost.map(|c| &c.error);
+    row("curvature error", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
+    row("pressure error", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
+    row("force error", errors.map(|e| error(e.force_n, "N", e.force_share)), hover);
+}
+
+/// A choice by name, as a row of a grid.
+pub(super) fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
+    let label = ui.label(name);
+    let shown = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
+    egui::ComboBox::from_id_salt(name)
+        .selected_text(shown)
+        .show_ui(ui, |ui| {
+            for (each, text) in all {
+                ui.selectable_value(value, *each, *text);
+            }
+        })
+        .response
+        .labelled_by(label.id);
+    ui.end_row();
+}
