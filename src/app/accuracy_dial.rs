@@ -45,6 +45,8 @@ fn tolerance_row(ui: &mut Ui, scene: &mut Scene) {
         .clamping(egui::SliderClamping::Edits)
         .custom_formatter(|value, _| format!("{value:.0e}"))
         .custom_parser(|text| text.trim().parse().ok());
+    // Narrow, so that a narrow panel holds it with its number.
+    ui.spacing_mut().slider_width = 60.0;
     if ui.add(slider).labelled_by(label.id).changed() {
         // One digit is as fine as a tolerance is meant.
         let rounded = format!("{tolerance:.0e}").parse().unwrap_or(tolerance);
@@ -93,13 +95,12 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
     );
     row("", cost.map(|c| format!("{}× real time", three_digits(c.times_real_time))), "Simulated time over CPU time");
     let hover = "Estimated numerical error over the grasp, root mean square of the band's half-width";
-    let error = |size: f64, unit: &str, share: f64| {
-        format!("±{} {unit}, {} %", three_digits(size), three_digits(share * 100.0))
-    };
+    let error =
+        |size: f64, unit: &str, share: f64| format!("{} {unit}, {} %", three_digits(size), three_digits(share * 100.0));
     let errors = cost.map(|c| &c.error);
-    row("curvature error", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
-    row("pressure error", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
-    row("force error", errors.map(|e| error(e.force_n, "N", e.force_share)), hover);
+    row("± curvature", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
+    row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
+    row("± force", errors.map(|e| error(e.force_n, "N", e.force_share)), hover);
 }
 
 /// A choice by name, as a row of a grid.

@@ -11,9 +11,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     let mut scene = context.scene.clone();
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         section(ui, "Object", true, |ui| object_ui(ui, &mut scene, context));
+        section(ui, "Accuracy", true, |ui| solver_ui(ui, &mut scene, context, actions));
         section(ui, "Gripper pose", true, |ui| pose_ui(ui, &mut scene));
         section(ui, "Programme", true, |ui| programme_ui(ui, &mut scene));
-        section(ui, "Accuracy", true, |ui| solver_ui(ui, &mut scene, context, actions));
         section(ui, "Finger", false, |ui| finger_ui(ui, &mut scene));
         section(ui, "Pad", false, |ui| pad_ui(ui, &mut scene));
         section(ui, "Support", false, |ui| support_ui(ui, &mut scene));

@@ -7,6 +7,9 @@
 //! within a tenth of a second on either side, and a factor for what the theory leaves out. How often it covers the truth
 //! is measured by a test.
 //!
+//! Where a free object may as well slip one way as the other, simulation and companion may end in different grasps; the
+//! band then is as wide as these are apart, and does not shrink with the step.
+//!
 //! The band knows only the error of integration. How far the equations are from a real gripper is another question.
 
 use super::run::prepare_companion;
