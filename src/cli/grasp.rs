@@ -113,7 +113,7 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
         warn(warning);
     }
     let duration = scene.timing.duration_s;
-    let held = if scene.object.fixed { "held in place" } else { "resting freely" };
+    let held = if scene.holds_object() { "held in place" } else { "resting freely" };
     say(format!("object        {}, {held}", summary.object))?;
     match summary.contact_onset_s {
         Some(onset) => say(format!("first contact {onset:.3} s"))?,

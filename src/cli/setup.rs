@@ -48,7 +48,9 @@ impl SceneArguments {
         if let Some(preset) = self.preset {
             scene.pose = preset.poses();
         }
-        scene.object.fixed |= self.fixed;
+        if self.fixed {
+            scene.set_object_fixed(true);
+        }
         Ok(scene.with_settings(&self.settings)?)
     }
 }

@@ -109,6 +109,38 @@ impl Default for Quality {
     }
 }
 
+/// One effect as a simulation took it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedEffect {
+    /// Its name in the scene's `[effects]`.
+    pub name: String,
+    /// What the scene says: `off`, `auto` or `on`.
+    pub setting: String,
+    /// Whether it was simulated.
+    pub on: bool,
+    /// How much the scene calls for it, without dimension; never infinite.
+    pub number: f64,
+    /// `auto` means on where the number is above this.
+    pub threshold: f64,
+    /// Why, in words.
+    pub reason: String,
+}
+
+/// Which effects a simulation takes into account and why; made once, when the scene is built.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Plan {
+    /// In the order in which effects are told; empty for trials from before there were effects.
+    pub effects: Vec<PlannedEffect>,
+}
+
+impl Plan {
+    /// Whether an effect is simulated. One that the plan does not have is not.
+    pub fn is_on(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name && effect.on)
+    }
+}
+
 /// What is known of a trial besides its frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialInfo {
@@ -125,6 +157,9 @@ pub struct TrialInfo {
     pub scene: String,
     /// Where the gripper was held.
     pub world_from_gripper: Pose,
+    /// Which effects were simulated; empty for a trial that was not, and for old ones.
+    #[serde(default)]
+    pub plan: Plan,
     /// How far it can be trusted.
     pub quality: Quality,
     /// What was guessed, mended or cut short.

@@ -27,6 +27,7 @@ const SEEN_BY_RENDER: [&str; 3] = ["geometry", "palette", "drawing"];
 /// Files of tests that stand beside the code.
 const TEST_FILES: &[&str] = &[
     "physics/closed_form.rs",
+    "physics/effects_tests.rs",
     "workers/sim_tests.rs",
     "recognition/conformance.rs",
     "recognition/network/gradients.rs",

@@ -92,8 +92,12 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
 }
 
 fn object_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>) {
+    let mut fixed = scene.holds_object();
+    choice(ui, "held", &mut fixed, &[(false, "resting freely"), (true, "fixed in place")]);
+    if fixed != scene.holds_object() {
+        scene.set_object_fixed(fixed);
+    }
     let object = &mut scene.object;
-    choice(ui, "held", &mut object.fixed, &[(false, "resting freely"), (true, "fixed in place")]);
     let card = context.snapshot.and_then(|s| s.object.as_deref());
     let mass = Number { name: "mass", unit: "g", factor: 1e3, range: [0.1, 5000.0], speed: 0.5 };
     automatic(ui, &mass, &mut object.mass, card.map_or(0.05, |c| c.mass));

@@ -28,7 +28,7 @@ impl PoseSampler {
         let lies_naturally = match scene.pose.faces {
             Faces::Nominal => false,
             Faces::Natural => true,
-            Faces::Any => !scene.object.fixed,
+            Faces::Any => !scene.holds_object(),
         };
         let natural = object.filter(|_| lies_naturally).map(natural_rotations).unwrap_or_default();
         Self { scene: scene.clone(), natural }
@@ -61,7 +61,7 @@ impl PoseSampler {
     /// The object's setup in the pose in which it was left; `None` where it is to be put down anew.
     fn left_behind(&self, object: &ObjectModel, frame: &Frame) -> Option<ObjectSetup> {
         let pose = frame.world_from_object?;
-        if self.scene.pose.between != Between::AsReleased || self.scene.object.fixed {
+        if self.scene.pose.between != Between::AsReleased || self.scene.holds_object() {
             return None;
         }
         let centre = pose.point(object.mass.centre);
@@ -95,7 +95,7 @@ impl PoseSampler {
             Faces::Natural | Faces::Any if !self.natural.is_empty() => {
                 lay(drawn, self.natural[random.random_range(0..self.natural.len())]);
             }
-            Faces::Any if self.scene.object.fixed => lay(drawn, random_rotation(random)),
+            Faces::Any if self.scene.holds_object() => lay(drawn, random_rotation(random)),
             Faces::Any | Faces::Nominal | Faces::Natural => {}
         }
     }

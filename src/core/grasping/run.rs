@@ -4,7 +4,7 @@ use crate::gripper::{BentFinger, Programme, Side};
 use crate::objects::ObjectModel;
 use crate::physics::Refinement;
 use crate::rig::{Event, Rig, SimRig};
-use crate::scene::Scene;
+use crate::scene::{Effect, Scene, Setting};
 use crate::trial::{Frame, Trial, TrialInfo};
 
 /// A grasp in progress on a rig.
@@ -39,6 +39,7 @@ fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refin
         collection: None,
         scene: scene.to_toml(),
         world_from_gripper: placement.world_from_gripper,
+        plan: rig.plan().clone(),
         quality: rig.quality(),
         warnings,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -146,9 +147,10 @@ impl<R: Rig> GraspRun<R> {
                  µs): try a larger tolerance"
             ));
         }
-        if let Some(t) = fingers_cross(scene, &self.frames) {
-            let text =
-                format!("the fingers pass through each other from {t:.2} s: contact between them is not simulated");
+        self.info.warnings.extend(self.rig.notes());
+        let passable = scene.effects.get(Effect::FingerContact) == Setting::Off;
+        if let Some(t) = fingers_cross(scene, &self.frames).filter(|_| passable) {
+            let text = format!("the fingers pass through each other from {t:.2} s: effects.finger-contact is off");
             self.info.warnings.push(text);
         }
         Trial { info: self.info, frames: self.frames }

@@ -21,6 +21,8 @@ pub struct Actuation {
     pub max_bar: f64,
     /// Resolution of the control box (bar): commands are multiples of it (paper, section IV-B).
     pub step_bar: f64,
+    /// Time in which the difference between line and chamber pressure falls to 1/e of itself (s); 0: at once.
+    pub filling_time: f64,
 }
 
 impl Default for Actuation {
@@ -28,7 +30,7 @@ impl Default for Actuation {
         // 0.06 N m at 1 bar bends the default finger by 0.143 rad per joint, 82 degrees in all, which is what
         // SoMo's calibrated finger does.
         let point = |bar: f64| TorquePoint { bar, torque: 0.06 * bar };
-        Self { curve: vec![point(0.0), point(1.5)], max_bar: 1.5, step_bar: 0.05 }
+        Self { curve: vec![point(0.0), point(1.5)], max_bar: 1.5, step_bar: 0.05, filling_time: 0.0 }
     }
 }
 

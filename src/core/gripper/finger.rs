@@ -27,6 +27,10 @@ pub struct Finger {
     pub damping_time: f64,
     /// Curvature at which the bellows close up and bending stops (1/m).
     pub curvature_limit: f64,
+    /// Share of each joint's stiffness that a lasting load relaxes away.
+    pub creep_share: f64,
+    /// Time in which that share falls to 1/e of itself at a held angle (s).
+    pub creep_time: f64,
 }
 
 impl Default for Finger {
@@ -40,6 +44,9 @@ impl Default for Finger {
             bending_stiffness: 4.2e-3,
             damping_time: 0.02, // tuned: a released finger settles within two swings, as silicone does
             curvature_limit: 60.0, // tuned: bellows of 10 mm pitch and 12 mm depth touch at a radius of about 17 mm
+            // Assumed, not measured: soft platinum silicones lose about a tenth of their stress over tens of seconds.
+            creep_share: 0.10,
+            creep_time: 30.0,
         }
     }
 }

@@ -7,35 +7,39 @@ use super::{Model, Placement, State, Workspace};
 use crate::geometry::Primitive;
 use crate::gripper::{Finger, PadLaw};
 use crate::objects::ObjectModel;
-use crate::scene::{Auto, Scene, SupportKind};
+use crate::scene::{Auto, Effect, Scene, Setting, SupportKind};
 use glam::DVec3;
 
-/// No gravity, no support, no object.
-fn bare(joints: usize) -> Scene {
+/// No gravity, no support, no object, and two fingers that know nothing of each other.
+pub(super) fn bare(joints: usize) -> Scene {
     let mut scene = Scene::default();
     scene.world.gravity = 0.0;
     scene.support.kind = SupportKind::None;
     scene.gripper.finger.joints = joints;
+    scene.effects.set(Effect::FingerContact, Setting::Off);
     scene
 }
 
-struct Run {
-    model: Model,
-    state: State,
-    ws: Workspace,
-    h: f64,
+pub(super) struct Run {
+    pub(super) model: Model,
+    pub(super) state: State,
+    pub(super) ws: Workspace,
+    pub(super) h: f64,
 }
 
 impl Run {
-    fn new(scene: &Scene, object: Option<&ObjectModel>, h: f64) -> Self {
+    pub(super) fn new(scene: &Scene, object: Option<&ObjectModel>, h: f64) -> Self {
         let placement = Placement::new(scene, object);
-        let model = Model::new(scene, object, &placement);
-        let state = State::new(&model, &placement);
+        Self::of(Model::new(scene, object, &placement), &placement, h)
+    }
+
+    pub(super) fn of(model: Model, placement: &Placement, h: f64) -> Self {
+        let state = State::new(&model, placement);
         let ws = Workspace::new(&model);
         Self { model, state, ws, h }
     }
 
-    fn steps(&mut self, count: usize, drive: &Drive) {
+    pub(super) fn steps(&mut self, count: usize, drive: &Drive) {
         for _ in 0..count {
             let report = step(&self.model, &mut self.state, &mut self.ws, drive, self.h).expect("finite");
             assert!(report.converged);
@@ -51,7 +55,7 @@ impl Run {
     }
 }
 
-fn torque(torque: f64) -> Drive {
+pub(super) fn torque(torque: f64) -> Drive {
     Drive { torque, ..Drive::default() }
 }
 

@@ -24,6 +24,8 @@ pub(super) enum Against {
     Object,
     /// A finger segment, or the object, against the world.
     World,
+    /// A finger segment against a segment of the other finger, counted as in [`Acting::Segment`].
+    Finger(u32),
 }
 
 /// Which body the contact acts on.

@@ -8,6 +8,7 @@
 //! axis, and by (s - t) (-n . u) along the surface normal n; apart, it is the same number below zero.
 
 use super::contact::{Acting, Against, Contact};
+use super::effects::{FingerContact, Fronts, OtherFinger, in_series};
 use super::model::{Body, Model};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
@@ -37,6 +38,7 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
     let h = workspace.step.h;
     let object = model.body.as_ref().map(|body| Solid::new(body, state));
     let (linear, angular) = state.body_velocity(model);
+    let fronts = fronts_of_near_fingers(model, workspace);
     for finger in 0..2 {
         let first_link = finger * (model.chain.joints + 1);
         for j in 0..=model.chain.joints {
@@ -53,11 +55,18 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
             let near_object = object.as_ref().filter(|o| o.distance(middle) < reach + against_object);
             let near_world =
                 !model.environment.is_empty() && model.environment.distance(middle) < reach + against_world;
-            if near_object.is_none() && !near_world {
+            let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
+                let margin = margin(workspace.step.h, speed + fastest[1 - finger]);
+                fronts.may_meet(model, finger, (&segment, model.chain.lengths[j]), margin).then_some(margin)
+            });
+            if near_object.is_none() && !near_world && against_finger.is_none() {
                 continue;
             }
-            let near =
-                Near { object: near_object.map(|o| (o, against_object)), world: near_world.then_some(against_world) };
+            let near = Near {
+                object: near_object.map(|o| (o, against_object)),
+                world: near_world.then_some(against_world),
+                finger: against_finger,
+            };
             detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment });
         }
     }
@@ -78,6 +87,8 @@ fn margin(h: f64, speed: f64) -> f64 {
 struct Near<'a> {
     object: Option<(&'a Solid<'a>, f64)>,
     world: Option<f64>,
+    /// The other finger.
+    finger: Option<f64>,
 }
 
 #[derive(Clone, Copy)]
@@ -102,16 +113,34 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
         };
         let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, margin));
         let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
-        let (hit, against) = match (on_object, on_world) {
-            (Some(object), Some(world)) if world.compression > object.compression => (world, Against::World),
-            (Some(object), _) => (object, Against::Object),
-            (None, Some(world)) => (world, Against::World),
-            (None, None) => continue,
+        let (mut hit, mut against) = match (on_object, on_world) {
+            (Some(object), Some(world)) if world.compression > object.compression => (Some(world), Against::World),
+            (Some(object), _) => (Some(object), Against::Object),
+            (None, world) => (world, Against::World),
         };
+        if let Some(margin) = near.finger {
+            let other = OtherFinger::opposite(model, &workspace.segments, place.finger);
+            if let Some(met) = ray.cast_finger(&other, margin) {
+                // What merely waits to touch gives way to everything else.
+                let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));
+                if met.compression > deepest {
+                    let first_link = (1 - place.finger) * (model.chain.joints + 1);
+                    against = Against::Finger((first_link + other.segment(met.point)) as u32);
+                    hit = Some(met);
+                }
+            }
+        }
+        let Some(hit) = hit else { continue };
+        workspace.fingers_meet |= matches!(against, Against::Finger(_));
         let site = place.finger * model.strands.all.len() + k;
         let mu = match against {
             Against::Object => model.pad_friction.on_object,
             Against::World => model.pad_friction.on_world,
+            Against::Finger(_) => model.pad_friction.on_pad,
+        };
+        let (stiffness, height) = match against {
+            Against::Finger(_) => in_series(strand.stiffness, strand.height),
+            _ => (strand.stiffness, strand.height),
         };
         let shear = local_axes * state.shear[site];
         workspace.contacts.push(Contact {
@@ -122,8 +151,8 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
             normal: hit.normal,
             compression: hit.compression,
             law: model.pad_law,
-            stiffness: strand.stiffness,
-            height: strand.height,
+            stiffness,
+            height,
             mu,
             limit: mu * state.expected_impulse(site, workspace.step.h),
             shear: shear - hit.normal * hit.normal.dot(shear),
@@ -131,6 +160,28 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
             change: DVec3::ZERO,
         });
     }
+}
+
+/// How far the fingers stand out towards each other, and the fastest segment of each (m/s); `None` where no segment of
+/// one can come near the other within the step, or where they pass through each other.
+fn fronts_of_near_fingers(model: &Model, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
+    workspace.fingers_meet = false;
+    if model.finger_contact == FingerContact::Never {
+        return None;
+    }
+    let links = model.chain.joints + 1;
+    let fastest = [0, 1].map(|finger| {
+        let speed = |j: usize| {
+            let link = finger * links + j;
+            let middle = workspace.segments[link].point(0.5 * model.chain.lengths[j], 0.0);
+            let arm = model.planes[finger].point(middle, 0.0) - workspace.reference;
+            let velocity = &workspace.spatial[link];
+            velocity.linear_at(arm).length() + velocity.angular.length() * model.strands.reach[j]
+        };
+        (0..links).map(speed).fold(0.0, f64::max)
+    });
+    let fronts = Fronts::new(model, &workspace.segments);
+    fronts.are_near(model, margin(workspace.step.h, fastest[0] + fastest[1])).then_some((fronts, fastest))
 }
 
 /// Axes in which a pad's shear is remembered: along the segment, across it, inward. Columns, in the gripper frame.
@@ -199,6 +250,10 @@ impl Ray {
         let environment = &model.environment;
         let (distance, normal) = (|p| environment.distance(p), |p| environment.normal(p));
         self.trace(self.foot, self.axis, margin, distance, normal)
+    }
+
+    fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
+        self.trace(self.foot, self.axis, margin, |p| other.distance(p), |p| other.normal(p))
     }
 
     /// Sphere tracing from `foot` along `axis`, both in the frame of the distance.

@@ -9,6 +9,8 @@
 //! v* carries torques, gravity and Coriolis forces. Springs, dampers and contacts are all taken at the *end* of the
 //! step, so that no stiffness, however large, makes a step unstable.
 //!
+//! What of all this a scene calls for is decided in [`effects`].
+//!
 //! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
 //! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
 //! long), [`Simulation`] (a grasp in time).
@@ -17,7 +19,11 @@ mod chain;
 #[cfg(test)]
 mod closed_form;
 mod contact;
+mod coupling;
 mod detect;
+pub mod effects;
+#[cfg(test)]
+mod effects_tests;
 mod energy;
 mod environment;
 mod integrator;

@@ -1,7 +1,8 @@
 //! A simulated grasp in time: steps on a clock of whole ticks, pressure in, frames out.
 
-use super::contact::Acting;
+use super::contact::{Acting, Against, Contact};
 use super::detect::detect;
+use super::effects::{FingerContact, OtherFinger};
 use super::integrator::Surroundings;
 use super::model::Model;
 use super::placement::Placement;
@@ -32,6 +33,8 @@ pub struct Simulation {
     /// Forces from outside; the torque in it is not used.
     pulls: Drive,
     stepper: Stepper,
+    /// The first step in which fingers that should not meet came near each other (its tick).
+    met_at: Option<u64>,
 }
 
 /// How much more finely than its scene asks for a simulation is computed.
@@ -90,6 +93,7 @@ impl Simulation {
             phase: Phase::Close,
             pulls: Drive::default(),
             stepper,
+            met_at: None,
         };
         (simulation, placement)
     }
@@ -138,7 +142,7 @@ impl Simulation {
 
     /// Advances by some ticks, within which nothing is sampled or commanded; reports the last step.
     pub fn advance_by(&mut self, ticks: u64) -> Result<StepReport, SimulationError> {
-        let drive = Drive { torque: self.actuation.torque(self.line_bar), ..self.pulls };
+        let drive = Drive { torque: self.actuation.torque(self.line_bar), line_bar: self.line_bar, ..self.pulls };
         let at_once = if self.stepper.is_controlled() { ticks } else { 1 };
         let mut report = StepReport::default();
         for _ in 0..ticks / at_once.max(1) {
@@ -150,6 +154,9 @@ impl Simulation {
                 seconds: self.clock.seconds(self.tick),
                 cause,
             })?;
+            if self.workspace.fingers_meet && self.met_at.is_none() {
+                self.met_at = Some(self.tick);
+            }
             self.tick += at_once;
         }
         Ok(report)
@@ -160,11 +167,18 @@ impl Simulation {
         step::lay_out(&self.model, &self.state, &mut self.workspace);
         segment_velocities(&self.model, &self.state.velocity, &mut self.workspace);
         detect(&self.model, &self.state, &mut self.workspace);
-        let on_finger = |c: &&super::contact::Contact| matches!(c.acting, Acting::Segment(_));
+        let on_finger = |c: &&Contact| matches!(c.acting, Acting::Segment(_));
         let contacts = self.workspace.contacts.iter().filter(on_finger);
         let deepest = contacts.map(|c| c.compression).fold(0.0, f64::max);
         self.workspace.contacts.clear();
         deepest
+    }
+
+    /// When, if ever, the fingers came so near each other that their contact, which `auto` had left out, was turned
+    /// on (s).
+    pub fn finger_contact_turned_on(&self) -> Option<f64> {
+        let guarded = self.model.finger_contact == FingerContact::Guarded;
+        self.met_at.filter(|_| guarded).map(|tick| self.clock.seconds(tick))
     }
 
     /// What a rig would sample now.
@@ -214,21 +228,44 @@ impl Simulation {
             };
             let (side, strand) = (contact.site as usize / strands.all.len(), contact.site as usize % strands.all.len());
             let (normal, tangential) = contact.force(self.workspace.step);
-            if strand >= strands.on_pad || normal <= 0.0 {
+            if normal <= 0.0 {
                 continue;
             }
             let force = contact.normal * normal + tangential;
-            let [along, across, inward] =
-                (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
-            loads.push(TaxelLoad {
-                taxel: (side * strands.on_pad + strand) as u16,
-                normal: -inward as f32,
-                along: along as f32,
-                across: across as f32,
-            });
+            if strand < strands.on_pad {
+                loads.push(self.taxel_load(side, strand, link, force));
+            }
+            if let Against::Finger(other) = contact.against {
+                let met = OtherFinger::opposite(&self.model, &self.workspace.segments, side);
+                if let Some(taxel) = met.taxel(contact.arm + self.workspace.reference) {
+                    loads.push(self.taxel_load(1 - side, taxel, other, -force));
+                }
+            }
         }
         loads.sort_by_key(|load| load.taxel);
+        if self.workspace.fingers_meet {
+            loads.dedup_by(|next, kept| {
+                let same = next.taxel == kept.taxel;
+                if same {
+                    kept.normal += next.normal;
+                    kept.along += next.along;
+                    kept.across += next.across;
+                }
+                same
+            });
+        }
         loads
+    }
+
+    fn taxel_load(&self, side: usize, taxel: usize, link: u32, force: DVec3) -> TaxelLoad {
+        let [along, across, inward] =
+            (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
+        TaxelLoad {
+            taxel: (side * self.model.strands.on_pad + taxel) as u16,
+            normal: -inward as f32,
+            along: along as f32,
+            across: across as f32,
+        }
     }
 
     /// Total force (N) and torque about its centre of mass (N m) that fingers and support exert on the object, in
@@ -240,8 +277,8 @@ impl Simulation {
             let on_acting = contact.normal * normal + tangential;
             let on_object = match (contact.acting, contact.against) {
                 (Acting::Object, _) => on_acting,
-                (Acting::Segment(_), super::contact::Against::Object) => -on_acting,
-                (Acting::Segment(_), super::contact::Against::World) => continue,
+                (Acting::Segment(_), Against::Object) => -on_acting,
+                (Acting::Segment(_), Against::World | Against::Finger(_)) => continue,
             };
             total = total.plus(&Spatial { linear: on_object, angular: contact.arm.cross(on_object) });
         }
@@ -254,8 +291,11 @@ impl Simulation {
         let mut extremes = (0.0f64, 0.0f64);
         for contact in &self.workspace.contacts {
             let (normal, tangential) = contact.force(self.workspace.step);
-            if matches!(contact.acting, Acting::Segment(_)) {
-                extremes.0 = extremes.0.max(contact.compression);
+            match (contact.acting, contact.against) {
+                // Both pads share it.
+                (_, Against::Finger(_)) => extremes.0 = extremes.0.max(0.5 * contact.compression),
+                (Acting::Segment(_), _) => extremes.0 = extremes.0.max(contact.compression),
+                (Acting::Object, _) => {}
             }
             if normal > 1e-3 && contact.mu > 0.0 {
                 extremes.1 = extremes.1.max(tangential.length() / (contact.mu * normal));
@@ -267,7 +307,8 @@ impl Simulation {
     /// Largest joint torque not balanced by springs, gravity and contacts, as a share of the actuation torque.
     fn static_residual(&self) -> f64 {
         let (model, ws) = (&self.model, &self.workspace);
-        let torque = self.actuation.torque(self.line_bar);
+        let bar = if model.chamber.is_some() { self.state.chamber_bar } else { self.line_bar };
+        let torque = self.actuation.torque(bar);
         if torque == 0.0 || self.tick == 0 {
             return 0.0;
         }
@@ -281,22 +322,25 @@ impl Simulation {
         for k in 0..2 * n {
             // At rest r holds h (torque - k q - gravity).
             let known = scratch.rhs[k] / ws.step.h;
-            let from_contacts: f64 = ws
-                .contacts
-                .iter()
-                .filter_map(|contact| match contact.acting {
-                    Acting::Segment(link) if beyond_joint(link as usize, k, n) => {
-                        let (normal, tangential) = contact.force(ws.step);
-                        let linear = contact.normal * normal + tangential;
-                        Some(ws.columns[k].dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
-                    }
-                    _ => None,
-                })
-                .sum();
+            let on_joint = |contact: &Contact| self.torque_on_joint(contact, k);
+            let from_contacts: f64 = ws.contacts.iter().filter_map(on_joint).sum();
             let limit = model.chain.limit_torque(self.state.q[k]).0;
             largest = largest.max((known + from_contacts - limit).abs());
         }
         largest / torque.abs()
+    }
+
+    /// Torque of a contact on joint `k` (N m), where it acts beyond it.
+    fn torque_on_joint(&self, contact: &Contact, k: usize) -> Option<f64> {
+        let n = self.model.chain.joints;
+        let sign = match (contact.acting, contact.against) {
+            (Acting::Segment(link), _) if beyond_joint(link as usize, k, n) => 1.0,
+            (_, Against::Finger(link)) if beyond_joint(link as usize, k, n) => -1.0,
+            _ => return None,
+        };
+        let (normal, tangential) = contact.force(self.workspace.step);
+        let linear = (contact.normal * normal + tangential) * sign;
+        Some(self.workspace.columns[k].dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
     }
 
     /// Kinetic, elastic and potential energy (J), the latter relative to the gripper's frame.

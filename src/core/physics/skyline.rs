@@ -18,6 +18,11 @@ impl Skyline {
         Self { size, values: vec![0.0; size * size], first }
     }
 
+    /// Lets the given rows begin at another column. Their entries have to be filled anew.
+    pub(super) fn begin_rows(&mut self, rows: std::ops::Range<usize>, first: usize) {
+        self.first[rows].fill(first);
+    }
+
     /// The stored part of row `i`: columns `first..=i`, and where it begins.
     #[inline]
     pub(super) fn row_mut(&mut self, i: usize) -> (usize, &mut [f64]) {

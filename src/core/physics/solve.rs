@@ -11,6 +11,7 @@
 //! everything moves with column S_i, so that H_ij = S_i' (sum of blocks from the tip to the farther joint) S_j.
 
 use super::contact::{Acting, Against, Contact};
+use super::coupling::{fill_coupling, prepare_coupling};
 use super::model::Model;
 use super::workspace::{Block, PerLink, Spatial, Workspace};
 use glam::DVec3;
@@ -31,6 +32,7 @@ const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
     let mut report = SolveReport::default();
     let mut passes = 0;
+    prepare_coupling(model, ws);
     multiply_by_a(model, ws, velocity, Product::OfVelocity);
     relative_velocities(model, velocity, ws, Product::OfVelocity);
     loop {
@@ -55,6 +57,7 @@ pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut 
         }
         report.iterations += 1;
         fill_hessian(model, q, velocity, ws);
+        fill_coupling(model, ws);
         ws.hessian.factorise();
         for (d, g) in ws.direction.iter_mut().zip(&ws.gradient) {
             *d = -g;
@@ -128,6 +131,7 @@ fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, which: Prod
         let relative = match contact.against {
             Against::Object => acting - object.linear_at(contact.arm),
             Against::World => acting,
+            Against::Finger(other) => acting - ws.spatial[other as usize].linear_at(contact.arm),
         };
         match which {
             Product::OfVelocity => contact.velocity = relative,
@@ -159,7 +163,7 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
     let n = model.chain.joints;
     let mut on_object = Spatial::default();
     for wrench in &mut ws.wrenches {
-        *wrench = PerLink { object: Spatial::default(), world: Spatial::default() };
+        *wrench = PerLink::all(Spatial::default());
     }
     for contact in &ws.contacts {
         let linear = contact.gradient(ws.step, contact.velocity);
@@ -172,6 +176,12 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
             (Acting::Segment(link), Against::World) => {
                 let sum = &mut ws.wrenches[link as usize].world;
                 *sum = sum.plus(&wrench);
+            }
+            (Acting::Segment(link), Against::Finger(other)) => {
+                let sum = &mut ws.wrenches[link as usize].world;
+                *sum = sum.plus(&wrench);
+                let back = &mut ws.wrenches[other as usize].met;
+                *back = back.plus(&wrench.scaled(-1.0));
             }
             (Acting::Object, _) => on_object = on_object.plus(&wrench),
         }
@@ -186,6 +196,9 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
             let k = finger * n + i;
             let link = &ws.wrenches[finger * (n + 1) + i + 1];
             beyond = beyond.plus(&link.object).plus(&link.world);
+            if ws.fingers_meet {
+                beyond = beyond.plus(&link.met);
+            }
             on_object = on_object.plus(&link.object.scaled(-1.0));
             let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
             let from_contacts = ws.columns[k].dot(&beyond) + limit;
@@ -242,9 +255,12 @@ fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) 
             let link = &ws.blocks[finger * (n + 1) + i + 1];
             beyond.add(&link.object);
             beyond.add(&link.world);
+            if ws.fingers_meet {
+                beyond.add(&link.met);
+            }
             let moved = beyond.times(&ws.columns[k]);
             let (first, row) = ws.hessian.row_mut(k);
-            debug_assert_eq!(first, finger * n, "fingers are separate blocks");
+            let row = &mut row[finger * n - first..];
             let matrix = &ws.finger_matrix[finger * n * n + i * n..];
             for j in 0..=i {
                 row[j] = matrix[j] + ws.columns[finger * n + j].dot(&moved);
@@ -278,7 +294,7 @@ fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) 
 /// Sums contact Hessians per segment; returns the sum that acts on the object.
 fn sum_blocks(ws: &mut Workspace) -> Block {
     for block in &mut ws.blocks {
-        *block = PerLink { object: Block::ZERO, world: Block::ZERO };
+        *block = PerLink::all(Block::ZERO);
     }
     let mut on_object = Block::ZERO;
     for contact in &ws.contacts {
@@ -289,6 +305,10 @@ fn sum_blocks(ws: &mut Workspace) -> Block {
             }
             (Acting::Segment(link), Against::World) => {
                 ws.blocks[link as usize].world.add_at(&hessian, contact.arm);
+            }
+            (Acting::Segment(link), Against::Finger(other)) => {
+                ws.blocks[link as usize].world.add_at(&hessian, contact.arm);
+                ws.blocks[other as usize].met.add_at(&hessian, contact.arm);
             }
             (Acting::Object, _) => on_object.add_at(&hessian, contact.arm),
         }

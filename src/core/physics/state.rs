@@ -1,5 +1,6 @@
 //! What changes during a simulation. All of it can be saved and restored; scratch memory is elsewhere.
 
+use super::effects::went_on;
 use super::model::Model;
 use super::placement::Placement;
 use crate::geometry::Pose;
@@ -22,6 +23,11 @@ pub struct State {
     pub(super) lag: Vec<f64>,
     /// Length of that step (s); zero before the first.
     pub(super) lag_h: f64,
+    /// Pressure in the chambers, and in the line that filled them last (bar), where chambers lag behind the line.
+    pub(super) chamber_bar: f64,
+    pub(super) filled_from_bar: f64,
+    /// Angle by which each joint has crept (rad); empty where joints do not.
+    pub(super) crept: Vec<f64>,
 }
 
 impl State {
@@ -41,6 +47,9 @@ impl State {
             shear: vec![DVec3::ZERO; model.sites()],
             lag: vec![0.0; model.sites()],
             lag_h: 0.0,
+            chamber_bar: 0.0,
+            filled_from_bar: 0.0,
+            crept: vec![0.0; if model.relaxation.is_some() { model.joint_count() } else { 0 }],
         }
     }
 
@@ -54,13 +63,16 @@ impl State {
 
     /// Becomes another state of the same model, without allocating.
     pub(super) fn copy_from(&mut self, other: &Self) {
-        let Self { q, velocity, body, shear, lag, lag_h } = other;
+        let Self { q, velocity, body, shear, lag, lag_h, chamber_bar, filled_from_bar, crept } = other;
         self.q.copy_from_slice(q);
         self.velocity.copy_from_slice(velocity);
         self.body = *body;
         self.shear.copy_from_slice(shear);
         self.lag.copy_from_slice(lag);
         self.lag_h = *lag_h;
+        self.chamber_bar = *chamber_bar;
+        self.filled_from_bar = *filled_from_bar;
+        self.crept.copy_from_slice(crept);
     }
 
     /// Goes on in a straight line, by `share` of the way from `start` to here. Normal impulses are no path and stay.
@@ -68,6 +80,10 @@ impl State {
         for (now, before) in self.q.iter_mut().zip(&start.q).chain(self.velocity.iter_mut().zip(&start.velocity)) {
             *now += share * (*now - before);
         }
+        for (now, before) in self.crept.iter_mut().zip(&start.crept) {
+            *now += share * (*now - before);
+        }
+        self.chamber_bar = went_on(start.chamber_bar, self.chamber_bar, self.filled_from_bar, share);
         self.body.position += (self.body.position - start.body.position) * share;
         let turn = rotation_vector(self.body.rotation * start.body.rotation.inverse());
         self.body.rotation = (DQuat::from_scaled_axis(turn * share) * self.body.rotation).normalize();
@@ -125,6 +141,11 @@ impl State {
     /// that is the gyroscopic torque, but the spin can never exceed |L| over the least moment of inertia, however
     /// long the step: an explicit torque flung light splinters out of the range of numbers.
     pub(super) fn integrate(&mut self, model: &Model, h: f64) {
+        if let Some(relaxation) = &model.relaxation {
+            for ((crept, q), rate) in self.crept.iter_mut().zip(&self.q).zip(&self.velocity) {
+                *crept = relaxation.crept(h, *q, *rate, *crept);
+            }
+        }
         for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
             *q += h * rate;
         }

@@ -49,8 +49,10 @@ pub struct NotFinite {
 /// What drives a step from outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drive {
-    /// Actuation torque on every joint (N m).
+    /// Actuation torque on every joint (N m), where the chambers do not lag.
     pub torque: f64,
+    /// Line pressure (bar), where they do.
+    pub line_bar: f64,
     /// Force pulling at each fingertip, left and right, in the gripper frame (N).
     pub tip_force: [DVec3; 2],
     /// Force pulling at the object's centre of mass, in the gripper frame (N).
@@ -68,7 +70,8 @@ pub fn step(
 ) -> Result<StepReport, NotFinite> {
     ws.step.h = h;
     lay_out(model, state, ws);
-    gather_dynamics(model, state, ws, drive);
+    let drive = fill_chamber(model, state, drive, h);
+    gather_dynamics(model, state, ws, &drive);
     segment_velocities(model, &state.velocity, ws);
     detect(model, state, ws);
     let solved = minimise(model, &state.q, &mut state.velocity, ws);
@@ -86,6 +89,18 @@ pub fn step(
             contacts: ws.contacts.len() as u32,
             friction_residual,
         }),
+    }
+}
+
+/// The drive at the end of the step, where chambers take time to fill.
+fn fill_chamber(model: &Model, state: &mut State, drive: &Drive, h: f64) -> Drive {
+    match &model.chamber {
+        Some(chamber) => {
+            state.filled_from_bar = drive.line_bar;
+            state.chamber_bar = chamber.filled(state.chamber_bar, drive.line_bar, h);
+            Drive { torque: chamber.torque(state.chamber_bar), ..*drive }
+        }
+        None => *drive,
     }
 }
 
@@ -116,13 +131,19 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
         let matrix = &mut ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
         let sign = model.planes[finger].sign;
         let in_plane = |v: DVec3| DVec2::new(sign * v.x, -v.z);
-        let gravity = in_plane(model.gravity);
+        let gravity = in_plane(model.finger_gravity);
         let pull = in_plane(drive.tip_force[finger]);
         let tip = segments[n].point(model.chain.lengths[n], 0.0);
         let (q, qd) = (&state.q[joints.clone()], &state.velocity[joints.clone()]);
-        model.chain.inertia(segments, matrix);
-        model.chain.bias(segments, qd, gravity, &mut ws.accelerations, &mut ws.bias);
-        let rhs = &mut ws.rhs[joints];
+        let rates = if model.finger_inertia {
+            model.chain.inertia(segments, matrix);
+            qd
+        } else {
+            matrix.fill(0.0);
+            &ws.still
+        };
+        model.chain.bias(segments, rates, gravity, &mut ws.accelerations, &mut ws.bias);
+        let rhs = &mut ws.rhs[joints.clone()];
         for (i, row) in matrix.chunks_exact(n).enumerate() {
             let momentum: f64 = row.iter().zip(qd).map(|(a, b)| a * b).sum();
             let load = drive.torque + turning(tip - segments[i + 1].start, pull);
@@ -131,12 +152,15 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
         for i in 0..n {
             matrix[i * n + i] += h * model.chain.damping + h * h * model.chain.stiffness;
         }
+        if let Some(relaxation) = &model.relaxation {
+            relaxation.soften(h, q, &state.crept[joints], matrix, rhs);
+        }
     }
     if let Some(body) = model.free_body() {
         let (linear, angular) = state.body_velocity(model);
         let r = state.body.matrix();
         ws.body_inertia = r * body.inertia * r.transpose();
-        let known_linear = (linear + model.gravity * h) * body.mass + drive.object_force * h;
+        let known_linear = (linear + model.object_gravity * h) * body.mass + drive.object_force * h;
         // No gyroscopic torque: `State::integrate` carries the angular momentum over, which amounts to it.
         let known_angular = ws.body_inertia * angular;
         ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());

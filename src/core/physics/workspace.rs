@@ -68,11 +68,20 @@ impl Block {
     }
 }
 
-/// What contacts ask of one segment: against the object, which couples to it, and against the world.
+/// What contacts ask of one segment: against the object, which couples to it, against the world or the other finger,
+/// and from the other finger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PerLink<T> {
     pub(super) object: T,
     pub(super) world: T,
+    /// Found by the other finger's strands. Kept apart, so that both fingers add up alike and mirrored scenes stay so.
+    pub(super) met: T,
+}
+
+impl<T: Copy> PerLink<T> {
+    pub(super) fn all(value: T) -> Self {
+        Self { object: value, world: value, met: value }
+    }
 }
 
 /// Scratch memory; see the fields for what each stage leaves.
@@ -92,6 +101,8 @@ pub struct Workspace {
     // dynamics
     pub(super) accelerations: Vec<DVec2>,
     pub(super) bias: Vec<f64>,
+    /// Rates of a finger without inertia, as its bias forces see them: zero.
+    pub(super) still: Vec<f64>,
     /// A = M + h C + h² K of both fingers, one N x N matrix after the other.
     pub(super) finger_matrix: Vec<f64>,
     /// Inertia of the object in the gripper frame (kg m²).
@@ -100,6 +111,8 @@ pub struct Workspace {
     pub(super) rhs: Vec<f64>,
     // contacts
     pub(super) contacts: Vec<Contact>,
+    /// True while any of them is between the fingers.
+    pub(super) fingers_meet: bool,
     pub(super) wrenches: Vec<PerLink<Spatial>>,
     pub(super) blocks: Vec<PerLink<Block>>,
     // Newton
@@ -108,13 +121,15 @@ pub struct Workspace {
     pub(super) a_velocity: Vec<f64>,
     pub(super) a_direction: Vec<f64>,
     pub(super) hessian: Skyline,
+    /// What the contacts between the fingers ask of each segment of the right finger per unit rate of each joint of
+    /// the left one, `N x (N + 1)`.
+    pub(super) coupling: Vec<Spatial>,
 }
 
 impl Workspace {
     /// Memory for a step of the model; its length is set as it is taken.
     pub fn new(model: &Model) -> Self {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
-        let zero = PerLink { object: Spatial::default(), world: Spatial::default() };
         let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {
             step: ContactStep { h: 0.0, dissipation: model.dissipation },
@@ -124,17 +139,20 @@ impl Workspace {
             spatial: vec![Spatial::default(); links],
             accelerations: vec![DVec2::ZERO; n + 1],
             bias: vec![0.0; n],
+            still: vec![0.0; n],
             finger_matrix: vec![0.0; 2 * n * n],
             body_inertia: DMat3::ZERO,
             rhs: vec![0.0; unknowns],
             contacts: Vec::with_capacity(model.sites()),
-            wrenches: vec![zero; links],
-            blocks: vec![PerLink { object: Block::ZERO, world: Block::ZERO }; links],
+            fingers_meet: false,
+            wrenches: vec![PerLink::all(Spatial::default()); links],
+            blocks: vec![PerLink::all(Block::ZERO); links],
             gradient: vec![0.0; unknowns],
             direction: vec![0.0; unknowns],
             a_velocity: vec![0.0; unknowns],
             a_direction: vec![0.0; unknowns],
             hessian: Skyline::new((0..unknowns).map(first).collect()),
+            coupling: vec![Spatial::default(); n * (n + 1)],
         }
     }
 }

@@ -275,7 +275,7 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     let drawn_as = PoseSpread { between: Between::default(), ..scene.pose.clone() };
     let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
     let signals = view.signals(&trial, &scene).map_err(|cause| DatasetError::Layout { cause })?;
-    Ok((signals, Origin::Simulated { preset, fixed: scene.object.fixed }))
+    Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
 }
 
 impl View {

@@ -23,9 +23,9 @@ const CHOOSE_INCOMING: &str = "
 
 const COPY_TRIALS: &str = "
     INSERT INTO main.trials (uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings,
-        version, samples, deleted, collection, size, shape)
+        version, samples, deleted, collection, size, shape, plan)
     SELECT uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings, version, samples,
-        deleted, collection, size, shape
+        deleted, collection, size, shape, plan
     FROM other.trials WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id;
 ";
 

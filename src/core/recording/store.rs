@@ -32,7 +32,7 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 3] = [
+const MIGRATIONS: [&str; 4] = [
     TABLES,
     "ALTER TABLE trials ADD COLUMN collection TEXT;
      CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
@@ -43,6 +43,7 @@ const MIGRATIONS: [&str; 3] = [
         channels TEXT NOT NULL,
         samples BLOB NOT NULL
      );",
+    "ALTER TABLE trials ADD COLUMN plan TEXT NOT NULL DEFAULT '[]';",
 ];
 
 const TABLES: &str = "
@@ -311,17 +312,17 @@ impl Store {
 
     fn load_info(&self, id: TrialId) -> Result<TrialInfo, StoreError> {
         let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
-                   collection FROM trials WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 3], String, Option<String>);
+                   collection, plan FROM trials WHERE id = ?1 AND deleted IS NULL";
+        type Columns = (String, String, i64, String, [String; 4], String, Option<String>);
         let found: Option<Columns> = self
             .connection
             .query_row(sql, [id], |row| {
-                let texts = [row.get(4)?, row.get(5)?, row.get(6)?];
+                let texts = [row.get(4)?, row.get(5)?, row.get(6)?, row.get(9)?];
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, texts, row.get(7)?, row.get(8)?))
             })
             .optional()
             .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, [pose, quality, warnings], version, collection)) = found else {
+        let Some((rig, object, seed, scene, [pose, quality, warnings, plan], version, collection)) = found else {
             return Err(self.no_trial(id));
         };
         let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
@@ -332,6 +333,7 @@ impl Store {
             collection,
             scene,
             world_from_gripper: serde_json::from_str::<Pose>(&pose).map_err(bad)?,
+            plan: serde_json::from_str(&plan).map_err(bad)?,
             quality: serde_json::from_str(&quality).map_err(bad)?,
             warnings: serde_json::from_str(&warnings).map_err(bad)?,
             version,
@@ -418,8 +420,8 @@ fn is_collected(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Re
 
 fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<TrialId> {
     transaction.execute(
-        "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection, \
+         plan) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
         params![
             info.rig,
             info.object,
@@ -430,6 +432,7 @@ fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Res
             json(&info.warnings),
             info.version,
             info.collection,
+            json(&info.plan),
         ],
     )?;
     Ok(transaction.last_insert_rowid())

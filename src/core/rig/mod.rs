@@ -46,4 +46,9 @@ pub trait Rig {
 
     /// How far its frames so far can be trusted.
     fn quality(&self) -> Quality;
+
+    /// What else should be known of its frames so far, in sentences.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
 }

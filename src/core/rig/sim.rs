@@ -5,7 +5,7 @@ use crate::gripper::Phase;
 use crate::objects::ObjectModel;
 use crate::physics::{Placement, Refinement, Simulation};
 use crate::scene::Scene;
-use crate::trial::{Frame, Quality};
+use crate::trial::{Frame, Plan, Quality};
 use glam::DVec3;
 
 /// A simulation on its clock.
@@ -39,6 +39,11 @@ impl SimRig {
     /// How deep the open fingers stand inside the object or its support before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         self.simulation.starting_overlap()
+    }
+
+    /// Which effects are simulated, and why.
+    pub fn plan(&self) -> &Plan {
+        self.simulation.model().plan()
     }
 
     /// Pulls at the object (N, world axes) from now on.
@@ -87,6 +92,12 @@ impl Rig for SimRig {
             quality.static_residual = at_hold;
         }
         quality
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let turned_on = self.simulation.finger_contact_turned_on();
+        let note = |t| format!("finger-contact was turned on at {t:.2} s: the fingers came near each other after all");
+        turned_on.map(note).into_iter().collect()
     }
 }
 

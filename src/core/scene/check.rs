@@ -93,6 +93,8 @@ impl Scene {
         ranges.number("gripper.finger.bending_stiffness", finger.bending_stiffness, 1e-9..=1e6);
         ranges.number("gripper.finger.damping_time", finger.damping_time, 0.0..=100.0);
         ranges.number("gripper.finger.curvature_limit", finger.curvature_limit, 1e-3..=1e4);
+        ranges.number("gripper.finger.creep_share", finger.creep_share, 0.0..=0.99);
+        ranges.number("gripper.finger.creep_time", finger.creep_time, 1e-3..=1e6);
         let pad = &self.gripper.pad;
         ranges.number("gripper.pad.thickness", pad.thickness, 1e-4..=0.5);
         ranges.number("gripper.pad.modulus", pad.modulus, 1.0..=1e12);
@@ -108,6 +110,7 @@ impl Scene {
         let actuation = &self.gripper.actuation;
         ranges.number("gripper.actuation.max_bar", actuation.max_bar, 1e-3..=100.0);
         ranges.number("gripper.actuation.step_bar", actuation.step_bar, 1e-6..=actuation.max_bar);
+        ranges.number("gripper.actuation.filling_time", actuation.filling_time, 0.0..=100.0);
         let points = small_count(actuation.curve.len());
         ranges.count("gripper.actuation.curve (its number of points)", points, 2..=1000);
         for point in &actuation.curve {

@@ -6,12 +6,14 @@
 mod accuracy;
 mod auto;
 mod check;
+mod effects;
 mod file;
 mod poses;
 mod timing;
 
 pub use accuracy::{Accuracy, Integrator, Method};
 pub use auto::Auto;
+pub use effects::{Effect, EffectSettings, Setting};
 pub use file::SceneError;
 pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
 pub use timing::{Clock, Timing};
@@ -41,6 +43,8 @@ pub struct Scene {
     pub solver: Solver,
     /// The world around.
     pub world: World,
+    /// Which physical effects are simulated.
+    pub effects: EffectSettings,
 }
 
 impl Scene {
@@ -55,6 +59,22 @@ impl Scene {
         }
     }
 
+    /// Whether the object is held in place. `effects.free-object` has the last word; left to `auto`, it is
+    /// `object.fixed` that counts.
+    pub fn holds_object(&self) -> bool {
+        match self.effects.get(Effect::FreeObject) {
+            Setting::Off => true,
+            Setting::Auto => self.object.fixed,
+            Setting::On => false,
+        }
+    }
+
+    /// Holds the object in place, or lets it rest freely; takes back what `effects.free-object` may have said.
+    pub fn set_object_fixed(&mut self, fixed: bool) {
+        self.object.fixed = fixed;
+        self.effects.set(Effect::FreeObject, Setting::Auto);
+    }
+
     /// Loads what the scene grasps; `None` for an empty hand.
     pub fn load_object(&self) -> Result<Option<ObjectModel>, ObjectError> {
         load(&self.object.source, &self.load_options())
@@ -67,7 +87,7 @@ impl Scene {
 pub struct ObjectSetup {
     /// The name of a built-in object, the path of a URDF, OBJ or STL file, or `empty` for an empty hand.
     pub source: String,
-    /// Held in place instead of resting freely until the fingers move it.
+    /// Held in place instead of resting freely until the fingers move it; see [`Scene::holds_object`].
     pub fixed: bool,
     /// Fixed-axis roll, pitch, yaw of the object as it is put down (degrees).
     pub rotation_deg: [f64; 3],
