@@ -21,6 +21,8 @@ pub enum Action {
     PickFile,
     /// Write the scene into a file.
     SaveScene,
+    /// Measure what the effects of the scene cost and change.
+    MeasureEffects,
     /// Look from here.
     SetCamera(Camera),
     /// Show the whole gripper.

@@ -21,7 +21,7 @@ use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::workers::{
-    Command, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake,
+    Command, EffectsWorker, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -60,6 +60,7 @@ const PICTURE_SCALE: f32 = 2.0;
 /// Everything in the window.
 pub struct Workbench {
     worker: SimWorker,
+    effects: EffectsWorker,
     wake: Wake,
     scene: Scene,
     /// A scene that the busy worker has not taken yet.
@@ -98,6 +99,8 @@ impl Workbench {
             wake: Arc::clone(&setup.wake),
         })
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
+        let effects = EffectsWorker::start(Arc::clone(&setup.wake))
+            .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -109,6 +112,7 @@ impl Workbench {
         theme::apply(ctx, view.theme);
         let mut workbench = Self {
             worker,
+            effects,
             wake: setup.wake,
             scene: setup.scene,
             unsent: false,
@@ -226,6 +230,7 @@ impl Workbench {
             snapshot,
             accuracy,
             scene: &self.scene,
+            effects: &self.effects,
             traces: &self.traces,
             view: &self.view,
             thumbnails: &self.thumbnails,
@@ -312,6 +317,7 @@ impl Workbench {
             Action::PickFile => self.ask(Ask::Object),
             Action::SaveScene => self.ask(Ask::SaveScene),
             Action::SavePicture => self.ask(Ask::SavePicture),
+            Action::MeasureEffects => self.effects.ask(&self.scene),
             Action::SetCamera(camera) => self.view.camera = camera,
             Action::FrameAll => {
                 if let Some(snapshot) = self.worker.snapshot() {
@@ -378,6 +384,7 @@ impl Workbench {
             return self.tell(Message::Error(error.to_string()));
         }
         self.scene = scene;
+        self.effects.give_up();
         self.send_scene();
     }
 

@@ -7,6 +7,7 @@ mod evaluate;
 mod grasp;
 mod learning;
 mod recognise;
+mod scene;
 mod setup;
 mod snapshot;
 mod terminal;
@@ -57,6 +58,8 @@ enum Command {
     Recognise(recognise::RecogniseArguments),
     /// Draw a scene or a stored trial into a PNG file, without a window.
     Snapshot(snapshot::SnapshotArguments),
+    /// Which effects a scene calls for, why, what each costs and changes.
+    Scene(scene::SceneCommandArguments),
     /// List, show, export, delete and restore recorded trials.
     Trials(trials::TrialsArguments),
     /// Measure what things cost on this machine, in CPU time.
@@ -127,6 +130,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Evaluate(evaluate)) => evaluate::run(evaluate, store)?,
         Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
+        Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,

@@ -35,7 +35,12 @@ fn parse_preset(text: &str) -> Result<PosePreset, String> {
 impl SceneArguments {
     /// The scene they describe, with another object where one is named.
     pub(super) fn scene(&self, object: Option<&str>) -> Result<Scene, Failure> {
-        let mut scene = match &self.scene {
+        self.with_file(self.scene.as_deref(), object)
+    }
+
+    /// The same on top of another scene file.
+    pub(super) fn with_file(&self, file: Option<&Path>, object: Option<&str>) -> Result<Scene, Failure> {
+        let mut scene = match file {
             Some(path) => Scene::from_file(path)?,
             None => Scene::default(),
         };

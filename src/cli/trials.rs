@@ -9,7 +9,7 @@ use palpate_core::recording::{
 };
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};
-use palpate_core::trial::Trial;
+use palpate_core::trial::{Plan, Trial};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -184,6 +184,7 @@ struct Shown {
     samples: usize,
     #[serde(flatten)]
     summary: GraspSummary,
+    plan: Plan,
     scene: String,
 }
 
@@ -236,6 +237,7 @@ fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
         version: trial.info.version,
         samples: trial.frames.len(),
         summary,
+        plan: trial.info.plan,
         scene: trial.info.scene,
     };
     if json {
@@ -257,6 +259,10 @@ fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
         say(format!("curvature {left:.2} 1/m left, {right:.2} 1/m right"))?;
         let [left, right] = hold.pressure_pa.map(|p| p * 1e-3);
         say(format!("pressure {left:.2} kPa left, {right:.2} kPa right"))?;
+    }
+    for effect in &shown.plan.effects {
+        let state = if effect.on { "on" } else { "off" };
+        say(format!("effect {} {state} ({}): {}", effect.name, effect.setting, effect.reason))?;
     }
     say("its scene is in `palpate trials show --json`")
 }

@@ -67,7 +67,15 @@ const HOMES: &[(&str, &[&str])] = &[
     ("rand", RANDOM),
     ("rand_chacha", RANDOM),
     ("rapier3d", &["src/core/physics"]),
-    ("rayon", &["src/core/geometry", "src/core/recognition/methods.rs", "src/core/study/network_cost.rs"]),
+    (
+        "rayon",
+        &[
+            "src/core/geometry",
+            "src/core/recognition/methods.rs",
+            "src/core/study/effects.rs",
+            "src/core/study/network_cost.rs",
+        ],
+    ),
     ("rfd", &["src/app/files.rs"]),
     ("rusqlite", &["src/core/recording"]),
     ("safetensors", &["src/core/recognition/model_file.rs"]),

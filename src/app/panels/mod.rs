@@ -2,6 +2,7 @@
 //! remembered, and a test that draws it in both themes.
 
 mod curvature;
+mod effects;
 mod force;
 mod grasp;
 mod line_pressure;
@@ -17,7 +18,7 @@ use super::view_state::ViewState;
 use egui::Ui;
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use palpate_core::scene::Scene;
-use palpate_core::workers::{MeasuredAccuracy, Snapshot};
+use palpate_core::workers::{EffectsWorker, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
 
 /// What panels may read.
@@ -28,6 +29,8 @@ pub struct PanelContext<'a> {
     pub accuracy: Option<&'a MeasuredAccuracy>,
     /// The scene as the user has set it.
     pub scene: &'a Scene,
+    /// Measures what effects cost and change.
+    pub effects: &'a EffectsWorker,
     /// Traces of the last grasps.
     pub traces: &'a Traces,
     /// How the user looks at things.
@@ -49,7 +52,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 9] = [
+pub const ALL: [PanelKind; 10] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -59,6 +62,7 @@ pub const ALL: [PanelKind; 9] = [
     PanelKind { name: "recognition", title: "Recognition", ui: recognition::ui },
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
+    PanelKind { name: "effects", title: "Effects", ui: effects::ui },
 ];
 
 /// A panel by its name.
@@ -72,10 +76,12 @@ pub(super) fn default_layout() -> Tree<String> {
     let mut pane = |name: &str| tiles.insert_pane(name.to_owned());
     let (objects, view, curvature) = (pane("objects"), pane("view"), pane("curvature"));
     let (pressure, force, line) = (pane("pressure"), pane("force"), pane("line"));
-    let (recognition, grasp, scene) = (pane("recognition"), pane("grasp"), pane("scene"));
+    let (recognition, grasp) = (pane("recognition"), pane("grasp"));
+    let (scene, effects) = (pane("scene"), pane("effects"));
     let [view, curvature] = [vec![view], vec![curvature]].map(|panes| tiles.insert_tab_tile(panes));
     let loads = tiles.insert_tab_tile(vec![pressure, force, line]);
-    let [left, right] = [vec![objects, scene], vec![recognition, grasp]].map(|panes| tiles.insert_tab_tile(panes));
+    let [left, right] =
+        [vec![objects, scene], vec![recognition, grasp, effects]].map(|panes| tiles.insert_tab_tile(panes));
     let middle = insert_linear(&mut tiles, LinearDir::Vertical, &[(view, 0.58), (curvature, 0.21), (loads, 0.21)]);
     let root = insert_linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.185), (middle, 0.555), (right, 0.26)]);
     Tree::new(egui::Id::unique("workbench"), root, tiles)

@@ -195,6 +195,7 @@ fn two_flat_pads_share_what_they_overlap() {
         let pad = &mut scene.gripper.pad;
         (pad.law, pad.crown_radius, pad.rows, pad.columns) = (law, 1e6, 200, 40);
         let mut run = Run::new(&scene, None, H);
+        run.ws.step.h = H;
         lay_out(&run.model, &run.state, &mut run.ws);
         detect(&run.model, &run.state, &mut run.ws);
         assert!(run.ws.contacts.iter().all(|c| matches!(c.against, Against::Finger(_))));

@@ -2,12 +2,14 @@
 
 mod accuracy_cost;
 mod comparison;
+mod effects;
 mod network_cost;
 mod physics_cost;
 mod search;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost, error_sensors};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
+pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain_effects};
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
 pub use search::{SearchRow, search};

@@ -6,7 +6,7 @@ use crate::picture::Stage;
 use crate::rig::SimRig;
 use crate::scene::Scene;
 use crate::sensing::Sensors;
-use crate::trial::Frame;
+use crate::trial::{Frame, Plan};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -15,6 +15,7 @@ pub(super) struct Current {
     pub(super) run: GraspRun<SimRig>,
     /// Runs along for the error band, where one is wanted.
     pub(super) companion: Option<Companion>,
+    pub(super) plan: Arc<Plan>,
     pub(super) scene: Arc<Scene>,
     pub(super) stage: Arc<Stage>,
     pub(super) sensors: Sensors,

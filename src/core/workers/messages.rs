@@ -7,7 +7,7 @@ use crate::recording::TrialId;
 use crate::scene::Scene;
 use crate::sensing::Channel;
 use crate::study::AccuracyCost;
-use crate::trial::Frame;
+use crate::trial::{Frame, Plan};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -162,6 +162,8 @@ pub struct Snapshot {
     pub grasp: u64,
     /// The scene as it was set up, with this grasp's pose.
     pub scene: Arc<Scene>,
+    /// Which effects this grasp takes into account, and why.
+    pub plan: Arc<Plan>,
     /// Meshes for the picture.
     pub stage: Arc<Stage>,
     /// What is in the hand; absent for an empty hand.

@@ -10,11 +10,14 @@
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
+//! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks.
+//!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
 mod companion;
 mod current;
+mod effects;
 mod gauge;
 mod held_object;
 mod latest;
@@ -29,6 +32,7 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 
+pub use effects::{EffectsState, EffectsView, EffectsWorker};
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{

@@ -332,11 +332,11 @@ impl Session {
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
         let frame = Arc::new(run.rig_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
-        let (told, scene) = (run.info().warnings.len(), Arc::new(scene));
+        let (told, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
         let channels = sensors.channels().len();
         let companion = self.status.error_band.then(|| Companion::new(&scene, model.as_deref(), seed, channels));
         self.current =
-            Some(Current { run, companion, scene, stage, sensors, frame, told, pulled: false, ended: false });
+            Some(Current { run, companion, plan, scene, stage, sensors, frame, told, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
         self.publish();
     }
@@ -479,6 +479,7 @@ impl Session {
             revision: self.revision,
             grasp: self.grasp,
             scene: Arc::clone(&current.scene),
+            plan: Arc::clone(&current.plan),
             stage: Arc::clone(&current.stage),
             object: self.card.clone(),
             channels: Arc::clone(&self.channels),

@@ -1,0 +1,109 @@
+//! Which effects are simulated: each with its setting, why it is on or off, what it costs, and what the grasp would be
+//! with it left out or put in. The last two are measured in the background while the panel is in view.
+
+use super::PanelContext;
+use crate::app::actions::Action;
+use crate::app::theme::colour;
+use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
+use palpate_core::palette::Theme;
+use palpate_core::scene::{Effect, Scene, Setting};
+use palpate_core::study::{ExplainedEffect, Explanation};
+use palpate_core::trial::PlannedEffect;
+use palpate_core::units::three_digits;
+use palpate_core::workers::{EffectsState, EffectsView};
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    if context.effects.asked() != Some(context.scene) {
+        actions.push(Action::MeasureEffects);
+    }
+    let view = context.effects.view().filter(|view| *view.scene == *context.scene);
+    let explanation = match view.as_deref().map(|view| &view.state) {
+        Some(EffectsState::Ready(explanation)) => Some(explanation.as_ref()),
+        _ => None,
+    };
+    let mut scene = context.scene.clone();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        state_ui(ui, view.as_deref());
+        for effect in Effect::ALL {
+            let explained = explanation.and_then(|e| e.effects.iter().find(|e| e.planned.name == effect.name()));
+            // Until all is measured, what the grasp that is going on has made of it.
+            let going_on = context.snapshot.and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
+            let planned = explained.map(|explained| &explained.planned).or(going_on);
+            effect_ui(ui, context.view.theme, &mut scene, *effect, planned);
+            details_ui(ui, planned, explained.zip(explanation));
+            ui.add_space(7.0);
+        }
+    });
+    if scene != *context.scene {
+        actions.push(Action::SetScene(Box::new(scene)));
+    }
+}
+
+/// One line on the measurement as a whole.
+fn state_ui(ui: &mut Ui, view: Option<&EffectsView>) {
+    let text = match view.map(|view| &view.state) {
+        None | Some(EffectsState::Measuring(_, 0)) => "measuring ..".to_owned(),
+        Some(EffectsState::Measuring(done, of)) => format!("measuring .. {done} of {of}"),
+        Some(EffectsState::Ready(explanation)) => {
+            format!("a grasp takes {} ms of CPU time", three_digits(explanation.cpu_ms))
+        }
+        Some(EffectsState::Failed(cause)) => cause.clone(),
+    };
+    ui.weak(text);
+    ui.add_space(4.0);
+}
+
+/// Lamp, name and the three settings.
+fn effect_ui(ui: &mut Ui, theme: Theme, scene: &mut Scene, effect: Effect, planned: Option<&PlannedEffect>) {
+    let name = effect.name();
+    ui.horizontal(|ui| {
+        lamp_ui(ui, theme, name, planned.is_some_and(|planned| planned.on));
+        ui.strong(name);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            for setting in Setting::ALL.into_iter().rev() {
+                let chosen = scene.effects.get(effect) == setting;
+                let response = ui.selectable_label(chosen, setting.name());
+                let label = format!("{name} {}", setting.name());
+                response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, &label));
+                if response.clicked() {
+                    scene.effects.set(effect, setting);
+                }
+            }
+        });
+    });
+}
+
+/// Lit where the effect is on.
+fn lamp_ui(ui: &mut Ui, theme: Theme, name: &str, on: bool) {
+    let (rect, response) = ui.allocate_exact_size(egui::vec2(12.0, 12.0), Sense::hover());
+    let label = format!("{name} is {}", if on { "on" } else { "off" });
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &label));
+    let colours = theme.colours();
+    let centre = rect.center();
+    if on {
+        ui.painter().circle_filled(centre, 4.5, colour(colours.accent));
+    }
+    let rim = if on { colours.accent } else { colours.quiet_text };
+    ui.painter().circle_stroke(centre, 4.5, egui::Stroke::new(1.2, colour(rim)));
+    response.on_hover_text(label);
+}
+
+/// Why, and what of it.
+fn details_ui(ui: &mut Ui, planned: Option<&PlannedEffect>, explained: Option<(&ExplainedEffect, &Explanation)>) {
+    let quiet = |ui: &mut Ui, text: String| ui.add(egui::Label::new(RichText::new(text).small().weak()).wrap());
+    if let Some(planned) = planned {
+        let relation = if planned.number > planned.threshold { ">" } else { "≤" };
+        let number = three_digits(planned.number);
+        let text = format!("{} ({number} {relation} {})", planned.reason, planned.threshold);
+        let response = quiet(ui, text);
+        if let Some((explained, _)) = explained {
+            response.on_hover_text(format!("{}\nThe number is {}.", explained.about, explained.number_is));
+        }
+    }
+    if let Some((explained, explanation)) = explained {
+        let small = |ui: &mut Ui, text: String| ui.add(egui::Label::new(RichText::new(text).small()).wrap());
+        small(ui, explained.cost_in_words());
+        small(ui, explained.change_in_words(explanation.contact_onset_s));
+    }
+}

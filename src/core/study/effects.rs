@@ -1,0 +1,365 @@
+//! What each effect costs and what it changes: leave one out, or put one in, and compare whole trials.
+//!
+//! Every effect is flipped alone; all others stay as the plan has them. Cost comes from pairs of runs, with and without,
+//! one after the other in one thread, of which the quickest of each kind count, because whatever else a machine does
+//! only adds. Differences are taken over all samples and both fingers.
+
+use crate::grasping::{GraspSummary, prepare};
+use crate::objects::ObjectModel;
+use crate::physics::effects::rule_of;
+use crate::scene::{Effect, Scene, Setting};
+use crate::sensing::{PressureArea, Quantity, SensorLayout, Sensors};
+use crate::trial::{Plan, PlannedEffect, Trial};
+use crate::units::three_digits;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Which effects a scene calls for, what they cost and what they change.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Explanation {
+    /// Name of the object.
+    pub object: String,
+    /// CPU time of the trial as the scene has it (ms).
+    pub cpu_ms: f64,
+    /// First contact (s); null when never.
+    pub contact_onset_s: Option<f64>,
+    /// What should be known of the trial.
+    pub warnings: Vec<String>,
+    /// All effects, in the order in which they are told.
+    pub effects: Vec<ExplainedEffect>,
+}
+
+/// One effect, explained.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExplainedEffect {
+    /// What the plan says of it.
+    #[serde(flatten)]
+    pub planned: PlannedEffect,
+    /// What it is.
+    pub about: &'static str,
+    /// What its number is the ratio of.
+    pub number_is: &'static str,
+    /// What it costs where it is on, and would cost where it is off, as a share of the trial's CPU time.
+    pub cost_share: f64,
+    /// What the trial would be with the effect left out where it is on, put in where it is off.
+    pub change: EffectChange,
+}
+
+/// Differences between two trials: root mean squares over all samples of both fingers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct EffectChange {
+    /// Curvature (1/m), and as a share of its range in both trials.
+    pub curvature_per_m: f64,
+    /// The same as a share of the range of curvature.
+    pub curvature_share: f64,
+    /// Pressure (Pa).
+    pub pressure_pa: f64,
+    /// The same as a share of the range of pressure.
+    pub pressure_share: f64,
+    /// Force (N).
+    pub force_n: f64,
+    /// The same as a share of the range of force.
+    pub force_share: f64,
+    /// First contact in the other trial (s); null when never.
+    pub contact_onset_s: Option<f64>,
+    /// How much later first contact is in the other trial (ms), in whole samples; null unless both touch.
+    pub onset_ms: Option<f64>,
+}
+
+impl ExplainedEffect {
+    /// What it costs, in words.
+    pub fn cost_in_words(&self) -> String {
+        let verb = if self.planned.on { "costs" } else { "would cost" };
+        format!("{verb} {:.0} % of the CPU time", 100.0 * self.cost_share)
+    }
+
+    /// What the other trial is like, in words, given when this one has its first contact (s).
+    pub fn change_in_words(&self, onset_here: Option<f64>) -> String {
+        let change = &self.change;
+        let how = if self.planned.on { "without it" } else { "with it" };
+        if change.curvature_per_m == 0.0 && change.force_n == 0.0 && change.contact_onset_s == onset_here {
+            return format!("{how} nothing changes");
+        }
+        let part = |name: &str, value: f64, unit: &str, share: f64| {
+            format!("{name} {} {unit} ({} %)", three_digits(value), three_digits(100.0 * share))
+        };
+        let onset = match (change.onset_ms, change.contact_onset_s) {
+            (Some(ms), _) => format!("onset {ms:+.0} ms"),
+            (None, Some(t)) => format!("onset at {t:.2} s"),
+            (None, None) if onset_here.is_some() => "no contact".to_owned(),
+            (None, None) => "no contact either way".to_owned(),
+        };
+        let curvature = part("curvature", change.curvature_per_m, "1/m", change.curvature_share);
+        let pressure = part("pressure", change.pressure_pa * 1e-3, "kPa", change.pressure_share);
+        let force = part("force", change.force_n, "N", change.force_share);
+        format!("{how}: {curvature}, {pressure}, {force}, {onset}")
+    }
+}
+
+/// Pairs of runs that are timed. Long trials are timed once: they average over much already.
+const PAIRS: usize = 3;
+/// What counts as long (s).
+const LONG: f64 = 10.0;
+
+/// How to measure.
+pub struct Measuring<'a> {
+    /// Threads to work in.
+    pub threads: usize,
+    /// Set to give up.
+    pub cancelled: &'a AtomicBool,
+    /// Hears how many of how many effects are done.
+    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+/// Explains every effect of a scene; `None` when cancelled.
+pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measuring<'_>) -> Option<Explanation> {
+    let (base, cpu_s) = run(scene, object, how.cancelled)?;
+    let base = Signals::new(scene, base);
+    let done = AtomicUsize::new(0);
+    (how.progress)(0, Effect::ALL.len());
+    let one = |effect: &Effect| {
+        let explained = explain_one(scene, object, &base, *effect, how.cancelled)?;
+        (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, Effect::ALL.len());
+        Some(explained)
+    };
+    let all = || Effect::ALL.par_iter().map(one).collect::<Option<Vec<ExplainedEffect>>>();
+    // Where the system has no threads to give, those that rayon has will do.
+    let effects = match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
+        Ok(pool) => pool.install(all),
+        Err(_none) => all(),
+    }?;
+    Some(Explanation {
+        object: base.trial.info.object.clone(),
+        cpu_ms: cpu_s * 1e3,
+        contact_onset_s: base.onset_s,
+        warnings: base.trial.info.warnings.clone(),
+        effects,
+    })
+}
+
+fn explain_one(
+    scene: &Scene,
+    object: Option<&ObjectModel>,
+    base: &Signals,
+    effect: Effect,
+    cancelled: &AtomicBool,
+) -> Option<ExplainedEffect> {
+    let plan = &base.trial.info.plan;
+    let planned = plan.effects.iter().find(|planned| planned.name == effect.name())?.clone();
+    let other_scene = flipped(scene, plan, effect);
+    let pairs = if scene.timing.duration_s > LONG { 1 } else { PAIRS };
+    let (mut here, mut there) = (f64::INFINITY, f64::INFINITY);
+    let mut other = None;
+    for _ in 0..pairs {
+        here = here.min(run(scene, object, cancelled)?.1);
+        let (trial, seconds) = run(&other_scene, object, cancelled)?;
+        there = there.min(seconds);
+        other = Some(trial);
+    }
+    let sign = if planned.on { 1.0 } else { -1.0 };
+    let rule = rule_of(effect);
+    Some(ExplainedEffect {
+        about: rule.about,
+        number_is: rule.number,
+        cost_share: sign * (here - there) / here,
+        change: base.change_to(&Signals::new(&other_scene, other?)),
+        planned,
+    })
+}
+
+/// The scene with one effect the other way round and all others held to the plan: what is decided from one effect being
+/// on must not be decided anew.
+fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
+    let mut scene = scene.clone();
+    for other in Effect::ALL {
+        let on = plan.is_on(other.name()) != (*other == effect);
+        // Contact between the fingers is guarded where it was left out by `auto`, and is to stay so.
+        let guarded = *other == Effect::FingerContact && *other != effect && !on;
+        if !guarded {
+            scene.effects.set(*other, if on { Setting::On } else { Setting::Off });
+        }
+    }
+    scene
+}
+
+/// A whole trial and its CPU time (s); `None` when cancelled.
+fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> Option<(Trial, f64)> {
+    let start = cpu_time::ThreadTime::now();
+    let mut run = prepare(scene, object, 0);
+    while run.next_frame().is_some() {
+        if cancelled.load(Ordering::Relaxed) {
+            return None;
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    Some((run.finish(scene), seconds))
+}
+
+/// What a trial feels like: both fingers' readings, sample by sample.
+struct Signals {
+    trial: Trial,
+    onset_s: Option<f64>,
+    curvature: Vec<f64>,
+    pressure: Vec<f64>,
+    force: Vec<f64>,
+}
+
+impl Signals {
+    fn new(scene: &Scene, trial: Trial) -> Self {
+        let layout = SensorLayout::named("C1+F").expect("a layout of our own");
+        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation);
+        let (mut curvature, mut pressure, mut force) = (Vec::new(), Vec::new(), Vec::new());
+        // Whole-finger spans fit every gripper.
+        if let Ok(sensors) = sensors {
+            for frame in &trial.frames {
+                for (channel, value) in sensors.channels().iter().zip(sensors.read(frame)) {
+                    let signal = match channel.quantity {
+                        Quantity::Curvature => &mut curvature,
+                        Quantity::Pressure => &mut pressure,
+                        Quantity::Force => &mut force,
+                    };
+                    // Without contact there is no pressure.
+                    signal.push(value.unwrap_or(0.0));
+                }
+            }
+        }
+        let onset_s = GraspSummary::new(&trial, scene).contact_onset_s;
+        Self { trial, onset_s, curvature, pressure, force }
+    }
+
+    fn change_to(&self, other: &Self) -> EffectChange {
+        let [curvature, pressure, force] =
+            [(&self.curvature, &other.curvature), (&self.pressure, &other.pressure), (&self.force, &other.force)]
+                .map(|(here, there)| difference(here, there));
+        let both = self.onset_s.zip(other.onset_s);
+        EffectChange {
+            curvature_per_m: curvature.0,
+            curvature_share: curvature.1,
+            pressure_pa: pressure.0,
+            pressure_share: pressure.1,
+            force_n: force.0,
+            force_share: force.1,
+            contact_onset_s: other.onset_s,
+            onset_ms: both.map(|(here, there)| (there - here) * 1e3),
+        }
+    }
+}
+
+/// Root mean square difference, and that as a share of the range of both.
+fn difference(here: &[f64], there: &[f64]) -> (f64, f64) {
+    let count = here.len().min(there.len()).max(1) as f64;
+    let rms = (here.iter().zip(there).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / count).sqrt();
+    let all = || here.iter().chain(there).copied();
+    let range = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
+    (rms, if range > 0.0 { rms / range } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Primitive;
+    use crate::scene::Accuracy;
+
+    fn explained(scene: &Scene, object: Option<&ObjectModel>) -> Explanation {
+        let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| {} };
+        let explanation = explain_effects(scene, object, &how).expect("not cancelled");
+        assert_eq!(explanation.effects.len(), Effect::ALL.len());
+        explanation
+    }
+
+    fn ball(radius: f64, density: f64) -> ObjectModel {
+        ObjectModel::from_primitive("ball", Primitive::Sphere { radius }, density, 0.6)
+    }
+
+    fn draft() -> Scene {
+        let mut scene = Scene::default();
+        scene.solver.accuracy = Accuracy::Draft;
+        scene
+    }
+
+    impl Explanation {
+        fn of(&self, effect: Effect) -> &ExplainedEffect {
+            self.effects.iter().find(|e| e.planned.name == effect.name()).expect("all are explained")
+        }
+
+        fn names_on(&self) -> Vec<&str> {
+            self.effects.iter().filter(|e| e.planned.on).map(|e| e.planned.name.as_str()).collect()
+        }
+    }
+
+    #[test]
+    fn a_fixed_sphere_calls_for_fingers_and_friction_alone() {
+        let mut scene = draft();
+        scene.object.fixed = true;
+        let told = explained(&scene, Some(&ball(0.025, 400.0)));
+        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
+        assert!(told.of(Effect::FreeObject).planned.reason.contains("fixed"));
+        for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
+            assert!(told.of(effect).change.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
+        }
+        // What was left out is not missed: no finger comes near the pedestal or the other finger.
+        for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
+            assert_eq!(told.of(effect).change.curvature_per_m, 0.0, "{effect:?}");
+            assert_eq!(told.of(effect).change.force_n, 0.0, "{effect:?}");
+        }
+    }
+
+    #[test]
+    fn a_light_free_ball_feels_support_and_friction_but_hardly_its_weight() {
+        let told = explained(&draft(), Some(&ball(0.020, 2.0)));
+        let on = ["free-object", "finger-gravity", "support", "friction", "finger-inertia"];
+        assert_eq!(told.names_on(), on, "{:#?}", told.effects);
+        let weight = told.of(Effect::ObjectGravity);
+        assert!(weight.planned.number < weight.planned.threshold && weight.change.curvature_share < 0.01, "{weight:?}");
+        assert!(told.of(Effect::Friction).change.force_share > weight.change.force_share);
+        // A heavy one does feel it.
+        let heavy = explained(&draft(), Some(&ball(0.020, 4000.0)));
+        assert!(heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.force_n > 1e-3);
+    }
+
+    #[test]
+    fn an_empty_hand_calls_for_its_fingers_to_meet() {
+        let told = explained(&draft(), None);
+        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
+        let contact = told.of(Effect::FingerContact);
+        assert!(contact.change.curvature_per_m > 1.0 && contact.change.force_n > 0.05, "{:?}", contact.change);
+        assert!(told.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
+        assert_eq!(told.of(Effect::FreeObject).change.curvature_per_m, 0.0);
+    }
+
+    #[test]
+    fn a_long_hold_calls_for_creep() {
+        let mut scene = draft();
+        scene.object.fixed = true;
+        (scene.programme.hold_ticks, scene.timing.duration_s) = (200, 23.0);
+        scene.gripper.finger.creep_time = 5.0;
+        let told = explained(&scene, Some(&ball(0.025, 400.0)));
+        let creep = told.of(Effect::Creep);
+        assert!(creep.planned.on && creep.planned.number == 4.0, "{:?}", creep.planned);
+        assert!(creep.change.force_share > 0.01 && creep.change.curvature_share > 0.005, "{:?}", creep.change);
+        let mut short = draft();
+        short.object.fixed = true;
+        let short = explained(&short, Some(&ball(0.025, 400.0)));
+        let unnoticed = short.of(Effect::Creep);
+        assert!(!unnoticed.planned.on && unnoticed.change.force_share < 0.2 * creep.change.force_share);
+    }
+
+    #[test]
+    fn the_others_stay_as_they_were_decided() {
+        let (scene, ball) = (draft(), ball(0.020, 400.0));
+        let plan = prepare(&scene, Some(&ball), 0).info().plan.clone();
+        for effect in Effect::ALL {
+            let other = prepare(&flipped(&scene, &plan, *effect), Some(&ball), 0).info().plan.clone();
+            for (before, after) in plan.effects.iter().zip(&other.effects) {
+                assert_eq!(before.on != after.on, before.name == effect.name(), "{} with {effect:?}", before.name);
+            }
+        }
+    }
+
+    #[test]
+    fn whoever_cancels_gets_nothing() {
+        let how = Measuring { threads: 1, cancelled: &AtomicBool::new(true), progress: &|_, _| {} };
+        assert_eq!(explain_effects(&draft(), None, &how), None);
+    }
+}
