@@ -29,6 +29,7 @@ pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_core::recognition::shipped_model;
 use palpate_core::scene::Scene;
+use palpate_core::workers::explain_scene;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -68,6 +69,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             store: options.store,
             view,
             model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
+            explain: Arc::new(explain_scene),
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

@@ -21,7 +21,8 @@ use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::workers::{
-    Command, EffectsWorker, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Wake,
+    Command, EffectsWorker, Explain, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
+    Wake,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -40,6 +41,8 @@ pub struct WorkbenchSetup<'a> {
     pub view: ViewState,
     /// Recognises what is in the hand; or why it cannot be had, which is told, and everything else works.
     pub model: Result<Arc<Model>, String>,
+    /// Measures what effects cost and change.
+    pub explain: Explain,
     /// Whether the first grasp runs by itself.
     pub playing: bool,
     /// Asks for the window to be drawn again; called from other threads.
@@ -99,7 +102,7 @@ impl Workbench {
             wake: Arc::clone(&setup.wake),
         })
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
-        let effects = EffectsWorker::start(Arc::clone(&setup.wake))
+        let effects = EffectsWorker::start(setup.explain, Arc::clone(&setup.wake))
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);

@@ -1,12 +1,14 @@
 //! A workbench without a window, for tests: it stands still until told, so that pictures and numbers repeat.
 
 use crate::scripted;
+use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use palpate::app::{Action, PanelKind, ViewState, Workbench, WorkbenchSetup};
 use palpate_core::palette::Theme;
 use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
-use palpate_core::workers::{Command, Snapshot};
+use palpate_core::study::{Explanation, Measuring};
+use palpate_core::workers::{Command, Snapshot, explain_scene};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -28,6 +30,18 @@ impl Default for BenchSetup {
         let model = Ok(scripted::model());
         Self { object: "lemon", theme: Theme::Dark, size: [1280.0, 820.0], panel: None, render_state: None, model }
     }
+}
+
+/// Measures as the window does, but for times, which are made up so that pictures repeat.
+fn explain_steadily(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, String> {
+    let steady = |mut explanation: Explanation| {
+        explanation.cpu_ms = 12.3;
+        for (k, effect) in explanation.effects.iter_mut().enumerate() {
+            effect.cost_share = [0.41, 0.01, 0.12, 0.30, -0.08, 0.04, 0.0, 0.0, 0.01][k % 9];
+        }
+        explanation
+    };
+    Ok(explain_scene(scene, how)?.map(steady))
 }
 
 /// The workbench and the harness that drives it.
@@ -54,6 +68,7 @@ impl Bench {
                     store: path.clone(),
                     view: ViewState { theme, ..ViewState::default() },
                     model: model.clone(),
+                    explain: Arc::new(explain_steadily),
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.
@@ -98,6 +113,14 @@ impl Bench {
     pub(crate) fn tell(&mut self, action: Action) {
         let ctx = self.harness.ctx.clone();
         self.harness.state_mut().as_mut().expect("made in the first frame").act(&ctx, action);
+    }
+
+    /// Draws until the effects of the scene at hand have been measured.
+    pub(crate) fn until_effects_are_measured(&mut self) {
+        while self.harness.query_by_label_contains("of CPU time").is_none() {
+            self.woken.recv_timeout(Duration::from_secs(60)).expect("the measurement is alive");
+            self.harness.step();
+        }
     }
 
     /// Runs the grasp up to `t` seconds and leaves it standing there.

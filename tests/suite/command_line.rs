@@ -3,6 +3,7 @@
 use crate::program::{json, palpate, ran, refused, run};
 use palpate_core::objects::catalogue;
 use palpate_core::recording::Store;
+use palpate_core::scene::Effect;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Stdio;
@@ -27,15 +28,43 @@ fn a_grasp_as_json_has_what_scripts_rely_on() {
         let pair = report["hold"][key].as_array().unwrap();
         assert!(pair.len() == 2 && pair.iter().all(|value| value.as_f64().unwrap() > 0.0), "{key}: {pair:?}");
     }
-    let empty = json(folder.path(), &["grasp", "empty", "--json", "--no-store"]);
+    let crossing = ["grasp", "empty", "--json", "--no-store", "--set", "effects.finger-contact=off"];
+    let empty = json(folder.path(), &crossing);
     assert_eq!((&empty["contact_onset_s"], &empty["trial_id"]), (&Value::Null, &Value::Null));
     assert!(!empty["warnings"].as_array().unwrap().is_empty(), "fingers that cross are worth a word");
 }
 
 #[test]
+fn a_scene_is_explained_effect_by_effect() {
+    let folder = folder();
+    let at = folder.path();
+    std::fs::write(at.join("scene.toml"), "[effects]\nfriction = \"off\"\n[solver]\naccuracy = \"draft\"\n").unwrap();
+    let told = json(at, &["scene", "explain", "scene.toml", "--set", "object.source=ball", "--fixed", "--json"]);
+    assert_eq!(told["object"], "ball");
+    let effects = told["effects"].as_array().unwrap();
+    let of = |name: &str| effects.iter().find(|effect| effect["name"] == name).unwrap();
+    assert_eq!(effects.len(), Effect::ALL.len());
+    assert_eq!((&of("friction")["on"], &of("friction")["setting"]), (&false.into(), &"off".into()));
+    assert!(of("friction")["change"]["force_n"].as_f64().unwrap() > 1e-3);
+    assert_eq!((&of("free-object")["on"], &of("finger-gravity")["on"]), (&false.into(), &true.into()));
+    for effect in effects {
+        assert!(effect["number"].is_number() && effect["threshold"].is_number() && effect["cost_share"].is_number());
+        assert!(!effect["reason"].as_str().unwrap().is_empty(), "{effect}");
+    }
+    let text = run(at, &["scene", "explain", "empty", "--accuracy", "draft"]);
+    assert!(text.code == Some(0) && text.err.is_empty(), "{text:?}");
+    for effect in Effect::ALL {
+        assert!(text.out.contains(effect.name()), "{text:?}");
+    }
+    refused(at, &["scene", "explain", "lemon", "--set", "effects.crep=on"], &["effects.crep", "effects.creep"]);
+    refused(at, &["scene", "explain", "nothing.toml"], &["nothing.toml"]);
+    refused(at, &["scene", "explain", "scene.toml", "--scene", "scene.toml"], &["two scene files"]);
+}
+
+#[test]
 fn text_results_go_to_standard_output_and_warnings_beside() {
     let folder = folder();
-    let ran = run(folder.path(), &["grasp", "empty"]);
+    let ran = run(folder.path(), &["grasp", "empty", "--set", "effects.finger-contact=off"]);
     assert!(ran.out.contains("first contact never") && ran.out.contains("stored        trial 1"), "{ran:?}");
     assert!(ran.err.starts_with("warning: the fingers pass"), "{ran:?}");
 }
@@ -52,6 +81,8 @@ fn trials_are_listed_shown_exported_deleted_and_restored() {
     assert_eq!(objects, ["ball", "cube"]);
     let shown = run(at, &["trials", "show", "2"]);
     assert!(shown.code == Some(0) && shown.out.contains("cube"), "{shown:?}");
+    assert!(shown.out.contains("effect creep off (auto): the hold lasts 1.00 s"), "{shown:?}");
+    assert_eq!(json(at, &["trials", "show", "2", "--json"])["plan"].as_array().unwrap().len(), Effect::ALL.len());
     let exported = run(at, &["trials", "export", "1", "2", "--out", "csv"]);
     assert_eq!(exported.code, Some(0), "{exported:?}");
     let files = std::fs::read_dir(at.join("csv")).unwrap().count();

@@ -9,9 +9,9 @@ use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Action};
-use palpate_core::objects::catalogue;
+use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::palette::Theme;
-use palpate_core::scene::Accuracy;
+use palpate_core::scene::{Accuracy, Effect, Setting};
 use palpate_core::units::three_digits;
 use palpate_core::workers::{Command, MeasuredAccuracy};
 use std::sync::Arc;
@@ -31,6 +31,9 @@ fn every_panel_in_both_themes() {
             let size = [300.0, 240.0];
             let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), ..BenchSetup::default() });
             bench.advance_to(2.6);
+            if panel.name == "effects" {
+                bench.until_effects_are_measured();
+            }
             bench.harness.render().unwrap()
         });
         compare(&format!("panel_{}", panel.name), &side_by_side(&dark, &light), "the CPU renderer of the tests");
@@ -206,6 +209,32 @@ fn error_bands_are_drawn_about_the_traces() {
         bench.harness.render().unwrap()
     });
     compare("panel_force_band", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
+fn effects_are_switched_and_both_numbers_move() {
+    let mut bench = whole_window();
+    bench.tell(Action::OpenObject(EMPTY.to_owned()));
+    bench.until(|s| s.object.is_none());
+    bench.harness.get_by_label("Effects").click();
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_label("finger-contact is on").is_some());
+    assert!(bench.harness.query_by_label_contains("measuring").is_some(), "it says so while it is not known");
+    bench.until_effects_are_measured();
+    // Without contact the empty hand feels nothing; what that costs is in front of it.
+    let cost = "% of the CPU time";
+    assert!(bench.harness.query_all_by_label_contains(cost).count() == Effect::ALL.len());
+    assert!(bench.harness.query_all_by_label_contains("without it: curvature").count() >= 3);
+    let before = bench.workbench().snapshot().unwrap();
+    bench.harness.get_by_role_and_label(Role::Button, "finger-contact off").click();
+    let after = bench.until(|s| s.grasp > before.grasp);
+    assert!(before.plan.is_on("finger-contact") && !after.plan.is_on("finger-contact"));
+    assert_eq!(after.scene.effects.get(Effect::FingerContact), Setting::Off);
+    bench.until_effects_are_measured();
+    assert!(bench.harness.query_by_label("finger-contact is off").is_some());
+    assert!(bench.harness.query_by_label_contains("onset at").is_some(), "what putting it in would change");
+    bench.harness.get_by_role_and_label(Role::Button, "finger-contact auto").click();
+    bench.until(|s| s.plan.is_on("finger-contact"));
 }
 
 #[test]

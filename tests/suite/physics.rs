@@ -6,7 +6,7 @@ use palpate_core::grasping::{GraspSummary, grasp};
 use palpate_core::gripper::Phase;
 use palpate_core::objects::{EMPTY, ObjectModel, catalogue};
 use palpate_core::physics::{Placement, Simulation};
-use palpate_core::scene::{Accuracy, Scene};
+use palpate_core::scene::{Accuracy, Effect, Scene, Setting};
 
 fn scene_of(name: &str) -> (Scene, Option<ObjectModel>) {
     let mut scene = Scene::default();
@@ -78,6 +78,8 @@ fn contact_carries_the_weight_of_a_held_object() {
 fn a_held_object_does_not_creep() {
     let (mut scene, object) = scene_of("lemon");
     scene.timing.duration_s = 20.0;
+    // What friction lets slip, not what silicone yields.
+    scene.effects.set(Effect::Creep, Setting::Off);
     let mut place_after = |hold_ticks: u32| {
         scene.programme.hold_ticks = hold_ticks;
         held(&scene, object.as_ref()).0.world_from_object().expect("not empty").position
@@ -109,6 +111,6 @@ fn a_step_allocates_nothing() {
             assert_eq!(count, 0, "{name} at step {}", simulation.tick());
             touching += report.unwrap().contacts;
         }
-        assert!(name == EMPTY || touching > 0, "{name} was never touched");
+        assert!(touching > 0, "{name}: nothing was ever touched");
     }
 }

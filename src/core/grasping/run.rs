@@ -212,10 +212,27 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_hand_says_that_its_fingers_cross() {
-        let trial = grasp(&Scene::default(), None, 0);
+    fn an_empty_hand_closes_on_itself_unless_it_is_told_not_to() {
+        let mut scene = Scene::default();
+        let trial = grasp(&scene, None, 0);
         assert_eq!(trial.info.object, "empty");
+        assert!(trial.info.warnings.is_empty() && trial.info.plan.is_on("finger-contact"), "{:?}", trial.info);
+        scene.effects.set(Effect::FingerContact, Setting::Off);
+        let trial = grasp(&scene, None, 0);
         assert!(trial.info.warnings.iter().any(|w| w.contains("pass through")), "{:?}", trial.info.warnings);
+    }
+
+    #[test]
+    fn fingers_that_meet_against_the_plan_are_mentioned() {
+        // Held so far to the side that it is not in the way, though it is large enough to be.
+        let mut scene = Scene::default();
+        scene.object.fixed = true;
+        scene.gripper.mount.offset = [0.0, 0.08, 0.0];
+        let block = ObjectModel::from_primitive("block", Primitive::Sphere { radius: 0.03 }, 400.0, 0.6);
+        let trial = grasp(&scene, Some(&block), 0);
+        assert!(!trial.info.plan.is_on("finger-contact") && trial.info.quality.converged);
+        let noted = |w: &String| w.contains("finger-contact was turned on at");
+        assert_eq!(trial.info.warnings.iter().filter(|w| noted(w)).count(), 1, "{:?}", trial.info.warnings);
     }
 
     #[test]

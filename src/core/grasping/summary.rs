@@ -93,6 +93,7 @@ mod tests {
     use crate::geometry::Primitive;
     use crate::grasping::grasp;
     use crate::objects::ObjectModel;
+    use crate::scene::{Effect, Setting};
 
     #[test]
     fn a_larger_ball_is_met_earlier_and_bends_the_fingers_less() {
@@ -109,10 +110,15 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_hand_touches_nothing() {
-        let scene = Scene::default();
+    fn an_empty_hand_touches_nothing_but_itself() {
+        let mut scene = Scene::default();
         let summary = GraspSummary::new(&grasp(&scene, None, 0), &scene);
-        assert_eq!((summary.contact_onset_s, summary.object_moved_m), (None, None));
+        let [left, right] = summary.hold.expect("held").force_n;
+        assert!(left > 0.05 && (left / right - 1.0).abs() < 1e-6, "{left} N and {right} N");
+        assert!(summary.contact_onset_s.is_some() && summary.object_moved_m.is_none());
+        scene.effects.set(Effect::FingerContact, Setting::Off);
+        let summary = GraspSummary::new(&grasp(&scene, None, 0), &scene);
+        assert_eq!(summary.contact_onset_s, None);
         assert_eq!(summary.hold.map(|hold| hold.force_n), Some([0.0, 0.0]));
     }
 }

@@ -37,6 +37,15 @@ pub struct EffectsView {
     pub state: EffectsState,
 }
 
+/// What measures a scene: its explanation, nothing when cancelled, or why it cannot be had.
+pub type Explain = Arc<dyn Fn(&Scene, &Measuring<'_>) -> Result<Option<Explanation>, String> + Send + Sync>;
+
+/// Loads a scene's object and explains the scene.
+pub fn explain_scene(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, String> {
+    let object = scene.load_object().map_err(|error| error.to_string())?;
+    Ok(explain_effects(scene, object.as_ref(), how))
+}
+
 /// A scene to be measured, and the flag by which that is given up.
 struct Wish {
     scene: Arc<Scene>,
@@ -55,10 +64,10 @@ pub struct EffectsWorker {
 
 impl EffectsWorker {
     /// Starts the thread.
-    pub fn start(wake: Wake) -> std::io::Result<Self> {
+    pub fn start(explain: Explain, wake: Wake) -> std::io::Result<Self> {
         let (wishes, inbox) = channel();
         let view = Arc::new(Latest::default());
-        let desk = Desk { view: Arc::clone(&view), wake, kept: VecDeque::new() };
+        let desk = Desk { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
         let thread = std::thread::Builder::new().name("effects".to_owned()).spawn(move || desk.work(&inbox))?;
         Ok(Self { wishes: Some(wishes), asked: None, view, thread: Some(thread) })
     }
@@ -107,6 +116,7 @@ impl Drop for EffectsWorker {
 
 /// What the thread owns.
 struct Desk {
+    explain: Explain,
     view: Arc<Latest<EffectsView>>,
     wake: Wake,
     kept: VecDeque<(Arc<Scene>, Arc<Explanation>)>,
@@ -134,16 +144,15 @@ impl Desk {
     }
 
     fn measure(&mut self, wish: &Wish) {
-        let object = match wish.scene.load_object() {
-            Ok(object) => object,
-            Err(error) => return self.publish(&wish.scene, EffectsState::Failed(error.to_string())),
-        };
         let progress = |done: usize, of: usize| self.publish(&wish.scene, EffectsState::Measuring(done, of));
         // One core is left to the simulation that is being watched.
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
         let how = Measuring { threads, cancelled: &wish.cancelled, progress: &progress };
-        let Some(explanation) = explain_effects(&wish.scene, object.as_ref(), &how) else { return };
-        let explanation = Arc::new(explanation);
+        let explanation = match (self.explain)(&wish.scene, &how) {
+            Ok(Some(explanation)) => Arc::new(explanation),
+            Ok(None) => return,
+            Err(cause) => return self.publish(&wish.scene, EffectsState::Failed(cause)),
+        };
         self.publish(&wish.scene, EffectsState::Ready(Arc::clone(&explanation)));
         self.kept.push_back((Arc::clone(&wish.scene), explanation));
         if self.kept.len() > KEPT {
@@ -177,7 +186,7 @@ mod tests {
             // The test may have stopped listening.
             let _heard = wake.send(());
         });
-        (EffectsWorker::start(wake).expect("a thread"), woken)
+        (EffectsWorker::start(Arc::new(explain_scene), wake).expect("a thread"), woken)
     }
 
     fn measured(worker: &EffectsWorker, woken: &Receiver<()>, scene: &Scene) -> Arc<Explanation> {

@@ -32,7 +32,7 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 
-pub use effects::{EffectsState, EffectsView, EffectsWorker};
+pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{

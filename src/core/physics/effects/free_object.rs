@@ -21,5 +21,6 @@ fn ruling(situation: &Situation<'_>) -> Ruling {
         true => (true, format!("object.fixed holds it in place; {forces}")),
         false => (false, format!("it rests freely; {forces}")),
     };
-    Ruling { possible: !fixed, number: ratio(grip, weight), facts }
+    let number = if fixed { 0.0 } else { ratio(grip, weight) };
+    Ruling { possible: !fixed, number, facts }
 }
