@@ -4,12 +4,13 @@ use super::closed_form::{Run, bare, torque};
 use super::contact::Against;
 use super::detect::detect;
 use super::effects::{plan, plan_of};
+use super::integrator::{Integrator, Surroundings};
 use super::step::{Drive, lay_out};
 use super::{Model, Placement, Simulation};
 use crate::geometry::Primitive;
 use crate::gripper::PadLaw;
 use crate::objects::ObjectModel;
-use crate::scene::{Auto, Effect, Scene, Setting, SupportKind};
+use crate::scene::{Auto, Effect, Method, Scene, Setting, SupportKind};
 use crate::trial::Plan;
 use glam::DVec3;
 
@@ -185,6 +186,35 @@ fn a_joint_under_a_constant_torque_creeps_as_a_standard_linear_solid() {
 }
 
 #[test]
+fn steps_made_of_stages_keep_chambers_and_creep_on_their_course() {
+    let mut scene = bare(10);
+    let finger = &mut scene.gripper.finger;
+    (finger.damping_time, finger.creep_share, finger.creep_time) = (0.02, 0.3, 0.5);
+    scene.gripper.actuation.filling_time = 0.1;
+    for effect in [Effect::PneumaticLag, Effect::Creep] {
+        scene.effects.set(effect, Setting::On);
+    }
+    let drive = Drive { line_bar: 0.8, ..Drive::default() };
+    let bent = |method: Method, h: f64| -> f64 {
+        let mut run = Run::new(&scene, None, h);
+        let mut integrator = Integrator::new(method, &run.state);
+        for _ in 0..(0.5 / h).round() as u32 {
+            let mut within = Surroundings { model: &run.model, ws: &mut run.ws, drive: &drive };
+            integrator.advance(&mut within, &mut run.state, h).expect("finite");
+        }
+        let bar = 0.8 * (1.0 - f64::exp(-0.5 / 0.1));
+        assert!((run.state.chamber_bar / bar - 1.0).abs() < 1e-9, "{method:?} h = {h}: {}", run.state.chamber_bar);
+        run.state.q[4]
+    };
+    let reference = bent(Method::Sdirk2, 1e-4);
+    let errors = |method| [0.01, 0.005, 0.0025].map(|h| (bent(method, h) - reference).abs());
+    let (euler, stages) = (errors(Method::Euler), errors(Method::Sdirk2));
+    for (one, two) in euler.iter().zip(&stages) {
+        assert!(two < &(0.3 * one), "{euler:?} {stages:?}");
+    }
+}
+
+#[test]
 fn two_flat_pads_share_what_they_overlap() {
     // Straight fingers whose pads overlap by 2 d everywhere: each is pushed in by d, F = E L w d / H. Linear and stiffening.
     let (length, width, height, modulus, d) = (0.1, 0.02, 0.008, 1e5, 0.002);
@@ -253,8 +283,7 @@ fn a_finger_against_its_mirror_image_is_a_finger_against_a_wall() {
     let apart = met.iter().zip(wall).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let free = 0.06 / run.model.chain.stiffness;
     let stopped = wall.iter().map(|q| free - q).fold(0.0, f64::max);
-    println!("joints {apart} rad apart, stopped by {stopped} rad\n{met:?}\n{wall:?}");
-    assert!(apart < 0.02 * stopped);
+    assert!(apart < 0.02 * stopped, "{apart} rad apart, stopped by {stopped} rad");
 }
 
 #[test]
