@@ -49,3 +49,13 @@ fn fragment(corner: Corner, @builtin(front_facing) front: bool) -> @location(0) 
     let outward = normalize(select(-corner.normal, corner.normal, front));
     return vec4<f32>(shade(corner.colour, corner.world, outward, corner.gloss), 1.0);
 }
+
+// A ghost: the nearer surface only, clearest where it turns away from the eye, so that outlines can be compared.
+@fragment
+fn fragment_ghost(corner: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    if (!front) {
+        discard;
+    }
+    let edge = 1.0 - abs(dot(normalize(corner.normal), towards_eye(corner.world)));
+    return vec4<f32>(corner.colour, 0.32 + 0.60 * edge * edge);
+}

@@ -31,6 +31,8 @@ pub enum Action {
     SetTheme(Theme),
     /// Force arrows on or off.
     SetForces(bool),
+    /// The other engine's fingers and object, translucent, on or off.
+    SetGhost(bool),
     /// The stretch of time that all plots show (s); `None` for the whole grasp.
     SetTimeWindow(Option<[f64; 2]>),
     /// Tell, or keep hidden, what is in the hand in truth.

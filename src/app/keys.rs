@@ -24,7 +24,7 @@ const fn key(
 }
 
 /// All keys. Those with more modifiers come first, so that they win.
-pub(super) const ALL: [Binding; 19] = [
+pub(super) const ALL: [Binding; 20] = [
     key(Modifiers::NONE, Key::Space, "play or pause", |c| {
         let playing = c.snapshot?.status.playing;
         Some(Action::Simulation(if playing { Command::Pause } else { Command::Play }))
@@ -40,6 +40,7 @@ pub(super) const ALL: [Binding; 19] = [
     key(Modifiers::SHIFT, Key::Z, "show everything", |_| Some(Action::FrameAll)),
     key(Modifiers::NONE, Key::Z, "show the object", |c| Some(Action::SetCamera(object_framed(c)?))),
     key(Modifiers::NONE, Key::F, "force arrows", |c| Some(Action::SetForces(!c.view.forces))),
+    key(Modifiers::NONE, Key::G, "ghost: what the other engine computes", |c| Some(Action::SetGhost(!c.view.ghost))),
     key(Modifiers::ALT, Key::Num1, "front view", |c| turned(c, StandardView::Front)),
     key(Modifiers::ALT, Key::Num3, "right view", |c| turned(c, StandardView::Right)),
     key(Modifiers::ALT, Key::Num7, "top view", |c| turned(c, StandardView::Top)),

@@ -16,6 +16,8 @@ pub struct ViewState {
     pub camera: Camera,
     /// Force arrows are drawn.
     pub forces: bool,
+    /// The other engine's fingers and object are drawn too.
+    pub ghost: bool,
     /// What is in the hand in truth is told in words.
     pub truth_shown: bool,
     /// Which panels are where; panes are the names of panels.
@@ -39,6 +41,7 @@ impl Default for ViewState {
             theme: Theme::Dark,
             camera: Camera::default(),
             forces: true,
+            ghost: false,
             truth_shown: true,
             layout: panels::default_layout(),
             time_window: None,

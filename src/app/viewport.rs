@@ -32,6 +32,8 @@ impl Viewport {
 pub(super) struct Key {
     pub(super) grasp: u64,
     pub(super) sample: f64,
+    /// Time of the ghost's frame, where one is drawn (s).
+    pub(super) ghost: Option<f64>,
     pub(super) view: PictureView,
     pub(super) pixels: [u32; 2],
     pub(super) pixels_per_point: f32,

@@ -20,9 +20,10 @@ use palpate_core::picture::PictureView;
 use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
+use palpate_core::trial::Frame as TrialFrame;
 use palpate_core::workers::{
-    Command, EffectsWorker, Explain, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
-    Wake,
+    Command, EffectsWorker, Explain, GhostGrasp, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup,
+    Snapshot, Wake,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -131,6 +132,11 @@ impl Workbench {
             seen: None,
             deck: ObjectDeck::new(DECK_SEED),
         };
+        if workbench.view.ghost
+            && let Err(cause) = workbench.worker.send(Command::SetGhost(true))
+        {
+            workbench.tell(Message::Warning(cause.to_string()));
+        }
         if let Err(cause) = setup.model {
             workbench.tell(Message::Error(format!("nothing will be recognised: {cause}")));
         }
@@ -173,8 +179,8 @@ impl Workbench {
         let mut actions = Vec::new();
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
         let mut layout = std::mem::replace(&mut self.view.layout, egui_tiles::Tree::empty(egui::Id::unique("drawing")));
-        let accuracy = self.worker.accuracy();
-        let context = self.panel_context(snapshot.as_deref(), accuracy.as_deref());
+        let (accuracy, ghost) = (self.worker.accuracy(), self.ghost());
+        let context = self.panel_context(snapshot.as_deref(), accuracy.as_deref(), ghost.as_deref());
         actions.extend(keys::pressed(&ctx, &context));
         let colours = self.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
@@ -198,15 +204,22 @@ impl Workbench {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
         let snapshot = self.worker.snapshot();
+        let ghost = self.ghost();
         let mut actions = Vec::new();
         panel_frame(panel, self.view.theme).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
             let accuracy = self.worker.accuracy();
-            (panel.ui)(ui, &self.panel_context(snapshot.as_deref(), accuracy.as_deref()), &mut actions);
+            let context = self.panel_context(snapshot.as_deref(), accuracy.as_deref(), ghost.as_deref());
+            (panel.ui)(ui, &context, &mut actions);
         });
         for action in actions {
             self.apply(&ctx, action);
         }
+    }
+
+    /// What the other engine computed last, where it is to be shown.
+    fn ghost(&self) -> Option<Arc<GhostGrasp>> {
+        self.worker.ghost().filter(|_| self.view.ghost)
     }
 
     /// A new object is shown whole and, where it came from a file, remembered.
@@ -228,6 +241,7 @@ impl Workbench {
         &'a self,
         snapshot: Option<&'a Snapshot>,
         accuracy: Option<&'a MeasuredAccuracy>,
+        ghost: Option<&'a GhostGrasp>,
     ) -> PanelContext<'a> {
         PanelContext {
             snapshot,
@@ -238,6 +252,7 @@ impl Workbench {
             view: &self.view,
             thumbnails: &self.thumbnails,
             driver: self.driver.as_deref(),
+            ghost: ghost_of(snapshot, ghost),
         }
     }
 
@@ -332,6 +347,10 @@ impl Workbench {
                 theme::apply(ctx, theme);
             }
             Action::SetForces(forces) => self.view.forces = forces,
+            Action::SetGhost(ghost) => {
+                self.view.ghost = ghost;
+                self.apply(ctx, Action::Simulation(Command::SetGhost(ghost)));
+            }
             Action::SetTimeWindow(window) => self.view.time_window = window,
             Action::ShowTruth(shown) => self.view.truth_shown = shown,
             Action::ShowKeys(shown) => self.view.keys_shown = shown,
@@ -414,9 +433,9 @@ impl Workbench {
             badge: Some("SIMULATED".to_owned()),
             ..PictureView::default()
         };
-        let (answers, wake) = (self.answers.0.clone(), Arc::clone(&self.wake));
+        let (answers, wake, ghost) = (self.answers.0.clone(), Arc::clone(&self.wake), self.ghost());
         let draw = move || {
-            let drawn = draw_picture(&snapshot, &view, &path);
+            let drawn = draw_picture(&snapshot, ghost.as_deref(), &view, &path);
             let message = match drawn {
                 Ok(()) => Message::Info(format!("picture saved as {}", path.display())),
                 Err(text) => Message::Error(text),
@@ -430,11 +449,25 @@ impl Workbench {
     }
 }
 
-fn draw_picture(snapshot: &Snapshot, view: &PictureView, path: &Path) -> Result<(), String> {
+/// The ghost's sample at the time of the snapshot's, if it belongs to the same grasp.
+fn ghost_of<'a>(snapshot: Option<&Snapshot>, ghost: Option<&'a GhostGrasp>) -> Option<&'a TrialFrame> {
+    let (snapshot, ghost) = (snapshot?, ghost?);
+    ghost.at(snapshot.frame.t).filter(|_| ghost.grasp == snapshot.grasp)
+}
+
+fn draw_picture(
+    snapshot: &Snapshot,
+    ghost: Option<&GhostGrasp>,
+    view: &PictureView,
+    path: &Path,
+) -> Result<(), String> {
     let gpu = Gpu::headless(DriverChoice::Any).map_err(|e| e.to_string())?;
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
     let pixels = [view.size.x, view.size.y].map(|side| (side * PICTURE_SCALE) as u32);
-    let list = snapshot.stage.draw(&snapshot.frame, view);
+    let mut list = snapshot.stage.draw(&snapshot.frame, view);
+    if let Some(frame) = ghost_of(Some(snapshot), ghost) {
+        list.ghosts = snapshot.stage.ghosts(frame, view.theme);
+    }
     let picture = Picture::draw(&gpu, &mut renderer, &list, pixels, PICTURE_SCALE).map_err(|e| e.to_string())?;
     picture.save(path).map_err(|e| e.to_string())
 }

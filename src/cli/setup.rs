@@ -3,7 +3,7 @@
 use super::Failure;
 use palpate_core::objects::anchored;
 use palpate_core::recording::Store;
-use palpate_core::scene::{Accuracy, PosePreset, Scene};
+use palpate_core::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use std::path::{Path, PathBuf};
 
 /// What to simulate.
@@ -16,6 +16,9 @@ pub(super) struct SceneArguments {
     /// step in joint angles (rad), and in fingertips and the object over the finger's length.
     #[arg(long, value_name = "NAME|TOL")]
     pub(super) accuracy: Option<Accuracy>,
+    /// What computes the motion: palpate, or rapier for comparison.
+    #[arg(long, value_name = "NAME", value_parser = parse_engine)]
+    pub(super) engine: Option<EngineKind>,
     /// Hold the object in place instead of letting it rest freely.
     #[arg(long)]
     pub(super) fixed: bool,
@@ -26,6 +29,11 @@ pub(super) struct SceneArguments {
     /// Set any key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
+}
+
+fn parse_engine(text: &str) -> Result<EngineKind, String> {
+    let found = EngineKind::ALL.into_iter().find(|engine| engine.name() == text);
+    found.ok_or_else(|| "choose palpate or rapier".to_owned())
 }
 
 fn parse_preset(text: &str) -> Result<PosePreset, String> {
@@ -49,6 +57,9 @@ impl SceneArguments {
         }
         if let Some(accuracy) = self.accuracy {
             scene.solver.accuracy = accuracy;
+        }
+        if let Some(engine) = self.engine {
+            scene.solver.engine = engine;
         }
         if let Some(preset) = self.preset {
             scene.pose = preset.poses();

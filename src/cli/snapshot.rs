@@ -4,7 +4,7 @@ use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::say;
 use glam::Vec2;
-use palpate_core::drawing::{Camera, StandardView};
+use palpate_core::drawing::{Camera, DrawList, StandardView};
 use palpate_core::grasping::prepare;
 use palpate_core::palette::Theme;
 use palpate_core::picture::{PictureView, Stage};
@@ -36,6 +36,9 @@ pub(super) struct SnapshotArguments {
     /// dark or light.
     #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
     theme: Theme,
+    /// Draw fingers and object as the other engine computes them too, translucent.
+    #[arg(long, conflicts_with = "trial")]
+    ghost: bool,
     /// Leave out force arrows.
     #[arg(long)]
     no_forces: bool,
@@ -70,8 +73,9 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<(), Failure> {
     let (stage, frame, badge) = match arguments.trial {
         Some(id) => stored(arguments, store, id)?,
-        None => simulated(arguments)?,
+        None => simulated(arguments, Which::Own)?,
     };
+    let ghost = if arguments.ghost { Some(simulated(arguments, Which::Other)?.1) } else { None };
     let view = PictureView {
         camera: Camera::default().turned_to(arguments.view),
         theme: arguments.theme,
@@ -83,27 +87,35 @@ pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result
     };
     let (centre, radius) = stage.bounds();
     let view = PictureView { camera: view.camera.framing(centre, radius), ..view };
-    draw(&stage, &frame, &view, arguments.size, &arguments.out)?;
+    let mut list = stage.draw(&frame, &view);
+    if let Some(ghost) = &ghost {
+        list.ghosts = stage.ghosts(ghost, view.theme);
+    }
+    draw(&list, arguments.size, &arguments.out)?;
     say(arguments.out.display())
 }
 
-/// Draws a frame off-screen and writes it.
-pub(super) fn draw(
-    stage: &Stage,
-    frame: &Frame,
-    view: &PictureView,
-    size: [u32; 2],
-    out: &Path,
-) -> Result<(), Failure> {
+/// Draws a list off-screen and writes it.
+fn draw(list: &DrawList, size: [u32; 2], out: &Path) -> Result<(), Failure> {
     let gpu = Gpu::headless(DriverChoice::Any)?;
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    Picture::draw(&gpu, &mut renderer, &stage.draw(frame, view), size, 1.0)?.save(out)?;
+    Picture::draw(&gpu, &mut renderer, list, size, 1.0)?.save(out)?;
     Ok(())
 }
 
+/// Which engine computes a picture: the scene's own, or the one to compare with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Which {
+    Own,
+    Other,
+}
+
 /// Simulates up to the moment asked for.
-fn simulated(arguments: &SnapshotArguments) -> Result<(Stage, Frame, String), Failure> {
-    let scene = arguments.scene.scene(arguments.object.as_deref())?;
+fn simulated(arguments: &SnapshotArguments, which: Which) -> Result<(Stage, Frame, String), Failure> {
+    let mut scene = arguments.scene.scene(arguments.object.as_deref())?;
+    if which == Which::Other {
+        scene.solver.engine = scene.solver.engine.other();
+    }
     let object = scene.load_object()?;
     let mut run = prepare(&scene, object.as_ref(), 0);
     let stage = Stage::new(&scene, object.as_ref(), run.info().world_from_gripper);

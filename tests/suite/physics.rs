@@ -6,7 +6,7 @@ use palpate_core::grasping::{GraspSummary, grasp};
 use palpate_core::gripper::Phase;
 use palpate_core::objects::{EMPTY, ObjectModel, catalogue};
 use palpate_core::physics::{Placement, Simulation};
-use palpate_core::scene::{Accuracy, Effect, Scene, Setting};
+use palpate_core::scene::{Accuracy, Effect, EngineKind, Scene, Setting};
 
 fn scene_of(name: &str) -> (Scene, Option<ObjectModel>) {
     let mut scene = Scene::default();
@@ -112,5 +112,34 @@ fn a_step_allocates_nothing() {
             touching += report.unwrap().contacts;
         }
         assert!(touching > 0, "{name}: nothing was ever touched");
+    }
+}
+
+/// Joint angles, forces and onset of the same grasps by both engines. rapier's skin is rigid and does not shear, which is
+/// worth what the bounds allow: see `physics::rapier_engine`.
+#[test]
+fn the_second_engine_grasps_alike() {
+    for name in ["ball", "jenga"] {
+        let (mut scene, object) = scene_of(name);
+        scene.timing.duration_s = 3.0;
+        let ours = grasp(&scene, object.as_ref(), 0);
+        scene.solver.engine = EngineKind::Rapier;
+        let theirs = grasp(&scene, object.as_ref(), 0);
+        assert!(theirs.info.quality.finite && theirs.info.warnings == ours.info.warnings, "{name}");
+        assert_eq!(ours.frames.len(), theirs.frames.len());
+        let mut squares = 0.0;
+        for (a, b) in ours.frames.iter().zip(&theirs.frames) {
+            assert_eq!((a.sample, a.t, a.line_bar, a.phase), (b.sample, b.t, b.line_bar, b.phase));
+            squares += a.q.iter().zip(&b.q).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.q.len() as f64;
+        }
+        let apart = (squares / ours.frames.len() as f64).sqrt().to_degrees();
+        assert!(apart < 0.25, "{name}: joints are {apart} degrees apart");
+        let [ours, theirs] = [ours, theirs].map(|trial| GraspSummary::new(&trial, &scene));
+        let onset = |summary: &GraspSummary| summary.contact_onset_s.expect("touched");
+        assert!((onset(&ours) - onset(&theirs)).abs() < 0.04, "{name}");
+        let force = |summary: &GraspSummary| summary.hold.as_ref().expect("held").force_n;
+        for (a, b) in force(&ours).into_iter().zip(force(&theirs)) {
+            assert!((b / a - 1.0).abs() < 0.1, "{name}: held with {b} N instead of {a} N");
+        }
     }
 }

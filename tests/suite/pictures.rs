@@ -29,6 +29,8 @@ struct Shot {
     size: [u32; 2],
     forces: bool,
     furniture: bool,
+    /// The other engine's run is laid over it.
+    ghost: bool,
 }
 
 const HELD: Shot = Shot {
@@ -39,6 +41,7 @@ const HELD: Shot = Shot {
     size: [480, 320],
     forces: true,
     furniture: true,
+    ghost: false,
 };
 
 fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaImage {
@@ -58,7 +61,14 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
         badge: shot.furniture.then(|| "SIMULATED".to_owned()),
         ..PictureView::default()
     };
-    let picture = Picture::draw(gpu, renderer, &stage.draw(frame, &view), shot.size, 1.0).unwrap();
+    let mut list = stage.draw(frame, &view);
+    if shot.ghost {
+        scene.solver.engine = scene.solver.engine.other();
+        let other = grasp(&scene, object.as_ref(), 0);
+        let frame = other.frames.iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
+        list.ghosts = stage.ghosts(frame, shot.theme);
+    }
+    let picture = Picture::draw(gpu, renderer, &list, shot.size, 1.0).unwrap();
     RgbaImage::from_raw(picture.width, picture.height, picture.rgba).unwrap()
 }
 
@@ -72,6 +82,7 @@ fn held_objects_from_several_sides() {
     let scene = Scene::default();
     check("view_lemon_dark", &HELD, &scene);
     check("view_lemon_light", &Shot { theme: Theme::Light, ..HELD }, &scene);
+    check("view_ball_ghost", &Shot { object: "ball", ghost: true, view: StandardView::Front, ..HELD }, &scene);
     check("view_box_front", &Shot { object: "box", view: StandardView::Front, ..HELD }, &scene);
     check(
         "view_syringe_top",

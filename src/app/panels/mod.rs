@@ -18,6 +18,7 @@ use super::view_state::ViewState;
 use egui::Ui;
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use palpate_core::scene::Scene;
+use palpate_core::trial::Frame;
 use palpate_core::workers::{EffectsWorker, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
 
@@ -39,6 +40,8 @@ pub struct PanelContext<'a> {
     pub thumbnails: &'a BTreeMap<String, egui::TextureHandle>,
     /// The graphics driver in words; absent when nothing can draw the 3-D view.
     pub driver: Option<&'a str>,
+    /// The other engine's sample at the same time, where it is to be drawn.
+    pub ghost: Option<&'a Frame>,
 }
 
 /// A kind of panel.

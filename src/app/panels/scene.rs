@@ -5,7 +5,7 @@ use crate::app::accuracy_dial::{self, choice};
 use crate::app::actions::Action;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_core::gripper::{Finger, PadLaw};
-use palpate_core::scene::{Auto, Scene, SupportKind};
+use palpate_core::scene::{Auto, EngineKind, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let mut scene = context.scene.clone();
@@ -139,6 +139,8 @@ fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
 }
 
 fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let engines = EngineKind::ALL.map(|engine| (engine, engine.name()));
+    choice(ui, "engine", &mut scene.solver.engine, &engines);
     accuracy_dial::rows(ui, scene, context, actions);
     let label = ui.label("sampling");
     ui.add(

@@ -98,8 +98,18 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
         ..PictureView::default()
     };
     let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
-    let key = Key { grasp: snapshot.grasp, sample: snapshot.frame.t, view: picture.clone(), pixels, pixels_per_point };
-    let list = snapshot.stage.draw(&snapshot.frame, &picture);
+    let key = Key {
+        grasp: snapshot.grasp,
+        sample: snapshot.frame.t,
+        ghost: context.ghost.map(|ghost| ghost.t),
+        view: picture.clone(),
+        pixels,
+        pixels_per_point,
+    };
+    let mut list = snapshot.stage.draw(&snapshot.frame, &picture);
+    if let Some(ghost) = context.ghost {
+        list.ghosts = snapshot.stage.ghosts(ghost, context.view.theme);
+    }
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
 }
 
@@ -108,7 +118,7 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ve
     if rect.width() < 560.0 || rect.height() < 160.0 {
         return;
     }
-    let place = Rect::from_min_size(rect.min + egui::vec2(12.0, 12.0), egui::vec2(340.0, 26.0));
+    let place = Rect::from_min_size(rect.min + egui::vec2(12.0, 12.0), egui::vec2(460.0, 26.0));
     let layout = egui::Layout::left_to_right(egui::Align::Center);
     let mut bar = ui.new_child(egui::UiBuilder::new().max_rect(place).layout(layout));
     bar.spacing_mut().item_spacing.x = 4.0;
@@ -133,5 +143,12 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ve
     let forces = bar.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
     if forces.clicked() {
         actions.push(Action::SetForces(!context.view.forces));
+    }
+    let other = context.scene.solver.engine.other().name();
+    let ghost = bar
+        .selectable_label(context.view.ghost, format!("Ghost: {other}"))
+        .on_hover_text("Fingers and object as the other engine computes them, translucent (G)");
+    if ghost.clicked() {
+        actions.push(Action::SetGhost(!context.view.ghost));
     }
 }

@@ -43,6 +43,7 @@ fn portrait(object: &ObjectModel) -> DrawList {
         backdrop: BACKDROP,
         shadow_bounds: (centre, 1.4 * radius),
         ground: Some(Ground { height: object.bounds.min.z as f32, colour: GROUND, grid: GROUND, radius: 6.0 * radius }),
+        ghosts: Vec::new(),
         solids: vec![Solid {
             mesh: Arc::clone(&object.surface),
             world_from_mesh: Mat4::from_translation(Vec3::ZERO),

@@ -27,6 +27,8 @@ pub struct DrawList {
     pub ground: Option<Ground>,
     /// Rigid things.
     pub solids: Vec<Solid>,
+    /// Things shown for comparison: translucent, without shadow.
+    pub ghosts: Vec<Solid>,
     /// Soft fingers.
     pub fingers: Vec<SoftFinger>,
     /// Forces.

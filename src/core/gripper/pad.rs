@@ -59,6 +59,13 @@ impl Default for Pad {
     }
 }
 
+impl Pad {
+    /// Height of the undeformed skin above the neutral axis at a distance `across` from the middle (m).
+    pub fn height(&self, across: f64) -> f64 {
+        self.thickness - across * across / (2.0 * self.crown_radius)
+    }
+}
+
 /// Compression, as a share of the rest length, beyond which the neo-Hookean law is continued by its tangent.
 const TANGENT_FROM: f64 = 0.85;
 

@@ -53,8 +53,7 @@ impl TaxelGrid {
 
     /// Height of the undeformed skin above the neutral axis, H (m): the pad's thickness less its crown.
     pub fn height(&self, taxel: usize) -> f64 {
-        let across = self.across(taxel);
-        self.pad.thickness - across * across / (2.0 * self.pad.crown_radius)
+        self.pad.height(self.across(taxel))
     }
 
     /// Small-strain stiffness of a taxel, k = E a / H (N/m).

@@ -153,6 +153,7 @@ impl Blueprint {
             surface: Arc::new(surface),
             field,
             resting: resting_of(&solids),
+            parts: solids.into(),
             mass,
             friction: DEFAULT_FRICTION,
             bounds,

@@ -1,6 +1,6 @@
 //! An object ready for simulation and drawing, whatever file it came from.
 
-use crate::geometry::{Bounds, DistanceField, MassProperties, Pose, Primitive, SurfaceMesh};
+use crate::geometry::{Bounds, DistanceField, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -130,6 +130,8 @@ pub struct ObjectModel {
     pub surface: Arc<SurfaceMesh>,
     /// What is touched.
     pub field: DistanceField,
+    /// The same, solid by solid, for engines that want shapes instead of distances.
+    pub parts: Arc<[SolidPart]>,
     /// With what it rests.
     pub resting: Resting,
     /// Mass, centre and inertia.
@@ -153,6 +155,7 @@ impl ObjectModel {
             class: None,
             surface: Arc::new(surface),
             field: DistanceField::primitive(shape, &Pose::IDENTITY),
+            parts: Arc::from([SolidPart::Primitive(shape, Pose::IDENTITY)]),
             resting: Resting::on_primitive(&shape, &Pose::IDENTITY),
             mass: unit.with_mass(unit.mass * density),
             friction,

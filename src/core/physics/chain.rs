@@ -23,7 +23,7 @@ pub(super) struct ChainModel {
     /// Masses of the segments (kg).
     pub(super) masses: Vec<f64>,
     /// Inertias of the segments about their own centres (kg m²).
-    inertias: Vec<f64>,
+    pub(super) inertias: Vec<f64>,
     /// Stiffness of each joint (N m/rad).
     pub(super) stiffness: f64,
     /// Damping of each joint (N m s/rad).

@@ -13,7 +13,8 @@
 //!
 //! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
 //! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
-//! long), [`Simulation`] (a grasp in time).
+//! long), [`Simulation`] (a grasp in time). A second engine, [`RapierSimulation`], computes the same scenes independently;
+//! both are an [`Engine`].
 
 mod chain;
 #[cfg(test)]
@@ -25,10 +26,12 @@ pub mod effects;
 #[cfg(test)]
 mod effects_tests;
 mod energy;
+mod engine;
 mod environment;
 mod integrator;
 mod model;
 mod placement;
+mod rapier_engine;
 mod resting;
 mod simulation;
 mod skyline;
@@ -41,8 +44,10 @@ mod stepper_tests;
 mod strands;
 mod workspace;
 
+pub use engine::Engine;
 pub use model::Model;
 pub use placement::Placement;
+pub use rapier_engine::RapierSimulation;
 pub use resting::{natural_rotations, random_rotation};
 pub use simulation::{Refinement, Simulation, SimulationError};
 pub use state::State;

@@ -3,6 +3,7 @@
 use super::contact::{Acting, Against, Contact};
 use super::detect::detect;
 use super::effects::{FingerContact, OtherFinger};
+use super::engine::Engine;
 use super::integrator::Surroundings;
 use super::model::Model;
 use super::placement::Placement;
@@ -15,7 +16,7 @@ use crate::geometry::Pose;
 use crate::gripper::{Actuation, Phase};
 use crate::objects::ObjectModel;
 use crate::scene::{Clock, Scene};
-use crate::trial::{Frame, Quality, TaxelLoad};
+use crate::trial::{Frame, Plan, Quality, TaxelLoad};
 use glam::DVec3;
 
 /// A gripper and an object being simulated. One tick of the clock is one solver step or, under a tolerance, as many as
@@ -346,6 +347,48 @@ impl Simulation {
     /// Kinetic, elastic and potential energy (J), the latter relative to the gripper's frame.
     pub fn energy(&self) -> f64 {
         super::energy::mechanical_energy(&self.model, &self.state)
+    }
+}
+
+impl Engine for Simulation {
+    fn clock(&self) -> Clock {
+        self.clock()
+    }
+
+    fn plan(&self) -> &Plan {
+        self.model().plan()
+    }
+
+    fn finger_contact_turned_on(&self) -> Option<f64> {
+        self.finger_contact_turned_on()
+    }
+
+    fn tick(&self) -> u64 {
+        self.tick()
+    }
+
+    fn command(&mut self, bar: f64, phase: Phase) {
+        self.command(bar, phase);
+    }
+
+    fn pull_object(&mut self, force: DVec3) {
+        self.pull_object(force);
+    }
+
+    fn advance_by(&mut self, ticks: u64) -> Result<(), SimulationError> {
+        self.advance_by(ticks).map(|_report| ())
+    }
+
+    fn frame(&self) -> Frame {
+        self.frame()
+    }
+
+    fn starting_overlap(&mut self) -> f64 {
+        self.starting_overlap()
+    }
+
+    fn quality(&self) -> Quality {
+        self.quality()
     }
 }
 

@@ -4,6 +4,7 @@
 mod fingers;
 mod forces;
 mod furniture;
+mod ghost;
 mod gripper_model;
 
 pub use furniture::SCALE_STEPS;
@@ -101,6 +102,7 @@ impl Stage {
                 radius: 0.45,
             }),
             solids: self.solids(frame),
+            ghosts: Vec::new(),
             fingers: fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, view.full_scale),
             arrows: if view.forces {
                 forces::arrows(&self.gripper, &self.world_from_gripper, frame)
@@ -109,6 +111,19 @@ impl Stage {
             },
             overlay,
         }
+    }
+
+    /// What a frame of another run of the same scene shows, to be laid over a picture as [`DrawList::ghosts`].
+    pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
+        let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, 1.0);
+        let colour = theme.colours().accent;
+        let solid = |mesh, world_from_mesh| Solid { mesh, world_from_mesh, gloss: 0.0 };
+        let mut ghosts: Vec<Solid> =
+            fingers.iter().map(|finger| solid(Arc::new(ghost::finger(finger, colour)), Mat4::IDENTITY)).collect();
+        if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
+            ghosts.push(solid(Arc::clone(mesh), matrix(pose)));
+        }
+        ghosts
     }
 
     fn solids(&self, frame: &Frame) -> Vec<Solid> {

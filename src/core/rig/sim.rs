@@ -3,19 +3,55 @@
 use super::{Event, Rig, RigError};
 use crate::gripper::Phase;
 use crate::objects::ObjectModel;
-use crate::physics::{Placement, Refinement, Simulation};
-use crate::scene::Scene;
+use crate::physics::{Engine, Placement, RapierSimulation, Refinement, Simulation};
+use crate::scene::{EngineKind, Scene};
 use crate::trial::{Frame, Plan, Quality};
 use glam::DVec3;
 
 /// A simulation on its clock.
 #[derive(Clone, Debug)]
 pub struct SimRig {
-    simulation: Simulation,
+    engine: Running,
     /// The actuation tick that has been asked for, so that it is asked for once.
     asked: Option<u32>,
     phase: Phase,
     static_residual: Option<f64>,
+}
+
+/// The engine that the scene asks for.
+#[derive(Clone, Debug)]
+enum Running {
+    Palpate(Box<Simulation>),
+    Rapier(Box<RapierSimulation>),
+}
+
+impl Running {
+    fn new(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
+        match scene.solver.engine {
+            EngineKind::Palpate => {
+                let (simulation, placement) = Simulation::refined(scene, object, refinement);
+                (Self::Palpate(Box::new(simulation)), placement)
+            }
+            EngineKind::Rapier => {
+                let (simulation, placement) = RapierSimulation::refined(scene, object, refinement);
+                (Self::Rapier(Box::new(simulation)), placement)
+            }
+        }
+    }
+
+    fn get(&self) -> &dyn Engine {
+        match self {
+            Self::Palpate(simulation) => simulation.as_ref(),
+            Self::Rapier(simulation) => simulation.as_ref(),
+        }
+    }
+
+    fn get_mut(&mut self) -> &mut dyn Engine {
+        match self {
+            Self::Palpate(simulation) => simulation.as_mut(),
+            Self::Rapier(simulation) => simulation.as_mut(),
+        }
+    }
 }
 
 impl SimRig {
@@ -26,29 +62,29 @@ impl SimRig {
 
     /// The same, computed more finely than the scene asks for.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
-        let (simulation, placement) = Simulation::refined(scene, object, refinement);
-        let rig = Self { simulation, asked: None, phase: Phase::Close, static_residual: None };
+        let (engine, placement) = Running::new(scene, object, refinement);
+        let rig = Self { engine, asked: None, phase: Phase::Close, static_residual: None };
         (rig, placement)
     }
 
     /// The state before the first step, as a frame: what a picture of the start shows.
     pub fn first_look(&self) -> Frame {
-        self.simulation.frame()
+        self.engine.get().frame()
     }
 
     /// How deep the open fingers stand inside the object or its support before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
-        self.simulation.starting_overlap()
+        self.engine.get_mut().starting_overlap()
     }
 
     /// Which effects are simulated, and why.
     pub fn plan(&self) -> &Plan {
-        self.simulation.model().plan()
+        self.engine.get().plan()
     }
 
     /// Pulls at the object (N, world axes) from now on.
     pub fn pull_object(&mut self, force: DVec3) {
-        self.simulation.pull_object(force);
+        self.engine.get_mut().pull_object(force);
     }
 }
 
@@ -58,9 +94,9 @@ impl Rig for SimRig {
     }
 
     fn next_event(&mut self) -> Result<Event, RigError> {
-        let clock = self.simulation.clock();
+        let clock = self.engine.get().clock();
         loop {
-            let tick = self.simulation.tick();
+            let tick = self.engine.get().tick();
             if tick >= clock.total_ticks() {
                 return Ok(Event::Finished);
             }
@@ -71,23 +107,24 @@ impl Rig for SimRig {
             }
             // Nothing happens before the nearer of the next sample and the next change of pressure.
             let until = |period: u32| u64::from(period) - tick % u64::from(period);
-            self.simulation.advance_by(until(clock.ticks_per_sample).min(until(clock.ticks_per_actuation)))?;
-            if self.simulation.tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
-                return Ok(Event::Sampled(self.simulation.frame()));
+            let ticks = until(clock.ticks_per_sample).min(until(clock.ticks_per_actuation));
+            self.engine.get_mut().advance_by(ticks)?;
+            if self.engine.get().tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
+                return Ok(Event::Sampled(self.engine.get().frame()));
             }
         }
     }
 
     fn command(&mut self, bar: f64, phase: Phase) {
         if self.phase == Phase::Hold && phase == Phase::Release {
-            self.static_residual = Some(self.simulation.quality().static_residual);
+            self.static_residual = Some(self.engine.get().quality().static_residual);
         }
         self.phase = phase;
-        self.simulation.command(bar, phase);
+        self.engine.get_mut().command(bar, phase);
     }
 
     fn quality(&self) -> Quality {
-        let mut quality = self.simulation.quality();
+        let mut quality = self.engine.get().quality();
         if let Some(at_hold) = self.static_residual {
             quality.static_residual = at_hold;
         }
@@ -95,7 +132,7 @@ impl Rig for SimRig {
     }
 
     fn notes(&self) -> Vec<String> {
-        let turned_on = self.simulation.finger_contact_turned_on();
+        let turned_on = self.engine.get().finger_contact_turned_on();
         let note = |t| format!("finger-contact was turned on at {t:.2} s: the fingers came near each other after all");
         turned_on.map(note).into_iter().collect()
     }

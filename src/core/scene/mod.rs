@@ -7,6 +7,7 @@ mod accuracy;
 mod auto;
 mod check;
 mod effects;
+mod engine;
 mod file;
 mod poses;
 mod timing;
@@ -14,6 +15,7 @@ mod timing;
 pub use accuracy::{Accuracy, Integrator, Method};
 pub use auto::Auto;
 pub use effects::{Effect, EffectSettings, Setting};
+pub use engine::EngineKind;
 pub use file::SceneError;
 pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
 pub use timing::{Clock, Timing};
@@ -139,6 +141,8 @@ pub struct Support {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Solver {
+    /// What computes the motion.
+    pub engine: EngineKind,
     /// A named time step, or a tolerance to which steps are chosen.
     pub accuracy: Accuracy,
     /// How steps are taken.
@@ -200,6 +204,7 @@ impl Solver {
 impl Default for Solver {
     fn default() -> Self {
         Self {
+            engine: EngineKind::Palpate,
             accuracy: Accuracy::Standard,
             integrator: Integrator::Auto,
             tolerance: 1e-6,

@@ -37,6 +37,8 @@ pub enum Command {
     SetRecording(bool),
     /// Whether a companion runs along for the numerical error band; the grasp begins anew.
     SetErrorBand(bool),
+    /// Whether the other engine computes each grasp too, for [`super::SimWorker::ghost`].
+    SetGhost(bool),
     /// Pull at the object with this force (N, world axes); zero lets go.
     Pull(DVec3),
     /// End the thread.

@@ -10,7 +10,8 @@
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
-//! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks.
+//! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks. A thread "ghost"
+//! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -19,6 +20,7 @@ mod companion;
 mod current;
 mod effects;
 mod gauge;
+mod ghost;
 mod held_object;
 mod latest;
 mod listener;
@@ -33,6 +35,7 @@ mod sim;
 mod sim_tests;
 
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
+pub use ghost::GhostGrasp;
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{

@@ -3,6 +3,7 @@
 use super::companion::Companion;
 use super::current::Current;
 use super::gauge::Gauge;
+use super::ghost::{GhostGrasp, GhostMaker};
 use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
 use super::listener::Listener;
@@ -37,6 +38,7 @@ pub(super) struct Outlets {
     pub(super) rows_lost: Arc<AtomicBool>,
     pub(super) loading: Arc<AtomicBool>,
     pub(super) notices: Sender<Notice>,
+    pub(super) ghost: Arc<Latest<GhostGrasp>>,
     pub(super) wake: Wake,
 }
 
@@ -74,6 +76,7 @@ pub(super) struct Session {
     pace: Pace,
     next_grasp_at: Option<Instant>,
     recorder_busy: bool,
+    ghost: GhostMaker,
 }
 
 impl Session {
@@ -123,6 +126,7 @@ impl Session {
             pace: Pace::starting_at(0.0),
             next_grasp_at: None,
             recorder_busy: false,
+            ghost: GhostMaker::new(Arc::clone(&outlets.ghost), Arc::clone(&outlets.wake)),
             outlets,
         };
         session.begin_somehow();
@@ -231,6 +235,10 @@ impl Session {
                     current.pull(force);
                 }
             }
+            Command::SetGhost(wanted) => {
+                self.ghost.set_wanted(wanted);
+                self.begin_ghost();
+            }
             Command::Quit => {}
         }
         self.publish();
@@ -338,7 +346,16 @@ impl Session {
         self.current =
             Some(Current { run, companion, plan, scene, stage, sensors, frame, told, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
+        self.begin_ghost();
         self.publish();
+    }
+
+    /// The other engine computes the same grasp, where a ghost is wanted.
+    fn begin_ghost(&mut self) {
+        if let Some(current) = &self.current {
+            let model = self.object.as_ref().and_then(|object| object.model.clone());
+            self.ghost.begin(self.grasp, &current.scene, model);
+        }
     }
 
     /// Loads a scene's object, unless it is the one at hand. On failure, which comes as a sentence, that one stays.

@@ -1,5 +1,6 @@
 //! The handle on the simulation's thread: commands go in, snapshots, trace rows and notices come out.
 
+use super::ghost::GhostGrasp;
 use super::latest::Latest;
 use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, Snapshot, TraceRow, Wake};
 use super::session::{Outlets, Session};
@@ -48,6 +49,7 @@ pub struct SimWorker {
     rows_lost: Arc<AtomicBool>,
     loading: Arc<AtomicBool>,
     notices: Receiver<Notice>,
+    ghost: Arc<Latest<GhostGrasp>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -59,6 +61,7 @@ impl SimWorker {
         let (notice_sender, notices) = channel();
         let snapshots = Arc::new(Latest::default());
         let accuracy = Arc::new(Latest::default());
+        let ghost = Arc::new(Latest::default());
         let [rows_lost, loading] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let outlets = Outlets {
             snapshots: Arc::clone(&snapshots),
@@ -67,6 +70,7 @@ impl SimWorker {
             rows_lost: Arc::clone(&rows_lost),
             loading: Arc::clone(&loading),
             notices: notice_sender,
+            ghost: Arc::clone(&ghost),
             wake: Arc::clone(&setup.wake),
         };
         let thread = std::thread::Builder::new().name("sim".to_owned()).spawn(move || {
@@ -82,7 +86,7 @@ impl SimWorker {
                 last_words.1();
             }
         })?;
-        Ok(Self { commands, snapshots, accuracy, rows, rows_lost, loading, notices, thread: Some(thread) })
+        Ok(Self { commands, snapshots, accuracy, rows, rows_lost, loading, notices, ghost, thread: Some(thread) })
     }
 
     /// Sends a command.
@@ -106,6 +110,11 @@ impl SimWorker {
     /// Trace rows since the last call, in order.
     pub fn rows(&self) -> impl Iterator<Item = TraceRow> + '_ {
         self.rows.try_iter()
+    }
+
+    /// The newest grasp that the other engine has computed; compare its number with the snapshot's.
+    pub fn ghost(&self) -> Option<Arc<GhostGrasp>> {
+        self.ghost.get()
     }
 
     /// True once after rows had to be dropped because nobody read them.

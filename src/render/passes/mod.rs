@@ -44,5 +44,5 @@ pub(crate) trait Pass: Send + Sync {
 pub(crate) type MakePass = fn(&PassSetup<'_>) -> Box<dyn Pass>;
 
 /// All passes in the order in which they are drawn.
-pub(crate) const ALL: [MakePass; 6] =
-    [backdrop::make, ground::make, solid::make, skin::make, arrow::make, overlay::make];
+pub(crate) const ALL: [MakePass; 7] =
+    [backdrop::make, ground::make, solid::make, skin::make, solid::make_ghosts, arrow::make, overlay::make];

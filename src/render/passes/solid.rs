@@ -1,9 +1,10 @@
-//! Rigid things. A mesh is uploaded once and kept as long as pictures keep showing it.
+//! Rigid things, and ghosts of things, which are translucent and cast no shadow. A mesh is uploaded once and kept as long
+//! as pictures keep showing it.
 
 use super::build::{Depth, PictureShape, StreamBuffer, fixed_buffer, module, picture_pipeline, shadow_pipeline};
 use super::{Pass, PassSetup, Prepare};
 use bytemuck::{Pod, Zeroable};
-use palpate_core::drawing::Solid;
+use palpate_core::drawing::{DrawList, Solid};
 use palpate_core::geometry::{SurfaceMesh, SurfaceVertex};
 use std::sync::Arc;
 use wgpu::{Buffer, BufferUsages, RenderPass, RenderPipeline, VertexBufferLayout, VertexStepMode};
@@ -24,7 +25,10 @@ struct Uploaded {
 
 struct SolidPass {
     pipeline: RenderPipeline,
-    shadow: RenderPipeline,
+    /// Absent for ghosts.
+    shadow: Option<RenderPipeline>,
+    /// What of a list is drawn.
+    of: fn(&DrawList) -> &[Solid],
     meshes: Vec<Uploaded>,
     instances: StreamBuffer,
     /// For each solid of the picture, which mesh it shows.
@@ -36,6 +40,15 @@ const INSTANCE_ATTRIBUTES: [wgpu::VertexAttribute; 4] =
     wgpu::vertex_attr_array![3 => Float32x4, 4 => Float32x4, 5 => Float32x4, 6 => Float32x4];
 
 pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
+    make_kind(setup, false)
+}
+
+/// Drawn after everything solid, so that it shows through them.
+pub(super) fn make_ghosts(setup: &PassSetup<'_>) -> Box<dyn Pass> {
+    make_kind(setup, true)
+}
+
+fn make_kind(setup: &PassSetup<'_>, ghosts: bool) -> Box<dyn Pass> {
     let shader = module(setup.device, "solid", crate::shaders::SOLID);
     let buffers = [
         Some(VertexBufferLayout {
@@ -52,19 +65,20 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
     let pipeline = picture_pipeline(
         setup,
         &PictureShape {
-            label: "solid",
+            label: if ghosts { "ghost" } else { "solid" },
             shader: &shader,
-            fragment: "fragment",
+            fragment: if ghosts { "fragment_ghost" } else { "fragment" },
             buffers: &buffers,
             groups: &[],
             topology: wgpu::PrimitiveTopology::TriangleList,
-            depth: Depth::Solid,
-            blends: false,
+            depth: if ghosts { Depth::Veil } else { Depth::Solid },
+            blends: ghosts,
         },
     );
     Box::new(SolidPass {
         pipeline,
-        shadow: shadow_pipeline(setup, "solid shadow", &shader, &buffers, &[]),
+        shadow: (!ghosts).then(|| shadow_pipeline(setup, "solid shadow", &shader, &buffers, &[])),
+        of: if ghosts { |list| &list.ghosts } else { |list| &list.solids },
         meshes: Vec::new(),
         instances: StreamBuffer::new("solid instances", BufferUsages::VERTEX),
         shown: Vec::new(),
@@ -104,7 +118,7 @@ impl SolidPass {
 
 impl Pass for SolidPass {
     fn prepare(&mut self, prepare: &Prepare<'_>) {
-        let solids = &prepare.list.solids;
+        let solids = (self.of)(prepare.list);
         self.meshes.retain(|m| solids.iter().any(|solid| Arc::ptr_eq(&m.mesh, &solid.mesh)));
         self.shown = solids.iter().map(|solid| self.index_of(prepare, solid)).collect();
         let instances: Vec<Instance> = solids
@@ -119,8 +133,10 @@ impl Pass for SolidPass {
     }
 
     fn draw_shadow(&self, pass: &mut RenderPass<'_>) {
-        pass.set_pipeline(&self.shadow);
-        self.draw_all(pass);
+        if let Some(shadow) = &self.shadow {
+            pass.set_pipeline(shadow);
+            self.draw_all(pass);
+        }
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>) {
