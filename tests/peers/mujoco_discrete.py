@@ -28,8 +28,9 @@ import numpy as np
 import matched as m
 
 IMPEDANCE = {"fixed_sphere": 0.001, "free_sphere": 0.9}
-RUNS = 7
+RUNS = 5
 STEPS = (1 / 150, 1 / 300, 1 / 600, 1 / 1200, 1 / 2400)
+TOLERANCES = (1e-3, 1e-4, 1e-5)
 FINEST = 1 / 9600
 BASE = 0.156  # height of the palm: pedestal 50 mm, half the ball, 86 mm
 
@@ -153,55 +154,73 @@ def common(name):
     return table[:, 1 : m.N + 1], table[:, m.N + 1]
 
 
-def settings(h):
+def settings(h, integrator):
     """Palpate steps at the common measure of its two rates: sampling faster makes steps shorter."""
     hz = round(1 / h)
-    return [f"timing.sample_hz={hz if hz > 300 else 75}"], "draft" if hz != 300 else "standard"
+    changed = [f"timing.sample_hz={hz if hz > 300 else 75}", f"solver.integrator={integrator}"]
+    return changed, "draft" if hz != 300 else "standard"
+
+
+def ours(program, name):
+    """Everything that Palpate is asked for: its two methods over step lengths, and tolerances."""
+    for integrator in ("euler", "sdirk2"):
+        for h in STEPS:
+            yield f"palpate {integrator}", h, *settings(h, integrator)
+    for tolerance in TOLERANCES:
+        yield "palpate tolerance", tolerance, [], f"{tolerance:g}"
+
+
+def row(setting, samples, q, force, own, truth):
+    return {
+        "setting": setting,
+        "cpu_ms": round(statistics.median(samples), 3),
+        "error_own_deg": float(f"{m.rms_deg(q, own):.3g}"),
+        "error_scipy_deg": float(f"{m.rms_deg(q[4::5], truth):.3g}"),
+        "hold_force_n": round(float(force[219]), 5),
+    }
+
+
+def compare(program, name):
+    truth, truth_force = common(name)
+    mujoco_q, mujoco_force = run(matched(name, FINEST), FINEST)
+    m.write(f"mujoco_{name}", mujoco_q, mujoco_force)
+    finest, accuracy = settings(FINEST, "sdirk2")
+    palpate_q, palpate_force, _ = m.palpate(program, name, finest, accuracy)
+    models = {h: matched(name, h) for h in STEPS}
+    asked = list(ours(program, name))
+    cpu = {k: [] for k in [*models, *range(len(asked))]}
+    last = {}
+    for _ in range(RUNS):
+        for h, mj in models.items():
+            cpu[h].append(stepping_ms(mj, h))
+        for k, (_, _, changed, accuracy) in enumerate(asked):
+            *last[k], ms = m.palpate(program, name, changed, accuracy)
+            cpu[k].append(ms)
+    rows = {}
+    for h, mj in models.items():
+        rows.setdefault("mujoco discrete", []).append(row(h, cpu[h], *run(mj, h), mujoco_q, truth))
+    for k, (method, setting, *_) in enumerate(asked):
+        rows.setdefault(method, []).append(row(setting, cpu[k], *last[k], palpate_q, truth))
+    for method, table in rows.items():
+        for line in table:
+            print(name, method, line, flush=True)
+    converged = {
+        "mujoco_scipy_deg": m.rms_deg(mujoco_q[4::5], truth),
+        "palpate_scipy_deg": m.rms_deg(palpate_q[4::5], truth),
+        "mujoco_palpate_deg": m.rms_deg(mujoco_q, palpate_q),
+        "hold_force_n": {
+            "mujoco": float(mujoco_force[219]),
+            "palpate": float(palpate_force[219]),
+            "scipy": float(truth_force[43]),
+        },
+    }
+    print(name, converged, flush=True)
+    return {"converged": converged, **rows}
 
 
 def main(program):
-    out = {"mujoco": mujoco.__version__, "runs": RUNS, "scenes": {}}
-    for name in m.SCENES:
-        truth, truth_force = common(name)
-        own_q, own_force = run(matched(name, FINEST), FINEST)
-        m.write(f"mujoco_{name}", own_q, own_force)
-        ours_q, ours_force, _ = m.palpate(program, name, ["timing.sample_hz=9600"])
-        rows = {"palpate": [], "mujoco": []}
-        for h in STEPS:
-            changed, accuracy = settings(h)
-            samples = {"palpate": [], "mujoco": []}
-            mj = matched(name, h)
-            for _ in range(RUNS):
-                q_p, f_p, ms = m.palpate(program, name, changed, accuracy)
-                samples["palpate"].append(ms)
-                samples["mujoco"].append(stepping_ms(mj, h))
-            q_m, f_m = run(mj, h)
-            for engine, q, f, own in (("palpate", q_p, f_p, ours_q), ("mujoco", q_m, f_m, own_q)):
-                rows[engine].append(
-                    {
-                        "h_s": h,
-                        "cpu_ms": statistics.median(samples[engine]),
-                        "error_own_deg": m.rms_deg(q, own),
-                        "error_scipy_deg": m.rms_deg(q[4::5], truth),
-                        "hold_force_n": float(f[219]),
-                    }
-                )
-                last = rows[engine][-1]
-                print(name, engine, {k: float(f"{v:.4g}") for k, v in last.items()}, flush=True)
-        out["scenes"][name] = {
-            "finest": {
-                "mujoco_scipy_deg": m.rms_deg(own_q[4::5], truth),
-                "palpate_scipy_deg": m.rms_deg(ours_q[4::5], truth),
-                "mujoco_palpate_deg": m.rms_deg(own_q, ours_q),
-                "hold_force_n": {
-                    "mujoco": float(own_force[219]),
-                    "palpate": float(ours_force[219]),
-                    "scipy": float(truth_force[43]),
-                },
-            },
-            **rows,
-        }
-        print(name, out["scenes"][name]["finest"])
+    scenes = {name: compare(program, name) for name in m.SCENES}
+    out = {"mujoco": mujoco.__version__, "runs": RUNS, "scenes": scenes}
     (m.RESULTS / "cost.json").write_text(json.dumps(out, indent=1) + "\n")
 
 

@@ -25,6 +25,7 @@ mod files;
 mod golden;
 mod learning;
 mod panels;
+mod peers;
 mod physics;
 mod pictures;
 mod program;
