@@ -119,7 +119,7 @@ fn a_step_allocates_nothing() {
 /// worth what the bounds allow: see `physics::rapier_engine`.
 #[test]
 fn the_second_engine_grasps_alike() {
-    for name in ["ball", "jenga"] {
+    for name in ["ball", "cube"] {
         let (mut scene, object) = scene_of(name);
         scene.timing.duration_s = 3.0;
         let ours = grasp(&scene, object.as_ref(), 0);

@@ -115,7 +115,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
 
 /// Standard views and switches, in the upper left corner of the picture.
 fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    if rect.width() < 560.0 || rect.height() < 160.0 {
+    if rect.width() < 620.0 || rect.height() < 160.0 {
         return;
     }
     let place = Rect::from_min_size(rect.min + egui::vec2(12.0, 12.0), egui::vec2(460.0, 26.0));
