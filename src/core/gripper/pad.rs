@@ -7,7 +7,7 @@
 //! - neo-Hookean:  f = (E a / 3) (1 / lambda² - lambda)   (uniaxial; Treloar, *The Physics of Rubber Elasticity*)
 //!
 //! Both have the same slope at x = 0. A linear pad has no bottom: enough torque pushes an object clean through it.
-//! The neo-Hookean force grows without bound as x approaches H; beyond 85 % compression it is continued by its
+//! The neo-Hookean force grows without bound as x approaches H; beyond 95 % compression it is continued by its
 //! tangent, so that any overlap, however deep, has a finite force and the law stays convex.
 
 use serde::{Deserialize, Serialize};
@@ -67,7 +67,7 @@ impl Pad {
 }
 
 /// Compression, as a share of the rest length, beyond which the neo-Hookean law is continued by its tangent.
-const TANGENT_FROM: f64 = 0.85;
+const TANGENT_FROM: f64 = 0.95;
 
 impl PadLaw {
     /// Force (N) and its slope (N/m) of a strand with small-strain stiffness `k` = E a / H (N/m) and rest length
