@@ -88,6 +88,39 @@ pub struct Quality {
     /// Largest torque at any joint that neither springs nor contacts account for at the end of the hold, as a share
     /// of the actuation torque. Far from zero means the grasp had not come to rest.
     pub static_residual: f64,
+    /// Where and when forces did not balance; absent where every step reached its tolerance.
+    pub imbalance: Option<Imbalance>,
+}
+
+/// Steps whose forces did not balance to the solver's tolerance: the first of them, and the worst.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Imbalance {
+    /// Tick at which the first such step began.
+    pub first_tick: u64,
+    /// Its time (s).
+    pub first_s: f64,
+    /// What was farthest from balance in the worst such step: `joint 4 of the left finger`, `the object`.
+    pub worst_at: String,
+    /// What was left there, as a multiple of what the tolerance allows.
+    pub worst_excess: f64,
+}
+
+impl Quality {
+    /// True when the trial may be learned from: every number was finite and every step reached its tolerance.
+    pub fn is_sound(&self) -> bool {
+        self.finite && self.converged
+    }
+
+    /// What is wrong with a trial that did not converge, in a sentence.
+    pub fn misses(&self) -> Option<String> {
+        let (missed, steps) = (self.unconverged_steps, self.steps);
+        let place = |imbalance: &Imbalance| {
+            let Imbalance { first_tick, first_s, worst_at, .. } = imbalance;
+            format!(", the first at {first_s:.3} s (tick {first_tick}), worst at {worst_at}")
+        };
+        let place = self.imbalance.as_ref().map(place).unwrap_or_default();
+        (!self.converged).then(|| format!("{missed} of {steps} steps missed the solver's tolerance{place}"))
+    }
 }
 
 impl Default for Quality {
@@ -105,6 +138,7 @@ impl Default for Quality {
             newton_max: 0,
             friction_residual: 0.0,
             static_residual: 0.0,
+            imbalance: None,
         }
     }
 }

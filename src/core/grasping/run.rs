@@ -134,11 +134,8 @@ impl<R: Rig> GraspRun<R> {
         let finite = self.info.quality.finite;
         self.info.quality = self.rig.quality();
         self.info.quality.finite &= finite;
+        self.info.warnings.extend(self.info.quality.misses());
         let quality = &self.info.quality;
-        if !quality.converged {
-            let (missed, steps) = (quality.unconverged_steps, quality.steps);
-            self.info.warnings.push(format!("{missed} of {steps} steps missed the solver's tolerance"));
-        }
         if quality.missed_steps > 0 {
             let (missed, steps, least) = (quality.missed_steps, quality.steps, quality.least_step_s * 1e6);
             let tolerance = scene.solver.accuracy;

@@ -80,7 +80,7 @@ impl Integrator {
             Method::Sdirk2 => {
                 self.start.copy_from(state);
                 let first = within.step(state, GAMMA * h)?;
-                state.go_on_from(&self.start, 1.0 / GAMMA - 2.0);
+                state.go_on_from(&self.start, 1.0 / GAMMA - 2.0, within.model);
                 let second = within.step(state, GAMMA * h)?;
                 Ok(first.followed_by(&second))
             }

@@ -15,7 +15,9 @@
 //! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
 //! long), [`Simulation`] (a grasp in time). A second engine, [`RapierSimulation`], computes the same scenes independently;
 //! both are an [`Engine`].
+//! [`SteppedScene`] takes steps of any length, for tests and hard cases; `explicit` is there to be compared with.
 
+mod balance;
 mod chain;
 #[cfg(test)]
 mod closed_form;
@@ -28,6 +30,7 @@ mod effects_tests;
 mod energy;
 mod engine;
 mod environment;
+mod explicit;
 mod integrator;
 mod model;
 mod placement;
@@ -38,6 +41,7 @@ mod skyline;
 mod solve;
 mod state;
 mod step;
+mod stepped;
 mod stepper;
 #[cfg(test)]
 mod stepper_tests;
@@ -51,5 +55,6 @@ pub use rapier_engine::RapierSimulation;
 pub use resting::{natural_rotations, random_rotation};
 pub use simulation::{Refinement, Simulation, SimulationError};
 pub use state::State;
-pub use step::{Drive, NotFinite, StepReport, step};
+pub use step::{Drive, NotFinite, StepReport, Unbalanced, step};
+pub use stepped::{SkinForce, SteppedScene, Stepping};
 pub use workspace::Workspace;

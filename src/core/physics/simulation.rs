@@ -1,5 +1,6 @@
 //! A simulated grasp in time: steps on a clock of whole ticks, pressure in, frames out.
 
+use super::balance::static_residual;
 use super::contact::{Acting, Against, Contact};
 use super::detect::detect;
 use super::effects::{FingerContact, OtherFinger};
@@ -9,14 +10,14 @@ use super::model::Model;
 use super::placement::Placement;
 use super::solve::segment_velocities;
 use super::state::State;
-use super::step::{self, Drive, StepReport, segment_axes_of};
+use super::step::{self, Drive, StepReport, Unbalanced, segment_axes_of};
 use super::stepper::Stepper;
 use super::workspace::{Spatial, Workspace};
 use crate::geometry::Pose;
 use crate::gripper::{Actuation, Phase};
 use crate::objects::ObjectModel;
 use crate::scene::{Clock, Scene};
-use crate::trial::{Frame, Plan, Quality, TaxelLoad};
+use crate::trial::{Frame, Imbalance, Plan, Quality, TaxelLoad};
 use glam::DVec3;
 
 /// A gripper and an object being simulated. One tick of the clock is one solver step or, under a tolerance, as many as
@@ -36,6 +37,7 @@ pub struct Simulation {
     stepper: Stepper,
     /// The first step in which fingers that should not meet came near each other (its tick).
     met_at: Option<u64>,
+    imbalance: Option<Imbalance>,
 }
 
 /// How much more finely than its scene asks for a simulation is computed.
@@ -95,6 +97,7 @@ impl Simulation {
             pulls: Drive::default(),
             stepper,
             met_at: None,
+            imbalance: None,
         };
         (simulation, placement)
     }
@@ -155,12 +158,28 @@ impl Simulation {
                 seconds: self.clock.seconds(self.tick),
                 cause,
             })?;
+            self.note_imbalance();
             if self.workspace.fingers_meet && self.met_at.is_none() {
                 self.met_at = Some(self.tick);
             }
             self.tick += at_once;
         }
         Ok(report)
+    }
+
+    /// Remembers the first step that missed its tolerance, and the place of the worst.
+    fn note_imbalance(&mut self) {
+        let Some(Unbalanced { unknown, excess }) = self.stepper.totals.unbalanced.take() else { return };
+        let known = self.imbalance.take();
+        self.imbalance = match known {
+            Some(known) if known.worst_excess >= excess => Some(known),
+            known => {
+                let (first_tick, first_s) =
+                    known.map_or((self.tick, self.clock.seconds(self.tick)), |known| (known.first_tick, known.first_s));
+                let worst_at = State::place_of(&self.model, unknown as usize);
+                Some(Imbalance { first_tick, first_s, worst_at, worst_excess: excess })
+            }
+        };
     }
 
     /// Deepest compression of a strand in the state as it is, before any step (m).
@@ -216,6 +235,7 @@ impl Simulation {
             newton_max: totals.newton_max,
             friction_residual: totals.friction_residual,
             static_residual: self.static_residual(),
+            imbalance: self.imbalance.clone(),
         }
     }
 
@@ -305,43 +325,16 @@ impl Simulation {
         extremes
     }
 
-    /// Largest joint torque not balanced by springs, gravity and contacts, as a share of the actuation torque.
     fn static_residual(&self) -> f64 {
-        let (model, ws) = (&self.model, &self.workspace);
-        let bar = if model.chamber.is_some() { self.state.chamber_bar } else { self.line_bar };
-        let torque = self.actuation.torque(bar);
-        if torque == 0.0 || self.tick == 0 {
-            return 0.0;
+        let bar = if self.model.chamber.is_some() { self.state.chamber_bar } else { self.line_bar };
+        let drive = Drive { torque: self.actuation.torque(bar), ..self.pulls };
+        let residual = static_residual(&self.model, &self.state, &self.workspace, &drive);
+        match self.tick {
+            0 => 0.0,
+            // After a step that failed; a number that is none could not be stored.
+            _ if !residual.is_finite() => f64::MAX,
+            _ => residual,
         }
-        let n = model.chain.joints;
-        let mut scratch = ws.clone();
-        let mut at_rest = self.state.clone();
-        at_rest.velocity.fill(0.0);
-        step::lay_out(model, &at_rest, &mut scratch);
-        step::gather_dynamics(model, &at_rest, &mut scratch, &Drive { torque, ..self.pulls });
-        let mut largest = 0.0f64;
-        for k in 0..2 * n {
-            // At rest r holds h (torque - k q - gravity).
-            let known = scratch.rhs[k] / ws.step.h;
-            let on_joint = |contact: &Contact| self.torque_on_joint(contact, k);
-            let from_contacts: f64 = ws.contacts.iter().filter_map(on_joint).sum();
-            let limit = model.chain.limit_torque(self.state.q[k]).0;
-            largest = largest.max((known + from_contacts - limit).abs());
-        }
-        largest / torque.abs()
-    }
-
-    /// Torque of a contact on joint `k` (N m), where it acts beyond it.
-    fn torque_on_joint(&self, contact: &Contact, k: usize) -> Option<f64> {
-        let n = self.model.chain.joints;
-        let sign = match (contact.acting, contact.against) {
-            (Acting::Segment(link), _) if beyond_joint(link as usize, k, n) => 1.0,
-            (_, Against::Finger(link)) if beyond_joint(link as usize, k, n) => -1.0,
-            _ => return None,
-        };
-        let (normal, tangential) = contact.force(self.workspace.step);
-        let linear = (contact.normal * normal + tangential) * sign;
-        Some(self.workspace.columns[k].dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
     }
 
     /// Kinetic, elastic and potential energy (J), the latter relative to the gripper's frame.
@@ -390,10 +383,4 @@ impl Engine for Simulation {
     fn quality(&self) -> Quality {
         self.quality()
     }
-}
-
-/// True when a segment lies beyond joint `k` (counted over both fingers of `n` joints).
-fn beyond_joint(link: usize, k: usize, n: usize) -> bool {
-    let (finger, segment) = (link / (n + 1), link % (n + 1));
-    finger == k / n && segment > k % n
 }

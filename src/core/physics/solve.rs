@@ -13,6 +13,7 @@
 use super::contact::{Acting, Against, Contact};
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::model::Model;
+use super::step::Unbalanced;
 use super::workspace::{Block, PerLink, Spatial, Workspace};
 use glam::DVec3;
 
@@ -22,6 +23,8 @@ pub(super) struct SolveReport {
     pub(super) iterations: u32,
     pub(super) line_search_steps: u32,
     pub(super) converged: bool,
+    /// What was farthest from balance where it did not converge.
+    pub(super) unbalanced: Option<Unbalanced>,
 }
 
 /// A gradient this small compared with nothing at all counts as zero.
@@ -37,10 +40,12 @@ pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut 
     relative_velocities(model, velocity, ws, Product::OfVelocity);
     loop {
         let size = fill_gradient(model, q, velocity, ws);
+        let allowed = ABSOLUTE_TOLERANCE + model.tolerance * size.forces;
         if !size.gradient.is_finite() {
+            report.unbalanced = Some(farthest_from_balance(model, ws, allowed));
             return report;
         }
-        if size.gradient <= ABSOLUTE_TOLERANCE + model.tolerance * size.forces {
+        if size.gradient <= allowed {
             if passes == model.relag_passes {
                 report.converged = true;
                 return report;
@@ -53,6 +58,7 @@ pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut 
             continue;
         }
         if report.iterations == model.max_iterations {
+            report.unbalanced = Some(farthest_from_balance(model, ws, allowed));
             return report;
         }
         report.iterations += 1;
@@ -82,7 +88,7 @@ pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut 
 
 /// Which of two vectors a product is taken of, and so where it goes.
 #[derive(Clone, Copy, PartialEq)]
-enum Product {
+pub(super) enum Product {
     OfVelocity,
     OfDirection,
 }
@@ -120,7 +126,7 @@ fn write_object_part(out: &mut [f64], from: usize, value: &Spatial) {
 }
 
 /// Velocities of all segments, and from them the relative velocity of each contact.
-fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, which: Product) {
+pub(super) fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, which: Product) {
     segment_velocities(model, x, ws);
     let object = object_part(x, model.joint_count());
     for contact in &mut ws.contacts {
@@ -154,12 +160,12 @@ pub(super) fn segment_velocities(model: &Model, x: &[f64], ws: &mut Workspace) {
 }
 
 /// Sizes of the gradient and of the terms it is the sum of, in the norm of the diagonal of A.
-struct Size {
+pub(super) struct Size {
     gradient: f64,
     forces: f64,
 }
 
-fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
+pub(super) fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
     let n = model.chain.joints;
     let mut on_object = Spatial::default();
     for wrench in &mut ws.wrenches {
@@ -223,6 +229,15 @@ fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace)
         known += ws.rhs[k] * ws.rhs[k] * weight;
     }
     Size { gradient: gradient.sqrt(), forces: contact_size.max(momentum).max(known).sqrt() }
+}
+
+/// The unknown with the largest share in the gradient, or the first whose share is no number at all.
+fn farthest_from_balance(model: &Model, ws: &Workspace, allowed: f64) -> Unbalanced {
+    let size = |k: usize| (ws.gradient[k] * ws.gradient[k] / diagonal(model, ws, k)).sqrt();
+    let sizes = (0..ws.gradient.len()).map(|k| (k, if size(k).is_finite() { size(k) } else { f64::MAX }));
+    let (unknown, largest) = sizes.fold((0, 0.0), |worst, next| if next.1 > worst.1 { next } else { worst });
+    let excess = largest / allowed;
+    Unbalanced { unknown: unknown as u32, excess: if excess.is_finite() { excess } else { f64::MAX } }
 }
 
 /// Diagonal entry of A.

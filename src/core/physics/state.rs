@@ -76,7 +76,11 @@ impl State {
     }
 
     /// Goes on in a straight line, by `share` of the way from `start` to here. Normal impulses are no path and stay.
-    pub(super) fn go_on_from(&mut self, start: &Self, share: f64) {
+    ///
+    /// A turning object goes on in angular momentum rather than in angular velocity: what flies freely keeps it.
+    pub(super) fn go_on_from(&mut self, start: &Self, share: f64, model: &Model) {
+        let momentum = self.angular_momentum(model);
+        let momentum = momentum + (momentum - start.angular_momentum(model)) * share;
         for (now, before) in self.q.iter_mut().zip(&start.q).chain(self.velocity.iter_mut().zip(&start.velocity)) {
             *now += share * (*now - before);
         }
@@ -87,6 +91,11 @@ impl State {
         self.body.position += (self.body.position - start.body.position) * share;
         let turn = rotation_vector(self.body.rotation * start.body.rotation.inverse());
         self.body.rotation = (DQuat::from_scaled_axis(turn * share) * self.body.rotation).normalize();
+        if let Some(body) = model.free_body() {
+            let axes = self.body.matrix();
+            let spin = axes * (body.inverse_inertia * (axes.transpose() * momentum));
+            self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
+        }
         for (site, (now, before)) in self.shear.iter_mut().zip(&start.shear).enumerate() {
             // Skin that has just been touched has no shear to go on from.
             if self.lag[site] > 0.0 && start.lag[site] > 0.0 {
@@ -135,6 +144,13 @@ impl State {
         }
     }
 
+    /// Angular momentum of a free object about its centre of mass, in the gripper frame (kg m²/s); zero otherwise.
+    pub(super) fn angular_momentum(&self, model: &Model) -> DVec3 {
+        let Some(body) = model.free_body() else { return DVec3::ZERO };
+        let axes = self.body.matrix();
+        axes * (body.inertia * (axes.transpose() * self.body_velocity(model).1))
+    }
+
     /// Moves joints and object by one step of `h` (s) at the current velocities.
     ///
     /// A turning object keeps its angular momentum L = I w while I turns with it: w+ = I+^-1 I w. To first order in h
@@ -166,12 +182,21 @@ impl State {
         let n = model.chain.joints;
         let bad = |values: &[f64]| values.iter().position(|x| !x.is_finite());
         if let Some(i) = bad(&self.q).or_else(|| bad(&self.velocity[..2 * n])) {
-            let side = if i < n { "left" } else { "right" };
-            return Some(format!("joint {} of the {side} finger", i % n + 1));
+            return Some(Self::place_of(model, i));
         }
         let (linear, angular) = self.body_velocity(model);
         let sound = self.body.is_finite() && linear.is_finite() && angular.is_finite();
-        (!sound).then(|| "the object".to_owned())
+        (!sound).then(|| Self::place_of(model, 2 * n))
+    }
+
+    /// What an unknown of the step belongs to, named for people.
+    pub fn place_of(model: &Model, unknown: usize) -> String {
+        let n = model.chain.joints;
+        match unknown / n {
+            0 => format!("joint {} of the left finger", unknown + 1),
+            1 => format!("joint {} of the right finger", unknown - n + 1),
+            _ => "the object".to_owned(),
+        }
     }
 }
 

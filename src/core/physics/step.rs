@@ -23,6 +23,18 @@ pub struct StepReport {
     /// The outer friction residual: by how much the lagged slip limits missed the true ones where they mattered,
     /// as a share of the sum of the true ones. Zero without friction forces.
     pub friction_residual: f64,
+    /// What was farthest from balance; absent where the minimisation reached its tolerance.
+    pub unbalanced: Option<Unbalanced>,
+}
+
+/// Forces that did not balance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unbalanced {
+    /// Which unknown of the step: joint rates of both fingers, then the six velocities of a free object. See
+    /// [`State::place_of`].
+    pub unknown: u32,
+    /// What was left over there, as a multiple of what the tolerance allows.
+    pub excess: f64,
 }
 
 impl StepReport {
@@ -34,6 +46,17 @@ impl StepReport {
             converged: self.converged && next.converged,
             contacts: next.contacts,
             friction_residual: self.friction_residual.max(next.friction_residual),
+            unbalanced: Unbalanced::worse(self.unbalanced, next.unbalanced),
+        }
+    }
+}
+
+impl Unbalanced {
+    /// The one that is farther from balance, if any is.
+    pub(super) fn worse(one: Option<Self>, other: Option<Self>) -> Option<Self> {
+        match (one, other) {
+            (Some(a), Some(b)) => Some(if b.excess > a.excess { b } else { a }),
+            (a, b) => a.or(b),
         }
     }
 }
@@ -78,6 +101,10 @@ pub fn step(
     if let Some(body) = state.not_finite(model) {
         return Err(NotFinite { body });
     }
+    if let Some(Unbalanced { unknown, excess: f64::MAX }) = solved.unbalanced {
+        // Forces that are no numbers leave the velocities as they were, and the step without meaning.
+        return Err(NotFinite { body: State::place_of(model, unknown as usize) });
+    }
     let friction_residual = remember_contacts(model, state, ws);
     state.integrate(model, h);
     match state.not_finite(model) {
@@ -88,6 +115,7 @@ pub fn step(
             converged: solved.converged,
             contacts: ws.contacts.len() as u32,
             friction_residual,
+            unbalanced: solved.unbalanced,
         }),
     }
 }
@@ -172,7 +200,7 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
 const FELT_FRICTION: f64 = 0.01;
 
 /// Keeps shear and normal impulse of each contact for the next step; returns the outer friction residual.
-fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace) -> f64 {
+pub(super) fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace) -> f64 {
     state.shear.fill(DVec3::ZERO);
     state.lag.fill(0.0);
     state.lag_h = ws.step.h;

@@ -12,7 +12,7 @@
 use super::integrator::{Integrator, Surroundings};
 use super::model::Model;
 use super::state::State;
-use super::step::{NotFinite, StepReport};
+use super::step::{NotFinite, StepReport, Unbalanced};
 use crate::gripper::SegmentPose;
 use crate::scene::Method;
 
@@ -37,6 +37,8 @@ pub(super) struct Totals {
     /// Shortest step taken (s); infinite before the first.
     pub(super) shortest: Option<f64>,
     pub(super) friction_residual: f64,
+    /// The worst imbalance of steps that missed the solver's tolerance, until somebody takes it.
+    pub(super) unbalanced: Option<Unbalanced>,
 }
 
 /// Chooses steps so that their error stays below a tolerance.
@@ -120,6 +122,7 @@ impl Totals {
         self.unconverged += u64::from(!report.converged);
         self.shortest = Some(self.shortest.map_or(h, |shortest| shortest.min(h)));
         self.friction_residual = self.friction_residual.max(report.friction_residual);
+        self.unbalanced = Unbalanced::worse(self.unbalanced, report.unbalanced);
     }
 }
 
