@@ -84,7 +84,10 @@ fn tell(told: &Told, store: &Path) -> Result<(), Failure> {
     say(format!("stored        {} trials now, {} were there already", report.stored, report.known))?;
     say(format!("poses         {} drawn again because the open fingers had no room", report.redrawn))?;
     if report.unsound > 0 {
-        say(format!("unsound       {} trials did not converge in every step; they are marked", report.unsound))?;
+        say(format!(
+            "unsound       {} trials did not converge in every step; they are marked, and no data set takes them",
+            report.unsound
+        ))?;
     }
     say(format!("cost          {:.1} s CPU on {} threads", told.cpu_s, told.threads))
 }

@@ -60,6 +60,10 @@ impl DataArguments {
             let names = data.about.collections.join(", ");
             warn(&format!("the trials are from several collections ({names}); choose one with --collection"));
         }
+        let left_out = data.about.left_out;
+        if left_out > 0 {
+            warn(&format!("{left_out} trial(s) left out: they did not stay finite or did not converge"));
+        }
         Ok(data)
     }
 }

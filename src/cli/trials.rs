@@ -11,6 +11,7 @@ use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};
 use palpate_core::trial::{Plan, Trial};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate trials`.
@@ -56,6 +57,9 @@ enum What {
         /// Divide force by the convex hull of the contacts, as the paper does.
         #[arg(long)]
         hull: bool,
+        /// Write trials that did not stay finite or did not converge as well.
+        #[arg(long)]
+        unsound: bool,
     },
     /// Take in grasps that were recorded elsewhere, from CSV files with the columns trial, label, t_s and any channels.
     Import {
@@ -90,9 +94,10 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
     match &arguments.what {
         What::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
         What::Show { id, json } => show(&store, *id, *json),
-        What::Export { ids, out, layout, hull } => {
+        What::Export { ids, out, layout, hull, unsound } => {
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
-            export(&store, ids, out, &SensorLayout::named(layout)?, area)
+            let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
+            export(&store, &ids, out, &SensorLayout::named(layout)?, area)
         }
         What::Import { files } => {
             for file in files {
@@ -166,7 +171,7 @@ fn remark(row: &TrialRow) -> String {
         remarks.push("interrupted or still recording".to_owned());
     }
     if !row.sound {
-        remarks.push("not sound".to_owned());
+        remarks.push("not sound: no data set takes it".to_owned());
     }
     if row.warnings > 0 {
         remarks.push(format!("{} warning(s)", row.warnings));
@@ -264,7 +269,33 @@ fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
         let state = if effect.on { "on" } else { "off" };
         say(format!("effect {} {state} ({}): {}", effect.name, effect.setting, effect.reason))?;
     }
+    let quality = &shown.summary.quality;
+    say(format!("{} steps, {:.2} Newton iterations each", quality.steps, quality.newton_mean))?;
+    say(format!(
+        "static residual at hold {:.1e}, friction residual {:.1e}",
+        quality.static_residual, quality.friction_residual
+    ))?;
+    if !quality.is_sound() {
+        say("not sound: no data set takes it")?;
+    }
     say("its scene is in `palpate trials show --json`")
+}
+
+/// Those of the trials that may be learned from: a CSV file says nothing of the others' flaws.
+fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
+    let unsound: BTreeSet<TrialId> = store.list(false)?.iter().filter(|row| !row.sound).map(|row| row.id).collect();
+    let (left_out, kept): (Vec<TrialId>, Vec<TrialId>) = ids.iter().partition(|id| unsound.contains(id));
+    if left_out.is_empty() {
+        return Ok(kept);
+    }
+    let list: Vec<String> = left_out.iter().map(ToString::to_string).collect();
+    let text =
+        format!("trial {} left out: it did not stay finite or did not converge (--unsound writes it)", list.join(", "));
+    if kept.is_empty() {
+        return Err(text.into());
+    }
+    warn(&text);
+    Ok(kept)
 }
 
 fn export(

@@ -4,6 +4,8 @@
 //! - `physics`: whole grasps of every object; no allocation in a step.
 //! - `determinism`: the same seed gives the same bytes.
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
+//! - `fuzz`: random scenes through the scene file.
+//! - `trust`: trials that did not converge stay out of data sets.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
@@ -22,6 +24,7 @@ mod command_line;
 mod cpu_renderer;
 mod determinism;
 mod files;
+mod fuzz;
 mod golden;
 mod learning;
 mod panels;
@@ -32,3 +35,4 @@ mod program;
 mod recognition_panel;
 mod scripted;
 mod store;
+mod trust;

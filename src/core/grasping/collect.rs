@@ -60,7 +60,7 @@ pub struct CollectionReport {
     pub known: u32,
     /// Poses drawn again because the open fingers would have stood inside the object.
     pub redrawn: u32,
-    /// Trials that did not stay finite or did not converge; they are stored and marked.
+    /// Trials that did not stay finite or did not converge; they are stored and marked, and no data set takes them.
     pub unsound: u32,
 }
 
@@ -241,7 +241,7 @@ fn store_in_order(
         report.stored +=
             store.insert_collected(ready.iter().map(|(trial, _)| trial)).map_err(CollectionError::Store)?;
         report.redrawn += ready.iter().map(|(_, redrawn)| redrawn).sum::<u32>();
-        let unsound = |(trial, _): &&(Trial, u32)| !(trial.info.quality.finite && trial.info.quality.converged);
+        let unsound = |(trial, _): &&(Trial, u32)| !trial.info.quality.is_sound();
         report.unsound += ready.iter().filter(unsound).count() as u32;
         line.stored.store(due, Ordering::Relaxed);
         tell(report.known + due as u32, object);

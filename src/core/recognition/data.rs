@@ -100,6 +100,9 @@ pub struct DataCard {
     pub layout: Option<String>,
     /// Sensor model of simulated grasps.
     pub sensors: Option<String>,
+    /// Grasps left out because their simulation did not stay finite or did not converge.
+    #[serde(default)]
+    pub left_out: usize,
 }
 
 impl DataCard {
@@ -114,6 +117,7 @@ impl DataCard {
         });
         parts.extend(self.sensors.as_ref().map(|sensors| format!("{sensors} sensors")));
         parts.extend(self.layout.clone());
+        parts.extend((self.left_out > 0).then(|| format!("{} left out as not sound", self.left_out)));
         parts.join(", ")
     }
 }

@@ -71,6 +71,17 @@ pub enum DatasetError {
         /// What was asked for.
         about: String,
     },
+    /// Trials fit, but none that may be learned from.
+    #[error(
+        "no trial that fits{about} may be learned from: {left_out} did not stay finite or did not converge; `palpate \
+         trials show` says where"
+    )]
+    Unsound {
+        /// What was asked for.
+        about: String,
+        /// How many fit.
+        left_out: usize,
+    },
     /// Trials that cannot stand in one data set.
     #[error(
         "the trials do not have the same channels: trial {first} has {first_channels}, trial {other} has \
@@ -127,11 +138,10 @@ fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
 }
 
 impl Source {
-    fn takes(&self, row: &TrialRow) -> bool {
+    fn fits(&self, row: &TrialRow) -> bool {
         let in_collection =
             |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
         row.state == "complete"
-            && row.sound
             && self.collection.as_ref().is_none_or(in_collection)
             && (self.objects.is_empty() || self.objects.contains(&row.object))
             && !(self.without_empty && row.object == EMPTY)
@@ -148,7 +158,7 @@ impl Source {
         about
     }
 
-    /// Reads the data set. Trials that did not stay finite or did not converge are left out. `tell` hears how many of
+    /// Reads the data set. Trials that did not stay finite or did not converge are left out and counted. `tell` hears how many of
     /// how many trials have been read.
     pub fn read(
         &self,
@@ -184,9 +194,16 @@ impl Source {
             *count += 1;
             self.most_of_each.is_none_or(|most| *count <= most)
         };
-        let rows: Vec<&TrialRow> = rows.iter().filter(|row| self.takes(row)).filter(&mut few_enough).collect();
+        let (sound, unsound): (Vec<&TrialRow>, Vec<&TrialRow>) =
+            rows.iter().filter(|row| self.fits(row)).partition(|row| row.sound);
+        let left_out = unsound.len();
+        let rows: Vec<&TrialRow> = sound.into_iter().filter(&mut few_enough).collect();
         if rows.is_empty() {
-            return Err(DatasetError::Nothing { about: self.described() });
+            let about = self.described();
+            return Err(match left_out {
+                0 => DatasetError::Nothing { about },
+                _ => DatasetError::Unsound { about, left_out },
+            });
         }
         if let Some(object) = self.objects.iter().find(|object| !rows.iter().any(|row| row.object == **object)) {
             return Err(DatasetError::NoSuchObject { object: object.clone() });
@@ -218,7 +235,7 @@ impl Source {
         let examples = read.into_iter().filter_map(example).collect();
         let channels = channels.map(|(_, channels)| channels).unwrap_or_default();
         let collections: BTreeSet<String> = rows.iter().filter_map(|row| row.collection.clone()).collect();
-        let about = card(&origins, view, collections.into_iter().collect(), rows.len());
+        let about = DataCard { left_out, ..card(&origins, view, collections.into_iter().collect(), rows.len()) };
         Ok(Dataset { channels, labels, examples, about })
     }
 }
@@ -253,6 +270,7 @@ fn card(origins: &BTreeSet<Origin>, view: &View, collections: Vec<String>, grasp
         grasps,
         layout: seen.then(|| view.layout.to_ascii_uppercase()),
         sensors: seen.then(|| view.sensors.name().to_owned()),
+        left_out: 0,
     }
 }
 

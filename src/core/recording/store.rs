@@ -295,7 +295,7 @@ impl Store {
                         collection: row.get(10)?,
                         properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
                         samples: row.get(6)?,
-                        sound: quality.is_some_and(|quality| quality.finite && quality.converged),
+                        sound: quality.is_some_and(|quality| quality.is_sound()),
                         warnings: warnings.len(),
                         deleted: row.get(9)?,
                     })
