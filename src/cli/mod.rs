@@ -10,6 +10,7 @@ mod recognise;
 mod scene;
 mod setup;
 mod snapshot;
+mod study;
 mod terminal;
 mod train;
 mod trials;
@@ -64,6 +65,8 @@ enum Command {
     Trials(trials::TrialsArguments),
     /// Measure what things cost on this machine, in CPU time.
     Bench(bench::BenchArguments),
+    /// Run an experiment and print what came out.
+    Study(study::StudyArguments),
     /// Write the built-in objects anew.
     #[command(hide = true)]
     Workshop(workshop::WorkshopArguments),
@@ -133,6 +136,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
+        Some(Command::Study(study)) => study::run(study)?,
         Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,
         None => window(arguments.object.as_deref(), store)?,
     }

@@ -101,6 +101,7 @@ const RANDOM: &[&str] = &[
     "src/core/physics/resting.rs",
     "src/core/sensing/model/streams.rs",
     "src/core/recognition",
+    "src/core/study/stability",
     "src/core/study/network_cost.rs",
     "src/cli/demo.rs",
 ];

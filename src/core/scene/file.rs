@@ -39,6 +39,39 @@ pub enum SceneError {
     },
 }
 
+/// A key of the scene file that holds a value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneKey {
+    /// Its name with its tables: `gripper.pad.modulus`.
+    pub name: String,
+    /// What it is by default, as TOML writes it.
+    pub default: String,
+}
+
+impl SceneKey {
+    /// True where it holds numbers that need not be whole, or could.
+    pub fn holds_fractions(&self) -> bool {
+        !matches!(Scene::default().with_settings(&[self.with("1.5")]), Err(SceneError::Syntax(_)))
+    }
+
+    /// A setting of it, for [`Scene::with_settings`], in which its first number is another.
+    pub fn with(&self, number: &str) -> String {
+        let mut value = self.default.clone();
+        match self.number() {
+            Some(place) => value.replace_range(place, number),
+            None => number.clone_into(&mut value),
+        }
+        format!("{}={value}", self.name)
+    }
+
+    /// Where its first number stands.
+    fn number(&self) -> Option<std::ops::Range<usize>> {
+        let from = self.default.find(|c: char| c.is_ascii_digit() || c == '-')?;
+        let end = self.default[from..].find(|c: char| !(c.is_ascii_alphanumeric() || "+-._".contains(c)));
+        Some(from..end.map_or(self.default.len(), |end| from + end))
+    }
+}
+
 /// Scene files larger than this are refused before parsing (bytes).
 const LARGEST_FILE: u64 = 1 << 20;
 
@@ -79,6 +112,13 @@ impl Scene {
         let beside = beside.to_str().filter(|_| beside.is_file());
         scene.object.source = anchored(beside.unwrap_or(&scene.object.source));
         Ok(scene)
+    }
+
+    /// All keys that hold a value, or a list of them.
+    pub fn keys() -> Vec<SceneKey> {
+        let mut keys = Vec::new();
+        collect_values(&known_keys(), "", &mut keys);
+        keys
     }
 
     /// The whole scene as TOML, every key written out.
@@ -184,6 +224,16 @@ fn collect_keys(table: &toml::Table, prefix: &str, into: &mut Vec<(String, Strin
     }
 }
 
+fn collect_values(table: &toml::Table, prefix: &str, into: &mut Vec<SceneKey>) {
+    for (key, value) in table {
+        let name = format!("{prefix}{key}");
+        match value {
+            toml::Value::Table(inner) => collect_values(inner, &format!("{name}."), into),
+            value => into.push(SceneKey { name, default: value.to_string() }),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,6 +265,20 @@ mod tests {
         assert!(message("[solver]\nopening = 0.1\n").contains("gripper.mount.opening"));
         assert!(message("[gripper.actuation]\ncurve = [{bar = 0, torqe = 1}]\n").contains("torque"));
         assert!(message("zzzz = 1\n").contains("no key \"zzzz\""));
+    }
+
+    #[test]
+    fn every_key_can_be_set_to_what_it_is() {
+        let keys = Scene::keys();
+        assert!(keys.len() > 40 && keys.iter().filter(|key| key.holds_fractions()).count() > 30);
+        for key in &keys {
+            let setting = format!("{}={}", key.name, key.default);
+            assert_eq!(Scene::default().with_settings(&[setting]), Ok(Scene::default()), "{}", key.name);
+        }
+        let key = |name: &str| keys.iter().find(|key| key.name == name).expect("there");
+        assert_eq!(key("object.rotation_deg").with("7"), "object.rotation_deg=[7, 0.0, 0.0]");
+        assert_eq!(key("object.mass").with("nan"), "object.mass=nan");
+        assert_eq!(key("gripper.pad.modulus").with("-inf"), "gripper.pad.modulus=-inf");
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub use accuracy::{Accuracy, Integrator, Method};
 pub use auto::Auto;
 pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
-pub use file::SceneError;
+pub use file::{SceneError, SceneKey};
 pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
 pub use timing::{Clock, Timing};
 

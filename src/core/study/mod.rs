@@ -6,6 +6,7 @@ mod effects;
 mod network_cost;
 mod physics_cost;
 mod search;
+pub mod stability;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost, error_sensors};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
