@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
     }
     match report.table.iter().filter(|row| !row.holds).count() + report.random.non_finite {
         0 => Ok(()),
-        failed => Err(format!("{failed} hard case(s) do not hold").into()),
+        failed => Err(format!("{failed} hard case(s) or random scene(s) do not hold").into()),
     }
 }
 
