@@ -4,7 +4,7 @@ use super::actions::Action;
 use super::panels::PanelContext;
 use egui::{RichText, Slider, Ui};
 use palpate_core::scene::{Accuracy, Integrator, Scene};
-use palpate_core::units::three_digits;
+use palpate_core::units::{three_digits, two_digits};
 use palpate_core::workers::Command;
 
 /// Where the slider stands when a tolerance is first asked for.
@@ -96,7 +96,7 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
     row("", cost.map(|c| format!("{}× real time", three_digits(c.times_real_time))), "Simulated time over CPU time");
     let hover = "Estimated numerical error over the grasp, root mean square of the band's half-width";
     let error =
-        |size: f64, unit: &str, share: f64| format!("{} {unit}, {} %", three_digits(size), three_digits(share * 100.0));
+        |size: f64, unit: &str, share: f64| format!("{} {unit}, {} %", two_digits(size), two_digits(share * 100.0));
     let errors = cost.map(|c| &c.error);
     row("± curvature", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
     row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
@@ -106,7 +106,9 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
 /// A choice by name, as a row of a grid.
 pub(super) fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
     let label = ui.label(name);
-    let shown = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
+    // What comes after a comma explains the choice while choosing; a narrow panel has no room for it afterwards.
+    let text = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
+    let shown = text.split(", ").next().unwrap_or(text);
     egui::ComboBox::from_id_salt(name)
         .selected_text(shown)
         .show_ui(ui, |ui| {

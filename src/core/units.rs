@@ -21,6 +21,15 @@ pub fn kg_of_load(newtons: f64) -> f64 {
 ///
 /// Values that are not finite are shown as an en dash, never as `NaN`.
 pub fn three_digits(value: f64) -> String {
+    digits(value, 3)
+}
+
+/// The same with two, for estimates.
+pub fn two_digits(value: f64) -> String {
+    digits(value, 2)
+}
+
+fn digits(value: f64, count: u8) -> String {
     if !value.is_finite() {
         return "–".to_owned();
     }
@@ -28,7 +37,7 @@ pub fn three_digits(value: f64) -> String {
         return "0".to_owned();
     }
     let magnitude = value.abs().log10().floor();
-    let decimals = (2.0 - magnitude).clamp(0.0, 6.0) as usize;
+    let decimals = (f64::from(count) - 1.0 - magnitude).clamp(0.0, 6.0) as usize;
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
         return "0".to_owned();
@@ -45,6 +54,7 @@ mod tests {
         assert_eq!(three_digits(12.345), "12.3");
         assert_eq!(three_digits(-0.0041249), "-0.00412");
         assert_eq!(three_digits(1234.5), "1234");
+        assert_eq!((two_digits(0.0964), two_digits(1.304)), ("0.096".to_owned(), "1.3".to_owned()));
         assert_eq!(three_digits(0.0), "0");
         assert_eq!(three_digits(-1e-9), "0");
         assert_eq!(three_digits(f64::NAN), "–");
