@@ -18,7 +18,7 @@
 //! | 1 | [`geometry`] | poses, circle fit, hulls, meshes and their repair, signed distance, mass properties |
 //! | 2 | [`drawing`] | what can be drawn: a plain [`drawing::DrawList`], and the camera |
 //! | 2 | [`objects`], [`gripper`] | URDF, OBJ, STL and the sixteen; what a finger, a pad and a programme are |
-//! | 3 | [`trial`] | plain frames and trials |
+//! | 3 | [`trial`], [`board`] | plain frames and trials; what a sensor board sends |
 //! | 4 | [`scene`] | the scene file: everything a user may set |
 //! | 5 | [`physics`] | the convex implicit step, contact, placement, resting faces, and a simulation on a clock of whole ticks |
 //! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames; what real sensors make of them |
@@ -51,6 +51,7 @@
 //! - Time is counted in whole ticks ([`scene::Clock`]); the same seed gives the same bytes, whatever the threads.
 //! - What comes from outside is checked where it comes in; after that, a wrong number is our own bug.
 
+pub mod board;
 pub mod drawing;
 pub mod geometry;
 pub mod grasping;

@@ -1,0 +1,131 @@
+//! What a sensor board sends, as far as it was understood: counts of its converter, stamped. Angle, force and pressure
+//! are derived from them later by a calibration, so that a better one serves old trials too.
+
+use serde::{Deserialize, Serialize};
+
+/// What a channel of the board is wired to, by its place on the gripper (paper, section IV-B).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sensor {
+    /// Flex strip on the back of the left finger.
+    FlexLeft,
+    /// Flex strip on the back of the right finger.
+    FlexRight,
+    /// Force sensor on the pad of the left finger.
+    PadLeft,
+    /// Force sensor on the pad of the right finger.
+    PadRight,
+}
+
+impl Sensor {
+    /// All four, in the order in which the firmware prints them.
+    pub const ALL: [Self; 4] = [Self::FlexLeft, Self::FlexRight, Self::PadLeft, Self::PadRight];
+
+    /// The name of its channel in the firmware's lines.
+    pub fn channel(self) -> &'static str {
+        match self {
+            Self::FlexLeft => "flexL",
+            Self::FlexRight => "flexR",
+            Self::PadLeft => "fsrL",
+            Self::PadRight => "fsrR",
+        }
+    }
+
+    /// What it is called on screen.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::FlexLeft => "left flex strip",
+            Self::FlexRight => "right flex strip",
+            Self::PadLeft => "left pad",
+            Self::PadRight => "right pad",
+        }
+    }
+
+    /// True for the strips, which read curvature; the others read force.
+    pub fn is_flex(self) -> bool {
+        matches!(self, Self::FlexLeft | Self::FlexRight)
+    }
+}
+
+/// What a board says of itself in its hello line, or what was found out from its lines.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Board {
+    /// Names of its channels, in the order of [`Reading::counts`].
+    pub channels: Vec<String>,
+    /// The largest count of its converter: 4095 for 12 bits.
+    pub full_scale: u32,
+    /// Voltage at which the converter reaches it, and which feeds the dividers (V).
+    pub reference_volt: f64,
+    /// Samples per second that it says it takes (1/s).
+    pub rate_hz: Option<f64>,
+    /// Fixed resistor of each channel's divider (ohm), where it says so; else empty.
+    pub divider_ohm: Vec<f64>,
+    /// Version of its firmware, where it says so.
+    pub firmware: Option<String>,
+}
+
+impl Default for Board {
+    /// The Due as our firmware sets it up.
+    fn default() -> Self {
+        Self {
+            channels: Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).collect(),
+            full_scale: 4095,
+            reference_volt: 3.3,
+            rate_hz: None,
+            divider_ohm: Vec::new(),
+            firmware: None,
+        }
+    }
+}
+
+impl Board {
+    /// Which of its channels a sensor is read on; names are compared without regard to case.
+    pub fn channel_of(&self, sensor: Sensor) -> Option<usize> {
+        self.channels.iter().position(|name| name.eq_ignore_ascii_case(sensor.channel()))
+    }
+}
+
+/// One line of a board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// When it was taken, in seconds since the stream began on this computer's clock (s): the board's own time mapped onto
+    /// it, where it sends one.
+    pub t_s: f64,
+    /// When its bytes arrived, on the same clock (s).
+    pub arrived_s: f64,
+    /// The board's counter, unwrapped.
+    pub seq: Option<u64>,
+    /// Counts per channel of the [`Board`]; none where the line had no number for it.
+    pub counts: Vec<Option<f32>>,
+    /// Line pressure that the board reports (bar).
+    pub line_bar: Option<f64>,
+}
+
+/// A stretch of time without readings. It stays a gap: nothing is put in its place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// Time of the last reading before it (s).
+    pub from_s: f64,
+    /// Time of the first one after it (s).
+    pub to_s: f64,
+    /// How many readings are missing, where the board counts them.
+    pub lost: Option<u64>,
+    /// Why, in words.
+    pub cause: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_knows_its_channels_by_name_and_not_by_place() {
+        let board = Board { channels: vec!["FSRL".into(), "flexr".into(), "temperature".into()], ..Board::default() };
+        assert_eq!(board.channel_of(Sensor::PadLeft), Some(0));
+        assert_eq!(board.channel_of(Sensor::FlexRight), Some(1));
+        assert_eq!(board.channel_of(Sensor::FlexLeft), None);
+        let places = Sensor::ALL.map(|sensor| Board::default().channel_of(sensor));
+        assert_eq!(places, [Some(0), Some(1), Some(2), Some(3)]);
+    }
+}
