@@ -19,12 +19,12 @@ pub struct GraspRun<R> {
 
 /// Sets up a simulated grasp. `seed` is recorded; it does not change the scene (see [`super::jittered`]).
 pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRig> {
-    prepare_refined(scene, object, seed, Refinement::NONE)
+    prepare_refined(scene, object, seed, Refinement::None)
 }
 
 /// The same grasp computed more finely, sampled at the same times: what the error of the other is estimated from.
 pub fn prepare_companion(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRig> {
-    prepare_refined(scene, object, seed, Refinement::COMPANION)
+    prepare_refined(scene, object, seed, Refinement::Companion)
 }
 
 fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refinement: Refinement) -> GraspRun<SimRig> {

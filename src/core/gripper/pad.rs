@@ -36,6 +36,8 @@ pub struct Pad {
     pub crown_radius: f64,
     /// Hunt-Crossley dissipation (s/m): force is multiplied by (1 - d v), v the speed of separation.
     pub dissipation: f64,
+    /// Damping of the skin in shear, as a time (s): its shear resists like k_t (xi + time v).
+    pub shear_damping_time: f64,
     /// Friction coefficient of the pad's skin against a surface of coefficient 1; combined as a geometric mean.
     pub friction: f64,
     /// Taxel rows along the finger; they are fixed by arc length and do not move when N changes.
@@ -51,7 +53,8 @@ impl Default for Pad {
             modulus: 1.0e5, // a soft silicone, Shore 00-30
             law: PadLaw::NeoHookean,
             crown_radius: 0.020,
-            dissipation: 2.0, // tuned: contact does not ring at 75 Hz sampling
+            dissipation: 2.0,         // tuned: contact does not ring at 75 Hz sampling
+            shear_damping_time: 5e-4, // a loss factor of 0.25 at 80 Hz, where 10 g between the fingers ring
             friction: 1.0,
             rows: 40,
             columns: 4,

@@ -86,21 +86,29 @@ impl ChainModel {
         }
     }
 
-    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane (m/s²)).
+    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane (m/s²)), for a step of h
+    /// (s). Forces that grow with the square of the rates are explicit; to be no source of energy where a segment turns by a
+    /// radian within a step, they are divided by 1 + (h w)², w the fastest turn of a segment.
     pub(super) fn bias(
         &self,
         segments: &[SegmentPose],
-        qd: &[f64],
+        (qd, h): (&[f64], f64),
         gravity: DVec2,
         accelerations: &mut [DVec2],
         bias: &mut [f64],
     ) {
         let n = self.joints;
+        let (mut turn, mut fastest) = (0.0f64, 0.0f64);
+        for rate in qd {
+            turn += rate;
+            fastest = fastest.max(turn.abs());
+        }
+        let share = 1.0 / (1.0 + (h * fastest).powi(2));
         let mut at_start = -gravity;
         let mut rate = 0.0;
         for link in 1..=n {
             rate += qd[link - 1];
-            let inward_pull = segments[link].along * (rate * rate * self.lengths[link]);
+            let inward_pull = segments[link].along * (share * rate * rate * self.lengths[link]);
             accelerations[link] = at_start - 0.5 * inward_pull;
             at_start -= inward_pull;
         }
@@ -186,7 +194,7 @@ mod tests {
         let mut segments = vec![SegmentPose::default(); n + 1];
         model.bend(&q, &mut segments);
         let (mut accelerations, mut bias) = (vec![DVec2::ZERO; n + 1], vec![0.0; n]);
-        model.bias(&segments, &qd, DVec2::ZERO, &mut accelerations, &mut bias);
+        model.bias(&segments, (&qd, 0.0), DVec2::ZERO, &mut accelerations, &mut bias);
         for i in 0..n {
             let shifted = |sign: f64| {
                 let mut q = q.clone();
@@ -205,10 +213,10 @@ mod tests {
         let mut segments = vec![SegmentPose::default(); 11];
         model.bend(&[0.0; 10], &mut segments);
         let (mut accelerations, mut bias) = (vec![DVec2::ZERO; 11], vec![0.0; 10]);
-        model.bias(&segments, &[0.0; 10], DVec2::new(0.0, 9.81), &mut accelerations, &mut bias);
+        model.bias(&segments, (&[0.0; 10], 0.0), DVec2::new(0.0, 9.81), &mut accelerations, &mut bias);
         assert!(bias.iter().all(|b| b.abs() < 1e-18));
         // Held out level by gravity across it, the first joint carries the weight of 95 mm at its middle.
-        model.bias(&segments, &[0.0; 10], DVec2::new(9.81, 0.0), &mut accelerations, &mut bias);
+        model.bias(&segments, (&[0.0; 10], 0.0), DVec2::new(9.81, 0.0), &mut accelerations, &mut bias);
         let want = -0.95 * 0.030 * 9.81 * 0.5 * 0.095;
         assert!((bias[0] / want - 1.0).abs() < 1e-12);
     }

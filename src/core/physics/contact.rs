@@ -7,8 +7,9 @@
 //!
 //! - normal impulse    gamma(v_n) = h f(x0 - h v_n) (1 - d v_n)+
 //!   with the pad law f and Hunt-Crossley dissipation d. It falls as v_n rises, so its potential is convex.
-//! - friction          e = xi + h v_t;  impulse -h k_t e while |h k_t e| <= mu gamma_lag, else -mu gamma_lag e/|e|
-//!   a shear spring with a slip limit (a Huber function of e). The limit uses a normal impulse from the step before
+//! - friction          e = xi + (h + tau) v_t;  impulse -h k_t e while |h k_t e| <= mu gamma_lag, else
+//!   -mu gamma_lag e/|e|: a shear spring with a damper of time tau beside it (Kelvin-Voigt), and a slip limit (a Huber
+//!   function of e). The limit uses a normal impulse from the step before
 //!   or from the last pass ("lag"), since a limit that followed v would not be the gradient of anything.
 //!
 //! A shear spring holds: a grasped object creeps 2e-7 mm/s, where velocity-regularised friction lets it slide at
@@ -54,10 +55,12 @@ pub(super) struct Contact {
     pub(super) compression: f64,
     /// Law of compression.
     pub(super) law: PadLaw,
-    /// Small-strain stiffness (N/m).
+    /// Small-strain stiffness along the normal (N/m).
     pub(super) stiffness: f64,
-    /// Rest length of the strand (m).
+    /// Rest length of the strand along the normal (m).
     pub(super) height: f64,
+    /// Stiffness of the skin in shear, k_t (N/m).
+    pub(super) shear_stiffness: f64,
     /// Friction coefficient.
     pub(super) mu: f64,
     /// Slip limit mu gamma_lag (N s).
@@ -77,16 +80,25 @@ pub(super) struct ContactStep {
     pub(super) h: f64,
     /// Dissipation, d (s/m).
     pub(super) dissipation: f64,
+    /// Damping of the skin in shear, as a time, tau (s).
+    pub(super) shear_damping_time: f64,
+}
+
+impl ContactStep {
+    /// What a velocity counts for in the friction impulse, beside the shear there is: h + tau (s).
+    fn shear_reach(self) -> f64 {
+        self.h + self.shear_damping_time
+    }
 }
 
 /// Shear stiffness of rubber as a share of its compressive stiffness: G / E of an incompressible solid.
-const SHEAR_SHARE: f64 = 1.0 / 3.0;
+pub(super) const SHEAR_SHARE: f64 = 1.0 / 3.0;
 
 impl Contact {
     /// Normal impulse gamma (N s) and -d gamma / d v_n, both non-negative.
     #[inline]
     pub(super) fn normal_impulse(&self, step: ContactStep, v_n: f64) -> (f64, f64) {
-        let ContactStep { h, dissipation: d } = step;
+        let ContactStep { h, dissipation: d, .. } = step;
         let damping = 1.0 - d * v_n;
         let compression = self.compression - h * v_n;
         if compression <= 0.0 || damping <= 0.0 {
@@ -103,8 +115,8 @@ impl Contact {
         let (gamma, _) = self.normal_impulse(step, v_n);
         let mut gradient = self.normal * -gamma;
         if self.limit > 0.0 {
-            let e = self.shear + (velocity - self.normal * v_n) * step.h;
-            let pull = e * (step.h * self.shear_stiffness());
+            let e = self.shear + (velocity - self.normal * v_n) * step.shear_reach();
+            let pull = e * (step.h * self.shear_stiffness);
             let size = pull.length();
             gradient += if size <= self.limit { pull } else { pull * (self.limit / size) };
         }
@@ -120,13 +132,14 @@ impl Contact {
         // Tangential part: `all` times the tangent projector, less `radial` along the direction of slip.
         let (mut all, mut radial, mut slip) = (0.0, 0.0, DVec3::ZERO);
         if self.limit > 0.0 {
-            let e = self.shear + (self.velocity - n * v_n) * step.h;
-            let stiffness = self.shear_stiffness();
+            let reach = step.shear_reach();
+            let e = self.shear + (self.velocity - n * v_n) * reach;
+            let stiffness = self.shear_stiffness;
             let size = e.length();
             if step.h * stiffness * size <= self.limit {
-                all = step.h * step.h * stiffness;
+                all = step.h * reach * stiffness;
             } else {
-                all = step.h * self.limit / size;
+                all = reach * self.limit / size;
                 radial = all;
                 slip = e / size;
             }
@@ -134,12 +147,6 @@ impl Contact {
         let column =
             |k: DVec3, n_k: f64, slip_k: f64| k * all + n * ((along_normal - all) * n_k) - slip * (radial * slip_k);
         DMat3::from_cols(column(DVec3::X, n.x, slip.x), column(DVec3::Y, n.y, slip.y), column(DVec3::Z, n.z, slip.z))
-    }
-
-    /// Stiffness of the skin in shear, k_t (N/m).
-    #[inline]
-    pub(super) fn shear_stiffness(&self) -> f64 {
-        self.stiffness * SHEAR_SHARE
     }
 
     /// Brings the slip limit up to date with the normal impulse at the current iterate.
@@ -161,7 +168,7 @@ impl Contact {
         }
         let v_n = self.normal.dot(self.velocity);
         let e = self.shear + (self.velocity - self.normal * v_n) * step.h;
-        let impulse = step.h * self.shear_stiffness() * e.length();
+        let impulse = step.h * self.shear_stiffness * e.length();
         if impulse > self.limit { e * (self.limit / impulse) } else { e }
     }
 
@@ -180,7 +187,7 @@ impl Contact {
 mod tests {
     use super::*;
 
-    const STEP: ContactStep = ContactStep { h: 1.0 / 300.0, dissipation: 2.0 };
+    const STEP: ContactStep = ContactStep { h: 1.0 / 300.0, dissipation: 2.0, shear_damping_time: 5e-4 };
 
     fn contact() -> Contact {
         Contact {
@@ -193,6 +200,7 @@ mod tests {
             law: PadLaw::NeoHookean,
             stiffness: 156.0,
             height: 0.008,
+            shear_stiffness: 52.0,
             mu: 0.8,
             limit: 2e-4,
             shear: DVec3::new(4e-4, 1e-4, -3e-4),

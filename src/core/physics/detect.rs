@@ -4,10 +4,17 @@
 //! something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels; rays
 //! that are as thick as the gaps between strands do not.
 //!
-//! With the rest position of the ball's centre at s and the touch at t, the strand is compressed by s - t along its
-//! axis, and by (s - t) (-n . u) along the surface normal n; apart, it is the same number below zero.
+//! With the rest position of the ball's centre at s and the touch at t, the strand is compressed by x = s - t along its
+//! axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A relative motion v
+//! of the surfaces changes x by -n . v / c, whatever the shape of what is touched. The strand stores the energy U(x) of its
+//! law, so that it presses along n with U'(x) / c: the pressure in the strand on the slanted surface it meets, which is
+//! larger than its own section by 1 / c. The same force, as a function of the compression along n, is that of a strand of
+//! stiffness k / c² and length c H, since U depends on k H² and x / H alone. That is what a contact is given.
+//!
+//! It matters: a strand pressed along n by the force of its axial compression alone is the gradient of no energy. Fingers
+//! that swing then gain energy while they press, and what they hold rings and wanders.
 
-use super::contact::{Acting, Against, Contact};
+use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
 use super::effects::{FingerContact, Fronts, OtherFinger, in_series};
 use super::model::{Body, Model};
 use super::state::State;
@@ -30,7 +37,13 @@ struct Hit {
     normal: DVec3,
     /// Where the surface is met.
     point: DVec3,
+    /// How squarely the strand meets the surface, c: from [`LEAST_COSINE`] to one.
+    cosine: f64,
 }
+
+/// A strand that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays finite, and
+/// its force vanishes with the compression along the normal.
+const LEAST_COSINE: f64 = 0.25;
 
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
 pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
@@ -143,6 +156,8 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
             _ => (strand.stiffness, strand.height),
         };
         let shear = local_axes * state.shear[site];
+        let shear_stiffness = SHEAR_SHARE * stiffness;
+        let (stiffness, height) = (stiffness / (hit.cosine * hit.cosine), height * hit.cosine);
         workspace.contacts.push(Contact {
             site: site as u32,
             acting: Acting::Segment(place.link as u32),
@@ -153,6 +168,7 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
             law: model.pad_law,
             stiffness,
             height,
+            shear_stiffness,
             mu,
             limit: mu * state.expected_impulse(site, workspace.step.h),
             shear: shear - hit.normal * hit.normal.dot(shear),
@@ -242,6 +258,7 @@ impl Ray {
         Some(Hit {
             compression: hit.compression,
             normal: to_gripper * hit.normal,
+            cosine: hit.cosine,
             point: to_gripper * (hit.point - solid.body.centre) + solid.centre,
         })
     }
@@ -288,12 +305,13 @@ impl Ray {
         if cosine < FROM_BEHIND && t == 0.0 {
             // The foot has come through a thin body: keep pushing back the way it came.
             let compression = self.rest - gap;
-            return Some(Hit { compression, normal: -axis, point: foot });
+            return Some(Hit { compression, normal: -axis, point: foot, cosine: 1.0 });
         }
         // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
         let compression = (self.rest - t) * cosine - gap;
         let point = centre - surface_normal * (self.radius + gap);
-        (compression > -margin).then_some(Hit { compression, normal: surface_normal, point })
+        let cosine = cosine.max(LEAST_COSINE);
+        (compression > -margin).then_some(Hit { compression, normal: surface_normal, point, cosine })
     }
 }
 
@@ -318,6 +336,7 @@ fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body:
             compression,
             law: PadLaw::Linear,
             stiffness: body.support_stiffness,
+            shear_stiffness: SHEAR_SHARE * body.support_stiffness,
             height: 1.0,
             mu: body.support_friction,
             limit: body.support_friction * state.expected_impulse(site, h),

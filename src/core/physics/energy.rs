@@ -1,4 +1,4 @@
-//! Mechanical energy of a state: what a passive gripper must never gain.
+//! Mechanical energy of a state, and the work that a drive does: what a step must never gain beyond.
 
 use super::detect::detect;
 use super::model::Model;
@@ -7,43 +7,73 @@ use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
 use super::workspace::Workspace;
 
-/// Kinetic energy, bending of the joints, compression and shear of the skin, and height in gravity (J).
-pub(super) fn mechanical_energy(model: &Model, state: &State) -> f64 {
+/// Mechanical energy, and what part of it cannot run away.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Energy {
+    /// In motion, bent joints, compressed and sheared skin, and height in gravity (J).
+    pub(super) total: f64,
+    /// Of it, in the turning of a free object (J). Its angular momentum is carried over exactly, which bounds it.
+    pub(super) spin: f64,
+}
+
+/// Mechanical energy of a state. What was in the workspace is lost.
+pub(super) fn mechanical_energy(model: &Model, state: &State, ws: &mut Workspace) -> Energy {
     // At h = 0, A is the inertia alone.
-    let mut ws = Workspace::new(model);
-    lay_out(model, state, &mut ws);
-    gather_dynamics(model, state, &mut ws, &Drive::default());
-    segment_velocities(model, &state.velocity, &mut ws);
-    detect(model, state, &mut ws);
+    ws.step.h = 0.0;
+    lay_out(model, state, ws);
+    gather_dynamics(model, state, ws, &Drive::default());
+    segment_velocities(model, &state.velocity, ws);
+    detect(model, state, ws);
     let n = model.chain.joints;
-    let mut energy = 0.0;
+    let (mut total, mut spin) = (0.0, 0.0);
     for finger in 0..2 {
         let rates = &state.velocity[finger * n..(finger + 1) * n];
         let matrix = &ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
         for i in 0..n {
             let row: f64 = matrix[i * n..(i + 1) * n].iter().zip(rates).map(|(a, b)| a * b).sum();
-            energy += 0.5 * rates[i] * row;
+            total += 0.5 * rates[i] * row;
             let q = state.q[finger * n + i];
             if let Some(relaxation) = &model.relaxation {
-                energy -= relaxation.energy_lost(q, state.crept[finger * n + i]);
+                total -= relaxation.energy_lost(q, state.crept[finger * n + i]);
             }
             let beyond = (q.abs() - model.chain.angle_limit).max(0.0);
-            energy += 0.5 * (model.chain.stiffness * q * q + model.chain.limit_stiffness * beyond * beyond);
+            total += 0.5 * (model.chain.stiffness * q * q + model.chain.limit_stiffness * beyond * beyond);
         }
         let segments = &ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
         for link in 1..=n {
             let centre = model.planes[finger].point(model.chain.centre(segments, link), 0.0);
-            energy -= model.chain.masses[link] * model.finger_gravity.dot(centre);
+            total -= model.chain.masses[link] * model.finger_gravity.dot(centre);
         }
     }
     if let Some(body) = model.free_body() {
         let (linear, angular) = state.body_velocity(model);
-        energy += 0.5 * body.mass * linear.length_squared() + 0.5 * angular.dot(ws.body_inertia * angular);
-        energy -= body.mass * model.object_gravity.dot(state.body.position);
+        spin = 0.5 * angular.dot(ws.body_inertia * angular);
+        total += 0.5 * body.mass * linear.length_squared() + spin;
+        total -= body.mass * model.object_gravity.dot(state.body.position);
     }
     for contact in &ws.contacts {
         let skin = contact.law.energy(contact.stiffness, contact.height, contact.compression);
-        energy += skin + 0.5 * contact.shear_stiffness() * contact.shear.length_squared();
+        total += skin + 0.5 * contact.shear_stiffness * contact.shear.length_squared();
     }
-    energy
+    Energy { total, spin }
+}
+
+/// Work that a drive does on the way from one state to another (J). Where chambers lag it is what the pressure at the end
+/// would do; while they fill or empty, that is more than they did.
+pub(super) fn work_done(model: &Model, drive: &Drive, from: &State, to: &State, ws: &mut Workspace) -> f64 {
+    let torque = model.chamber.as_ref().map_or(drive.torque, |chamber| chamber.torque(to.chamber_bar));
+    let bent: f64 = to.q.iter().sum::<f64>() - from.q.iter().sum::<f64>();
+    let pulled = drive.object_force.dot(to.body.position - from.body.position);
+    let mut work = torque * bent + pulled;
+    let n = model.chain.joints;
+    for finger in 0..2 {
+        let plane = &model.planes[finger];
+        let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
+        let [before, after] = [from, to].map(|state| {
+            let tip = model.chain.bend(&state.q[finger * n..(finger + 1) * n], segments);
+            plane.point(tip, 0.0)
+        });
+        work += drive.tip_force[finger].dot(after - before);
+    }
+    work
 }

@@ -1,6 +1,7 @@
 //! The constant description that a step reads: everything the scene says, resolved to numbers, in the gripper frame.
 
 use super::chain::ChainModel;
+use super::contact::ContactStep;
 use super::effects::{Chamber, FingerContact, Relaxation, plan};
 use super::environment::Environment;
 use super::placement::Placement;
@@ -15,8 +16,8 @@ use glam::{DMat3, DVec3};
 /// Constants of a simulation. Built once, never changed; a step is a function of it and a [`super::State`].
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// Dissipation of the pads, d (s/m).
-    pub(super) dissipation: f64,
+    /// What all contacts share; the length of a step is set as it is taken.
+    pub(super) contact: ContactStep,
     pub(super) chain: ChainModel,
     pub(super) planes: [FingerPlane; 2],
     pub(super) strands: Strands,
@@ -136,7 +137,11 @@ impl Model {
         let nothing = Support { kind: SupportKind::None, ..scene.support.clone() };
         let support = if is_on(Effect::Support) { &scene.support } else { &nothing };
         Self {
-            dissipation: gripper.pad.dissipation,
+            contact: ContactStep {
+                h: 0.0,
+                dissipation: gripper.pad.dissipation,
+                shear_damping_time: gripper.pad.shear_damping_time,
+            },
             chain: ChainModel::new(&gripper.finger, &gripper.pad),
             planes: Side::BOTH.map(|side| gripper.plane(side)),
             strands: Strands::new(&gripper.finger, &gripper.pad, &gripper.taxels()),

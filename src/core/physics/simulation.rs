@@ -40,20 +40,13 @@ pub struct Simulation {
     imbalance: Option<Imbalance>,
 }
 
-/// How much more finely than its scene asks for a simulation is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Refinement {
-    /// Factor on the number of steps; under a tolerance, on the fewest.
-    pub steps: u32,
-    /// Factor on the tolerance, where there is one.
-    pub tolerance: f64,
-}
-
-impl Refinement {
+/// How finely a simulation is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refinement {
     /// As the scene says.
-    pub const NONE: Self = Self { steps: 1, tolerance: 1.0 };
-    /// Half the step, or a tenth of the tolerance at half the longest step: what an error is estimated from.
-    pub const COMPANION: Self = Self { steps: 2, tolerance: 0.1 };
+    None,
+    /// More finely, to estimate an error from; see [`Solver::companion`].
+    Companion,
 }
 
 /// A simulation that had to stop.
@@ -71,20 +64,22 @@ pub struct SimulationError {
 impl Simulation {
     /// Sets up a scene at rest; placement comes with what had to be moved to make room.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
-        Self::refined(scene, object, Refinement::NONE)
+        Self::refined(scene, object, Refinement::None)
     }
 
     /// The same, computed more finely than the scene asks for.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let placement = Placement::new(scene, object);
-        let solver = &scene.solver;
-        let clock = scene.timing.clock(solver.accuracy).refined(refinement.steps);
+        let (parts, solver) = match refinement {
+            Refinement::None => (1, scene.solver.clone()),
+            Refinement::Companion => (2, scene.solver.companion()),
+        };
+        let clock = scene.timing.clock(solver.accuracy).refined(parts);
         let model = Model::new(scene, object, &placement);
         let state = State::new(&model, &placement);
-        let tolerance = solver.accuracy.tolerance().map(|tolerance| tolerance * refinement.tolerance);
         // No step can be longer than from sample to sample; a finer simulation takes more.
-        let longest = f64::from(clock.ticks_per_sample) * clock.step() / f64::from(refinement.steps);
-        let stepper = Stepper::new(&model, &state, solver.method(), tolerance, longest);
+        let longest = f64::from(clock.ticks_per_sample) * clock.step() / f64::from(parts);
+        let stepper = Stepper::new(&model, &state, solver.method(), solver.accuracy.tolerance(), longest);
         let simulation = Self {
             state,
             workspace: Workspace::new(&model),
@@ -339,7 +334,7 @@ impl Simulation {
 
     /// Kinetic, elastic and potential energy (J), the latter relative to the gripper's frame.
     pub fn energy(&self) -> f64 {
-        super::energy::mechanical_energy(&self.model, &self.state)
+        super::energy::mechanical_energy(&self.model, &self.state, &mut Workspace::new(&self.model)).total
     }
 }
 

@@ -170,7 +170,7 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
             matrix.fill(0.0);
             &ws.still
         };
-        model.chain.bias(segments, rates, gravity, &mut ws.accelerations, &mut ws.bias);
+        model.chain.bias(segments, (rates, h), gravity, &mut ws.accelerations, &mut ws.bias);
         let rhs = &mut ws.rhs[joints.clone()];
         for (i, row) in matrix.chunks_exact(n).enumerate() {
             let momentum: f64 = row.iter().zip(qd).map(|(a, b)| a * b).sum();

@@ -180,7 +180,7 @@ impl SteppedScene {
 
     /// Kinetic, elastic and potential energy (J), the latter relative to the gripper's frame.
     pub fn energy(&self) -> f64 {
-        super::energy::mechanical_energy(&self.model, &self.state)
+        super::energy::mechanical_energy(&self.model, &self.state, &mut Workspace::new(&self.model)).total
     }
 
     /// Deepest compression of any strand of a finger in the last step (m).

@@ -7,12 +7,16 @@
 //!
 //! The error is the largest of: joint angles and turn of the object (rad), fingertips and position of the object as
 //! shares of the finger's length. Velocities and forces do not enter: at an impact they jump, and no step is short
-//! enough for a jump.
+//! enough for a jump. Energy does: a second stage that goes on along the slope of the first can be thrown into the skin
+//! and come out of it faster than it went in, with angles that agree. So what a step gains beyond the work done on it
+//! counts as error too, as the angle by which joints as bent as these would have to be off for it.
 
+use super::energy::{mechanical_energy, work_done};
 use super::integrator::{Integrator, Surroundings};
 use super::model::Model;
 use super::state::State;
 use super::step::{NotFinite, StepReport, Unbalanced};
+use super::workspace::Workspace;
 use crate::gripper::SegmentPose;
 use crate::scene::Method;
 
@@ -56,12 +60,16 @@ struct Control {
     /// The state at its beginning.
     origin: State,
     segments: [Vec<SegmentPose>; 2],
+    /// Where energies are worked out: the forces of the last step stay where they are.
+    aside: Workspace,
 }
 
 /// The shortest step as a share of the longest: 1/75 s becomes 13 µs.
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// The next step is planned to have this share of the tolerance's error, to the power of 1 / (p + 1).
 const SAFETY: f64 = 0.9;
+/// Energy (J) that the longest step may always gain: for rounding, where nothing is bent.
+const UNFELT_GAIN: f64 = 1e-9;
 /// A step becomes at most this much longer than the one before it, and at most this much shorter.
 const FASTEST_GROWTH: f64 = 4.0;
 const FASTEST_SHRINKING: f64 = 0.2;
@@ -77,6 +85,7 @@ impl Stepper {
             whole: state.clone(),
             origin: state.clone(),
             segments: [(); 2].map(|()| vec![SegmentPose::default(); model.chain.joints + 1]),
+            aside: Workspace::new(model),
         });
         Self { integrator: Integrator::new(method, state), control, totals: Totals::default() }
     }
@@ -157,7 +166,8 @@ impl Control {
             Err(cause) if shortest => return Err(cause),
             Err(_) => (StepReport::default(), f64::INFINITY),
         };
-        let ratio = error / self.tolerance;
+        let ratio =
+            if error < self.tolerance { error.max(self.gain(within, state, h)) } else { error } / self.tolerance;
         if ratio > 1.0 && !shortest {
             state.copy_from(&self.origin);
             self.wanted = (h * Self::factor(ratio, integrator.order())).max(self.least);
@@ -192,6 +202,20 @@ impl Control {
         let halves = first.followed_by(&second);
         let newton_iterations = halves.newton_iterations + whole.newton_iterations;
         Ok((StepReport { newton_iterations, ..halves }, distance / (2f64.powi(integrator.order()) - 1.0)))
+    }
+
+    /// Energy from nowhere in a step of `h` (s), as the error (rad) by which joints as bent as these would have to be off
+    /// for it, or by which a free object would have to be turned. Joints may gain in a step its share of what they may in
+    /// the longest, for their gains add up; the energy of a turning object swings about what its momentum allows.
+    fn gain(&mut self, within: &Surroundings<'_>, state: &State, h: f64) -> f64 {
+        let model = within.model;
+        let before = mechanical_energy(model, &self.origin, &mut self.aside);
+        let work = work_done(model, within.drive, &self.origin, state, &mut self.aside);
+        let gain = mechanical_energy(model, state, &mut self.aside).total - before.total - work;
+        let bent: f64 = state.q.iter().zip(&self.origin.q).map(|(a, b)| a.abs().max(b.abs())).sum();
+        let share = h / self.longest;
+        let worth = model.chain.stiffness * bent * share + before.spin;
+        (gain - UNFELT_GAIN * share).max(0.0) / worth.max(f64::MIN_POSITIVE)
     }
 
     /// How much longer the next step may be, from the error over the tolerance: errors grow with h^(p + 1).

@@ -132,7 +132,7 @@ impl Workspace {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
         let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {
-            step: ContactStep { h: 0.0, dissipation: model.dissipation },
+            step: ContactStep { h: 0.0, ..model.contact },
             segments: vec![SegmentPose::default(); links],
             reference: DVec3::ZERO,
             columns: vec![Spatial::default(); 2 * n],

@@ -57,7 +57,7 @@ impl Running {
 impl SimRig {
     /// A scene at rest, and where everything was put.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
-        Self::refined(scene, object, Refinement::NONE)
+        Self::refined(scene, object, Refinement::None)
     }
 
     /// The same, computed more finely than the scene asks for.

@@ -101,6 +101,7 @@ impl Scene {
         let least_crown = 0.51 * finger.width; // a crown rounder than the pad is wide would leave its edges behind
         ranges.number("gripper.pad.crown_radius", pad.crown_radius, least_crown..=1e6);
         ranges.number("gripper.pad.dissipation", pad.dissipation, 0.0..=1e4);
+        ranges.number("gripper.pad.shear_damping_time", pad.shear_damping_time, 0.0..=1.0);
         ranges.number("gripper.pad.friction", pad.friction, 0.0..=100.0);
         ranges.count("gripper.pad.rows", small_count(pad.rows), 2..=400);
         ranges.count("gripper.pad.columns", small_count(pad.columns), 1..=64);

@@ -102,17 +102,18 @@ pub struct RapierSimulation {
 impl RapierSimulation {
     /// Sets up a scene at rest; placement comes with what had to be moved to make room.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
-        Self::refined(scene, object, Refinement::NONE)
+        Self::refined(scene, object, Refinement::None)
     }
 
-    /// The same in shorter steps. rapier controls no error: under a tolerance it takes standard steps.
+    /// The same, or a companion in half the steps. rapier controls no error: under a tolerance it takes standard steps.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let placement = Placement::new(scene, object);
         let accuracy = match scene.solver.accuracy.tolerance() {
             Some(_) => Accuracy::Standard,
             None => scene.solver.accuracy,
         };
-        let clock = scene.timing.clock(accuracy).refined(refinement.steps);
+        let parts = if refinement == Refinement::Companion { 2 } else { 1 };
+        let clock = scene.timing.clock(accuracy).refined(parts);
         let gripper = &scene.gripper;
         let plan = simulated(plan(scene, object, &placement));
         let is_on = |effect: Effect| plan.is_on(effect.name());
@@ -192,7 +193,7 @@ impl RapierSimulation {
             let in_plane = |v: DVec3| DVec2::new(plane.sign * v.x, -v.z);
             let segments = self.segments(side, &q);
             let (mut scratch, mut bias) = (vec![DVec2::ZERO; n + 1], vec![0.0; n]);
-            self.chain.bias(&segments, &vec![0.0; n], in_plane(self.gravity), &mut scratch, &mut bias);
+            self.chain.bias(&segments, (&vec![0.0; n], 0.0), in_plane(self.gravity), &mut scratch, &mut bias);
             let touches = self.touches(side);
             for (i, bias) in bias.iter().enumerate() {
                 let angle = q[side.index() * n + i];

@@ -33,6 +33,14 @@ impl Setting {
         }
     }
 
+    /// The error that a step may have; zero where its length is given.
+    pub fn tolerance(self) -> f64 {
+        match self {
+            Self::Accuracy(accuracy) => accuracy.tolerance().unwrap_or(0.0),
+            Self::Step(_) => 0.0,
+        }
+    }
+
     /// Length of a step (s).
     pub fn step(self) -> f64 {
         match self {
