@@ -1,7 +1,7 @@
 """The three matched scenes as numbers, for the scripts beside this file; `scenes/*.toml` says the same to Palpate.
 
 A finger is N = 10 hinges at the middle of equal segments, each with a linear spring and damper; its skin is 20 balls of
-4 mm radius, 4 mm in front of the neutral axis, each with a linear normal spring of 1250 N/m and no damper. The scene is a mirror image
+4 mm radius, 4 mm in front of the neutral axis, each on a linear spring of 1250 N/m across the finger and no damper. The scene is a mirror image
 of itself, so that one finger tells all: lengths in m, x inward from the palm, y from the palm to the tip.
 """
 

@@ -8,7 +8,8 @@ MuJoCo's contact is a spring of k_eff = k / ((1 - d) A) N/m, with d the constant
 `solref` and A the inverse inertia of the pair as the solver sees it. With `integrator="discrete"` that is the inertia
 M + h D + h^2 K, so that A changes with the step and with the pose (54, 34, 18, 2 1/kg at h = 0 .. 1/150 s): a stiffness
 in N/m cannot be asked for, only found. Here k of every pair is set from the mean A over its time of contact, anew for
-each step length; what remains is MuJoCo's. Every contact also adds an inertia of d / ((1 - d) A): d = 0.001 makes that
+each step length; what remains is MuJoCo's. A spring across the finger that meets the ball at an angle of cosine c is
+k / c^2 along the normal; the mean of that over the time of contact is asked for. Every contact also adds an inertia of d / ((1 - d) A): d = 0.001 makes that
 negligible. Friction in MuJoCo is a damper tied to the same d, so that the free sphere, which friction has to carry, needs
 d = 0.9 and impratio 100, the settings that hold best; the normal stiffness is matched all the same.
 
@@ -97,12 +98,14 @@ def matched(name, h):
     inverse = weight[mj.geom_bodyid[mj.pair_geom1]] + weight[mj.geom_bodyid[mj.pair_geom2]]
     wanted = np.array([m.SUPPORT if "pin" in (mj.geom(a).name, mj.geom(b).name) else m.CONTACT
                        for a, b in zip(mj.pair_geom1, mj.pair_geom2)])
+    slant = np.ones(mj.npair)
+    on_skin = wanted == m.CONTACT
     for _ in range(3):
-        k = wanted * (1 - d) * inverse
+        k = wanted * slant * (1 - d) * inverse
         mj.pair_solref[:, 0] = -k
         # The pads have no damper of their own; friction needs one, and so does the pin.
         mj.pair_solref[:, 1] = -2 * np.sqrt(k) if name == "free_sphere" else -1e-9
-        data, sums = mujoco.MjData(mj), np.zeros((mj.npair, 2))
+        data, sums = mujoco.MjData(mj), np.zeros((mj.npair, 3))
         for step in range(round(m.DURATION / h)):
             if step % round(0.1 / h) == 0:
                 data.qfrc_applied[: 2 * m.N] = m.TORQUE * m.line_bar(step // round(0.1 / h))
@@ -110,9 +113,12 @@ def matched(name, h):
             if step % max(round(1 / 150 / h), 1) == 0:
                 for c in range(data.ncon):
                     pair = pair_of[frozenset(data.contact[c].geom)]
-                    sums[pair] += data.efc_R[data.contact[c].efc_address] * d / (1 - d), 1
-        seen = sums[:, 1] > 0
-        inverse[seen] = sums[seen, 0] / sums[seen, 1]
+                    axis = data.xmat[mj.geom_bodyid[mj.pair_geom1[pair]]].reshape(3, 3)[:, 0]
+                    cosine = abs(axis @ data.contact[c].frame[:3]) if on_skin[pair] else 1.0
+                    sums[pair] += data.efc_R[data.contact[c].efc_address] * d / (1 - d), cosine**-2, 1
+        seen = sums[:, 2] > 0
+        inverse[seen] = sums[seen, 0] / sums[seen, 2]
+        slant[seen] = sums[seen, 1] / sums[seen, 2]
     return mj
 
 

@@ -56,16 +56,26 @@ class Scene:
         carried = segments[:, None] > np.arange(m.N)[None, :]
         return np.swapaxes(quarter_turn(arms) * carried[:, :, None], 1, 2)
 
-    def contacts(self, y, along, starts, q):
-        """Normal force (taxels), and force on each taxel with its Jacobian and shear rate."""
-        centres = starts[SEGMENT] + along[SEGMENT] * ALONG[:, None] + quarter_turn(along[SEGMENT]) * m.AHEAD
+    def contacts(self, y, along, starts):
+        """Where each taxel touches, the ball, the normal there, normal force; all (taxels, ..).
+
+        A taxel is a strand: its ball is pushed back along the strand's axis until it just touches, by x, and stores
+        k x^2 / 2. A motion v of the surfaces changes x by -n.v / c, c the cosine between axis and normal, so that the
+        force along the normal is k x / c.
+        """
+        axis = quarter_turn(along[SEGMENT])
+        foot = starts[SEGMENT] + along[SEGMENT] * ALONG[:, None]
         height = y[2 * m.N] if self.free else 0.0
         ball = np.array([m.HALF_GAP, m.DROP - height])
-        out = centres - ball
-        gap = np.linalg.norm(out, axis=1)
-        normal = out / gap[:, None]
-        depth = np.maximum(m.SKIN + m.BALL - gap, 0.0)
-        return centres, ball, normal, m.CONTACT * depth
+        ahead = np.einsum("tx,tx->t", ball - foot, axis)
+        reach = m.SKIN + m.BALL
+        aside = np.sum((ball - foot - axis * ahead[:, None]) ** 2, axis=1)
+        half_chord = np.sqrt(np.maximum(reach**2 - aside, 0.0))
+        centre = ahead - half_chord
+        pushed = np.where(aside < reach**2, np.maximum(m.AHEAD - centre, 0.0), 0.0)
+        normal = (foot + axis * centre[:, None] - ball) / reach
+        cosine = np.maximum(half_chord / reach, 0.25)
+        return ball, normal, m.CONTACT * pushed / cosine
 
     def rate(self, _t, y):
         q, qd = y[: m.N], y[m.N : 2 * m.N]
@@ -83,12 +93,11 @@ class Scene:
         force = self.torque - m.STIFFNESS * q - m.DAMPING * qd - np.einsum("lxi,lx->i", jac, inertial)
         out = np.zeros_like(y)
         if self.ball:
-            points, ball, normal, pressing = self.contacts(y, along, starts, q)
+            ball, normal, pressing = self.contacts(y, along, starts)
             on_taxel = normal * pressing[:, None]
+            jac_touch = self.jacobian(ball + normal * m.BALL, SEGMENT, starts)
             if self.free:
                 tangent = quarter_turn(normal)
-                touch = ball + normal * m.BALL
-                jac_touch = self.jacobian(touch, SEGMENT, starts)
                 rise = y[2 * m.N + 1]
                 velocity = np.einsum("txi,i->tx", jac_touch, qd) - np.array([0, -rise])
                 xi = y[2 * m.N + 2 :]
@@ -105,9 +114,7 @@ class Scene:
                 standing = max(m.SUPPORT * sunk - damping, 0.0)
                 out[2 * m.N] = rise
                 out[2 * m.N + 1] = (up + standing) / m.BALL_MASS - self.gravity
-                force = force + np.einsum("txi,tx->i", jac_touch, on_taxel)
-            else:
-                force = force + np.einsum("txi,tx->i", self.jacobian(points, SEGMENT, starts), on_taxel)
+            force = force + np.einsum("txi,tx->i", jac_touch, on_taxel)
         out[: m.N] = qd
         out[m.N : 2 * m.N] = np.linalg.solve(mass, force)
         return out
@@ -127,7 +134,7 @@ class Scene:
         if not self.ball:
             return 0.0
         along, starts, _ = self.kinematics(y[: m.N], y[m.N : 2 * m.N])
-        _, _, normal, pressing = self.contacts(y, along, starts, y[: m.N])
+        _, normal, pressing = self.contacts(y, along, starts)
         force = normal * pressing[:, None]
         if self.free:
             limit = m.FRICTION * pressing

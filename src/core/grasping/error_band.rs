@@ -117,13 +117,16 @@ impl ErrorNorms {
         Self { curvature_per_m, curvature_share, pressure_pa, pressure_share, force_n, force_share }
     }
 
-    /// How far one trial is from another of the same scene, sampled at the same times.
-    pub fn between(trial: &Trial, truth: &Trial, sensors: &Sensors) -> Self {
+    /// How far one trial is from another, sampled at the same times; the range is that of both.
+    pub fn between(trial: &Trial, other: &Trial, sensors: &Sensors) -> Self {
         let read = |trial: &Trial| -> Vec<Vec<Option<f64>>> { trial.frames.iter().map(|f| sensors.read(f)).collect() };
-        let (own, other) = (read(trial), read(truth));
-        Self::new(sensors.channels(), &other, |channel, sample| {
-            let value = |rows: &[Vec<Option<f64>>]| Some(rows.get(sample)?.get(channel)?.unwrap_or_default());
-            Some(value(&own)? - value(&other)?)
+        let (mut rows, others) = (read(trial), read(other));
+        let (own, common) = (rows.len(), rows.len().min(others.len()));
+        rows.extend(others);
+        Self::new(sensors.channels(), &rows, |channel, sample| {
+            // Without contact there is no pressure.
+            let value = |sample: usize| Some(rows.get(sample)?.get(channel)?.unwrap_or_default());
+            if sample < common { Some(value(sample)? - value(own + sample)?) } else { None }
         })
     }
 }

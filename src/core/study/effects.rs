@@ -5,11 +5,11 @@
 //! of which the quickest of each kind count, because whatever else a machine does only adds. Differences are taken over
 //! all samples and both fingers.
 
-use crate::grasping::{GraspSummary, prepare};
+use super::accuracy_cost::error_sensors;
+use crate::grasping::{ErrorNorms, GraspSummary, prepare};
 use crate::objects::ObjectModel;
 use crate::physics::effects::rule_of;
 use crate::scene::{Effect, Scene, Setting};
-use crate::sensing::{PressureArea, Quantity, SensorLayout, Sensors};
 use crate::trial::{Plan, PlannedEffect, Trial};
 use crate::units::three_digits;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
@@ -47,21 +47,12 @@ pub struct ExplainedEffect {
     pub change: EffectChange,
 }
 
-/// Differences between two trials: root mean squares over all samples of both fingers.
+/// Differences between two trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EffectChange {
-    /// Curvature (1/m), and as a share of its range in both trials.
-    pub curvature_per_m: f64,
-    /// The same as a share of the range of curvature.
-    pub curvature_share: f64,
-    /// Pressure (Pa).
-    pub pressure_pa: f64,
-    /// The same as a share of the range of pressure.
-    pub pressure_share: f64,
-    /// Force (N).
-    pub force_n: f64,
-    /// The same as a share of the range of force.
-    pub force_share: f64,
+    /// Of what the sensors read.
+    #[serde(flatten)]
+    pub norms: ErrorNorms,
     /// First contact in the other trial (s); null when never.
     pub contact_onset_s: Option<f64>,
     /// How much later first contact is in the other trial (ms), in whole samples; null unless both touch.
@@ -87,7 +78,7 @@ impl ExplainedEffect {
     pub fn change_in_words(&self, onset_here: Option<f64>) -> String {
         let change = &self.change;
         let how = if self.planned.on { "without it" } else { "with it" };
-        if change.curvature_per_m == 0.0 && change.force_n == 0.0 && change.contact_onset_s == onset_here {
+        if change.norms.curvature_per_m == 0.0 && change.norms.force_n == 0.0 && change.contact_onset_s == onset_here {
             return format!("{how} nothing changes");
         }
         let part = |name: &str, value: f64, unit: &str, share: f64| {
@@ -99,9 +90,9 @@ impl ExplainedEffect {
             (None, None) if onset_here.is_some() => "no contact".to_owned(),
             (None, None) => "no contact either way".to_owned(),
         };
-        let curvature = part("curvature", change.curvature_per_m, "1/m", change.curvature_share);
-        let pressure = part("pressure", change.pressure_pa * 1e-3, "kPa", change.pressure_share);
-        let force = part("force", change.force_n, "N", change.force_share);
+        let curvature = part("curvature", change.norms.curvature_per_m, "1/m", change.norms.curvature_share);
+        let pressure = part("pressure", change.norms.pressure_pa * 1e-3, "kPa", change.norms.pressure_share);
+        let force = part("force", change.norms.force_n, "N", change.norms.force_share);
         format!("{how}: {curvature}, {pressure}, {force}, {onset}")
     }
 }
@@ -126,7 +117,7 @@ pub struct Measuring<'a> {
 /// Explains every effect of a scene; `None` when cancelled.
 pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measuring<'_>) -> Option<Explanation> {
     let (base, cpu_s) = run(scene, object, how.cancelled)?;
-    let base = Signals::new(scene, base);
+    let base = Felt::new(scene, base);
     let done = AtomicUsize::new(0);
     (how.progress)(0, Effect::ALL.len());
     let one = |effect: &Effect| {
@@ -152,7 +143,7 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
 fn explain_one(
     scene: &Scene,
     object: Option<&ObjectModel>,
-    base: &Signals,
+    base: &Felt,
     effect: Effect,
     cancelled: &AtomicBool,
 ) -> Option<ExplainedEffect> {
@@ -174,7 +165,7 @@ fn explain_one(
         about: rule.about,
         number_is: rule.number,
         cost_share: sign * (here - there) / here,
-        change: base.change_to(&Signals::new(&other_scene, other?)),
+        change: base.change_to(&Felt::new(&other_scene, other?), scene),
         planned,
     })
 }
@@ -199,63 +190,27 @@ fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> O
     Some((run.finish(scene), seconds))
 }
 
-/// What a trial feels like: both fingers' readings, sample by sample.
-struct Signals {
+/// A trial, and when its first contact was (s).
+struct Felt {
     trial: Trial,
     onset_s: Option<f64>,
-    curvature: Vec<f64>,
-    pressure: Vec<f64>,
-    force: Vec<f64>,
 }
 
-impl Signals {
+impl Felt {
     fn new(scene: &Scene, trial: Trial) -> Self {
-        let layout = SensorLayout::named("C1+F").expect("a layout of our own");
-        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation);
-        let (mut curvature, mut pressure, mut force) = (Vec::new(), Vec::new(), Vec::new());
-        // Whole-finger spans fit every gripper.
-        if let Ok(sensors) = sensors {
-            for frame in &trial.frames {
-                for (channel, value) in sensors.channels().iter().zip(sensors.read(frame)) {
-                    let signal = match channel.quantity {
-                        Quantity::Curvature => &mut curvature,
-                        Quantity::Pressure => &mut pressure,
-                        Quantity::Force => &mut force,
-                    };
-                    // Without contact there is no pressure.
-                    signal.push(value.unwrap_or(0.0));
-                }
-            }
-        }
-        let onset_s = GraspSummary::new(&trial, scene).contact_onset_s;
-        Self { trial, onset_s, curvature, pressure, force }
+        Self { onset_s: GraspSummary::new(&trial, scene).contact_onset_s, trial }
     }
 
-    fn change_to(&self, other: &Self) -> EffectChange {
-        let [curvature, pressure, force] =
-            [(&self.curvature, &other.curvature), (&self.pressure, &other.pressure), (&self.force, &other.force)]
-                .map(|(here, there)| difference(here, there));
+    /// From this trial to another; the sensors of `scene` read both.
+    fn change_to(&self, other: &Self, scene: &Scene) -> EffectChange {
+        let sensors = error_sensors(scene);
         let both = self.onset_s.zip(other.onset_s);
         EffectChange {
-            curvature_per_m: curvature.0,
-            curvature_share: curvature.1,
-            pressure_pa: pressure.0,
-            pressure_share: pressure.1,
-            force_n: force.0,
-            force_share: force.1,
+            norms: sensors.map(|own| ErrorNorms::between(&other.trial, &self.trial, &own)).unwrap_or_default(),
             contact_onset_s: other.onset_s,
             onset_ms: both.map(|(here, there)| (there - here) * 1e3),
         }
     }
-}
-
-/// Root mean square difference, and that as a share of the range of both.
-fn difference(here: &[f64], there: &[f64]) -> (f64, f64) {
-    let count = here.len().min(there.len()).max(1) as f64;
-    let rms = (here.iter().zip(there).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / count).sqrt();
-    let all = || here.iter().chain(there).copied();
-    let range = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
-    (rms, if range > 0.0 { rms / range } else { 0.0 })
 }
 
 #[cfg(test)]
@@ -299,12 +254,12 @@ mod tests {
         assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
         assert!(told.of(Effect::FreeObject).planned.reason.contains("fixed"));
         for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
-            assert!(told.of(effect).change.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
+            assert!(told.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
         }
         // What was left out is not missed: no finger comes near the pedestal or the other finger.
         for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
-            assert_eq!(told.of(effect).change.curvature_per_m, 0.0, "{effect:?}");
-            assert_eq!(told.of(effect).change.force_n, 0.0, "{effect:?}");
+            assert_eq!(told.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
+            assert_eq!(told.of(effect).change.norms.force_n, 0.0, "{effect:?}");
         }
     }
 
@@ -314,11 +269,16 @@ mod tests {
         let on = ["free-object", "finger-gravity", "support", "friction", "finger-inertia"];
         assert_eq!(told.names_on(), on, "{:#?}", told.effects);
         let weight = told.of(Effect::ObjectGravity);
-        assert!(weight.planned.number < weight.planned.threshold && weight.change.curvature_share < 0.01, "{weight:?}");
-        assert!(told.of(Effect::Friction).change.force_share > weight.change.force_share);
+        assert!(
+            weight.planned.number < weight.planned.threshold && weight.change.norms.curvature_share < 0.01,
+            "{weight:?}"
+        );
+        assert!(told.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
         // A heavy one does feel it.
         let heavy = explained(&draft(), Some(&ball(0.020, 4000.0)));
-        assert!(heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.force_n > 1e-3);
+        assert!(
+            heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.norms.force_n > 1e-3
+        );
     }
 
     #[test]
@@ -326,9 +286,13 @@ mod tests {
         let told = explained(&draft(), None);
         assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
         let contact = told.of(Effect::FingerContact);
-        assert!(contact.change.curvature_per_m > 1.0 && contact.change.force_n > 0.05, "{:?}", contact.change);
+        assert!(
+            contact.change.norms.curvature_per_m > 1.0 && contact.change.norms.force_n > 0.05,
+            "{:?}",
+            contact.change
+        );
         assert!(told.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
-        assert_eq!(told.of(Effect::FreeObject).change.curvature_per_m, 0.0);
+        assert_eq!(told.of(Effect::FreeObject).change.norms.curvature_per_m, 0.0);
     }
 
     #[test]
@@ -340,12 +304,16 @@ mod tests {
         let told = explained(&scene, Some(&ball(0.025, 400.0)));
         let creep = told.of(Effect::Creep);
         assert!(creep.planned.on && creep.planned.number == 4.0, "{:?}", creep.planned);
-        assert!(creep.change.force_share > 0.01 && creep.change.curvature_share > 0.005, "{:?}", creep.change);
+        assert!(
+            creep.change.norms.force_share > 0.01 && creep.change.norms.curvature_share > 0.005,
+            "{:?}",
+            creep.change
+        );
         let mut short = draft();
         short.object.fixed = true;
         let short = explained(&short, Some(&ball(0.025, 400.0)));
         let unnoticed = short.of(Effect::Creep);
-        assert!(!unnoticed.planned.on && unnoticed.change.force_share < 0.2 * creep.change.force_share);
+        assert!(!unnoticed.planned.on && unnoticed.change.norms.force_share < 0.2 * creep.change.norms.force_share);
     }
 
     #[test]
@@ -353,12 +321,12 @@ mod tests {
         let (mut scene, ball) = (draft(), ball(0.020, 400.0));
         scene.object.fixed = true;
         let told = explained(&scene, Some(&ball));
-        let free = Signals::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
-        let held = Signals::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
+        let free = Felt::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
+        let held = Felt::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
         // An object let go has its weight, and rests.
-        let expected = held.change_to(&free);
+        let expected = held.change_to(&free, &scene);
         assert_eq!(told.of(Effect::FreeObject).change, expected);
-        assert!(expected.force_n > 1e-3);
+        assert!(expected.norms.force_n > 1e-3);
     }
 
     #[test]

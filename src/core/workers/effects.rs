@@ -208,7 +208,7 @@ mod tests {
         worker.ask(&given_up);
         worker.ask(&wanted);
         let first = measured(&worker, &woken, &wanted);
-        assert!(first.effects.iter().any(|effect| effect.planned.on && effect.change.curvature_per_m > 0.0));
+        assert!(first.effects.iter().any(|effect| effect.planned.on && effect.change.norms.curvature_per_m > 0.0));
         worker.ask(&empty_hand(0.5));
         worker.ask(&wanted);
         assert!(Arc::ptr_eq(&first, &measured(&worker, &woken, &wanted)), "measured twice");
