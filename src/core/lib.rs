@@ -20,6 +20,7 @@
 //! | 2 | [`objects`], [`gripper`] | URDF, OBJ, STL and the sixteen; what a finger, a pad and a programme are |
 //! | 3 | [`trial`], [`board`] | plain frames and trials; what a sensor board sends |
 //! | 4 | [`scene`] | the scene file: everything a user may set |
+//! | 4 | [`wire`] | bytes of a sensor board to stamped readings and gaps |
 //! | 5 | [`physics`] | the convex implicit step, contact, placement, resting faces, and a simulation on a clock of whole ticks |
 //! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames; what real sensors make of them |
 //! | 7 | [`rig`] | a gripper that can be told a pressure and read: simulated, or replayed |
@@ -68,4 +69,5 @@ pub mod sensing;
 pub mod study;
 pub mod trial;
 pub mod units;
+pub mod wire;
 pub mod workers;

@@ -9,7 +9,7 @@ const LAYERS: &[&[&str]] = &[
     &["geometry"],
     &["drawing", "objects", "gripper"],
     &["trial", "board"],
-    &["scene"],
+    &["scene", "wire"],
     &["physics"],
     &["sensing"],
     &["rig"],
@@ -33,6 +33,7 @@ const TEST_FILES: &[&str] = &[
     "recognition/network/gradients.rs",
     "recognition/forest/peers.rs",
     "sensing/model/tests.rs",
+    "wire/decoder_tests.rs",
 ];
 
 /// Where each third-party crate may be named.

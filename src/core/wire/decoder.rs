@@ -1,0 +1,281 @@
+//! Bytes to readings. The board's way of writing is found out from its lines and may be asked for; what cannot be read is
+//! counted and told as a gap, and nothing is put in its place.
+
+use super::cadence::{Cadence, Meter};
+use super::clock::{Counters, Stamp, StreamClock, TimeSource};
+use super::columns::Columns;
+use super::fields::{Format, Parsed, parse};
+use super::hello;
+use super::lines::{Line, LineSplitter};
+use super::rails::{Rail, RailWatch};
+use super::shape::{Candidate, Judged, Role, Shapes};
+use super::tail::{ConsoleLine, Tail, Verdict};
+use super::teleplot::Assembler;
+use crate::board::{Board, Gap, Reading};
+
+/// What was heard, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Heard {
+    /// A line of the board.
+    Reading(Reading),
+    /// Readings are missing before the one that comes next.
+    Gap(Gap),
+    /// What is known of the board has changed. Its channels are only ever added to, or renamed in place.
+    Board(Board),
+    /// A remark of the board, without its `#`.
+    Said(String),
+}
+
+/// How a board's lines are read, and why.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Detected {
+    /// How it writes.
+    pub format: Format,
+    /// How that was found out, and what was taken for granted, in a sentence.
+    pub why: String,
+    /// What the times of readings rest on.
+    pub time: TimeSource,
+}
+
+/// Listens to one board. Memory stays bounded whatever it sends.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    splitter: LineSplitter,
+    reader: Reader,
+}
+
+/// A decoder without the line that is going on.
+#[derive(Clone, Debug, Default)]
+struct Reader {
+    shapes: Shapes,
+    columns: Columns,
+    /// Names of the channels, in the order of the counts.
+    channels: Vec<String>,
+    /// What the board said of itself.
+    hello: Option<Board>,
+    teleplot: Assembler,
+    clock: StreamClock,
+    meter: Meter,
+    rails: RailWatch,
+    tail: Tail,
+    /// Lines since the last reading that could not be read.
+    unreadable: u64,
+    /// Why readings may be missing before the next one.
+    broken: Option<String>,
+    /// The newest reading's time (s).
+    last_s: Option<f64>,
+}
+
+/// Largest counter that is believed: beyond it whole numbers are not told apart.
+const LARGEST_COUNTER: f64 = 9.0e15;
+
+impl Decoder {
+    /// Takes in bytes that arrived at a time (s since the stream began) and adds what they say to `heard`.
+    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let Self { splitter, reader } = self;
+        reader.meter.bytes(bytes, arrived_s);
+        splitter.push(bytes, |line| match line {
+            Line::Whole(line) => reader.line(line, arrived_s, heard),
+            Line::TooLong => reader.bad(b"", "it does not end", arrived_s),
+        });
+    }
+
+    /// The stream was interrupted; readings that are found missing when it goes on are put down to `cause`.
+    pub fn interrupt(&mut self, cause: &str) {
+        self.splitter.interrupt();
+        self.reader.teleplot = Assembler::default();
+        self.reader.shapes.give_up();
+        self.reader.clock.interrupt();
+        self.reader.broken = Some(cause.to_owned());
+    }
+
+    /// What is known of the board.
+    pub fn board(&self) -> Board {
+        self.reader.board()
+    }
+
+    /// How its lines are read; none before two of them agree.
+    pub fn detected(&self) -> Option<Detected> {
+        let format = self.reader.shapes.format?;
+        let why = match format {
+            Format::Csv => format!("{}; {}", format.mark(), self.reader.columns.why()),
+            Format::Plotter | Format::Teleplot | Format::JsonLines => format.mark().to_owned(),
+        };
+        Some(Detected { format, why, time: self.reader.clock.source() })
+    }
+
+    /// How well it keeps time.
+    pub fn cadence(&self) -> Cadence {
+        self.reader.meter.cadence(self.reader.clock.drift())
+    }
+
+    /// The newest lines as they came, oldest first.
+    pub fn console(&self) -> impl Iterator<Item = &ConsoleLine> {
+        self.reader.tail.lines()
+    }
+
+    /// For each channel, the end of the converter's range at which it has stood for half a second or more.
+    pub fn rails(&self) -> Vec<Option<Rail>> {
+        self.reader.rails.at()
+    }
+
+    /// True where the counts look like those of a converter with 10 bits, and the board has not said otherwise.
+    pub fn looks_10_bit(&self) -> bool {
+        self.reader.hello.is_none() && self.reader.rails.looks_10_bit()
+    }
+}
+
+impl Reader {
+    fn board(&self) -> Board {
+        let mut board = self.hello.clone().unwrap_or_default();
+        let place = |name: &String| board.channels.iter().position(|known| known.eq_ignore_ascii_case(name));
+        let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
+        board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
+        board.channels.clone_from(&self.channels);
+        board
+    }
+
+    fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
+        self.tail.add(line, arrived_s, Verdict::Bad(why));
+        self.give_up(arrived_s);
+        self.unreadable += 1;
+        self.meter.bad_line(arrived_s);
+    }
+
+    /// Counts the line that waited for another like it as one that could not be read.
+    fn give_up(&mut self, arrived_s: f64) {
+        if self.shapes.give_up() {
+            self.unreadable += 1;
+            self.meter.bad_line(arrived_s);
+        }
+    }
+
+    fn line(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        if let Some(remark) = line.strip_prefix(b"#") {
+            return self.remark(remark, line, arrived_s, heard);
+        }
+        let (format, fields) = match parse(line) {
+            Err(why) => return self.bad(line, why, arrived_s),
+            Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
+            Ok(Parsed::Columns(values)) => (Format::Csv, self.columns.name(values, self.hello.as_ref())),
+            Ok(Parsed::Named(Format::Teleplot, fields)) => {
+                self.tail.add(line, arrived_s, Verdict::Read);
+                match self.teleplot.push(fields) {
+                    None => return,
+                    Some(fields) => (Format::Teleplot, fields),
+                }
+            }
+            Ok(Parsed::Named(format, fields)) => (format, fields),
+        };
+        if format != Format::Teleplot {
+            self.tail.add(line, arrived_s, Verdict::Read);
+        }
+        match self.shapes.judge(Candidate { format, fields, arrived_s }) {
+            Judged::Known(line) => {
+                self.give_up(arrived_s);
+                self.reading(&line, heard);
+            }
+            Judged::Changed(lines) => lines.iter().for_each(|line| self.reading(line, heard)),
+            Judged::Waits { given_up } => {
+                for _ in 0..given_up {
+                    self.unreadable += 1;
+                    self.meter.bad_line(arrived_s);
+                }
+            }
+        }
+    }
+
+    fn remark(&mut self, remark: &[u8], line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let Ok(text) = std::str::from_utf8(remark) else {
+            return self.bad(line, "it holds bytes that are no text", arrived_s);
+        };
+        self.tail.add(line, arrived_s, Verdict::Said);
+        if let Some(board) = hello::parse(text)
+            && self.hello.as_ref() != Some(&board)
+        {
+            self.hello = Some(board);
+            self.name_columns(heard);
+            heard.push(Heard::Board(self.board()));
+        }
+        heard.push(Heard::Said(text.trim().to_owned()));
+    }
+
+    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        self.tail.add(line, arrived_s, Verdict::Said);
+        self.columns.set_header(names);
+        self.name_columns(heard);
+    }
+
+    /// Columns that have gone by other names so far get those that have become known.
+    fn name_columns(&mut self, heard: &mut Vec<Heard>) {
+        if self.shapes.format != Some(Format::Csv) {
+            return;
+        }
+        let names = self.columns.names(self.shapes.names().len(), self.hello.as_ref());
+        let before = self.shapes.roles(&mut self.channels).to_vec();
+        if !self.shapes.rename(&names) {
+            return;
+        }
+        for (column, (role, name)) in before.iter().zip(names).enumerate() {
+            if let Role::Channel(place) = role {
+                // What turns out to be a counter leaves a channel behind that stays empty from now on.
+                let name = if Role::is_channel(&name) { name } else { format!("column {}", column + 1) };
+                self.channels[*place] = name;
+            }
+        }
+        self.shapes.roles(&mut self.channels);
+        heard.push(Heard::Board(self.board()));
+    }
+
+    fn reading(&mut self, line: &Candidate, heard: &mut Vec<Heard>) {
+        let known = self.channels.len();
+        let roles = self.shapes.roles(&mut self.channels);
+        let mut counts = vec![None; self.channels.len()];
+        let (mut counters, mut line_bar) = (Counters { unreadable: self.unreadable, ..Counters::default() }, None);
+        let mut whole = true;
+        for (role, (_, value)) in roles.iter().zip(&line.fields) {
+            let counter = value.filter(|value| (0.0..LARGEST_COUNTER).contains(value));
+            match role {
+                Role::Channel(place) => counts[*place] = value.map(|value| value as f32),
+                Role::Micros => counters.time = counter.map(|count| (count, 1e-6)),
+                Role::Millis if counters.time.is_none() => counters.time = counter.map(|count| (count, 1e-3)),
+                Role::Sequence => counters.seq = counter,
+                Role::LineBar => line_bar = *value,
+                Role::Millis | Role::Ignored => {}
+            }
+            whole &= counter.is_some() || !matches!(role, Role::Micros | Role::Millis | Role::Sequence);
+        }
+        if self.channels.len() != known {
+            heard.push(Heard::Board(self.board()));
+        }
+        if !whole {
+            self.unreadable += 1;
+            return self.meter.bad_line(line.arrived_s);
+        }
+        let stamp = self.clock.stamp(&counters, line.arrived_s);
+        self.tell_gap(&stamp, heard);
+        self.last_s = Some(stamp.t_s);
+        self.meter.reading(stamp.t_s, line.arrived_s, self.clock.source() == TimeSource::Arrival);
+        let full_scale = self.hello.as_ref().map(|board| board.full_scale);
+        self.rails.add(&counts, stamp.t_s, full_scale);
+        let Stamp { t_s, seq, .. } = stamp;
+        heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
+    }
+
+    fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<Heard>) {
+        let unreadable = std::mem::take(&mut self.unreadable);
+        let broken = self.broken.take();
+        let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
+        let cause = match (broken, stamp.restarted, unreadable) {
+            (Some(cause), true, _) => format!("{cause}; the board began anew"),
+            (Some(cause), false, _) => cause,
+            (None, true, _) => "the board began anew".to_owned(),
+            (None, false, 0) if stamp.missing.is_none() => "nothing arrived".to_owned(),
+            (None, false, 0) => "lost on the way".to_owned(),
+            (None, false, 1) => "a line could not be read".to_owned(),
+            (None, false, n) => format!("{n} lines could not be read"),
+        };
+        self.meter.gap(stamp.missing);
+        heard.push(Heard::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
+    }
+}

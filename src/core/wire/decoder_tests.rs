@@ -1,0 +1,197 @@
+//! Whole streams through the decoder: every format, every fault, any bytes.
+
+use super::*;
+use crate::board::{Board, Gap, Reading, Sensor};
+use proptest::prelude::*;
+
+/// What a stream says, with each chunk arriving at its time.
+fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<Heard>) {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    for (t, bytes) in chunks {
+        decoder.push(bytes, t, &mut heard);
+    }
+    (decoder, heard)
+}
+
+/// Lines that arrive every 20 ms, the first behind the end of another.
+fn hear_lines(lines: &[String]) -> (Decoder, Vec<Heard>) {
+    let lines: Vec<String> = lines.iter().map(|line| format!("\n{line}\n")).collect();
+    hear(lines.iter().enumerate().map(|(i, line)| (0.02 * i as f64, line.as_bytes())))
+}
+
+fn readings(heard: &[Heard]) -> Vec<&Reading> {
+    heard.iter().filter_map(|h| if let Heard::Reading(reading) = h { Some(reading) } else { None }).collect()
+}
+
+fn gaps(heard: &[Heard]) -> Vec<&Gap> {
+    heard.iter().filter_map(|h| if let Heard::Gap(gap) = h { Some(gap) } else { None }).collect()
+}
+
+fn firmware_line(i: u32) -> String {
+    let (us, a, b) = (20_000 * u64::from(i) + 123_456, 2000 + i % 7, 2100 + i % 5);
+    format!("t_us:{us},seq:{i},flexL:{a}.125,flexR:{b},fsrL:12.5,fsrR:0,p_bar:0.55")
+}
+
+const HELLO: &str = "# tactile-gripper fw=1 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700";
+
+#[test]
+fn the_firmwares_stream_is_heard_whole() {
+    let mut lines = vec![HELLO.to_owned()];
+    lines.extend((0..100).map(firmware_line));
+    let (decoder, heard) = hear_lines(&lines);
+    let readings = readings(&heard);
+    assert_eq!((readings.len(), gaps(&heard).len()), (100, 0));
+    assert_eq!(readings[40].counts, [Some(2005.125), Some(2100.0), Some(12.5), Some(0.0)]);
+    assert_eq!(readings[40].line_bar, Some(0.55));
+    assert!(readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 1e-6));
+    assert_eq!(decoder.board().divider_ohm, [47e3, 47e3, 4.7e3, 4.7e3]);
+    let detected = decoder.detected().map(|d| (d.format, d.time));
+    assert_eq!(detected, Some((Format::Plotter, TimeSource::Device)));
+    assert_eq!(decoder.cadence().bad_lines, 0);
+}
+
+#[test]
+fn the_same_stream_is_found_in_every_format() {
+    type Write = fn(u32) -> String;
+    let formats: [(Format, Write); 5] = [
+        (Format::Plotter, |i| format!("flexL:{i} flexR:{} fsrL:nan fsrR:4", i + 1)),
+        (Format::Csv, |i| format!("{i};{};;4", i + 1)),
+        (Format::Csv, |i| format!("{i}\t{}\tnan\t4", i + 1)),
+        (Format::Teleplot, |i| format!(">flexL:{i}\n>flexR:{}\n>fsrL:nan\n>fsrR:4", i + 1)),
+        (Format::JsonLines, |i| format!(r#"{{"flexL":{i},"flexR":{},"fsrL":null,"fsrR":4}}"#, i + 1)),
+    ];
+    for (format, write) in formats {
+        let lines: Vec<String> = std::iter::once("rest of a line".to_owned()).chain((10..60).map(write)).collect();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!(decoder.detected().map(|d| d.format), Some(format));
+        let readings = readings(&heard);
+        // Teleplot's last reading is complete when the next begins.
+        assert!(readings.len() >= 49, "{format:?}: {}", readings.len());
+        assert_eq!(decoder.board().channels, Board::default().channels, "{format:?}");
+        for (reading, i) in readings.iter().zip(10u8..) {
+            let i = f32::from(i);
+            assert_eq!(reading.counts, [Some(i), Some(i + 1.0), None, Some(4.0)], "{format:?}");
+        }
+    }
+}
+
+#[test]
+fn a_header_that_comes_late_renames_the_columns() {
+    let mut lines: Vec<String> = (0..30).map(|i| format!("{},{i},7,8,9", 20 * i)).collect();
+    lines[10] = "ms,flexR,flexL,fsrL,fsrR".to_owned();
+    let (decoder, heard) = hear_lines(&lines);
+    let board = decoder.board();
+    assert_eq!(board.channels, ["column 1", "flexR", "flexL", "fsrL", "fsrR"]);
+    assert_eq!(readings(&heard).last().map(|r| r.counts.clone()), {
+        Some(vec![None, Some(29.0), Some(7.0), Some(8.0), Some(9.0)])
+    });
+    assert_eq!(decoder.detected().map(|d| d.time), Some(TimeSource::Device));
+    assert_eq!(board.channel_of(Sensor::FlexRight), Some(1));
+}
+
+#[test]
+fn lost_lines_and_bad_lines_are_gaps_and_nothing_is_invented() {
+    let mut lines: Vec<String> = (0..300).map(firmware_line).collect();
+    lines[50] = lines[50][..40].to_owned();
+    lines[80] = "\u{fffd}garbage~~".to_owned();
+    lines[120] = format!("{}{}", &lines[120][..60], lines[121]);
+    lines.drain(200..204);
+    lines.remove(121);
+    let (decoder, heard) = hear_lines(&lines);
+    let gaps = gaps(&heard);
+    assert_eq!(gaps.iter().map(|gap| gap.lost).collect::<Vec<_>>(), [Some(1), Some(1), Some(2), Some(4)]);
+    assert_eq!((gaps[1].cause.as_str(), gaps[3].cause.as_str()), ("a line could not be read", "lost on the way"));
+    for reading in readings(&heard) {
+        let i = reading.seq.unwrap_or_default();
+        let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
+        assert_eq!(reading.counts, wanted, "{i}");
+    }
+    let cadence = decoder.cadence();
+    assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (292, 8, 3));
+}
+
+#[test]
+fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    let mut t = 0.0;
+    decoder.push(b"\n", t, &mut heard);
+    for i in 0..150u32 {
+        if i == 100 {
+            t += 3.0;
+            decoder.interrupt("the cable was pulled");
+            decoder.push(b"45,fsrR:0\n", t, &mut heard);
+        }
+        let restarted = i % 100;
+        decoder.push(format!("{}\n", firmware_line(restarted)).as_bytes(), t, &mut heard);
+        t += 0.02;
+    }
+    let gaps = gaps(&heard);
+    assert_eq!(gaps.len(), 1);
+    assert!(gaps[0].cause.starts_with("the cable was pulled") && gaps[0].to_s - gaps[0].from_s > 2.9, "{gaps:?}");
+    assert_eq!(readings(&heard).len(), 150);
+}
+
+#[test]
+fn another_sketch_is_believed_after_two_of_its_lines() {
+    let lines: Vec<String> =
+        (0..20).map(|i| if i < 10 { format!("{i},1,2,3") } else { format!("grip:{i} bend:2") }).collect();
+    let (decoder, heard) = hear_lines(&lines);
+    assert_eq!(readings(&heard).len(), 20);
+    assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL", "fsrR", "grip", "bend"]);
+    assert_eq!(decoder.cadence().bad_lines, 0);
+}
+
+/// Bytes like a line's, a fault in them, or none at all.
+fn bytes() -> impl Strategy<Value = Vec<u8>> {
+    prop_oneof![
+        3 => (0u32..500).prop_map(|i| format!("{}\n", firmware_line(i)).into_bytes()),
+        1 => prop::collection::vec(any::<u8>(), 0..60),
+        1 => (0u32..500, 0usize..90).prop_map(|(i, cut)| {
+            let line = firmware_line(i);
+            line.as_bytes()[..cut.min(line.len())].to_vec()
+        }),
+        1 => "[0-9,;: \t\r\n{}>#\"a-z.-]{0,80}".prop_map(String::into_bytes),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn whatever_comes_time_moves_on_and_counts_add_up(chunks in prop::collection::vec((bytes(), 0.0f64..0.5), 0..150)) {
+        let mut decoder = Decoder::default();
+        let (mut heard, mut t) = (Vec::new(), 0.0);
+        for (chunk, wait) in &chunks {
+            t += wait;
+            decoder.push(chunk, t, &mut heard);
+        }
+        let (mut last, mut channels) = (f64::NEG_INFINITY, 0);
+        for event in &heard {
+            match event {
+                Heard::Reading(reading) => {
+                    prop_assert!(reading.t_s > last && reading.t_s <= reading.arrived_s + 1e-3, "{reading:?}");
+                    prop_assert_eq!(reading.counts.len(), channels);
+                    prop_assert!(reading.counts.iter().flatten().all(|count| count.is_finite()));
+                    last = reading.t_s;
+                }
+                Heard::Gap(gap) => prop_assert!(gap.from_s == last && gap.to_s > gap.from_s, "{gap:?}"),
+                Heard::Board(board) => {
+                    prop_assert!(board.channels.len() >= channels && board.channels.len() <= 64);
+                    channels = board.channels.len();
+                }
+                Heard::Said(_) => {}
+            }
+        }
+        prop_assert_eq!(decoder.cadence().samples as usize, readings(&heard).len());
+    }
+
+    #[test]
+    fn how_a_stream_is_cut_does_not_matter(chunks in prop::collection::vec(bytes(), 0..60), cut in 1usize..97) {
+        let whole: Vec<u8> = chunks.concat();
+        let (_, at_once) = hear([(1.0, whole.as_slice())]);
+        let (_, in_pieces) = hear(whole.chunks(cut).map(|chunk| (1.0, chunk)));
+        prop_assert_eq!(at_once, in_pieces);
+    }
+}

@@ -1,0 +1,33 @@
+//! The wire: bytes of a sensor board to stamped readings. No ports and no threads here; bytes and their times of arrival
+//! go in, and memory is bounded whatever they are.
+//!
+//! ```text
+//! bytes -> lines -> fields -> shape -> clock -> readings, gaps, remarks
+//!         (lines)  (fields)  (shape)  (clock, delay_line, counters)
+//! ```
+//!
+//! Not read: binary frames (COBS). Text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
+
+mod cadence;
+mod clock;
+mod columns;
+mod counters;
+mod decoder;
+#[cfg(test)]
+mod decoder_tests;
+mod delay_line;
+mod fields;
+mod hello;
+mod lines;
+mod rails;
+mod shape;
+mod tail;
+mod teleplot;
+
+pub use cadence::Cadence;
+pub use clock::TimeSource;
+pub use decoder::{Decoder, Detected, Heard};
+pub use fields::Format;
+pub use lines::MAX_LINE;
+pub use rails::Rail;
+pub use tail::{ConsoleLine, Verdict};

@@ -1,0 +1,159 @@
+//! Which fields a board's lines have. A board repeats itself, and that is how its lines are told from noise: a line is
+//! taken when it has the fields of the lines before. Other fields are believed when two lines in a row have them; a part
+//! of the known ones looks like a line that was cut, and is believed only when it goes on like that.
+
+use super::fields::{Fields, Format, MAX_FIELDS};
+
+/// Fields of one line.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Candidate {
+    pub(super) format: Format,
+    pub(super) fields: Fields,
+    pub(super) arrived_s: f64,
+}
+
+/// Where each field of a line goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Into the counts, at this place.
+    Channel(usize),
+    /// The board's time, in microseconds or milliseconds.
+    Micros,
+    /// The same in milliseconds.
+    Millis,
+    /// The sequence number.
+    Sequence,
+    /// Line pressure (bar).
+    LineBar,
+    /// Nowhere: there are too many channels.
+    Ignored,
+}
+
+impl Role {
+    /// The role of a field that is no channel.
+    fn named(name: &str) -> Option<Self> {
+        let is = |other: &str| name.eq_ignore_ascii_case(other);
+        match () {
+            () if is("t_us") || is("micros") => Some(Self::Micros),
+            () if is("ms") || is("t_ms") || is("millis") => Some(Self::Millis),
+            () if is("seq") => Some(Self::Sequence),
+            () if is("p_bar") => Some(Self::LineBar),
+            () => None,
+        }
+    }
+
+    /// True where a field by this name is a channel.
+    pub(super) fn is_channel(name: &str) -> bool {
+        Self::named(name).is_none()
+    }
+}
+
+/// Lines that confirm another set of fields.
+const CONFIRM: u32 = 2;
+/// The same where it is a part of the known one.
+const CONFIRM_PART: u32 = 20;
+
+/// The fields that are believed, and those that might be next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shapes {
+    pub(super) format: Option<Format>,
+    names: Vec<String>,
+    roles: Vec<Role>,
+    /// The newest line with other fields, and how many such came in a row.
+    waiting: Option<(Candidate, u32)>,
+}
+
+/// What becomes of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Judged {
+    /// It has the known fields.
+    Known(Candidate),
+    /// Its fields are now known; the line before it had them too, and waited.
+    Changed(Box<[Candidate; 2]>),
+    /// It waits for a second one like it. How many lines are given up instead: those that waited before.
+    Waits { given_up: u64 },
+}
+
+impl Shapes {
+    /// What to make of a line.
+    pub(super) fn judge(&mut self, line: Candidate) -> Judged {
+        if self.format == Some(line.format) && has_names(&line, &self.names) {
+            // Whoever waits is given up by the caller, who has seen this line arrive.
+            return Judged::Known(line);
+        }
+        let part = self.format == Some(line.format) && self.is_part(&line);
+        let needed = if part { CONFIRM_PART } else { CONFIRM };
+        match self.waiting.take() {
+            Some((before, count)) if before.format == line.format && same_names(&before, &line) => {
+                if count + 1 >= needed {
+                    self.names = line.fields.iter().map(|(name, _)| name.clone()).collect();
+                    self.format = Some(line.format);
+                    self.roles.clear();
+                    return Judged::Changed(Box::new([before, line]));
+                }
+                self.waiting = Some((line, count + 1));
+                Judged::Waits { given_up: 1 }
+            }
+            before => {
+                self.waiting = Some((line, 1));
+                Judged::Waits { given_up: u64::from(before.is_some()) }
+            }
+        }
+    }
+
+    /// Gives up the line that waits; true where there was one.
+    pub(super) fn give_up(&mut self) -> bool {
+        self.waiting.take().is_some()
+    }
+
+    /// Known fields in their order, some missing: a line that was cut.
+    fn is_part(&self, line: &Candidate) -> bool {
+        if line.format == Format::Csv {
+            return line.fields.len() < self.names.len();
+        }
+        line.fields.iter().all(|(name, _)| self.names.contains(name))
+    }
+
+    /// Where the fields go; channels that are new are added to `channels`.
+    pub(super) fn roles(&mut self, channels: &mut Vec<String>) -> &[Role] {
+        if self.roles.is_empty() {
+            let mut role = |name: &String| {
+                Role::named(name).unwrap_or_else(|| match channels.iter().position(|c| c.eq_ignore_ascii_case(name)) {
+                    Some(place) => Role::Channel(place),
+                    None if channels.len() >= MAX_FIELDS => Role::Ignored,
+                    None => {
+                        channels.push(name.clone());
+                        Role::Channel(channels.len() - 1)
+                    }
+                })
+            };
+            self.roles = self.names.iter().map(&mut role).collect();
+        }
+        &self.roles
+    }
+
+    /// Names of the fields.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Calls the fields by other names, one for each; true where that changes something.
+    pub(super) fn rename(&mut self, names: &[String]) -> bool {
+        let changed = self.names != names;
+        if changed {
+            self.names = names.to_vec();
+            self.roles.clear();
+        }
+        changed
+    }
+}
+
+fn has_names(line: &Candidate, names: &[String]) -> bool {
+    // Columns have no names of their own.
+    line.fields.len() == names.len()
+        && (line.format == Format::Csv || line.fields.iter().zip(names).all(|((name, _), known)| name == known))
+}
+
+fn same_names(a: &Candidate, b: &Candidate) -> bool {
+    a.fields.len() == b.fields.len() && a.fields.iter().zip(&b.fields).all(|((a, _), (b, _))| a == b)
+}
