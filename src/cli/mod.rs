@@ -5,6 +5,7 @@ mod collect;
 mod demo;
 mod evaluate;
 mod grasp;
+mod interrupt;
 mod learning;
 mod recognise;
 mod scene;

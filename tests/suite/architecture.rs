@@ -48,6 +48,7 @@ const HOMES: &[(&str, &[&str])] = &[
         &["src/cli", "src/core/study", "src/core/recognition/evaluation.rs", "src/core/recognition/methods.rs"],
     ),
     ("csv", &["src/core/recording"]),
+    ("ctrlc", &["src/cli/interrupt.rs"]),
     ("directories", &["src/core/recording"]),
     ("eframe", &["src/app"]),
     ("egui", &["src/app"]),
