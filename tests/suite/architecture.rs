@@ -34,6 +34,7 @@ const TEST_FILES: &[&str] = &[
     "recognition/forest/peers.rs",
     "sensing/model/tests.rs",
     "wire/decoder_tests.rs",
+    "rig/serial/link_tests.rs",
 ];
 
 /// Where each third-party crate may be named.

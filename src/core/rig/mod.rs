@@ -2,6 +2,7 @@
 //! recognition are written once, against this trait.
 
 mod replay;
+pub mod serial;
 mod sim;
 
 pub use replay::ReplayRig;

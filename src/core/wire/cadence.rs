@@ -91,6 +91,10 @@ impl Meter {
         self.bin(arrived_s).good += 1;
     }
 
+    pub(super) fn readings(&self) -> u64 {
+        self.samples
+    }
+
     pub(super) fn bad_line(&mut self, arrived_s: f64) {
         self.bad_lines += 1;
         self.bin(arrived_s).bad += 1;

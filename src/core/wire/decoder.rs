@@ -109,6 +109,11 @@ impl Decoder {
         self.reader.meter.cadence(self.reader.clock.drift())
     }
 
+    /// How many readings there were so far; [`Decoder::cadence`] says more, for more work.
+    pub fn readings(&self) -> u64 {
+        self.reader.meter.readings()
+    }
+
     /// The newest lines as they came, oldest first.
     pub fn console(&self) -> impl Iterator<Item = &ConsoleLine> {
         self.reader.tail.lines()

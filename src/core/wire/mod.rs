@@ -9,6 +9,7 @@
 //! Not read: binary frames (COBS). Text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
 
 mod cadence;
+mod capture;
 mod clock;
 mod columns;
 mod counters;
@@ -25,6 +26,7 @@ mod tail;
 mod teleplot;
 
 pub use cadence::Cadence;
+pub use capture::{CaptureReader, Captured, MAGIC as CAPTURE_MAGIC};
 pub use clock::TimeSource;
 pub use decoder::{Decoder, Detected, Heard};
 pub use fields::Format;

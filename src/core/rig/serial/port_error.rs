@@ -1,0 +1,212 @@
+//! Why a port cannot be used, and what to do about it.
+
+use super::ports::PortInfo;
+use serde::Serialize;
+use std::io::ErrorKind as Io;
+use std::path::Path;
+
+/// Which kind of trouble it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PortTrouble {
+    /// There is no such port.
+    NotFound,
+    /// No port looks like a board.
+    NoBoard,
+    /// More than one does.
+    Several,
+    /// The user may not open it.
+    Permission,
+    /// Another program has it.
+    Busy,
+    /// It is no serial port.
+    NotSerial,
+    /// A file of captured bytes cannot be read.
+    Capture,
+    /// Something else.
+    System,
+}
+
+/// Trouble with a port: what, why, and what to try.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
+#[error("{what}: {cause}. {fix}")]
+pub struct PortError {
+    /// Which kind.
+    pub trouble: PortTrouble,
+    /// What could not be done, to what.
+    pub what: String,
+    /// Why.
+    pub cause: String,
+    /// What to try, in a sentence.
+    pub fix: String,
+    /// A command that does it, where there is one.
+    pub command: Option<String>,
+}
+
+/// A rule that keeps ModemManager away from the boards of Arduino.
+pub const MODEM_MANAGER_RULE: &str = "ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"";
+/// Puts that rule where udev finds it.
+const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
+     sudo tee /etc/udev/rules.d/77-palpate.rules && sudo udevadm control --reload";
+
+impl PortError {
+    fn opening(trouble: PortTrouble, path: &Path, cause: impl Into<String>, fix: impl Into<String>) -> Self {
+        let what = format!("cannot open port \"{}\"", path.display());
+        Self { trouble, what, cause: cause.into(), fix: fix.into(), command: None }
+    }
+
+    /// What a failed attempt to open a port means.
+    pub(super) fn of(path: &Path, error: &serialport::Error, ports: &[PortInfo]) -> Self {
+        match error.kind() {
+            serialport::ErrorKind::Io(Io::PermissionDenied) => Self::permission(path),
+            serialport::ErrorKind::Io(Io::NotFound) => Self::not_found(path, ports),
+            serialport::ErrorKind::NoDevice if path.exists() => Self::busy(path),
+            serialport::ErrorKind::NoDevice => Self::not_found(path, ports),
+            _ if path.is_dir() || is_no_terminal(&error.description) => {
+                let fix = format!("Choose another{}", listing(ports));
+                Self::opening(PortTrouble::NotSerial, path, "it is not a serial port", fix)
+            }
+            _ => {
+                let fix = "Unplug the board, plug it in again, then connect";
+                Self::opening(PortTrouble::System, path, error.description.clone(), fix)
+            }
+        }
+    }
+
+    pub(super) fn not_found(path: &Path, ports: &[PortInfo]) -> Self {
+        let fix = format!("Is the board plugged in? Choose another port{}", listing(ports));
+        Self::opening(PortTrouble::NotFound, path, "there is no such port", fix)
+    }
+
+    fn permission(path: &Path) -> Self {
+        let Some(group) = group_of(path) else {
+            let fix = "Ask whoever looks after this computer for access to serial ports";
+            return Self::opening(PortTrouble::Permission, path, "you are not allowed to", fix);
+        };
+        let command = format!("sudo usermod -aG {group} $USER");
+        let cause = format!("only members of the group {group} are allowed to");
+        let fix = format!("Run `{command}`, then log out and in again");
+        Self { command: Some(command), ..Self::opening(PortTrouble::Permission, path, cause, fix) }
+    }
+
+    fn busy(path: &Path) -> Self {
+        if runs("ModemManager") {
+            let fix = format!(
+                "ModemManager asks each new port whether it is a modem, for half a minute: wait and connect again, or keep \
+                 it away from boards with the udev rule {MODEM_MANAGER_RULE}"
+            );
+            let command = Some(MODEM_MANAGER_COMMAND.to_owned());
+            let cause = "it is in use, most likely by ModemManager";
+            return Self { command, ..Self::opening(PortTrouble::Busy, path, cause, fix) };
+        }
+        let fix = "Close the Serial Monitor of the Arduino IDE and other programs that listen to it, then connect";
+        Self::opening(PortTrouble::Busy, path, "it is open in another program", fix)
+    }
+
+    pub(super) fn several(ports: &[PortInfo]) -> Self {
+        Self {
+            trouble: PortTrouble::Several,
+            what: "cannot choose a port".to_owned(),
+            cause: "more than one looks like the gripper's board".to_owned(),
+            fix: format!("Name one{}", listing(ports)),
+            command: None,
+        }
+    }
+
+    pub(super) fn no_board(ports: &[PortInfo]) -> Self {
+        Self {
+            trouble: PortTrouble::NoBoard,
+            what: "cannot choose a port".to_owned(),
+            cause: "none looks like the gripper's board".to_owned(),
+            fix: format!("Plug it in, or name a port{}", listing(ports)),
+            command: None,
+        }
+    }
+
+    pub(super) fn capture(path: &Path, cause: impl Into<String>) -> Self {
+        Self {
+            trouble: PortTrouble::Capture,
+            what: format!("cannot replay \"{}\"", path.display()),
+            cause: cause.into(),
+            fix: "Choose a port, or a file of bytes that were captured from one".to_owned(),
+            command: None,
+        }
+    }
+}
+
+/// The ports that there are, for the end of a sentence.
+fn listing(ports: &[PortInfo]) -> String {
+    if ports.is_empty() {
+        return "; this computer has none at the moment".to_owned();
+    }
+    let ports: Vec<String> = ports.iter().map(|p| format!("{} {}", p.path.display(), p.title)).collect();
+    format!(": {}", ports.join(", "))
+}
+
+fn is_no_terminal(description: &str) -> bool {
+    let text = description.to_ascii_lowercase();
+    text.contains("typewriter") || text.contains("inappropriate ioctl")
+}
+
+/// The group that a device belongs to.
+#[cfg(unix)]
+fn group_of(path: &Path) -> Option<String> {
+    use std::os::unix::fs::MetadataExt;
+    let gid = std::fs::metadata(path).ok()?.gid().to_string();
+    let groups = std::fs::read_to_string("/etc/group").ok()?;
+    let line = groups.lines().find(|line| line.split(':').nth(2) == Some(gid.as_str()))?;
+    // Being of root's group would be more than anybody should ask for.
+    line.split(':').next().filter(|name| *name != "root").map(str::to_owned)
+}
+
+#[cfg(not(unix))]
+fn group_of(_path: &Path) -> Option<String> {
+    None
+}
+
+/// True where a program by this name runs, as far as the system tells (Linux).
+pub(super) fn runs(program: &str) -> bool {
+    let Ok(processes) = std::fs::read_dir("/proc") else { return false };
+    let comm = |entry: std::fs::DirEntry| std::fs::read_to_string(entry.path().join("comm")).unwrap_or_default();
+    // The system cuts names after fifteen letters.
+    let short: String = program.chars().take(15).collect();
+    processes.flatten().any(|entry| comm(entry).trim_end() == short)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    #[cfg(target_os = "linux")]
+    fn error(kind: serialport::ErrorKind, text: &str) -> PortError {
+        // A file that exists wherever tests run.
+        PortError::of(&PathBuf::from("/proc/self/comm"), &serialport::Error::new(kind, text), &[])
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn troubles_are_told_apart_with_cause_and_fix() {
+        let busy = error(serialport::ErrorKind::NoDevice, "Device or resource busy");
+        assert!(busy.trouble == PortTrouble::Busy && busy.to_string().contains("comm\": it is"));
+        let gone = PortError::of(
+            Path::new("/dev/ttyACM77"),
+            &serialport::Error::new(serialport::ErrorKind::Io(Io::NotFound), "No such file"),
+            &[],
+        );
+        assert!(gone.trouble == PortTrouble::NotFound && gone.fix.contains("plugged in"));
+        let denied = error(serialport::ErrorKind::Io(Io::PermissionDenied), "Permission denied");
+        assert!(denied.trouble == PortTrouble::Permission && denied.cause.contains("allowed"));
+        assert_eq!(error(serialport::ErrorKind::Unknown, "Not a typewriter").trouble, PortTrouble::NotSerial);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_group_that_owns_a_port_is_named() {
+        // /etc/passwd is root's; the terminal of last resort belongs to a group of its own on most systems.
+        let groups = ["/dev/tty", "/dev/ptmx", "/etc/passwd"].map(|path| group_of(Path::new(path)));
+        assert!(groups.iter().flatten().all(|group| !group.is_empty() && group != "root"), "{groups:?}");
+        let own = std::fs::read_to_string("/proc/self/comm").unwrap_or_default();
+        assert!(runs(own.trim_end()) && !runs("no such program"));
+    }
+}

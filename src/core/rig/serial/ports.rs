@@ -1,0 +1,171 @@
+//! Which ports there are, what is plugged into them, and which of them is meant. Names and numbers are what the system
+//! knows of the USB device; no library of the system's is needed for that.
+
+use super::port_error::PortError;
+use serde::Serialize;
+use serialport::{SerialPortType, available_ports};
+use std::path::{Path, PathBuf};
+
+/// A USB device, found again by these wherever it is plugged in.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct UsbIdentity {
+    /// Vendor.
+    pub vid: u16,
+    /// Product.
+    pub pid: u16,
+    /// Serial number, where it has one.
+    pub serial: Option<String>,
+}
+
+/// A port.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PortInfo {
+    /// How it is opened: `/dev/ttyACM0`, `COM3`.
+    pub path: PathBuf,
+    /// What is plugged into it, in words.
+    pub title: String,
+    /// The USB device, where it is one.
+    pub usb: Option<UsbIdentity>,
+    /// What is known of such a board.
+    #[serde(skip)]
+    pub kind: BoardKind,
+}
+
+/// What is known of a board by its USB numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BoardKind {
+    /// How much it looks like the gripper's board; 0 for what is never chosen by itself.
+    pub rank: u8,
+    /// The microcontroller speaks USB itself: its speed means nothing, and it is mute until DTR is set.
+    pub native: bool,
+}
+
+/// What devices are, by vendor and product; a product of zero stands for any other of the vendor. Sources: Arduino's
+/// `boards.txt`, usb.ids.
+const KNOWN: &[(u16, u16, &str, BoardKind)] = &[
+    (0x2341, 0x003d, "Arduino Due, programming port", BoardKind { rank: 3, native: false }),
+    (0x2a03, 0x003d, "Arduino Due, programming port", BoardKind { rank: 3, native: false }),
+    (0x2341, 0x003e, "Arduino Due, native port", BoardKind { rank: 3, native: true }),
+    (0x2a03, 0x003e, "Arduino Due, native port", BoardKind { rank: 3, native: true }),
+    (0x2341, 0x0043, "Arduino Uno", BoardKind { rank: 2, native: false }),
+    (0x2341, 0x0042, "Arduino Mega 2560", BoardKind { rank: 2, native: false }),
+    (0x2341, 0x8036, "Arduino Leonardo", BoardKind { rank: 2, native: true }),
+    (0x2341, 0x8037, "Arduino Micro", BoardKind { rank: 2, native: true }),
+    (0x2341, 0x804d, "Arduino Zero", BoardKind { rank: 2, native: true }),
+    (0x2341, 0x0058, "Arduino Nano Every", BoardKind { rank: 2, native: false }),
+    (0x2341, 0, "Arduino", BoardKind { rank: 2, native: false }),
+    (0x2a03, 0, "Arduino", BoardKind { rank: 2, native: false }),
+    (0x16c0, 0x0483, "Teensy", BoardKind { rank: 2, native: true }),
+    (0x2e8a, 0x000a, "Raspberry Pi Pico", BoardKind { rank: 2, native: true }),
+    (0x1a86, 0x7523, "CH340 converter (many boards)", BoardKind { rank: 1, native: false }),
+    (0x1a86, 0, "WCH converter (many boards)", BoardKind { rank: 1, native: false }),
+    (0x0403, 0, "FTDI converter (many boards)", BoardKind { rank: 1, native: false }),
+    (0x10c4, 0xea60, "CP210x converter (many boards)", BoardKind { rank: 1, native: false }),
+    (0x067b, 0x2303, "PL2303 converter (many boards)", BoardKind { rank: 1, native: false }),
+];
+
+impl PortInfo {
+    /// A port as the system describes it.
+    fn new(path: String, kind: &SerialPortType) -> Self {
+        let path = PathBuf::from(path);
+        let SerialPortType::UsbPort(usb) = kind else {
+            let title = match kind {
+                SerialPortType::BluetoothPort => "Bluetooth",
+                SerialPortType::PciPort => "built-in port",
+                SerialPortType::UsbPort(_) | SerialPortType::Unknown => "serial port",
+            };
+            return Self { path, title: title.to_owned(), usb: None, kind: BoardKind::default() };
+        };
+        let known = |wanted: u16| KNOWN.iter().find(|(vid, pid, ..)| *vid == usb.vid && *pid == wanted);
+        let known = known(usb.pid).or_else(|| known(0));
+        let kind = known.map_or(BoardKind { rank: 1, native: false }, |(.., kind)| *kind);
+        let named = known.map(|(_, _, name, _)| (*name).to_owned());
+        let name = named.or_else(|| usb.product.clone()).unwrap_or_else(|| "USB serial port".to_owned());
+        let title = format!("{name} (USB {:04x}:{:04x})", usb.vid, usb.pid);
+        let identity = UsbIdentity { vid: usb.vid, pid: usb.pid, serial: usb.serial_number.clone() };
+        Self { path, title, usb: Some(identity), kind }
+    }
+
+    /// A port that no list has: a pseudo-terminal, or a link to one.
+    pub(super) fn unlisted(path: &Path) -> Self {
+        let is_pty = std::fs::canonicalize(path).is_ok_and(|real| real.starts_with("/dev/pts"));
+        let title = if is_pty { "pseudo-terminal" } else { "serial port" };
+        Self { path: path.to_owned(), title: title.to_owned(), usb: None, kind: BoardKind::default() }
+    }
+}
+
+/// All ports, those that look most like the gripper's board first.
+pub fn list_ports() -> Vec<PortInfo> {
+    // The library takes this folder for granted; containers may lack it.
+    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
+        return Vec::new();
+    }
+    let found = available_ports().unwrap_or_default();
+    let mut ports: Vec<PortInfo> =
+        found.into_iter().map(|port| PortInfo::new(port.port_name, &port.port_type)).collect();
+    // Every port of a Mac comes twice; tty.* waits for a carrier that boards do not give.
+    ports.retain(|port| !port.path.to_string_lossy().starts_with("/dev/tty."));
+    ports.sort_by(|a, b| b.kind.rank.cmp(&a.kind.rank).then_with(|| a.path.cmp(&b.path)));
+    ports
+}
+
+/// The port that is meant where nobody says which: the only one of those that look most like the gripper's board.
+pub(super) fn choose(ports: &[PortInfo]) -> Result<PortInfo, PortError> {
+    let best = ports.iter().map(|port| port.kind.rank).max().unwrap_or(0);
+    let mut likely = ports.iter().filter(|port| best > 0 && port.kind.rank == best);
+    match (likely.next(), likely.next()) {
+        (Some(port), None) => Ok(port.clone()),
+        (Some(_), Some(_)) => Err(PortError::several(ports)),
+        (None, _) => Err(PortError::no_board(ports)),
+    }
+}
+
+/// What is known of the port at a path.
+pub(super) fn describe(path: &Path) -> PortInfo {
+    let real = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let listed = list_ports().into_iter().find(|port| port.path == real || port.path == path);
+    listed.map_or_else(|| PortInfo::unlisted(path), |port| PortInfo { path: path.to_owned(), ..port })
+}
+
+/// Where a device is plugged in now.
+pub(super) fn find(identity: &UsbIdentity) -> Option<PortInfo> {
+    list_ports().into_iter().find(|port| port.usb.as_ref() == Some(identity))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serialport::UsbPortInfo;
+
+    fn usb(path: &str, vid: u16, pid: u16, product: Option<&str>) -> PortInfo {
+        let info = UsbPortInfo {
+            vid,
+            pid,
+            serial_number: Some("A1".to_owned()),
+            manufacturer: None,
+            product: product.map(str::to_owned),
+        };
+        PortInfo::new(path.to_owned(), &SerialPortType::UsbPort(info))
+    }
+
+    #[test]
+    fn boards_are_called_by_their_names() {
+        let due = usb("/dev/ttyACM0", 0x2341, 0x003d, Some("Arduino Due Prog. Port"));
+        assert_eq!(due.title, "Arduino Due, programming port (USB 2341:003d)");
+        assert!(usb("/dev/ttyACM1", 0x2a03, 0x003e, None).kind.native);
+        assert_eq!(usb("/dev/ttyACM1", 0x2341, 0x9999, None).title, "Arduino (USB 2341:9999)");
+        assert_eq!(usb("/dev/ttyUSB0", 0x1234, 0x5678, Some("Odd thing")).title, "Odd thing (USB 1234:5678)");
+    }
+
+    #[test]
+    fn one_likely_board_is_chosen_and_several_are_listed() {
+        let built_in = PortInfo::new("/dev/ttyS0".to_owned(), &SerialPortType::PciPort);
+        let due = usb("/dev/ttyACM0", 0x2341, 0x003d, None);
+        let other = usb("/dev/ttyUSB0", 0x1a86, 0x7523, None);
+        assert_eq!(choose(&[built_in.clone(), other, due.clone()]), Ok(due.clone()));
+        let both = choose(&[due, usb("/dev/ttyACM1", 0x2341, 0x003e, None)]).map_err(|e| e.to_string());
+        assert!(both.is_err_and(|text| text.contains("native port") && text.contains("/dev/ttyACM0")));
+        assert!(choose(&[built_in]).is_err_and(|e| e.to_string().contains("/dev/ttyS0")));
+        assert!(choose(&[]).is_err());
+    }
+}

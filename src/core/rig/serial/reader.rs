@@ -1,0 +1,221 @@
+//! The thread that reads a port. It stamps and queues what comes and does nothing else, but for two things that only it
+//! can do: to look for the board when it is gone, and to try other speeds when nothing can be understood.
+
+use super::baud::Baud;
+use super::link::{LinkOptions, LinkState, Shared};
+use super::port_error::PortError;
+use super::ports::{PortInfo, describe, find, list_ports};
+use super::queue::lock;
+use super::scan::{Scan, scan};
+use crate::wire::Captured;
+use serialport::SerialPort;
+use std::io::ErrorKind;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// How long a read waits: stopping takes no longer.
+const READ_PATIENCE: Duration = Duration::from_millis(50);
+/// A board boots within this time of being connected to.
+const BOOT: Duration = Duration::from_secs(4);
+/// A native port that is mute for this long is woken by DTR, once.
+const MUTE: Duration = Duration::from_secs(3);
+/// This many bytes without a reading are not a start that went wrong.
+const ENOUGH_BYTES: u64 = 300;
+/// How long to listen before speeds are doubted, and between two scans.
+const DOUBT: Duration = Duration::from_millis(1500);
+const RESCAN: Duration = Duration::from_secs(10);
+/// Waits between attempts to find a board that is gone; the last goes on.
+const ATTEMPTS: [Duration; 3] = [Duration::from_millis(200), Duration::from_millis(500), Duration::from_secs(1)];
+/// After this many attempts it is looked for less often, at [`SELDOM`].
+const MANY: u32 = 300;
+const SELDOM: Duration = Duration::from_secs(3);
+
+/// Opens a port as boards need it: DTR set, at no speed that does harm.
+pub(super) fn open_port(path: &Path, baud: Baud) -> Result<Box<dyn SerialPort>, PortError> {
+    let builder = serialport::new(path.to_string_lossy(), baud.rate()).timeout(READ_PATIENCE).dtr_on_open(true);
+    builder.open().map_err(|error| PortError::of(path, &error, &list_ports()))
+}
+
+/// Reads one port, through losses.
+#[derive(Debug)]
+pub(super) struct PortReader {
+    shared: Arc<Shared>,
+    port: PortInfo,
+    baud: Baud,
+    /// The user has said the speed.
+    baud_is_given: bool,
+    reconnect: bool,
+}
+
+/// What is known of a connection.
+struct Connection {
+    opened: Instant,
+    bytes: u64,
+    readings_before: u64,
+    newest: Instant,
+    woken: bool,
+    scanned: Option<Instant>,
+}
+
+impl PortReader {
+    pub(super) fn new(shared: Arc<Shared>, port: PortInfo, baud: Baud, options: &LinkOptions) -> Self {
+        Self { shared, port, baud, baud_is_given: options.baud.is_some(), reconnect: options.reconnect }
+    }
+
+    pub(super) fn run(mut self, first: Box<dyn SerialPort>) {
+        let mut port = first;
+        loop {
+            let cause = self.listen(port);
+            *lock(&self.shared.writer) = None;
+            let Some(cause) = cause.filter(|_| !self.shared.is_stopped()) else {
+                return self.shared.set_state(LinkState::Ended { cause: None });
+            };
+            let at_s = self.shared.began.elapsed().as_secs_f64();
+            self.shared.bytes.push(Captured::Interrupted { at_s, cause: cause.clone() });
+            if !self.reconnect {
+                return self.shared.set_state(LinkState::Ended { cause: Some(cause) });
+            }
+            match self.find_again(&cause) {
+                Some(found) => port = found,
+                None => return self.shared.set_state(LinkState::Ended { cause: None }),
+            }
+            self.shared.reconnects.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Reads until the port is gone, and says why; none when it was told to stop.
+    fn listen(&mut self, mut port: Box<dyn SerialPort>) -> Option<String> {
+        self.shared.set_state(LinkState::Waiting);
+        self.shared.baud.store(self.baud.rate(), Ordering::Relaxed);
+        *lock(&self.shared.writer) = port.try_clone().ok();
+        let now = Instant::now();
+        let readings_before = self.shared.readings.load(Ordering::Relaxed);
+        let mut connection =
+            Connection { opened: now, bytes: 0, readings_before, newest: now, woken: false, scanned: None };
+        let mut buffer = [0; 4096];
+        while !self.shared.is_stopped() {
+            match port.read(&mut buffer) {
+                Ok(0) => return Some("the board was unplugged".to_owned()),
+                Ok(count) => {
+                    let arrived_s = self.shared.began.elapsed().as_secs_f64();
+                    self.shared.bytes.push(Captured::Bytes { arrived_s, bytes: buffer[..count].to_vec() });
+                    connection.bytes += count as u64;
+                    connection.newest = Instant::now();
+                }
+                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+                Err(error) if error.kind() == ErrorKind::BrokenPipe => {
+                    return Some("the board was unplugged".to_owned());
+                }
+                Err(error) => return Some(format!("the port cannot be read any more ({error})")),
+            }
+            self.judge(&mut connection, port.as_mut());
+        }
+        None
+    }
+
+    /// Where the connection stands, and whether something should be done about it.
+    fn judge(&mut self, connection: &mut Connection, port: &mut dyn SerialPort) {
+        let readings = self.shared.readings.load(Ordering::Relaxed);
+        let mute = connection.newest.elapsed();
+        let native = self.port.kind.native;
+        if mute >= MUTE {
+            if native && !connection.woken {
+                connection.woken = true;
+                wake(port, &self.shared);
+            }
+            if mute >= BOOT {
+                self.shared.set_state(LinkState::Silent { hint: self.silence() });
+            }
+        } else if readings > connection.readings_before {
+            self.shared.set_state(LinkState::Listening);
+        } else if connection.bytes >= ENOUGH_BYTES && connection.opened.elapsed() >= DOUBT {
+            let due = connection.scanned.is_none_or(|scanned| scanned.elapsed() >= RESCAN);
+            if native || self.baud_is_given {
+                self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() });
+            } else if due {
+                self.try_speeds(port);
+                connection.scanned = Some(Instant::now());
+            }
+        }
+    }
+
+    fn try_speeds(&mut self, port: &mut dyn SerialPort) {
+        match scan(port, self.baud, &self.shared) {
+            Scan::Found(baud) if baud == self.baud => {}
+            Scan::Found(baud) => {
+                self.baud = baud;
+                self.shared.baud.store(baud.rate(), Ordering::Relaxed);
+                let at_s = self.shared.began.elapsed().as_secs_f64();
+                let cause = format!("the speed was found to be {} baud", baud.rate());
+                self.shared.bytes.push(Captured::Interrupted { at_s, cause });
+            }
+            Scan::Nothing => self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() }),
+        }
+    }
+
+    fn silence(&self) -> String {
+        let port = self.port.path.display();
+        if self.port.kind.native {
+            format!(
+                "Nothing comes from {port}: does the sketch print to SerialUSB? One that prints to Serial is heard on the \
+                 programming port"
+            )
+        } else {
+            format!(
+                "Nothing comes from {port}: is the sketch on the board? Press its reset button, or try its other port"
+            )
+        }
+    }
+
+    fn nonsense(&self) -> String {
+        let port = self.port.path.display();
+        let speeds = if self.port.kind.native {
+            String::new()
+        } else if self.baud_is_given {
+            format!(" at {} baud; leave the speed out to have the usual ones tried", self.baud.rate())
+        } else {
+            let tried = Baud::SCANNED.map(|baud| baud.rate().to_string());
+            format!("; tried at {} baud", tried.join(", "))
+        };
+        format!("{port} sends what are no readings{speeds}. The console shows what comes")
+    }
+
+    /// Looks for the board until it is back; none when told to stop.
+    fn find_again(&mut self, cause: &str) -> Option<Box<dyn SerialPort>> {
+        let mut cause = cause.to_owned();
+        for attempt in 0u32.. {
+            self.shared.set_state(LinkState::Lost { cause: cause.clone() });
+            let usual = ATTEMPTS.get(attempt as usize).or(ATTEMPTS.last()).copied().unwrap_or(SELDOM);
+            self.shared.sleep(if attempt < MANY { usual } else { SELDOM });
+            if self.shared.is_stopped() {
+                return None;
+            }
+            // It may come back under another number.
+            let found = self.port.usb.as_ref().map_or_else(|| Some(describe(&self.port.path)), find);
+            let Some(found) = found else { continue };
+            match open_port(&found.path, self.baud) {
+                Ok(port) => {
+                    *lock(&self.shared.port) = found.clone();
+                    self.port = found;
+                    return Some(port);
+                }
+                // That it is still gone is no news.
+                Err(error) if !found.path.exists() => tracing::debug!("{error}"),
+                Err(error) => cause = error.to_string(),
+            }
+        }
+        None
+    }
+}
+
+/// Lowers DTR and raises it again: a native port sends only to whom it takes for connected.
+fn wake(port: &mut dyn SerialPort, shared: &Shared) {
+    for level in [false, true] {
+        if let Err(error) = port.write_data_terminal_ready(level) {
+            tracing::debug!("DTR cannot be set: {error}");
+        }
+        shared.sleep(Duration::from_millis(50));
+    }
+}
