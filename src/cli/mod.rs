@@ -8,6 +8,7 @@ mod grasp;
 mod interrupt;
 mod learning;
 mod recognise;
+mod record;
 mod scene;
 mod setup;
 mod snapshot;
@@ -58,6 +59,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// Say what stored trials are grasps of.
     Recognise(recognise::RecogniseArguments),
+    /// Record what the real gripper's board sends, as a trial in the store.
+    Record(record::RecordArguments),
     /// Draw a scene or a stored trial into a PNG file, without a window.
     Snapshot(snapshot::SnapshotArguments),
     /// Which effects a scene calls for, why, what each costs and changes.
@@ -133,6 +136,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Train(train)) => train::run(train, store)?,
         Some(Command::Evaluate(evaluate)) => evaluate::run(evaluate, store)?,
         Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,
+        Some(Command::Record(record)) => record::run(record, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,

@@ -3,9 +3,11 @@
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{file_name_of, say, say_json, table, warn};
+use palpate_core::board::Gap;
 use palpate_core::grasping::GraspSummary;
 use palpate_core::recording::{
-    Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_contacts_csv, write_signals_csv, write_trial_csv,
+    BoardInfo, BoardTrial, Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_board_csv,
+    write_contacts_csv, write_signals_csv, write_trial_csv,
 };
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};
@@ -229,7 +231,63 @@ fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Resu
     say(format!("channels {}", shown.channels.join(", ")))
 }
 
+/// What `trials show --json` prints of a trial of a real gripper.
+#[derive(Serialize)]
+struct ShownBoard {
+    id: TrialId,
+    rig: String,
+    object: String,
+    version: String,
+    samples: usize,
+    duration_s: f64,
+    #[serde(flatten)]
+    about: BoardInfo,
+    gaps: Vec<Gap>,
+    warnings: Vec<String>,
+}
+
+fn show_board(store: &Store, id: TrialId, trial: BoardTrial, json: bool) -> Result<(), Failure> {
+    let info = store.load(id)?.info;
+    let shown = ShownBoard {
+        id,
+        rig: info.rig,
+        object: info.object,
+        version: info.version,
+        samples: trial.readings.len(),
+        duration_s: trial.readings.last().map_or(0.0, |last| last.t_s - trial.about.began_s),
+        about: trial.about,
+        gaps: trial.gaps,
+        warnings: info.warnings,
+    };
+    if json {
+        return say_json(&shown);
+    }
+    for warning in &shown.warnings {
+        warn(warning);
+    }
+    say(format!("trial {id}: {} (real gripper on {})", shown.object, shown.about.port))?;
+    say(format!("{} samples over {:.2} s, recorded by Palpate {}", shown.samples, shown.duration_s, shown.version))?;
+    say(format!("channels {}", shown.about.board.channels.join(", ")))?;
+    if let Some(detected) = &shown.about.detected {
+        say(format!("format {}: {}", detected.format.label(), detected.why))?;
+    }
+    let cadence = &shown.about.cadence;
+    say(format!(
+        "{:.2} Hz, jitter {:.2} ms, {} lost, {} bad lines, {} reconnects",
+        cadence.rate_hz, cadence.jitter_p95_ms, cadence.lost, cadence.bad_lines, shown.about.reconnects
+    ))?;
+    for gap in &shown.gaps {
+        let since = |t: f64| t - shown.about.began_s;
+        let lost = gap.lost.map_or_else(|| "an unknown number of".to_owned(), |lost| lost.to_string());
+        say(format!("gap {:.2} s to {:.2} s, {lost} readings: {}", since(gap.from_s), since(gap.to_s), gap.cause))?;
+    }
+    Ok(())
+}
+
 fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
+    if let Some(trial) = store.board_trial(id)? {
+        return show_board(store, id, trial, json);
+    }
     if let Some(signals) = store.readings(id)? {
         return show_import(store, id, signals, json);
     }
@@ -316,6 +374,12 @@ fn export(
         } else {
             out.join(format!("trial_{id}_{}.csv", file_name_of(&trial.info.object)))
         };
+        if let Some(board) = store.board_trial(*id)? {
+            write_board_csv(&path, &board)?;
+            std::fs::write(path.with_extension("bytes"), store.board_bytes(*id)?.unwrap_or_default())?;
+            say(path.display())?;
+            continue;
+        }
         if let Some(signals) = store.readings(*id)? {
             write_signals_csv(&path, &signals)?;
             say(path.display())?;

@@ -34,6 +34,7 @@ const TEST_FILES: &[&str] = &[
     "recognition/forest/peers.rs",
     "sensing/model/tests.rs",
     "wire/decoder_tests.rs",
+    "recording/board_tests.rs",
     "rig/serial/link_tests.rs",
 ];
 
@@ -58,6 +59,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("egui_tiles", &["src/app"]),
     ("egui_wgpu", &["src/app"]),
     ("epaint_default_fonts", &["src/render/text.rs"]),
+    ("fs4", &["src/core/recording"]),
     ("glam", &["src"]),
     ("image", &["src/render"]),
     ("include_dir", &["src/core/objects", "src/render/shaders.rs"]),

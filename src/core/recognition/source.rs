@@ -3,7 +3,7 @@
 use super::data::{Class, DataCard, Dataset, Example, Labels, Sequence};
 use crate::gripper::Phase;
 use crate::objects::{EMPTY, catalogue};
-use crate::recording::{Store, StoreError, TrialId, TrialRow};
+use crate::recording::{BOARD_RIG, Store, StoreError, TrialId, TrialRow};
 use crate::scene::{Between, PRESETS, PoseSpread, Scene};
 use crate::sensing::model::SensorModel;
 use crate::sensing::{LayoutError, PressureArea, SensorLayout, Sensors, Signals};
@@ -141,7 +141,9 @@ impl Source {
     fn fits(&self, row: &TrialRow) -> bool {
         let in_collection =
             |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
+        // Counts of a board mean nothing without a calibration.
         row.state == "complete"
+            && row.rig != BOARD_RIG
             && self.collection.as_ref().is_none_or(in_collection)
             && (self.objects.is_empty() || self.objects.contains(&row.object))
             && !(self.without_empty && row.object == EMPTY)

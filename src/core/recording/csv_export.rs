@@ -92,7 +92,7 @@ pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(
 }
 
 /// Writes to a temporary neighbour first, so that a kill leaves either the old file or the whole new one.
-fn write_file(
+pub(super) fn write_file(
     path: &Path,
     fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<std::fs::File>>) -> csv::Result<()>,
 ) -> Result<(), CsvError> {
@@ -116,7 +116,7 @@ fn write_file(
 }
 
 /// Shortest text that reads back as the same number.
-fn number(x: f64) -> String {
+pub(super) fn number(x: f64) -> String {
     x.to_string()
 }
 

@@ -1,5 +1,6 @@
 //! Joining stores: the parts of a data set that several machines have collected.
 
+use super::board_trials::COPY_BOARD_TRIALS;
 use super::store::Store;
 use super::store_error::{StoreError, fault};
 use serde::Serialize;
@@ -40,7 +41,6 @@ const COPY_CHUNKS: &str = "
     JOIN other.trials AS theirs ON theirs.id = incoming.id
     JOIN main.trials AS ours ON ours.uid = theirs.uid
     JOIN other.readings AS readings ON readings.trial = theirs.id;
-    DROP TABLE temp.incoming;
 ";
 
 impl Store {
@@ -62,6 +62,8 @@ impl Store {
             transaction.execute_batch(CHOOSE_INCOMING).map_err(fault)?;
             let added = transaction.execute(COPY_TRIALS, []).map_err(fault)? as u64;
             transaction.execute_batch(COPY_CHUNKS).map_err(fault)?;
+            transaction.execute_batch(COPY_BOARD_TRIALS).map_err(fault)?;
+            transaction.execute_batch("DROP TABLE temp.incoming").map_err(fault)?;
             transaction.commit().map_err(fault)?;
             Ok(Merged { added, known: total.cast_unsigned().saturating_sub(added) })
         });

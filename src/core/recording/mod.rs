@@ -1,14 +1,24 @@
 //! Trials on disk: an SQLite store that survives kills and shares itself between programs, and CSV for everyone else.
 
 mod blob;
+mod board_blob;
+mod board_export;
+mod board_recorder;
+#[cfg(test)]
+mod board_tests;
+mod board_trials;
 mod csv_export;
 mod csv_import;
+mod disk;
 mod merge;
 mod readings;
 mod store;
 mod store_error;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
+pub use board_export::write_board_csv;
+pub use board_recorder::{BoardRecorder, BoardTrialPlan, Recorded};
+pub use board_trials::{BOARD_RIG, BoardChunk, BoardInfo, BoardTrial, PhaseMark};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use merge::Merged;

@@ -5,11 +5,13 @@
 //! trials   one row each: what is known of a trial; `state` is 'recording' until its last chunk is in
 //! chunks   its frames, about a second each, as described in `blob`
 //! readings channels of an imported trial, which has no frames
+//! board_*  what the board of a real gripper sent; see `board_trials`
 //! ```
 //!
 //! Deleting marks; purging removes. Chunks are only ever added.
 
 use super::blob::{decode_frames, encode_frames};
+use super::board_trials::BOARD_TABLES;
 use super::store_error::{StoreError, fault, plain};
 use crate::geometry::Pose;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
@@ -32,7 +34,7 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 4] = [
+const MIGRATIONS: [&str; 5] = [
     TABLES,
     "ALTER TABLE trials ADD COLUMN collection TEXT;
      CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
@@ -44,6 +46,7 @@ const MIGRATIONS: [&str; 4] = [
         samples BLOB NOT NULL
      );",
     "ALTER TABLE trials ADD COLUMN plan TEXT NOT NULL DEFAULT '[]';",
+    BOARD_TABLES,
 ];
 
 const TABLES: &str = "
@@ -418,7 +421,7 @@ fn is_collected(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Re
     transaction.query_row(sql, params![info.collection, info.object, info.seed.cast_signed()], |row| row.get(0))
 }
 
-fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<TrialId> {
+pub(super) fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<TrialId> {
     transaction.execute(
         "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection, \
          plan) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
@@ -439,7 +442,7 @@ fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Res
 }
 
 /// JSON of the few types that are stored as text.
-fn json<T: Serialize + ?Sized>(value: &T) -> String {
+pub(super) fn json<T: Serialize + ?Sized>(value: &T) -> String {
     serde_json::to_string(value).expect("plain structs with text keys always have a JSON form")
 }
 
@@ -453,7 +456,7 @@ fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) ->
     Ok(())
 }
 
-fn set_complete(
+pub(super) fn set_complete(
     transaction: &Transaction<'_>,
     id: TrialId,
     quality: &Quality,

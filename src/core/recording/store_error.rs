@@ -48,6 +48,20 @@ pub enum StoreError {
     /// No space is left.
     #[error("the disk is full: the trial was not stored. Free some space and record again; earlier trials are safe")]
     DiskFull,
+    /// Too little space is left to begin.
+    #[error(
+        "the disk with the store \"{path}\" has {free_mb} MB free; the trial may need {needed_mb} MB and was not begun. Free \
+         some space, or choose another disk with --store",
+        path = path.display()
+    )]
+    NoRoom {
+        /// The store.
+        path: PathBuf,
+        /// What is free (MB).
+        free_mb: u64,
+        /// What may be needed (MB).
+        needed_mb: u64,
+    },
     /// The file cannot be written.
     #[error("the store \"{path}\" cannot be written: it or its folder is read-only", path = path.display())]
     ReadOnly {

@@ -10,7 +10,7 @@ const OPENING: u8 = b'#';
 
 /// A line as it came, without its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Line<'a> {
+pub(super) enum Line<'a> {
     /// Its bytes.
     Whole(&'a [u8]),
     /// Longer than [`MAX_LINE`].
@@ -19,7 +19,7 @@ pub enum Line<'a> {
 
 /// Splits a stream into lines, chunk by chunk.
 #[derive(Clone, Debug)]
-pub struct LineSplitter {
+pub(super) struct LineSplitter {
     begun: Vec<u8>,
     state: State,
 }
@@ -42,7 +42,7 @@ impl Default for LineSplitter {
 
 impl LineSplitter {
     /// Takes in the next bytes and hands over the lines that they end. Empty lines are left out.
-    pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(Line<'_>)) {
+    pub(super) fn push(&mut self, bytes: &[u8], mut take: impl FnMut(Line<'_>)) {
         for &byte in bytes {
             if byte == b'\n' || byte == b'\r' {
                 self.end_line(&mut take);
@@ -66,7 +66,7 @@ impl LineSplitter {
     }
 
     /// The stream was interrupted: what was begun is forgotten, and the next line may lack its beginning.
-    pub fn interrupt(&mut self) {
+    pub(super) fn interrupt(&mut self) {
         *self = Self::default();
     }
 }

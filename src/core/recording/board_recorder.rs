@@ -1,0 +1,190 @@
+//! Records what a link hears as a trial. Whoever holds the link hands over its events and calls [`BoardRecorder::flush`]
+//! when it is due, so that a kill loses at most a second.
+
+use super::board_trials::{BOARD_RIG, BoardChunk, BoardInfo, PhaseMark};
+use super::disk::check_space;
+use super::store::{Store, TrialId};
+use super::store_error::StoreError;
+use crate::board::Board;
+use crate::geometry::Pose;
+use crate::rig::serial::{LinkEvent, LinkStatus};
+use crate::trial::{Plan, Quality, TrialInfo};
+use crate::wire::{Cadence, Captured, Heard};
+use std::time::{Duration, Instant};
+
+/// What waits to be written is never older than this.
+const FLUSH_AFTER: Duration = Duration::from_millis(800);
+/// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
+const BYTES_PER_S: f64 = 400e3;
+/// A trial of unknown length is given this long (s).
+const UNKNOWN_LENGTH_S: f64 = 600.0;
+
+/// A trial of a real gripper that is being recorded.
+#[derive(Debug)]
+pub struct BoardRecorder {
+    id: TrialId,
+    about: BoardInfo,
+    chunk: BoardChunk,
+    flushed: Instant,
+    samples: u64,
+    lost: u64,
+    gaps: u64,
+    interrupted: Vec<String>,
+    /// Counts of the link when the trial began.
+    before: (Cadence, u32),
+}
+
+/// What a trial came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorded {
+    /// Its number.
+    pub id: TrialId,
+    /// What is known of it.
+    pub about: BoardInfo,
+    /// What should be known of it, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// What is known of a trial of a real gripper before it begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoardTrialPlan {
+    /// Name of the object.
+    pub object: String,
+    /// The scene as TOML: the gripper as it is modelled, and its programme.
+    pub scene: String,
+    /// How long it will take (s), where that is known.
+    pub seconds: Option<f64>,
+}
+
+impl BoardRecorder {
+    /// Begins a trial. What the link has heard before is not part of it.
+    pub fn begin(
+        store: &mut Store,
+        plan: &BoardTrialPlan,
+        status: &LinkStatus,
+        began_s: f64,
+    ) -> Result<Self, StoreError> {
+        check_space(store.path(), plan.seconds.unwrap_or(UNKNOWN_LENGTH_S) * BYTES_PER_S)?;
+        let info = TrialInfo {
+            rig: BOARD_RIG.to_owned(),
+            object: plan.object.clone(),
+            seed: 0,
+            collection: None,
+            scene: plan.scene.clone(),
+            world_from_gripper: Pose::IDENTITY,
+            plan: Plan::default(),
+            quality: Quality::default(),
+            warnings: Vec::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        };
+        let about = BoardInfo {
+            port: format!("{}, {}", status.port.path.display(), status.port.title),
+            board: status.board.clone(),
+            detected: status.detected.clone(),
+            began_s,
+            ..BoardInfo::default()
+        };
+        Ok(Self {
+            id: store.begin_board(&info, &about)?,
+            about,
+            chunk: BoardChunk::default(),
+            flushed: Instant::now(),
+            samples: 0,
+            lost: 0,
+            gaps: 0,
+            interrupted: Vec::new(),
+            before: (status.cadence.clone(), status.reconnects),
+        })
+    }
+
+    /// Its number.
+    pub fn id(&self) -> TrialId {
+        self.id
+    }
+
+    /// Readings so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Takes in the next event of the link.
+    pub fn take(&mut self, event: LinkEvent) {
+        match event {
+            LinkEvent::Captured(piece) => {
+                if let Captured::Interrupted { cause, .. } = &piece {
+                    self.interrupted.push(cause.clone());
+                }
+                self.chunk.bytes.push(piece);
+            }
+            LinkEvent::Heard(Heard::Reading(reading)) => {
+                self.samples += 1;
+                self.chunk.readings.push(reading);
+            }
+            LinkEvent::Heard(Heard::Gap(gap)) => {
+                self.lost += gap.lost.unwrap_or(0);
+                self.gaps += 1;
+                self.chunk.gaps.push(gap);
+            }
+            LinkEvent::Heard(Heard::Board(board)) => self.about.board = board,
+            LinkEvent::Heard(Heard::Said(_)) => {}
+        }
+    }
+
+    /// The control box does something else from now on.
+    pub fn mark(&mut self, mark: PhaseMark) {
+        self.about.phases.push(mark);
+    }
+
+    /// True when what waits should be written.
+    pub fn is_due(&self) -> bool {
+        self.flushed.elapsed() >= FLUSH_AFTER
+    }
+
+    /// Writes what waits.
+    pub fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
+        store.append_board(self.id, &self.about, &self.chunk)?;
+        self.chunk = BoardChunk::default();
+        self.flushed = Instant::now();
+        Ok(())
+    }
+
+    /// Ends the trial.
+    pub fn finish(mut self, store: &mut Store, status: &LinkStatus) -> Result<Recorded, StoreError> {
+        self.flush(store)?;
+        let (before, reconnects) = &self.before;
+        self.about.reconnects = status.reconnects - reconnects;
+        self.about.detected.clone_from(&status.detected);
+        self.about.cadence = Cadence {
+            samples: self.samples,
+            lost: self.lost,
+            gaps: self.gaps,
+            bad_lines: status.cadence.bad_lines.saturating_sub(before.bad_lines),
+            ..status.cadence.clone()
+        };
+        let warnings = self.warnings(status);
+        store.finish_board(self.id, &self.about, &warnings)?;
+        Ok(Recorded { id: self.id, about: self.about, warnings })
+    }
+
+    fn warnings(&self, status: &LinkStatus) -> Vec<String> {
+        let cadence = &self.about.cadence;
+        let mut warnings: Vec<String> = self.interrupted.iter().map(|cause| format!("interrupted: {cause}")).collect();
+        if cadence.samples == 0 {
+            warnings.push(format!("nothing was recorded: {}", status.state.sentence()));
+        }
+        if cadence.lost > 0 {
+            let (lost, gaps) = (cadence.lost, cadence.gaps);
+            warnings.push(format!("{lost} reading(s) are missing, in {gaps} gap(s)"));
+        }
+        if status.looks_10_bit {
+            let text = "the counts look like those of ten bits: call analogReadResolution(12) in the sketch";
+            warnings.push(text.to_owned());
+        }
+        let assumed = Board::default().channels.iter().any(|name| !self.about.board.channels.contains(name));
+        if assumed && cadence.samples > 0 {
+            let names = self.about.board.channels.join(", ");
+            warnings.push(format!("the board has not all of flexL, flexR, fsrL, fsrR, but {names}"));
+        }
+        warnings
+    }
+}
