@@ -5,15 +5,15 @@ use super::interrupt::stop_flag;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
 use indicatif::{ProgressBar, ProgressStyle};
+use palpate_core::grasping::record_board;
 use palpate_core::objects::EMPTY;
-use palpate_core::recording::{BoardRecorder, BoardTrialPlan, Recorded, Store};
-use palpate_core::rig::serial::{Baud, LinkEvent, LinkOptions, LinkState, LinkStatus, SerialLink, list_ports};
+use palpate_core::recording::{BoardRecorder, BoardTrialPlan, Recorded};
+use palpate_core::rig::serial::{
+    Baud, Control, LinkOptions, LinkState, LinkStatus, SerialLink, SerialPlan, SerialRig, list_ports,
+};
 use palpate_core::scene::Scene;
-use palpate_core::wire::Heard;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 /// Arguments of `palpate record`.
 #[derive(Debug, clap::Args)]
@@ -21,12 +21,18 @@ pub(super) struct RecordArguments {
     /// The port, a link to one, or a file of captured bytes; without it the only port that looks like the board.
     #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
-    /// How long to record (s); without it until Ctrl+C.
+    /// How long to record (s); without it until Ctrl+C, or for as long as the programme takes.
     #[arg(long, value_name = "N", value_parser = parse_seconds)]
     seconds: Option<f64>,
     /// What is in the hand.
     #[arg(long, value_name = "NAME", default_value = EMPTY)]
     object: String,
+    /// Let the board drive the control box through the programme of the scene: P, K and V lines, as our firmware takes them.
+    #[arg(long, conflicts_with = "by_hand")]
+    drive: bool,
+    /// You drive the control box by hand, in the phases of the programme, beginning with the first reading.
+    #[arg(long)]
+    by_hand: bool,
     /// The speed of the port; without it the usual ones are tried.
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     baud: Option<Baud>,
@@ -55,11 +61,6 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 fn parse_baud(text: &str) -> Result<Baud, String> {
     Baud::try_from(text.parse::<u32>().map_err(|e| e.to_string())?)
 }
-
-/// How long the board may take to send its first readings before the trial begins.
-const FIRST_READING: Duration = Duration::from_secs(20);
-/// How often the link is asked.
-const PATIENCE: Duration = Duration::from_millis(50);
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -99,80 +100,25 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         reconnect: !arguments.no_reconnect,
         replay_speed: if arguments.speed > 0.0 { arguments.speed } else { f64::INFINITY },
     })?;
-    // The board says what it is when it starts, and again when it is asked; one that does not listen minds nothing.
-    if let Err(error) = link.send("?") {
-        tracing::debug!("{error}");
-    }
-    let first = wait_for_readings(&link, &stop)?;
-    let plan = BoardTrialPlan { object: arguments.object.clone(), scene: scene.to_toml(), seconds: arguments.seconds };
-    let (recorded, status) = record(&mut store, &plan, &link, first, &stop)?;
-    tell(recorded, &plan.object, &status, arguments.json)
-}
-
-/// Everything heard up to the first readings; the trial begins with them.
-fn wait_for_readings(link: &SerialLink, stop: &AtomicBool) -> Result<Vec<LinkEvent>, Failure> {
-    let start = Instant::now();
-    let mut events = Vec::new();
-    loop {
-        events.extend(link.take(PATIENCE));
-        if events.iter().any(|event| matches!(event, LinkEvent::Heard(Heard::Reading(_)))) {
-            return Ok(events);
-        }
-        let status = link.status();
-        let given_up = start.elapsed() > FIRST_READING || stop.load(Ordering::Relaxed) || link.is_over();
-        if given_up {
-            let port = status.port.path.display();
-            return Err(format!("nothing was recorded from \"{port}\": {}", status.state.sentence()).into());
-        }
-        // A board that is not there, or cannot be understood, has had its chance by then.
-        if matches!(status.state, LinkState::Unreadable { .. }) && start.elapsed() > FIRST_READING / 2 {
-            return Err(status.state.sentence().into());
-        }
-    }
-}
-
-fn record(
-    store: &mut Store,
-    plan: &BoardTrialPlan,
-    link: &SerialLink,
-    first: Vec<LinkEvent>,
-    stop: &AtomicBool,
-) -> Result<(Recorded, LinkStatus), Failure> {
-    let time = |event: &LinkEvent| match event {
-        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
-        LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+    let control = match (arguments.drive, arguments.by_hand) {
+        (true, _) => Control::Driven,
+        (false, true) => Control::ByHand,
+        (false, false) => Control::Free,
     };
-    let began_s = first.iter().find_map(time).unwrap_or(0.0);
-    let mut recorder = BoardRecorder::begin(store, plan, &link.status(), began_s)?;
+    let actuation_hz = f64::from(scene.timing.actuation_hz);
+    let programme_s = f64::from(scene.programme.total_ticks()) / actuation_hz;
+    let seconds = arguments.seconds.or((control != Control::Free).then_some(programme_s));
+    let rig = SerialRig::begin(link, SerialPlan { control, actuation_hz, seconds }, stop)?;
+    let plan = BoardTrialPlan { object: arguments.object.clone(), scene: scene.to_toml(), seconds };
     // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{elapsed} {msg}")?);
-    let end_s = plan.seconds.map_or(f64::INFINITY, |seconds| began_s + seconds);
-    let mut events = first;
-    let mut over = false;
-    loop {
-        for event in events {
-            // The bytes of the reading that ends it are in; what follows is not part of it.
-            over |= time(&event).is_some_and(|t_s| t_s >= end_s);
-            if !over {
-                recorder.take(event);
-            }
-        }
-        if recorder.is_due() {
-            recorder.flush(store)?;
-            bar.set_message(progress(&recorder, &link.status()));
-        }
-        // A board that is silent to the end must not keep the trial open.
-        over |= link.is_over()
-            || stop.load(Ordering::Relaxed)
-            || (link.status().baud.is_some() && link.now_s() >= end_s + 0.5);
-        if over {
-            break;
-        }
-        events = link.take(PATIENCE);
-    }
+    let outcome = record_board(rig, &scene.programme, &plan, &mut store, &mut |recorder, status| {
+        bar.set_message(progress(recorder, status));
+        bar.tick();
+    });
     bar.finish_and_clear();
-    let status = link.status();
-    Ok((recorder.finish(store, &status)?, status))
+    let (recorded, status) = outcome?;
+    tell(recorded, &plan.object, &status, arguments.json)
 }
 
 fn progress(recorder: &BoardRecorder, status: &LinkStatus) -> String {

@@ -18,6 +18,17 @@ pub struct TaxelLoad {
     pub across: f32,
 }
 
+/// From when on the control box of a real gripper did something.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhaseMark {
+    /// On the clock of the readings (s).
+    pub from_s: f64,
+    /// What.
+    pub phase: Phase,
+    /// Commanded line pressure (bar), where this program commands it.
+    pub line_bar: Option<f64>,
+}
+
 /// Everything sampled at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {

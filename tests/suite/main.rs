@@ -6,6 +6,7 @@
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
+//! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
@@ -34,5 +35,6 @@ mod pictures;
 mod program;
 mod recognition_panel;
 mod scripted;
+mod serial;
 mod store;
 mod trust;

@@ -118,6 +118,8 @@ impl<R: Rig> GraspRun<R> {
                     self.frames.push(frame);
                     return self.frames.last();
                 }
+                // A board is recorded by `record_board`.
+                Ok(Event::Heard(_) | Event::Commanded(_)) => {}
                 Ok(Event::Finished) => self.finished = true,
                 Err(error) => {
                     self.info.warnings.push(error.to_string());

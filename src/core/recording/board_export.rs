@@ -5,9 +5,10 @@
 //! (bar)`, `phase`. A field without a number had none; `missing_before` says how many readings are missing between the
 //! row before and this one, `?` where that is not known.
 
-use super::board_trials::{BoardTrial, PhaseMark};
+use super::board_trials::BoardTrial;
 use super::csv_export::{CsvError, number, write_file};
 use crate::board::Reading;
+use crate::trial::PhaseMark;
 use std::path::Path;
 
 /// Writes one row per reading.

@@ -1,14 +1,14 @@
 //! Records what a link hears as a trial. Whoever holds the link hands over its events and calls [`BoardRecorder::flush`]
 //! when it is due, so that a kill loses at most a second.
 
-use super::board_trials::{BOARD_RIG, BoardChunk, BoardInfo, PhaseMark};
+use super::board_trials::{BOARD_RIG, BoardChunk, BoardInfo};
 use super::disk::check_space;
 use super::store::{Store, TrialId};
 use super::store_error::StoreError;
 use crate::board::Board;
 use crate::geometry::Pose;
 use crate::rig::serial::{LinkEvent, LinkStatus};
-use crate::trial::{Plan, Quality, TrialInfo};
+use crate::trial::{PhaseMark, Plan, Quality, TrialInfo};
 use crate::wire::{Cadence, Captured, Heard};
 use std::time::{Duration, Instant};
 
@@ -148,8 +148,13 @@ impl BoardRecorder {
         Ok(())
     }
 
-    /// Ends the trial.
-    pub fn finish(mut self, store: &mut Store, status: &LinkStatus) -> Result<Recorded, StoreError> {
+    /// Ends the trial; `notes` are what its rig has to say.
+    pub fn finish(
+        mut self,
+        store: &mut Store,
+        status: &LinkStatus,
+        notes: Vec<String>,
+    ) -> Result<Recorded, StoreError> {
         self.flush(store)?;
         let (before, reconnects) = &self.before;
         self.about.reconnects = status.reconnects - reconnects;
@@ -161,7 +166,8 @@ impl BoardRecorder {
             bad_lines: status.cadence.bad_lines.saturating_sub(before.bad_lines),
             ..status.cadence.clone()
         };
-        let warnings = self.warnings(status);
+        let mut warnings = self.warnings(status);
+        warnings.extend(notes);
         store.finish_board(self.id, &self.about, &warnings)?;
         Ok(Recorded { id: self.id, about: self.about, warnings })
     }

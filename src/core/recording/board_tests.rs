@@ -3,6 +3,7 @@
 use super::*;
 use crate::rig::serial::{LinkEvent, LinkOptions, SerialLink};
 use crate::scene::Scene;
+use crate::trial::PhaseMark;
 use crate::wire::{CAPTURE_MAGIC, CaptureReader, Captured, Heard};
 use std::path::Path;
 use std::time::Duration;
@@ -38,7 +39,7 @@ fn record(store: &mut Store, path: &Path) -> Result<Recorded, Box<dyn std::error
         link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.take(event));
         recorder.flush(store)?;
     }
-    Ok(recorder.finish(store, &link.status())?)
+    Ok(recorder.finish(store, &link.status(), Vec::new())?)
 }
 
 #[test]

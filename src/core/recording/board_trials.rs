@@ -9,8 +9,7 @@ use super::board_blob::{decode_readings, encode_readings};
 use super::store::{Store, TrialId, insert_info, json, set_complete};
 use super::store_error::{StoreError, fault};
 use crate::board::{Board, Gap, Reading};
-use crate::gripper::Phase;
-use crate::trial::{Quality, TrialInfo};
+use crate::trial::{PhaseMark, Quality, TrialInfo};
 use crate::wire::{CAPTURE_MAGIC, Cadence, CaptureReader, Captured, Detected};
 use rusqlite::{OptionalExtension, params};
 use serde::{Deserialize, Serialize};
@@ -47,17 +46,6 @@ pub(super) const COPY_BOARD_TRIALS: &str = "
 
 /// The rig of trials that were recorded from a board.
 pub const BOARD_RIG: &str = "serial";
-
-/// From when on the control box did something.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PhaseMark {
-    /// On the clock of the readings (s).
-    pub from_s: f64,
-    /// What.
-    pub phase: Phase,
-    /// Commanded line pressure (bar), where this program commands it.
-    pub line_bar: Option<f64>,
-}
 
 /// What is known of a trial of a real gripper besides its readings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -18,7 +18,7 @@ mod store_error;
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use board_export::write_board_csv;
 pub use board_recorder::{BoardRecorder, BoardTrialPlan, Recorded};
-pub use board_trials::{BOARD_RIG, BoardChunk, BoardInfo, BoardTrial, PhaseMark};
+pub use board_trials::{BOARD_RIG, BoardChunk, BoardInfo, BoardTrial};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use merge::Merged;

@@ -1,4 +1,4 @@
-//! Grippers, simulated or replayed, behind one interface: command a pressure, read frames. Grasping, recording and
+//! Grippers, simulated, real or replayed, behind one interface: command a pressure, read frames. Grasping, recording and
 //! recognition are written once, against this trait.
 
 mod replay;
@@ -10,7 +10,8 @@ pub use sim::SimRig;
 
 use crate::gripper::Phase;
 use crate::physics::SimulationError;
-use crate::trial::{Frame, Quality};
+use crate::trial::{Frame, PhaseMark, Quality};
+use serial::LinkEvent;
 
 /// What happens next on a rig.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,10 @@ pub enum Event {
     },
     /// A sample was taken.
     Sampled(Frame),
+    /// A board said something, or its connection changed.
+    Heard(LinkEvent),
+    /// The control box of a real gripper does something else from now on.
+    Commanded(PhaseMark),
     /// The trial is over.
     Finished,
 }
@@ -32,11 +37,14 @@ pub enum RigError {
     /// The simulation left the range of numbers.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// The board of the real gripper; the sentence says what is wrong and what to try.
+    #[error("{0}")]
+    Board(String),
 }
 
 /// A two-finger gripper that runs on a clock of its own.
 pub trait Rig {
-    /// Where its frames come from, as recorded with a trial: `sim`, `replay`.
+    /// Where its frames come from, as recorded with a trial: `sim`, `serial`, `replay`.
     fn name(&self) -> &'static str;
 
     /// Lets time pass until the next event.

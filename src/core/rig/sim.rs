@@ -156,7 +156,7 @@ mod tests {
                     rig.command(bar, phase);
                 }
                 Event::Sampled(frame) => samples.push((frame.sample, frame.t)),
-                Event::Finished => break,
+                Event::Finished | Event::Heard(_) | Event::Commanded(_) => break,
             }
         }
         assert_eq!(ticks, [0, 1, 2, 3]);

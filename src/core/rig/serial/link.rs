@@ -218,6 +218,10 @@ impl SerialLink {
         let shared = Shared::new(port.clone(), WhenFull::Drop);
         let baud = options.baud.unwrap_or(Baud::B115200);
         let opened = open_port(&port.path, baud)?;
+        // What was sent while nobody listened is old, and most likely cut.
+        if let Err(error) = opened.clear(serialport::ClearBuffer::Input) {
+            tracing::debug!("old bytes cannot be discarded: {error}");
+        }
         let reader = PortReader::new(Arc::clone(&shared), port, baud, options);
         Self::start(shared, move || reader.run(opened))
     }

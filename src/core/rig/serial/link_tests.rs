@@ -76,6 +76,7 @@ fn a_board_that_vanishes_is_found_again_and_leaves_one_gap() {
     assert_eq!(readings(&taken).len(), 70);
     assert_eq!((gaps.len(), gaps[0].lost), (1, Some(30)), "{gaps:?}");
     assert!(gaps[0].cause.contains("unplugged"), "{gaps:?}");
+    take_until(&link, |_| link.status().state == LinkState::Listening);
     assert_eq!(link.status().state, LinkState::Listening);
 }
 

@@ -9,6 +9,7 @@ mod ports;
 mod queue;
 mod reader;
 mod replay;
+mod rig;
 mod scan;
 
 pub use baud::Baud;
@@ -16,3 +17,4 @@ pub use link::{LinkOptions, LinkState, LinkStatus, SendError, SerialLink};
 pub use port_error::{MODEM_MANAGER_RULE, PortError, PortTrouble};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};
 pub use queue::LinkEvent;
+pub use rig::{Control, SerialPlan, SerialRig};

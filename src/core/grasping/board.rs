@@ -1,0 +1,49 @@
+//! A grasp of the real gripper, recorded as it happens: raw bytes and counts; what they mean is derived later.
+
+use crate::gripper::Programme;
+use crate::recording::{BoardRecorder, BoardTrialPlan, Recorded, Store, StoreError};
+use crate::rig::serial::{LinkStatus, SerialRig};
+use crate::rig::{Event, Rig, RigError};
+
+/// Why a trial of the real gripper ended badly.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardGraspError {
+    /// The rig.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The store; what was written before is safe.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// Records on a rig that has begun, to its end. `tell` is called about once a second.
+pub fn record_board(
+    mut rig: SerialRig,
+    programme: &Programme,
+    plan: &BoardTrialPlan,
+    store: &mut Store,
+    tell: &mut dyn FnMut(&BoardRecorder, &LinkStatus),
+) -> Result<(Recorded, LinkStatus), BoardGraspError> {
+    let mut recorder = BoardRecorder::begin(store, plan, &rig.link().status(), rig.began_s())?;
+    loop {
+        match rig.next_event()? {
+            Event::ActuationDue { tick } => {
+                let (bar, phase) = programme.command(tick);
+                rig.command(bar, phase);
+            }
+            Event::Commanded(mark) => recorder.mark(mark),
+            Event::Heard(event) => recorder.take(event),
+            // A board has no frames.
+            Event::Sampled(_) => {}
+            Event::Finished => break,
+        }
+        if recorder.is_due() {
+            recorder.flush(store)?;
+            tell(&recorder, &rig.link().status());
+        }
+    }
+    let status = rig.link().status();
+    let notes = rig.notes();
+    drop(rig);
+    Ok((recorder.finish(store, &status, notes)?, status))
+}

@@ -1,0 +1,221 @@
+//! The real gripper as a rig: its board's readings, and its control box. The box is driven from here where the board
+//! passes pressure on; else by hand, and the programme only says what should be done when. Time is this computer's.
+
+use super::link::{LinkState, LinkStatus, SerialLink};
+use super::queue::LinkEvent;
+use crate::gripper::Phase;
+use crate::rig::{Event, Rig, RigError};
+use crate::trial::{PhaseMark, Quality};
+use crate::wire::Heard;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Who moves the fingers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Control {
+    /// Nobody, or nobody says: no phases are known.
+    Free,
+    /// A person at the control box, at the times of the programme.
+    ByHand,
+    /// This program, through the board.
+    Driven,
+}
+
+/// What a recording on a real gripper is like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SerialPlan {
+    /// Who moves the fingers.
+    pub control: Control,
+    /// Actuation ticks per second (1/s).
+    pub actuation_hz: f64,
+    /// How long it takes (s); without it until it is stopped.
+    pub seconds: Option<f64>,
+}
+
+/// The board vents when it hears nothing for a second; this leaves it time (s).
+const KEEP_ALIVE: Duration = Duration::from_millis(400);
+/// How long the rig waits for the board at a time.
+const PATIENCE: Duration = Duration::from_millis(20);
+/// How long the board may take to send its first readings.
+const FIRST_READING: Duration = Duration::from_secs(20);
+/// The same where its bytes cannot be understood, all speeds tried.
+const NONSENSE: Duration = Duration::from_secs(10);
+/// A board that is silent at the end is not waited for longer than this (s).
+const LATE_S: f64 = 0.5;
+
+/// The real gripper, from its first reading on. Dropping it vents.
+#[derive(Debug)]
+pub struct SerialRig {
+    link: SerialLink,
+    plan: SerialPlan,
+    stop: Arc<AtomicBool>,
+    began_s: f64,
+    heard: VecDeque<LinkEvent>,
+    marks: VecDeque<PhaseMark>,
+    asked: Option<u32>,
+    commanded: Option<(f64, Phase)>,
+    sent: Instant,
+    notes: Vec<String>,
+    over: bool,
+}
+
+impl SerialRig {
+    /// Waits for the first reading; the recording begins with it.
+    pub fn begin(link: SerialLink, plan: SerialPlan, stop: Arc<AtomicBool>) -> Result<Self, RigError> {
+        // The board says what it is when it starts, and again when it is asked; one that does not listen minds nothing.
+        if let Err(error) = link.send("?") {
+            tracing::debug!("{error}");
+        }
+        let start = Instant::now();
+        let mut heard = VecDeque::new();
+        let began_s = loop {
+            heard.extend(link.take(PATIENCE));
+            if let Some(t_s) = heard.iter().find_map(reading_time) {
+                break t_s;
+            }
+            let LinkStatus { state, port, .. } = link.status();
+            let nonsense = matches!(state, LinkState::Unreadable { .. }) && start.elapsed() > NONSENSE;
+            if nonsense || start.elapsed() > FIRST_READING || stop.load(Ordering::Relaxed) || link.is_over() {
+                let (path, why) = (port.path.display(), state.sentence());
+                return Err(RigError::Board(format!("nothing was heard from \"{path}\": {why}")));
+            }
+        };
+        let sent = Instant::now();
+        let (marks, notes) = (VecDeque::new(), Vec::new());
+        Ok(Self { link, plan, stop, began_s, heard, marks, asked: None, commanded: None, sent, notes, over: false })
+    }
+
+    /// When it began, on the clock of the readings (s).
+    pub fn began_s(&self) -> f64 {
+        self.began_s
+    }
+
+    /// The link to its board.
+    pub fn link(&self) -> &SerialLink {
+        &self.link
+    }
+
+    fn end_s(&self) -> f64 {
+        self.plan.seconds.map_or(f64::INFINITY, |seconds| self.began_s + seconds)
+    }
+
+    /// The actuation tick that is due and was not asked for.
+    fn tick(&mut self) -> Option<u32> {
+        if self.plan.control == Control::Free {
+            return None;
+        }
+        let tick = ((self.link.now_s() - self.began_s).max(0.0) * self.plan.actuation_hz) as u32;
+        (self.asked != Some(tick)).then(|| {
+            self.asked = Some(tick);
+            tick
+        })
+    }
+
+    fn send(&mut self, line: &str) {
+        self.sent = Instant::now();
+        if let Err(error) = self.link.send(line) {
+            let note = format!("{line}: {error}");
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+    }
+
+    fn keep_alive(&mut self) {
+        let pressed = self.commanded.is_some_and(|(bar, _)| bar > 0.0);
+        if self.plan.control == Control::Driven && pressed && self.sent.elapsed() >= KEEP_ALIVE {
+            self.send("K");
+        }
+    }
+
+    /// What the next event is to those who listen.
+    fn hear(&mut self, event: LinkEvent) -> Option<Event> {
+        if reading_time(&event).is_some_and(|t_s| t_s >= self.end_s()) {
+            self.over = true;
+            return None;
+        }
+        if let LinkEvent::Heard(Heard::Said(text)) = &event
+            && (text.starts_with("refused") || text.starts_with("vent"))
+        {
+            self.notes.push(format!("the board said: {text}"));
+        }
+        Some(Event::Heard(event))
+    }
+
+    fn is_over(&self) -> bool {
+        // Captured bytes keep their own time.
+        let live = self.link.status().baud.is_some();
+        let late = live && self.link.now_s() > self.end_s() + LATE_S;
+        self.over || late || self.link.is_over() || self.stop.load(Ordering::Relaxed)
+    }
+}
+
+fn reading_time(event: &LinkEvent) -> Option<f64> {
+    match event {
+        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+    }
+}
+
+impl Rig for SerialRig {
+    fn name(&self) -> &'static str {
+        "serial"
+    }
+
+    fn next_event(&mut self) -> Result<Event, RigError> {
+        loop {
+            if let Some(mark) = self.marks.pop_front() {
+                return Ok(Event::Commanded(mark));
+            }
+            if let Some(tick) = self.tick().filter(|_| !self.over) {
+                return Ok(Event::ActuationDue { tick });
+            }
+            if let Some(event) = self.heard.pop_front() {
+                match self.hear(event) {
+                    Some(event) => return Ok(event),
+                    None => return Ok(Event::Finished),
+                }
+            }
+            if self.is_over() {
+                return Ok(Event::Finished);
+            }
+            self.keep_alive();
+            self.heard = self.link.take(PATIENCE).into();
+        }
+    }
+
+    fn command(&mut self, bar: f64, phase: Phase) {
+        if self.commanded == Some((bar, phase)) {
+            return;
+        }
+        let driven = self.plan.control == Control::Driven;
+        if driven {
+            self.send(&format!("P {bar:.2}"));
+        }
+        self.commanded = Some((bar, phase));
+        // The board tells the pressure itself where it knows it; by hand, the programme's is only what was wished for.
+        self.marks.push_back(PhaseMark { from_s: self.link.now_s(), phase, line_bar: driven.then_some(bar) });
+    }
+
+    fn quality(&self) -> Quality {
+        Quality::default()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+}
+
+impl Drop for SerialRig {
+    fn drop(&mut self) {
+        if self.plan.control == Control::Driven
+            && let Err(error) = self.link.send("V")
+        {
+            // A board that cannot be told vents by itself within a second.
+            tracing::debug!("{error}");
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! The real gripper's side, over real pseudo-terminals: `palpate record` as a user would run it.
+#![cfg(unix)]
+
+use crate::program::{palpate, refused};
+use palpate_core::recording::Store;
+use serialport::{SerialPort, TTYPort};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// A board that sends a hundred lines a second until it is dropped, and remembers what it was told.
+struct Board {
+    stop: Arc<AtomicBool>,
+    sent: Arc<AtomicU32>,
+    thread: Option<JoinHandle<Vec<u8>>>,
+}
+
+fn line(i: u32) -> String {
+    format!("t_us:{},seq:{i},flexL:{},flexR:2100,fsrL:12.5,fsrR:0\n", 10_000 * u64::from(i), 1000 + i % 3000)
+}
+
+impl Board {
+    /// Plugs it in at `link`, counting from `first` on; nothing is sent to a port that nobody has opened.
+    fn plug_in(link: &Path, first: u32) -> Self {
+        let (mut board, port) = TTYPort::pair().unwrap();
+        let _old = std::fs::remove_file(link);
+        std::os::unix::fs::symlink(port.name().unwrap(), link).unwrap();
+        board.set_timeout(Duration::from_millis(1)).unwrap();
+        let (stop, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU32::new(first)));
+        let (stopped, count) = (Arc::clone(&stop), Arc::clone(&sent));
+        let thread = std::thread::spawn(move || {
+            let (mut told, mut buffer, start) = (Vec::new(), [0; 256], Instant::now());
+            // Listeners ask for the hello line when they begin; whoever comes back does not.
+            while first == 0 && told.is_empty() && !stopped.load(Ordering::Relaxed) {
+                let count = board.read(&mut buffer).unwrap_or(0);
+                told.extend_from_slice(&buffer[..count]);
+            }
+            let hello = b"\n# tactile-gripper fw=1 adc=12 vref=3.3 rate=100 ch=flexL,flexR,fsrL,fsrR\n";
+            let start = if told.is_empty() { start } else { Instant::now() };
+            let _unheard = board.write_all(hello);
+            let mut i = first;
+            while !stopped.load(Ordering::Relaxed) {
+                // A full buffer means that nobody listens.
+                let _unheard = board.write_all(line(i).as_bytes());
+                i += 1;
+                count.store(i, Ordering::Relaxed);
+                if let Ok(n) = board.read(&mut buffer) {
+                    told.extend_from_slice(&buffer[..n]);
+                }
+                let due = start + Duration::from_millis(10) * (i - first);
+                std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            }
+            drop(port);
+            told
+        });
+        Self { stop, sent, thread: Some(thread) }
+    }
+
+    /// Unplugs it; what it was told, and how many lines it had sent.
+    fn unplug(mut self) -> (String, u32) {
+        self.stop.store(true, Ordering::Relaxed);
+        let told = self.thread.take().unwrap().join().unwrap();
+        (String::from_utf8(told).unwrap(), self.sent.load(Ordering::Relaxed))
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+fn record(folder: &Path, port: &Path, arguments: &[&str]) -> Command {
+    let mut command = palpate(&folder.join("trials.sqlite"));
+    command.arg("record").arg("--port").arg(port).args(["--json", "--object", "lemon"]).args(arguments);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn told(child: Child) -> serde_json::Value {
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Waits until a trial has readings in the store.
+fn wait_for_samples(store: &Path, trial: usize, samples: i64) {
+    let start = Instant::now();
+    loop {
+        let rows = if store.exists() { Store::open(store).unwrap().list(false).unwrap() } else { Vec::new() };
+        if rows.get(trial).is_some_and(|row| row.samples >= samples) {
+            return;
+        }
+        assert!(start.elapsed() < Duration::from_secs(30), "{rows:?}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_second_of_a_board_is_a_trial_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("due");
+    let board = Board::plug_in(&port, 0);
+    let told = told(record(folder.path(), &port, &["--seconds", "1"]).spawn().unwrap());
+    board.unplug();
+    assert_eq!((&told["lost"], &told["bad_lines"], &told["reconnects"]), (&0.into(), &0.into(), &0.into()));
+    assert_eq!((&told["trial_id"], &told["samples"]), (&1.into(), &100.into()), "{told}");
+    assert!((told["rate_hz"].as_f64().unwrap() - 100.0).abs() < 1.0 && told["jitter_p95_ms"].is_f64(), "{told}");
+    let store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
+    let trial = store.board_trial(1).unwrap().unwrap();
+    for pair in trial.readings.windows(2) {
+        assert_eq!(pair[1].seq.unwrap(), pair[0].seq.unwrap() + 1);
+        assert!((pair[1].t_s - pair[0].t_s - 0.01).abs() < 1e-3);
+    }
+    // What was recorded is heard again from its bytes.
+    let out = folder.path().join("out.csv");
+    let text = crate::program::run(folder.path(), &["trials", "export", "1", "--out", out.to_str().unwrap()]);
+    assert_eq!(text.code, Some(0), "{text:?}");
+    assert_eq!(std::fs::read_to_string(&out).unwrap().lines().count(), 101);
+    let again = record(folder.path(), &out.with_extension("bytes"), &["--speed", "0"]).spawn().unwrap();
+    let again = self::told(again);
+    assert!(again["samples"].as_u64().unwrap() >= 100 && again["lost"] == 0, "{again}");
+    let shown = crate::program::json(folder.path(), &["trials", "show", "1", "--json"]);
+    assert_eq!(shown["cadence"]["samples"], 100);
+}
+
+#[test]
+fn a_board_that_vanishes_while_it_is_recorded_leaves_a_gap_and_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, store) = (folder.path().join("due"), folder.path().join("trials.sqlite"));
+    let board = Board::plug_in(&port, 0);
+    let child = record(folder.path(), &port, &["--seconds", "4"]).spawn().unwrap();
+    wait_for_samples(&store, 0, 50);
+    let (_, sent) = board.unplug();
+    let board = Board::plug_in(&port, sent + 50);
+    let told = told(child);
+    board.unplug();
+    assert_eq!(told["reconnects"], 1, "{told}");
+    let trial = Store::open(&store).unwrap().board_trial(1).unwrap().unwrap();
+    assert_eq!(trial.gaps.len(), 1, "{:?}", trial.gaps);
+    assert!(trial.gaps[0].cause.contains("unplugged") && trial.gaps[0].lost >= Some(50), "{:?}", trial.gaps);
+    let numbers: Vec<u64> = trial.readings.iter().map(|reading| reading.seq.unwrap()).collect();
+    let jumps: Vec<u64> = numbers.windows(2).map(|pair| pair[1] - pair[0]).filter(|jump| *jump != 1).collect();
+    assert_eq!(jumps, [trial.gaps[0].lost.unwrap() + 1]);
+    for reading in &trial.readings {
+        assert_eq!(reading.counts[0], Some((1000 + reading.seq.unwrap() % 3000) as f32));
+    }
+}
+
+#[test]
+fn a_kill_loses_no_more_than_the_last_second_and_no_other_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, store) = (folder.path().join("due"), folder.path().join("trials.sqlite"));
+    let board = Board::plug_in(&port, 0);
+    told(record(folder.path(), &port, &["--seconds", "0.3"]).spawn().unwrap());
+    let mut child = record(folder.path(), &port, &[]).spawn().unwrap();
+    wait_for_samples(&store, 1, 100);
+    std::thread::sleep(Duration::from_millis(500));
+    let newest = board.sent.load(Ordering::Relaxed);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    board.unplug();
+    let found = Store::open(&store).unwrap();
+    assert_eq!(found.board_trial(1).unwrap().unwrap().readings.len(), 30);
+    let kept = found.board_trial(2).unwrap().unwrap().readings.last().unwrap().seq.unwrap();
+    assert!(u64::from(newest) - kept <= 110, "{newest} was sent, {kept} was kept");
+    assert!(found.board_bytes(2).unwrap().is_some());
+    let states: Vec<String> = found.list(false).unwrap().into_iter().map(|row| row.state).collect();
+    assert_eq!(states, ["complete", "recording"]);
+}
+
+#[test]
+fn an_end_by_ctrl_c_is_an_end_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, store) = (folder.path().join("due"), folder.path().join("trials.sqlite"));
+    let board = Board::plug_in(&port, 0);
+    let child = record(folder.path(), &port, &[]).spawn().unwrap();
+    wait_for_samples(&store, 0, 50);
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    let told = told(child);
+    board.unplug();
+    assert!(told["samples"].as_u64().unwrap() >= 50 && told["lost"] == 0, "{told}");
+    assert_eq!(Store::open(&store).unwrap().list(false).unwrap()[0].state, "complete");
+}
+
+#[test]
+fn two_programs_record_two_boards_into_one_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let ports: Vec<PathBuf> = ["left", "right"].iter().map(|name| folder.path().join(name)).collect();
+    let boards: Vec<Board> = ports.iter().map(|port| Board::plug_in(port, 0)).collect();
+    let children: Vec<Child> =
+        ports.iter().map(|port| record(folder.path(), port, &["--seconds", "1"]).spawn().unwrap()).collect();
+    for child in children {
+        let told = told(child);
+        assert_eq!((&told["samples"], &told["lost"]), (&100.into(), &0.into()), "{told}");
+    }
+    boards.into_iter().for_each(|board| drop(board.unplug()));
+    let store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
+    for id in 1..=2 {
+        let trial = store.board_trial(id).unwrap().unwrap();
+        assert!(trial.readings.len() == 100 && trial.gaps.is_empty());
+    }
+}
+
+#[test]
+fn a_driven_grasp_tells_the_board_each_pressure_and_vents() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("due");
+    let scene = folder.path().join("quick.toml");
+    let programme =
+        "[programme]\npeak_bar = 0.3\nclose_bar_per_tick = 0.1\nhold_ticks = 8\nrelease_bar_per_tick = 0.3\n";
+    std::fs::write(&scene, programme).unwrap();
+    let board = Board::plug_in(&port, 0);
+    let scene = scene.to_string_lossy().into_owned();
+    told(record(folder.path(), &port, &["--drive", "--scene", &scene]).spawn().unwrap());
+    let (lines, _) = board.unplug();
+    let said: Vec<&str> = lines.lines().collect();
+    let pressures: Vec<&str> = said.iter().copied().filter(|line| line.starts_with('P')).collect();
+    assert!(pressures.ends_with(&["P 0.30", "P 0.00"]) || pressures.contains(&"P 0.30"), "{said:?}");
+    assert!(said.contains(&"K") && said.last() == Some(&"V"), "{said:?}");
+    let trial = Store::open(&folder.path().join("trials.sqlite")).unwrap().board_trial(1).unwrap().unwrap();
+    let phases: Vec<&str> = trial.about.phases.iter().map(|mark| mark.phase.name()).collect();
+    assert!(phases.contains(&"close") && phases.contains(&"hold"), "{phases:?}");
+}
+
+#[test]
+fn ports_that_cannot_be_recorded_say_cause_and_fix() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("due");
+    let path = port.to_str().unwrap();
+    refused(folder.path(), &["record", "--port", path], &["cannot open port", "no such port", "plugged in"]);
+    refused(folder.path(), &["record", "--port", "/dev/null"], &["not a serial port"]);
+    let empty = folder.path().join("empty.bytes");
+    std::fs::write(&empty, "").unwrap();
+    refused(folder.path(), &["record", "--port", empty.to_str().unwrap()], &["nothing was heard"]);
+    let _board = Board::plug_in(&port, 0);
+    let _held = serialport::new(path, 115_200).open_native().unwrap();
+    refused(folder.path(), &["record", "--port", path], &["it is", "use", "connect"]);
+    let ran = crate::program::run(folder.path(), &["record", "--port", path, "--baud", "1200"]);
+    assert!(ran.code == Some(2) && ran.err.contains("erases"), "{ran:?}");
+    let listed = crate::program::run(folder.path(), &["record", "--list"]);
+    assert_eq!(listed.code, Some(0), "{listed:?}");
+    let mut lines = BufReader::new(listed.out.as_bytes()).lines();
+    assert!(lines.next().is_some());
+}
