@@ -4,6 +4,7 @@
 //!
 //! Objects lie as they are put down: z up, their long side along y, so that the fingers close across it along x.
 
+mod fuzz_wire;
 mod live_model;
 mod sixteen;
 mod thumbnails;
@@ -54,9 +55,15 @@ pub(super) struct WorkshopArguments {
     /// Make the model that comes with the program, from grasps collected into the store, instead of the objects.
     #[arg(long, conflicts_with = "thumbnails")]
     model: bool,
+    /// Listen to bytes that no board should send, for this long (s), and check what is made of them.
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["thumbnails", "model"])]
+    fuzz_wire: Option<f64>,
 }
 
 pub(super) fn run(arguments: &WorkshopArguments, store: Option<&Path>) -> Result<(), Failure> {
+    if let Some(seconds) = arguments.fuzz_wire {
+        return fuzz_wire::run(seconds);
+    }
     if arguments.model {
         return live_model::make(&arguments.out, &mut open_store(store)?);
     }

@@ -241,7 +241,8 @@ impl Reader {
         for (role, (_, value)) in roles.iter().zip(&line.fields) {
             let counter = value.filter(|value| (0.0..LARGEST_COUNTER).contains(value));
             match role {
-                Role::Channel(place) => counts[*place] = value.map(|value| value as f32),
+                // What no f32 can hold is no count of any converter.
+                Role::Channel(place) => counts[*place] = value.map(|value| value as f32).filter(|c| c.is_finite()),
                 Role::Micros => counters.time = counter.map(|count| (count, 1e-6)),
                 Role::Millis if counters.time.is_none() => counters.time = counter.map(|count| (count, 1e-3)),
                 Role::Sequence => counters.seq = counter,

@@ -222,6 +222,7 @@ impl SerialLink {
         if let Err(error) = opened.clear(serialport::ClearBuffer::Input) {
             tracing::debug!("old bytes cannot be discarded: {error}");
         }
+        *lock(&shared.writer) = opened.try_clone().ok();
         let reader = PortReader::new(Arc::clone(&shared), port, baud, options);
         Self::start(shared, move || reader.run(opened))
     }

@@ -78,7 +78,10 @@ impl PortReader {
                 return self.shared.set_state(LinkState::Ended { cause: Some(cause) });
             }
             match self.find_again(&cause) {
-                Some(found) => port = found,
+                Some(found) => {
+                    *lock(&self.shared.writer) = found.try_clone().ok();
+                    port = found;
+                }
                 None => return self.shared.set_state(LinkState::Ended { cause: None }),
             }
             self.shared.reconnects.fetch_add(1, Ordering::Relaxed);
@@ -89,7 +92,6 @@ impl PortReader {
     fn listen(&mut self, mut port: Box<dyn SerialPort>) -> Option<String> {
         self.shared.set_state(LinkState::Waiting);
         self.shared.baud.store(self.baud.rate(), Ordering::Relaxed);
-        *lock(&self.shared.writer) = port.try_clone().ok();
         let now = Instant::now();
         let readings_before = self.shared.readings.load(Ordering::Relaxed);
         let mut connection =

@@ -1,0 +1,171 @@
+//! Streams that no board should send, without end, and what must hold whatever they are. The same seed gives the same
+//! stream. A test hears a second of it; `palpate workshop --fuzz-wire SECONDS` goes on for as long as one likes.
+
+use super::decoder::{Decoder, Heard};
+
+/// What is never exceeded: channels of a board.
+const MOST_CHANNELS: usize = 64;
+
+/// Makes streams up.
+#[derive(Clone, Debug)]
+pub struct FuzzStream {
+    state: u64,
+    now_s: f64,
+    sample: u64,
+    format: u64,
+}
+
+/// Listens to one, and checks what it hears.
+#[derive(Clone, Debug, Default)]
+pub struct FuzzListener {
+    decoder: Decoder,
+    heard: Vec<Heard>,
+    last_s: Option<f64>,
+    channels: usize,
+    readings: u64,
+}
+
+impl FuzzStream {
+    /// A stream.
+    pub fn new(seed: u64) -> Self {
+        Self { state: seed, now_s: 0.0, sample: 0, format: 0 }
+    }
+
+    /// The next random number (SplitMix64).
+    fn draw(&mut self) -> u64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        self.draw() % n
+    }
+
+    /// Puts the next bytes into `out`; when they arrive (s).
+    pub fn next(&mut self, out: &mut Vec<u8>) -> f64 {
+        out.clear();
+        self.now_s += match self.below(50) {
+            0 => 3.0,
+            1..=9 => 0.0,
+            _ => 0.02,
+        };
+        if self.below(400) == 0 {
+            self.format = self.below(6);
+        }
+        for _ in 0..=self.below(3) {
+            self.line(out);
+        }
+        // What happens to bytes on their way.
+        match self.below(12) {
+            0 => {
+                let end = self.below(out.len() as u64 + 1) as usize;
+                out.truncate(end);
+            }
+            1 => {
+                for _ in 0..self.below(8) {
+                    let at = self.below(out.len().max(1) as u64) as usize;
+                    let value = self.draw() as u8;
+                    if let Some(byte) = out.get_mut(at) {
+                        *byte = value;
+                    }
+                }
+            }
+            2 => (0..self.below(3000)).for_each(|_| out.push(self.draw() as u8)),
+            3 => out.extend(std::iter::repeat_n(b"0:,{>-"[self.below(6) as usize], 2000)),
+            4 => out.retain(|byte| *byte != b'\n'),
+            _ => {}
+        }
+        self.now_s
+    }
+
+    fn line(&mut self, out: &mut Vec<u8>) {
+        self.sample += 1 + u64::from(self.below(30) == 0) * self.below(1000);
+        let (n, a) = (self.sample, self.below(4096));
+        let odd = ["nan", "", "inf", "1e999", "-5", "0x1f", "99999999999999999999"][self.below(7) as usize];
+        let b = if self.below(20) == 0 { odd.to_owned() } else { self.below(4096).to_string() };
+        let us = (n * 20_000) & 0xffff_ffff;
+        let line = match self.format {
+            0 => format!("t_us:{us},seq:{},flexL:{a},flexR:{b},p_bar:0.5", n & 0xffff),
+            1 => format!("{a},{b},{n},7"),
+            2 => format!(">flexL:{}:{a}§V|g\n>x{}:{b}", n * 20, self.below(200)),
+            3 => format!("{{\"flexL\":{a},\"flexR\":\"{b}\",\"seq\":{n},\"deep\":[[{{}}]]}}"),
+            4 => format!("name{}:{a} other{}:{b}", self.below(1000), self.below(3)),
+            _ => format!("# tactile-gripper adc={b} ch={a},b rm={b},2\nch{a};other{}", self.below(9)),
+        };
+        out.extend_from_slice(line.as_bytes());
+        out.extend_from_slice(if self.below(2) == 0 { b"\n" } else { b"\r\n" });
+    }
+}
+
+impl FuzzListener {
+    /// Takes in bytes; an error says what does not hold.
+    pub fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), String> {
+        self.decoder.push(bytes, arrived_s, &mut self.heard);
+        for event in std::mem::take(&mut self.heard) {
+            self.check(&event).map_err(|what| format!("{what}: {event:?}"))?;
+        }
+        let told = self.decoder.cadence().samples;
+        if told == self.readings {
+            Ok(())
+        } else {
+            Err(format!("{told} readings are told, {} were heard", self.readings))
+        }
+    }
+
+    fn check(&mut self, event: &Heard) -> Result<(), &'static str> {
+        match event {
+            Heard::Reading(reading) => {
+                self.readings += 1;
+                let before = self.last_s.replace(reading.t_s);
+                if before.is_some_and(|before| reading.t_s <= before) {
+                    return Err("time does not move on");
+                }
+                if reading.counts.len() != self.channels {
+                    return Err("a reading has other channels than the board");
+                }
+                if !reading.t_s.is_finite() || reading.counts.iter().flatten().any(|count| !count.is_finite()) {
+                    return Err("a number is not finite");
+                }
+            }
+            Heard::Gap(gap) => {
+                if self.last_s != Some(gap.from_s) || gap.to_s <= gap.from_s {
+                    return Err("a gap does not lie behind the last reading");
+                }
+            }
+            Heard::Board(board) => {
+                if board.channels.len() < self.channels || board.channels.len() > MOST_CHANNELS {
+                    return Err("channels were taken away, or are too many");
+                }
+                self.channels = board.channels.len();
+            }
+            Heard::Said(_) => {}
+        }
+        Ok(())
+    }
+
+    /// Readings so far.
+    pub fn readings(&self) -> u64 {
+        self.readings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_comes_nothing_breaks() -> Result<(), String> {
+        let mut bytes = Vec::new();
+        for seed in 0..20 {
+            let (mut stream, mut listener) = (FuzzStream::new(seed), FuzzListener::default());
+            for _ in 0..400 {
+                let arrived_s = stream.next(&mut bytes);
+                listener.push(&bytes, arrived_s)?;
+            }
+            assert!(listener.readings() > 50, "seed {seed}: {} readings", listener.readings());
+        }
+        Ok(())
+    }
+}
