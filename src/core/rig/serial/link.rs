@@ -224,7 +224,7 @@ impl SerialLink {
         }
         *lock(&shared.writer) = opened.try_clone().ok();
         let reader = PortReader::new(Arc::clone(&shared), port, baud, options);
-        Self::start(shared, move || reader.run(opened))
+        Self::start(&shared, move || reader.run(opened))
     }
 
     fn replay(path: &Path, speed: f64) -> Result<Self, PortError> {
@@ -237,17 +237,17 @@ impl SerialLink {
         };
         let shared = Shared::new(port, WhenFull::Wait);
         let for_thread = Arc::clone(&shared);
-        Self::start(shared, move || replay.run(&for_thread))
+        Self::start(&shared, move || replay.run(&for_thread))
     }
 
-    fn start(shared: Arc<Shared>, read: impl FnOnce() + Send + 'static) -> Result<Self, PortError> {
-        let mut link = Self { shared: Arc::clone(&shared), threads: Vec::new() };
+    fn start(shared: &Arc<Shared>, read: impl FnOnce() + Send + 'static) -> Result<Self, PortError> {
+        let mut link = Self { shared: Arc::clone(shared), threads: Vec::new() };
         let path = lock(&shared.port).path.clone();
         let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let failed = |error: std::io::Error| PortError::of(&path, &error.into(), &[]);
-        let decoding = Arc::clone(&shared);
+        let decoding = Arc::clone(shared);
         link.threads.push(thread("serial-decode").spawn(move || decoding.decode()).map_err(failed)?);
-        let closing = Arc::clone(&shared);
+        let closing = Arc::clone(shared);
         let reading = thread("serial-read").spawn(move || {
             read();
             closing.bytes.close();
