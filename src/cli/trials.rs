@@ -291,6 +291,10 @@ fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
     if let Some(signals) = store.readings(id)? {
         return show_import(store, id, signals, json);
     }
+    show_simulated(store, id, json)
+}
+
+fn show_simulated(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
     let trial = store.load(id)?;
     let summary = GraspSummary::new(&trial, &scene_of(&trial)?);
     let shown = Shown {

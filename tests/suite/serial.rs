@@ -40,7 +40,7 @@ fn line(i: u32) -> String {
 }
 
 impl Board {
-    /// Plugs it in at `link`, counting from `first` on; nothing is sent to a port that nobody has opened.
+    /// Plugs it in at `link`, counting from `first` on.
     fn plug_in(link: &Path, first: u32) -> Self {
         let (mut board, port) = pair();
         let _old = std::fs::remove_file(link);
@@ -50,13 +50,7 @@ impl Board {
         let (stopped, count) = (Arc::clone(&stop), Arc::clone(&sent));
         let thread = std::thread::spawn(move || {
             let (mut told, mut buffer, start) = (Vec::new(), [0; 256], Instant::now());
-            // Listeners ask for the hello line when they begin; whoever comes back does not.
-            while first == 0 && told.is_empty() && !stopped.load(Ordering::Relaxed) {
-                let count = board.read(&mut buffer).unwrap_or(0);
-                told.extend_from_slice(&buffer[..count]);
-            }
             let hello = b"\n# tactile-gripper fw=1 adc=12 vref=3.3 rate=100 ch=flexL,flexR,fsrL,fsrR\n";
-            let start = if told.is_empty() { start } else { Instant::now() };
             let _unheard = board.write_all(hello);
             let mut i = first;
             while !stopped.load(Ordering::Relaxed) {
@@ -166,6 +160,22 @@ fn a_board_that_vanishes_while_it_is_recorded_leaves_a_gap_and_comes_back() {
     for reading in &trial.readings {
         assert_eq!(reading.counts[0], Some((1000 + reading.seq.unwrap() % 3000) as f32));
     }
+}
+
+#[test]
+fn a_board_that_does_not_come_back_leaves_a_gap_to_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, store) = (folder.path().join("due"), folder.path().join("trials.sqlite"));
+    let board = Board::plug_in(&port, 0);
+    let child = start(record(folder.path(), &port, &["--seconds", "2.5"]));
+    wait_for_samples(&store, 0, 50);
+    board.unplug();
+    let told = told(child);
+    let trial = Store::open(&store).unwrap().board_trial(1).unwrap().unwrap();
+    let [gap] = &trial.gaps[..] else { panic!("{:?}", trial.gaps) };
+    assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.about.began_s >= 2.5, "{gap:?}");
+    assert_eq!(gap.from_s, trial.readings.last().unwrap().t_s);
+    assert!(told["warnings"].to_string().contains("interrupted"), "{told}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::board_trials::{BOARD_RIG, BoardChunk, BoardInfo};
 use super::disk::check_space;
 use super::store::{Store, TrialId};
 use super::store_error::StoreError;
-use crate::board::Board;
+use crate::board::{Board, Gap};
 use crate::geometry::Pose;
 use crate::rig::serial::{LinkEvent, LinkStatus};
 use crate::trial::{PhaseMark, Plan, Quality, TrialInfo};
@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 const FLUSH_AFTER: Duration = Duration::from_millis(800);
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
 const BYTES_PER_S: f64 = 400e3;
+/// A board that was silent for longer than this before the end left a gap there (s).
+const SILENCE_S: f64 = 1.0;
 /// A trial of unknown length is given this long (s).
 const UNKNOWN_LENGTH_S: f64 = 600.0;
 
@@ -30,6 +32,8 @@ pub struct BoardRecorder {
     lost: u64,
     gaps: u64,
     interrupted: Vec<String>,
+    /// The newest reading's time (s), and why none has come since, where that is known.
+    last: Option<(f64, Option<String>)>,
     /// Counts of the link when the trial began.
     before: (Cadence, u32),
 }
@@ -93,6 +97,7 @@ impl BoardRecorder {
             lost: 0,
             gaps: 0,
             interrupted: Vec::new(),
+            last: None,
             before: (status.cadence.clone(), status.reconnects),
         })
     }
@@ -113,11 +118,13 @@ impl BoardRecorder {
             LinkEvent::Captured(piece) => {
                 if let Captured::Interrupted { cause, .. } = &piece {
                     self.interrupted.push(cause.clone());
+                    self.last = self.last.take().map(|(t_s, _)| (t_s, Some(cause.clone())));
                 }
                 self.chunk.bytes.push(piece);
             }
             LinkEvent::Heard(Heard::Reading(reading)) => {
                 self.samples += 1;
+                self.last = Some((reading.t_s, None));
                 self.chunk.readings.push(reading);
             }
             LinkEvent::Heard(Heard::Gap(gap)) => {
@@ -155,6 +162,7 @@ impl BoardRecorder {
         status: &LinkStatus,
         notes: Vec<String>,
     ) -> Result<Recorded, StoreError> {
+        self.close(status);
         self.flush(store)?;
         let (before, reconnects) = &self.before;
         self.about.reconnects = status.reconnects - reconnects;
@@ -172,15 +180,26 @@ impl BoardRecorder {
         Ok(Recorded { id: self.id, about: self.about, warnings })
     }
 
+    /// What was not heard up to the end is a gap as well.
+    fn close(&mut self, status: &LinkStatus) {
+        let live = status.baud.is_some();
+        let Some((from_s, cause)) = self.last.take().filter(|(t_s, _)| live && status.now_s - t_s > SILENCE_S) else {
+            return;
+        };
+        let cause = cause.unwrap_or_else(|| "nothing came any more".to_owned());
+        self.gaps += 1;
+        self.chunk.gaps.push(Gap { from_s, to_s: status.now_s, lost: None, cause });
+    }
+
     fn warnings(&self, status: &LinkStatus) -> Vec<String> {
         let cadence = &self.about.cadence;
         let mut warnings: Vec<String> = self.interrupted.iter().map(|cause| format!("interrupted: {cause}")).collect();
         if cadence.samples == 0 {
             warnings.push(format!("nothing was recorded: {}", status.state.sentence()));
         }
-        if cadence.lost > 0 {
-            let (lost, gaps) = (cadence.lost, cadence.gaps);
-            warnings.push(format!("{lost} reading(s) are missing, in {gaps} gap(s)"));
+        let (lost, gaps) = (cadence.lost, cadence.gaps);
+        if gaps > 0 {
+            warnings.push(format!("{lost} reading(s) are missing for certain, in {gaps} gap(s)"));
         }
         if status.looks_10_bit {
             let text = "the counts look like those of ten bits: call analogReadResolution(12) in the sketch";

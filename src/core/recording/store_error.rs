@@ -1,6 +1,7 @@
 //! What can go wrong with the store, in sentences for the user.
 
 use super::blob::BlobError;
+use super::disk::is_full;
 use super::store::{PATIENCE, SCHEMA_VERSION, TrialId};
 use rusqlite::ErrorCode;
 use std::path::{Path, PathBuf};
@@ -116,6 +117,8 @@ pub(super) fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
         Some(ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
         Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => StoreError::Busy,
         Some(ErrorCode::DiskFull) => StoreError::DiskFull,
+        // Without room for its log, SQLite cannot even read, and does not say why.
+        Some(ErrorCode::SystemIoFailure) if is_full(path) => StoreError::DiskFull,
         Some(ErrorCode::ReadOnly) => StoreError::ReadOnly { path: path.to_owned() },
         _ => StoreError::Sqlite { path: path.to_owned(), cause: plain(error) },
     }

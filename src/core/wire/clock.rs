@@ -51,6 +51,8 @@ const SILENCE_S: f64 = 0.3;
 const LATE_SHARE: f64 = 0.6;
 /// How long lines must be late before one counts as lost (s).
 const LATE_FOR_S: f64 = 1.0;
+/// A number that has run ahead of the time by more than this factor, and by more than this many, is not one of it.
+const AHEAD: f64 = 2.0;
 /// Two readings are never given the same time (s).
 const LEAST_STEP_S: f64 = 1e-6;
 
@@ -69,6 +71,8 @@ pub(super) struct StreamClock {
     late: Option<(f64, f64)>,
     /// The connection was lost since the last reading.
     broken: bool,
+    /// The counters of the line before contradicted each other.
+    doubted: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -90,6 +94,7 @@ impl Default for StreamClock {
             counted: 0.0,
             late: None,
             broken: false,
+            doubted: false,
         }
     }
 }
@@ -111,8 +116,8 @@ impl StreamClock {
         self.broken = true;
     }
 
-    /// Places the next reading.
-    pub(super) fn stamp(&mut self, counters: &Counters, arrived_s: f64) -> Stamp {
+    /// Places the next reading; none where its counters contradict each other, so that one has lost a digit on its way.
+    pub(super) fn stamp(&mut self, counters: &Counters, arrived_s: f64) -> Option<Stamp> {
         let source = match counters {
             Counters { time: Some(_), .. } => TimeSource::Device,
             Counters { seq: Some(_), .. } => TimeSource::Sequence,
@@ -121,14 +126,17 @@ impl StreamClock {
         if source != self.source {
             self.begin_anew(source);
         }
+        let before = (self.sequence, self.time);
         let step = counters.seq.map(|seq| self.sequence.step(seq));
-        let mut restarted = step == Some(Step::Restarted);
-        if restarted {
-            self.begin_anew(source);
-        }
         let mut x = self.count(counters, arrived_s);
-        if source == TimeSource::Device && self.is_elsewhere(x, arrived_s) {
-            restarted = true;
+        let elsewhere = source == TimeSource::Device && self.is_elsewhere(x, arrived_s);
+        if self.is_contradiction(step, elsewhere, x) && !std::mem::replace(&mut self.doubted, true) {
+            (self.sequence, self.time) = before;
+            return None;
+        }
+        self.doubted = false;
+        let restarted = elsewhere || step == Some(Step::Restarted);
+        if restarted {
             self.begin_anew(source);
             x = self.count(counters, arrived_s);
         }
@@ -149,7 +157,7 @@ impl StreamClock {
         }
         self.last = Some(Last { t_s, arrived_s, x });
         let seq = counters.seq.map(|_| self.sequence.running());
-        Stamp { t_s, seq, restarted, missing }
+        Some(Stamp { t_s, seq, restarted, missing })
     }
 
     fn begin_anew(&mut self, source: TimeSource) {
@@ -201,6 +209,19 @@ impl StreamClock {
     fn is_elsewhere(&self, x: f64, arrived_s: f64) -> bool {
         let backwards = self.last.is_some_and(|last| x < last.x);
         self.time.is_some() && (backwards || self.line.at(x).is_some_and(|t| t > arrived_s + FUTURE_S))
+    }
+
+    /// True where the board's number and its time do not tell of the same thing: only one of them has begun anew, or the
+    /// number has run far ahead.
+    fn is_contradiction(&self, step: Option<Step>, elsewhere: bool, x: f64) -> bool {
+        match (step, self.source, self.last, self.period.median()) {
+            (Some(Step::Restarted), TimeSource::Device, Some(_), _) => !elsewhere,
+            (Some(Step::On(_)), TimeSource::Device, Some(_), _) if elsewhere => true,
+            (Some(Step::On(step)), TimeSource::Device, Some(last), Some(period)) => {
+                step as f64 > AHEAD * (x - last.x) / period + AHEAD
+            }
+            _ => false,
+        }
     }
 
     fn missing(&self, counters: &Counters, step: Option<Step>, x: f64, arrived_s: f64) -> Option<u64> {
@@ -255,6 +276,10 @@ impl Period {
 mod tests {
     use super::*;
 
+    fn stamp(clock: &mut StreamClock, counters: &Counters, arrived_s: f64) -> Stamp {
+        clock.stamp(counters, arrived_s).expect("no contradiction")
+    }
+
     fn at(us: f64, seq: f64) -> Counters {
         Counters { time: Some((us, 1e-6)), seq: Some(seq), unreadable: 0 }
     }
@@ -265,7 +290,7 @@ mod tests {
         let start = 4_294_967_296.0 - 1e6;
         for i in 0..200u32 {
             let us = (start + 20_000.0 * f64::from(i)) % 4_294_967_296.0;
-            let stamp = clock.stamp(&at(us, f64::from(i)), 7.0 + 0.02 * f64::from(i));
+            let stamp = stamp(&mut clock, &at(us, f64::from(i)), 7.0 + 0.02 * f64::from(i));
             assert!(!stamp.restarted && stamp.missing == Some(0), "{i}: {stamp:?}");
             assert!((stamp.t_s - 7.0 - 0.02 * f64::from(i)).abs() < 1e-6, "{i}: {stamp:?}");
         }
@@ -277,7 +302,7 @@ mod tests {
         for i in 0..500u32 {
             let us = if i < 300 { 3e9 + 20_000.0 * f64::from(i) } else { 800_000.0 + 20_000.0 * f64::from(i - 300) };
             let counters = Counters { time: Some((us, 1e-6)), ..Counters::default() };
-            let stamp = clock.stamp(&counters, 0.02 * f64::from(i));
+            let stamp = stamp(&mut clock, &counters, 0.02 * f64::from(i));
             assert_eq!(stamp.restarted, i == 300, "{i}: {stamp:?}");
         }
     }
@@ -290,7 +315,7 @@ mod tests {
             for i in (0..1000u32).filter(|i| ![100, 200, 201, 202, 700].contains(i)) {
                 let mut counters = at(20_000.0 * f64::from(i), f64::from(i));
                 counters.seq = counters.seq.filter(|_| with_seq);
-                missing += clock.stamp(&counters, 0.02 * f64::from(i) + 0.001).missing.unwrap_or(99);
+                missing += stamp(&mut clock, &counters, 0.02 * f64::from(i) + 0.001).missing.unwrap_or(99);
             }
             assert_eq!(missing, 5);
         }
@@ -303,7 +328,7 @@ mod tests {
         for i in 0..2000u32 {
             let happened = 0.02 * f64::from(i);
             let arrived = happened + 0.02 * f64::from(3 - i % 4);
-            let stamp = clock.stamp(&Counters::default(), arrived);
+            let stamp = stamp(&mut clock, &Counters::default(), arrived);
             assert_eq!(stamp.missing, Some(0));
             if i > 200 {
                 worst = worst.max((stamp.t_s - happened).abs());
@@ -318,7 +343,7 @@ mod tests {
         let mut last_error = f64::NAN;
         for i in (0..1000u32).filter(|i| !(300..305).contains(i)) {
             let arrived = 0.02 * f64::from(i);
-            last_error = clock.stamp(&Counters::default(), arrived).t_s - arrived;
+            last_error = stamp(&mut clock, &Counters::default(), arrived).t_s - arrived;
             if i == 420 {
                 assert!(last_error.abs() < 1e-3, "{last_error}");
             }
@@ -330,9 +355,34 @@ mod tests {
     fn a_long_silence_without_any_counter_is_a_gap_of_unknown_size() {
         let mut clock = StreamClock::default();
         let missing: Vec<Option<u64>> = (0..300u32)
-            .map(|i| clock.stamp(&Counters::default(), 0.02 * f64::from(i) + if i < 150 { 0.0 } else { 2.0 }).missing)
+            .map(|i| 0.02 * f64::from(i) + if i < 150 { 0.0 } else { 2.0 })
+            .map(|arrived_s| stamp(&mut clock, &Counters::default(), arrived_s).missing)
             .collect();
         assert_eq!(missing.iter().filter(|m| m.is_none()).count(), 1);
         assert_eq!(missing[150], None);
+    }
+
+    #[test]
+    fn a_counter_that_lost_a_digit_costs_its_line_and_nothing_else() {
+        let mut clock = StreamClock::default();
+        let (mut refused, mut missing) = (Vec::new(), 0);
+        for i in 0..400u32 {
+            let (mut us, mut seq) = (1e6 + 20_000.0 * f64::from(i), f64::from(i));
+            match i {
+                100 => us /= 10.0,
+                200 => us *= 10.0,
+                250 => seq = 2.0,
+                300 => seq *= 10.0,
+                _ => {}
+            }
+            match clock.stamp(&at(us, seq), 0.02 * f64::from(i)) {
+                None => refused.push(i),
+                Some(stamp) => {
+                    assert!(!stamp.restarted && (stamp.t_s - 0.02 * f64::from(i)).abs() < 1e-3, "{i}: {stamp:?}");
+                    missing += stamp.missing.unwrap_or(99);
+                }
+            }
+        }
+        assert_eq!((refused, missing), (vec![100, 200, 250, 300], 4));
     }
 }

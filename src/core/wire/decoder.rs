@@ -94,6 +94,11 @@ impl Decoder {
         self.reader.board()
     }
 
+    /// True once the board has said what it is.
+    pub fn knows_board(&self) -> bool {
+        self.reader.hello.is_some()
+    }
+
     /// How its lines are read; none before two of them agree.
     pub fn detected(&self) -> Option<Detected> {
         let format = self.reader.shapes.format?;
@@ -254,14 +259,14 @@ impl Reader {
         if self.channels.len() != known {
             heard.push(Heard::Board(self.board()));
         }
-        if !whole {
+        let stamp = if whole { self.clock.stamp(&counters, line.arrived_s) } else { None };
+        let Some(stamp) = stamp else {
             self.unreadable += 1;
             return self.meter.bad_line(line.arrived_s);
-        }
-        let stamp = self.clock.stamp(&counters, line.arrived_s);
+        };
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
-        self.meter.reading(stamp.t_s, line.arrived_s, self.clock.source() == TimeSource::Arrival);
+        self.meter.reading(stamp.t_s, line.arrived_s, self.clock.source() != TimeSource::Device);
         let full_scale = self.hello.as_ref().map(|board| board.full_scale);
         self.rails.add(&counts, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;

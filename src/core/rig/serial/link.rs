@@ -12,7 +12,7 @@ use super::baud::Baud;
 use super::port_error::PortError;
 use super::ports::{PortInfo, choose, describe, list_ports};
 use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
-use super::reader::{PortReader, open_port};
+use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
 use crate::board::Board;
 use crate::wire::{Cadence, Captured, ConsoleLine, Decoder, Detected, Rail};
@@ -109,6 +109,8 @@ pub struct LinkStatus {
     pub looks_10_bit: bool,
     /// How often the connection was taken up again.
     pub reconnects: u32,
+    /// Time since the link was opened (s).
+    pub now_s: f64,
     /// Bytes, and readings, that this computer was too slow to take.
     pub dropped: [u64; 2],
 }
@@ -218,10 +220,7 @@ impl SerialLink {
         let shared = Shared::new(port.clone(), WhenFull::Drop);
         let baud = options.baud.unwrap_or(Baud::B115200);
         let opened = open_port(&port.path, baud)?;
-        // What was sent while nobody listened is old, and most likely cut.
-        if let Err(error) = opened.clear(serialport::ClearBuffer::Input) {
-            tracing::debug!("old bytes cannot be discarded: {error}");
-        }
+        discard_old(opened.as_ref(), port.kind);
         *lock(&shared.writer) = opened.try_clone().ok();
         let reader = PortReader::new(Arc::clone(&shared), port, baud, options);
         Self::start(&shared, move || reader.run(opened))
@@ -299,6 +298,7 @@ impl SerialLink {
             rails: decoder.rails(),
             looks_10_bit: decoder.looks_10_bit(),
             reconnects: shared.reconnects.load(Ordering::Relaxed),
+            now_s: self.now_s(),
             dropped: [shared.bytes.dropped_bytes(), shared.events.dropped_readings()],
         }
     }

@@ -4,11 +4,11 @@
 use super::baud::Baud;
 use super::link::{LinkOptions, LinkState, Shared};
 use super::port_error::PortError;
-use super::ports::{PortInfo, describe, find, list_ports};
+use super::ports::{BoardKind, PortInfo, describe, find, list_ports};
 use super::queue::lock;
 use super::scan::{Scan, scan};
 use crate::wire::Captured;
-use serialport::SerialPort;
+use serialport::{ClearBuffer, SerialPort};
 use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
@@ -17,6 +17,8 @@ use std::time::{Duration, Instant};
 
 /// How long a read waits: stopping takes no longer.
 const READ_PATIENCE: Duration = Duration::from_millis(50);
+/// What was sent before a reset has arrived within this time.
+const RESET: Duration = Duration::from_millis(250);
 /// A board boots within this time of being connected to.
 const BOOT: Duration = Duration::from_secs(4);
 /// A native port that is mute for this long is woken by DTR, once.
@@ -26,6 +28,8 @@ const ENOUGH_BYTES: u64 = 300;
 /// How long to listen before speeds are doubted, and between two scans.
 const DOUBT: Duration = Duration::from_millis(1500);
 const RESCAN: Duration = Duration::from_secs(10);
+/// With more printable bytes than this the speed is right: at half of it, about half of the bytes are.
+const TEXT: f64 = 0.9;
 /// Waits between attempts to find a board that is gone; the last goes on.
 const ATTEMPTS: [Duration; 3] = [Duration::from_millis(200), Duration::from_millis(500), Duration::from_secs(1)];
 /// After this many attempts it is looked for less often, at [`SELDOM`].
@@ -36,6 +40,17 @@ const SELDOM: Duration = Duration::from_secs(3);
 pub(super) fn open_port(path: &Path, baud: Baud) -> Result<Box<dyn SerialPort>, PortError> {
     let builder = serialport::new(path.to_string_lossy(), baud.rate()).timeout(READ_PATIENCE).dtr_on_open(true);
     builder.open().map_err(|error| PortError::of(path, &error, &list_ports()))
+}
+
+/// Discards what came before a port was opened: it is old, and most likely cut. A board that is reset by being connected
+/// to sends on for a moment.
+pub(super) fn discard_old(port: &dyn SerialPort, kind: BoardKind) {
+    if kind.rank > 0 && !kind.native {
+        std::thread::sleep(RESET);
+    }
+    if let Err(error) = port.clear(ClearBuffer::Input) {
+        tracing::debug!("old bytes cannot be discarded: {error}");
+    }
 }
 
 /// Reads one port, through losses.
@@ -56,6 +71,8 @@ struct Connection {
     readings_before: u64,
     newest: Instant,
     woken: bool,
+    /// The board was asked what it is.
+    asked: bool,
     scanned: Option<Instant>,
 }
 
@@ -94,8 +111,15 @@ impl PortReader {
         self.shared.baud.store(self.baud.rate(), Ordering::Relaxed);
         let now = Instant::now();
         let readings_before = self.shared.readings.load(Ordering::Relaxed);
-        let mut connection =
-            Connection { opened: now, bytes: 0, readings_before, newest: now, woken: false, scanned: None };
+        let mut connection = Connection {
+            opened: now,
+            bytes: 0,
+            readings_before,
+            newest: now,
+            woken: false,
+            asked: false,
+            scanned: None,
+        };
         let mut buffer = [0; 4096];
         while !self.shared.is_stopped() {
             match port.read(&mut buffer) {
@@ -132,9 +156,14 @@ impl PortReader {
             }
         } else if readings > connection.readings_before {
             self.shared.set_state(LinkState::Listening);
+            if !std::mem::replace(&mut connection.asked, true) {
+                self.ask(port);
+            }
         } else if connection.bytes >= ENOUGH_BYTES && connection.opened.elapsed() >= DOUBT {
             let due = connection.scanned.is_none_or(|scanned| scanned.elapsed() >= RESCAN);
-            if native || self.baud_is_given {
+            // Text that is no readings is not the fault of the speed.
+            let is_text = lock(&self.shared.decoder).cadence().printable_share > TEXT;
+            if native || self.baud_is_given || is_text {
                 self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() });
             } else if due {
                 self.try_speeds(port);
@@ -143,18 +172,30 @@ impl PortReader {
         }
     }
 
+    /// Asks a board that has not said what it is; our firmware answers with its hello line, other sketches mind nothing.
+    fn ask(&self, port: &mut dyn SerialPort) {
+        if !lock(&self.shared.decoder).knows_board()
+            && let Err(error) = port.write_all(b"?\n")
+        {
+            tracing::debug!("the board cannot be asked: {error}");
+        }
+    }
+
     fn try_speeds(&mut self, port: &mut dyn SerialPort) {
-        match scan(port, self.baud, &self.shared) {
-            Scan::Found(baud) if baud == self.baud => {}
+        let cause = match scan(port, self.baud, &self.shared.stop) {
             Scan::Found(baud) => {
                 self.baud = baud;
                 self.shared.baud.store(baud.rate(), Ordering::Relaxed);
-                let at_s = self.shared.began.elapsed().as_secs_f64();
-                let cause = format!("the speed was found to be {} baud", baud.rate());
-                self.shared.bytes.push(Captured::Interrupted { at_s, cause });
+                format!("the speed was found to be {} baud", baud.rate())
             }
-            Scan::Nothing => self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() }),
-        }
+            Scan::Nothing => {
+                self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() });
+                "other speeds were tried".to_owned()
+            }
+        };
+        // What came meanwhile was heard by the scan alone.
+        let at_s = self.shared.began.elapsed().as_secs_f64();
+        self.shared.bytes.push(Captured::Interrupted { at_s, cause });
     }
 
     fn silence(&self) -> String {

@@ -65,10 +65,6 @@ pub struct SerialRig {
 impl SerialRig {
     /// Waits for the first reading; the recording begins with it.
     pub fn begin(link: SerialLink, plan: SerialPlan, stop: Arc<AtomicBool>) -> Result<Self, RigError> {
-        // The board says what it is when it starts, and again when it is asked; one that does not listen minds nothing.
-        if let Err(error) = link.send("?") {
-            tracing::debug!("{error}");
-        }
         let start = Instant::now();
         let mut heard = VecDeque::new();
         let began_s = loop {

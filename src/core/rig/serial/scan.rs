@@ -1,10 +1,10 @@
 //! At which speed a board speaks: each is listened to for a moment and judged by what can be read.
 
 use super::baud::Baud;
-use super::link::Shared;
 use crate::wire::{Cadence, Decoder};
 use serialport::{ClearBuffer, SerialPort};
 use std::io::ErrorKind;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// How long each speed is listened to: five lines of a board that sends ten a second.
@@ -26,9 +26,9 @@ pub(super) enum Scan {
 }
 
 /// Tries the usual speeds in turn.
-pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, shared: &Shared) -> Scan {
+pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) -> Scan {
     for baud in Baud::SCANNED {
-        if shared.is_stopped() {
+        if stop.load(Ordering::Relaxed) {
             break;
         }
         // A speed that the port does not have is not the one.
@@ -63,4 +63,42 @@ fn listen(port: &mut dyn SerialPort) -> Cadence {
 
 fn is_understood(cadence: &Cadence) -> bool {
     cadence.samples >= READINGS && cadence.bad_share <= BAD_SHARE && cadence.printable_share >= PRINTABLE
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use serialport::TTYPort;
+    use std::io::Write;
+
+    /// A board that speaks at one speed: at any other its bytes arrive as nonsense. The end of a pseudo-terminal that a
+    /// board has knows the speed that is set at the other.
+    fn speak(board: &mut TTYPort, speed: u32, stop: &AtomicBool) {
+        let mut i = 0u32;
+        while !stop.load(Ordering::Relaxed) {
+            let line = format!("flexL:{},flexR:2\n", i % 4096);
+            let right = board.baud_rate().is_ok_and(|baud| baud == speed);
+            let bytes =
+                line.bytes().map(|byte| if right { byte } else { byte.rotate_left(3) | 0x80 }).collect::<Vec<u8>>();
+            let _unheard = board.write_all(&bytes);
+            i += 1;
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    #[test]
+    fn the_speed_of_a_board_is_found_by_what_can_be_read() {
+        let (mut board, mut port) = TTYPort::pair().expect("a pseudo-terminal");
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| speak(&mut board, 57_600, &stop));
+            let found = scan(&mut port, Baud::B115200, &stop);
+            stop.store(true, Ordering::Relaxed);
+            assert_eq!(found, Scan::Found(Baud::B57600));
+        });
+        assert_eq!(port.baud_rate().ok(), Some(57_600));
+        // Told to stop, it leaves the port as it was.
+        assert_eq!(scan(&mut port, Baud::B9600, &stop), Scan::Nothing);
+        assert_eq!(port.baud_rate().ok(), Some(9_600));
+    }
 }
