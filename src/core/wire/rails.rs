@@ -12,8 +12,9 @@ pub enum Rail {
 
 /// A channel is told once it has stood at an end for this long (s).
 const TOLD_AFTER_S: f64 = 0.5;
-/// Counts within this of an end are at it: the mean of several conversions may be a fraction short.
-const NEAR: f32 = 0.5;
+/// Counts within this of an end are at it: what is open picks up noise, and the mean of several conversions that are cut off
+/// at the end falls short of it.
+const NEAR: f32 = 3.0;
 /// Full scale of the Due as our firmware sets it up.
 const FULL_12_BIT: u32 = 4095;
 /// Full scale of `analogRead` when nobody asked for more.

@@ -43,6 +43,8 @@ const PATIENCE: Duration = Duration::from_millis(20);
 const FIRST_READING: Duration = Duration::from_secs(20);
 /// The same where its bytes cannot be understood, all speeds tried.
 const NONSENSE: Duration = Duration::from_secs(10);
+/// The trial begins this long after the first reading (s): until then it is not known how late the first ones arrived.
+const SETTLE_S: f64 = 0.5;
 /// A board that is silent at the end is not waited for longer than this (s).
 const LATE_S: f64 = 0.5;
 
@@ -63,16 +65,24 @@ pub struct SerialRig {
 }
 
 impl SerialRig {
-    /// Waits for the first reading; the recording begins with it.
+    /// Waits until the board speaks and the times of its readings have settled; the recording begins then.
     pub fn begin(link: SerialLink, plan: SerialPlan, stop: Arc<AtomicBool>) -> Result<Self, RigError> {
         let start = Instant::now();
         let mut heard = VecDeque::new();
+        let mut first_s = None;
         let began_s = loop {
             heard.extend(link.take(PATIENCE));
-            if let Some(t_s) = heard.iter().find_map(reading_time) {
-                break t_s;
+            let LinkStatus { state, port, baud, .. } = link.status();
+            first_s = first_s.or_else(|| heard.iter().find_map(reading_time));
+            if let Some(first_s) = first_s {
+                // Captured bytes keep the beginning that they were captured with.
+                if baud.is_some() {
+                    leave_out_before(&mut heard, first_s + SETTLE_S);
+                }
+                if let Some(t_s) = heard.iter().find_map(reading_time) {
+                    break t_s;
+                }
             }
-            let LinkStatus { state, port, .. } = link.status();
             let nonsense = matches!(state, LinkState::Unreadable { .. }) && start.elapsed() > NONSENSE;
             if nonsense || start.elapsed() > FIRST_READING || stop.load(Ordering::Relaxed) || link.is_over() {
                 let (path, why) = (port.path.display(), state.sentence());
@@ -147,6 +157,24 @@ impl SerialRig {
         let late = live && self.link.now_s() > self.end_s() + LATE_S;
         self.over || late || self.link.is_over() || self.stop.load(Ordering::Relaxed)
     }
+}
+
+/// Takes away readings from before a time, and what belongs to them; what is known of the board stays.
+fn leave_out_before(heard: &mut VecDeque<LinkEvent>, from_s: f64) {
+    let begins = heard.iter().position(|event| reading_time(event).is_some_and(|t_s| t_s >= from_s));
+    let Some(mut begins) = begins else {
+        heard.retain(|event| reading_time(event).is_none());
+        return;
+    };
+    // The bytes of the first reading stand before it.
+    if let Some(at) = heard.iter().take(begins).rposition(|event| matches!(event, LinkEvent::Captured(_))) {
+        begins = at;
+    }
+    let mut place = 0;
+    heard.retain(|event| {
+        place += 1;
+        place > begins || matches!(event, LinkEvent::Heard(Heard::Board(_)))
+    });
 }
 
 fn reading_time(event: &LinkEvent) -> Option<f64> {
