@@ -30,6 +30,7 @@ fn start(mut command: Command) -> Child {
 
 /// A board that sends a hundred lines a second until it is dropped, and remembers what it was told.
 struct Board {
+    link: PathBuf,
     stop: Arc<AtomicBool>,
     sent: Arc<AtomicU32>,
     thread: Option<JoinHandle<Vec<u8>>>,
@@ -67,11 +68,13 @@ impl Board {
             drop(port);
             told
         });
-        Self { stop, sent, thread: Some(thread) }
+        Self { link: link.to_owned(), stop, sent, thread: Some(thread) }
     }
 
     /// Unplugs it; what it was told, and how many lines it had sent.
     fn unplug(mut self) -> (String, u32) {
+        // Its number may be another's the moment it is free.
+        std::fs::remove_file(&self.link).unwrap();
         self.stop.store(true, Ordering::Relaxed);
         let told = self.thread.take().unwrap().join().unwrap();
         (String::from_utf8(told).unwrap(), self.sent.load(Ordering::Relaxed))

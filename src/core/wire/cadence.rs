@@ -1,5 +1,6 @@
 //! How well a stream keeps time: rate, jitter, losses, unreadable lines; over the last seconds, in bounded memory.
 
+use super::clock::Stamp;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -51,7 +52,6 @@ pub(super) struct Meter {
     lost: u64,
     bad_lines: u64,
     gaps: u64,
-    last: Option<(f64, f64)>,
     steps: VecDeque<Step>,
     bins: VecDeque<Bin>,
     troubled: bool,
@@ -59,9 +59,10 @@ pub(super) struct Meter {
 
 #[derive(Clone, Copy, Debug)]
 struct Step {
-    t_s: f64,
-    /// Time since the reading before (s); none after a gap.
+    /// Time since the reading before (s), where it is known.
     step_s: Option<f64>,
+    /// No reading is missing in between.
+    whole: bool,
     delay_s: f64,
 }
 
@@ -75,19 +76,14 @@ struct Bin {
 }
 
 impl Meter {
-    /// A reading taken at `t_s`, which arrived at `arrived_s` (s). `by_arrival` where the former was made from the latter.
-    pub(super) fn reading(&mut self, t_s: f64, arrived_s: f64, by_arrival: bool) {
+    /// A reading that arrived at `arrived_s` (s).
+    pub(super) fn reading(&mut self, stamp: &Stamp, arrived_s: f64) {
         self.samples += 1;
-        let (before, now) = if by_arrival {
-            (self.last.map(|(_, arrived)| arrived), arrived_s)
-        } else {
-            (self.last.map(|(t, _)| t), t_s)
-        };
         if self.steps.len() == STEPS {
             self.steps.pop_front();
         }
-        self.steps.push_back(Step { t_s, step_s: before.map(|before| now - before), delay_s: arrived_s - t_s });
-        self.last = Some((t_s, arrived_s));
+        let whole = stamp.missing == Some(0);
+        self.steps.push_back(Step { step_s: stamp.step_s, whole, delay_s: arrived_s - stamp.t_s });
         self.bin(arrived_s).good += 1;
     }
 
@@ -103,7 +99,6 @@ impl Meter {
     pub(super) fn gap(&mut self, lost: Option<u64>) {
         self.gaps += 1;
         self.lost = self.lost.saturating_add(lost.unwrap_or(0));
-        self.last = None;
     }
 
     pub(super) fn bytes(&mut self, bytes: &[u8], arrived_s: f64) {
@@ -167,14 +162,19 @@ impl Meter {
     }
 
     fn rate(&self) -> f64 {
-        let Some(newest) = self.steps.back() else { return 0.0 };
-        let recent = self.steps.iter().filter(|step| newest.t_s - step.t_s <= RATE_SPAN_S);
-        let (count, first) = recent.fold((0u32, newest.t_s), |(n, first), step| (n + 1, first.min(step.t_s)));
-        if count < 2 { 0.0 } else { f64::from(count - 1) / (newest.t_s - first) }
+        let (mut count, mut span) = (0u32, 0.0);
+        for step in self.steps.iter().rev().filter_map(|step| step.step_s) {
+            if span + step > RATE_SPAN_S {
+                break;
+            }
+            count += 1;
+            span += step;
+        }
+        if span > 0.0 { f64::from(count) / span } else { 0.0 }
     }
 
     fn jitter(&self) -> f64 {
-        let mut steps: Vec<f64> = self.steps.iter().filter_map(|step| step.step_s).collect();
+        let mut steps: Vec<f64> = self.steps.iter().filter(|step| step.whole).filter_map(|step| step.step_s).collect();
         steps.sort_by(f64::total_cmp);
         let Some(usual) = steps.get(steps.len() / 2).copied() else { return 0.0 };
         percentile_95(steps.iter().map(|step| (step - usual).abs()).collect())
@@ -191,13 +191,18 @@ fn percentile_95(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
+    fn stamp(t_s: f64, step_s: Option<f64>, missing: u64) -> Stamp {
+        Stamp { t_s, seq: None, restarted: false, missing: Some(missing), step_s }
+    }
+
     #[test]
     fn rate_and_jitter_of_a_known_stream() {
         let mut meter = Meter::default();
         for i in 0..2000u32 {
             // Every tenth reading is 3 ms late: two steps in ten are off by 3 ms.
-            let t = 0.02 * f64::from(i) + if i % 10 == 0 { 3e-3 } else { 0.0 };
-            meter.reading(t, t + 1e-3, false);
+            let t = |i: u32| 0.02 * f64::from(i) + if i % 10 == 0 { 3e-3 } else { 0.0 };
+            let step = (i > 0).then(|| t(i) - t(i - 1));
+            meter.reading(&stamp(t(i), step, 0), t(i) + 1e-3);
         }
         let cadence = meter.cadence(Some(2e-4));
         assert!((cadence.rate_hz - 50.0).abs() < 0.1, "{cadence:?}");
@@ -210,14 +215,16 @@ mod tests {
     fn a_gap_is_neither_jitter_nor_hidden() {
         let mut meter = Meter::default();
         for i in 0..100u32 {
-            let t = 0.02 * f64::from(i) + if i < 50 { 0.0 } else { 5.0 };
+            let t = 0.02 * f64::from(i) + if i < 50 { 0.0 } else { 1.0 };
+            let (step, missing) = if i == 50 { (1.02, 50) } else { (0.02, 0) };
             if i == 50 {
-                meter.gap(Some(250));
+                meter.gap(Some(missing));
             }
-            meter.reading(t, t, false);
+            meter.reading(&stamp(t, (i > 0).then_some(step), missing), t);
         }
         let cadence = meter.cadence(None);
-        assert!(cadence.jitter_p95_ms < 1e-6 && cadence.lost == 250 && cadence.gaps == 1, "{cadence:?}");
+        assert!(cadence.jitter_p95_ms < 1e-6 && cadence.lost == 50 && cadence.gaps == 1, "{cadence:?}");
+        assert!((cadence.rate_hz - 99.0 / 2.98).abs() < 1e-6, "{cadence:?}");
     }
 
     #[test]
@@ -233,7 +240,7 @@ mod tests {
                 if t >= bad_from && t < bad_to && i % 3 == 0 {
                     meter.bad_line(t);
                 } else {
-                    meter.reading(t, t, false);
+                    meter.reading(&stamp(t, Some(0.02), 0), t);
                 }
                 i += 1;
             }

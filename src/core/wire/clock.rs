@@ -41,6 +41,9 @@ pub(super) struct Stamp {
     pub(super) restarted: bool,
     /// How many readings are missing before this one; none where that cannot be known.
     pub(super) missing: Option<u64>,
+    /// Time since the reading before (s): by the board's clock, which what is learned of delays does not move, else by
+    /// arrival. None where the board began anew, or nobody knows what was lost.
+    pub(super) step_s: Option<f64>,
 }
 
 /// A mapped time that lies this far in the future shows that the board's clock began anew (s).
@@ -155,9 +158,13 @@ impl StreamClock {
                 TimeSource::Sequence | TimeSource::Arrival => self.line.gain().unwrap_or(arrived_s - last.arrived_s),
             });
         }
+        let step_s = self.last.filter(|_| missing.is_some()).map(|last| match source {
+            TimeSource::Device => (x - last.x) * self.line.gain().unwrap_or(1.0),
+            TimeSource::Sequence | TimeSource::Arrival => arrived_s - last.arrived_s,
+        });
         self.last = Some(Last { t_s, arrived_s, x });
         let seq = counters.seq.map(|_| self.sequence.running());
-        Some(Stamp { t_s, seq, restarted, missing })
+        Some(Stamp { t_s, seq, restarted, missing, step_s })
     }
 
     fn begin_anew(&mut self, source: TimeSource) {

@@ -266,7 +266,7 @@ impl Reader {
         };
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
-        self.meter.reading(stamp.t_s, line.arrived_s, self.clock.source() != TimeSource::Device);
+        self.meter.reading(&stamp, line.arrived_s);
         let full_scale = self.hello.as_ref().map(|board| board.full_scale);
         self.rails.add(&counts, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;
