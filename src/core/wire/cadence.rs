@@ -200,7 +200,7 @@ mod tests {
         let mut meter = Meter::default();
         for i in 0..2000u32 {
             // Every tenth reading is 3 ms late: two steps in ten are off by 3 ms.
-            let t = |i: u32| 0.02 * f64::from(i) + if i % 10 == 0 { 3e-3 } else { 0.0 };
+            let t = |i: u32| 0.02 * f64::from(i) + if i.is_multiple_of(10) { 3e-3 } else { 0.0 };
             let step = (i > 0).then(|| t(i) - t(i - 1));
             meter.reading(&stamp(t(i), step, 0), t(i) + 1e-3);
         }
