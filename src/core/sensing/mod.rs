@@ -3,6 +3,7 @@
 //! Nothing here is stored. A trial keeps joint angles and taxel forces, so that any layout can be derived later.
 
 mod curvature;
+pub mod electronics;
 mod layout;
 pub mod model;
 mod pressure;

@@ -1,32 +1,15 @@
-//! The flex strip that reads curvature: Spectra Symbol FS-L-0055-253-ST (paper, section IV-B).
-//!
-//! A strip of active length L on a finger of curvature kappa bends by theta = kappa L. Its resistance is linear in the
-//! angle (paper), R = R0 (1 + s theta), and is read in a divider with R_f to the supply: share = R / (R + R_f).
+//! The flex strip that reads curvature: Spectra Symbol FS-L-0055-253-ST (paper, section IV-B), see
+//! [`crate::sensing::electronics`].
 //!
 //! Calibration in two points: flat, where R0 of each part is measured, for it is off by up to 30 %; and 90 degrees,
 //! where the nominal rise is believed. What a part rises more or less stays as an error of gain.
 
-use super::converter::Converter;
+use super::input::Input;
 use super::physical_like::PhysicalLike;
 use super::sampling::SAMPLE_HZ;
 use super::streams::Streams;
-use std::f64::consts::{FRAC_PI_2, PI};
-
-/// Active length, L (m): code 0055 of the order number.
-const ACTIVE_LENGTH: f64 = 0.055_37;
-
-/// Resistance of a flat strip, R0 (ohm): code 253.
-const FLAT_OHM: f64 = 25e3;
-
-/// How far a part's flat resistance is from nominal, at most, as a share of it (data sheet).
-const FLAT_TOLERANCE: f64 = 0.30;
-
-/// Resistance at 90 degrees over flat, from part to part: 2 (25 to 50 kOhm, amperka) to 2.5 (30 to 70 kOhm, SparkFun,
-/// is 2.3). The nominal part is in the middle.
-const BENT_OVER_FLAT: [f64; 2] = [2.0, 2.5];
-
-/// The other resistor of the divider, R_f (ohm): near the root of flat times bent resistance, for the widest span.
-const DIVIDER_OHM: f64 = 47e3;
+use crate::sensing::electronics::{Divider, FlexStrip, StripPart};
+use std::f64::consts::PI;
 
 /// Share of the bend that reaches the strip, left and right. In recordings of the real gripper the left curvature
 /// reads up to 47 degrees and the right up to 32 where both fingers bend alike. An empty grasp reads 43 to 44 degrees
@@ -40,97 +23,58 @@ const SLIP: f64 = 0.005;
 /// Deviation of the rest angle from grasp to grasp (rad): 0.3 degrees, assumed for the same reason.
 const REST_DRIFT: f64 = 0.3 * PI / 180.0;
 
-/// Share of the bend that follows late, in the substrate's viscoelasticity. Assumed: a few per cent.
-const CREEPING: f64 = 0.04;
-
-/// Time constant of what follows late (s). Assumed: lasting about as long as a step of the closing.
-const CREEP_S: f64 = 0.4;
-
-/// Relative rise of resistance per angle, s (1/rad), of a part with a given resistance at 90 degrees over flat.
-fn rise(bent_over_flat: f64) -> f64 {
-    (bent_over_flat - 1.0) / FRAC_PI_2
-}
-
-/// The rise that the calibration believes in (1/rad).
-fn nominal_rise() -> f64 {
-    rise(0.5 * (BENT_OVER_FLAT[0] + BENT_OVER_FLAT[1]))
-}
-
-/// One strip on its finger during one grasp.
+/// One strip on its finger during one grasp, and its calibration.
 #[derive(Clone, Debug)]
-pub(super) struct FlexStrip {
-    reaching: f64,
-    flat_ohm: f64,
-    rise: f64,
-    rest_drift: f64,
-    one_way: bool,
-    folds: bool,
-    creeps: bool,
-    /// What follows late has come so far (rad); `None` before the first sample.
-    late: Option<f64>,
-    converter: Converter,
+pub(super) struct ReadStrip {
+    strip: FlexStrip,
+    divider: Divider,
+    input: Input,
 }
 
-impl FlexStrip {
+impl ReadStrip {
     /// The strip of a channel.
     pub(super) fn new(settings: &PhysicalLike, side: usize, streams: Streams<'_>) -> Self {
         let mounting = if settings.asymmetry { REACHING[side] } else { 1.0 };
         let slip = if settings.slip { 1.0 + SLIP * streams.of_trial("slip").normal() } else { 1.0 };
-        let [least, most] = BENT_OVER_FLAT;
-        let (flat_ohm, rise) = if settings.parts {
-            let off = streams.of_gripper("flat").within(-FLAT_TOLERANCE, FLAT_TOLERANCE);
-            (FLAT_OHM * (1.0 + off), rise(streams.of_gripper("bent").within(least, most)))
+        let [least, most] = StripPart::BENT_OVER_FLAT;
+        let (flat_ohm, rise_per_rad) = if settings.parts {
+            let off = streams.of_gripper("flat").within(-StripPart::FLAT_TOLERANCE, StripPart::FLAT_TOLERANCE);
+            let bent_over_flat = streams.of_gripper("bent").within(least, most);
+            (StripPart::NOMINAL_OHM * (1.0 + off), StripPart::rise(bent_over_flat))
         } else {
-            (FLAT_OHM, nominal_rise())
+            (StripPart::NOMINAL_OHM, StripPart::nominal_rise())
         };
-        Self {
-            reaching: mounting * slip,
-            flat_ohm,
-            rise,
-            rest_drift: if settings.drift { REST_DRIFT * streams.of_trial("drift").normal() } else { 0.0 },
-            one_way: settings.threshold,
-            folds: settings.saturation,
-            creeps: settings.hysteresis,
-            late: None,
-            converter: Converter::new(settings, streams),
-        }
+        let rest_drift = if settings.drift { REST_DRIFT * streams.of_trial("drift").normal() } else { 0.0 };
+        let rest = rest_drift * StripPart::nominal_rise();
+        let part = StripPart { flat_ohm, rise_per_rad, reaching: mounting * slip, rest };
+        let mut strip = FlexStrip::new(part, SAMPLE_HZ);
+        strip.one_way = settings.threshold;
+        strip.folds = settings.saturation;
+        strip.creeps = settings.hysteresis;
+        Self { strip, divider: Divider::of_strip(StripPart::DIVIDER_OHM), input: Input::new(settings, streams) }
     }
 
     /// The curvature (1/m) that is reported of a true one at the next sample.
     pub(super) fn read(&mut self, kappa: f64) -> f64 {
-        let bend = self.creep(kappa * ACTIVE_LENGTH * self.reaching);
-        // Bent backwards the ink is not stretched; folded back on itself it cannot be bent further.
-        let bend = if self.one_way { bend.max(0.0) } else { bend };
-        let bend = if self.folds { bend.min(PI) } else { bend };
-        let relative = self.convert(1.0 + bend * self.rise + self.rest_drift * nominal_rise());
-        (relative - 1.0) / (nominal_rise() * ACTIVE_LENGTH)
-    }
-
-    /// The angle that shows of a bend (rad): most at once, the rest late, as in a standard linear solid.
-    fn creep(&mut self, bend: f64) -> f64 {
-        if !self.creeps {
-            return bend;
-        }
-        let late = self.late.unwrap_or(bend);
-        let late = late + (bend - late) * -(-1.0 / (SAMPLE_HZ * CREEP_S)).exp_m1();
-        self.late = Some(late);
-        bend + CREEPING * (late - bend)
+        let relative = self.strip.relative(kappa);
+        let relative = self.convert(relative);
+        (relative - 1.0) / (StripPart::nominal_rise() * StripPart::ACTIVE_LENGTH)
     }
 
     /// A resistance through divider and converter and back, both relative to flat.
     fn convert(&mut self, relative: f64) -> f64 {
-        if self.converter.is_perfect() {
+        if self.input.is_perfect() {
             return relative;
         }
-        let ohm = self.flat_ohm * relative.max(0.0);
-        let share = self.converter.read(ohm / (ohm + DIVIDER_OHM));
-        DIVIDER_OHM * share / (1.0 - share) / self.flat_ohm
+        let flat_ohm = self.strip.part.flat_ohm;
+        let share = self.input.read(self.divider.share_of_ohm(flat_ohm * relative.max(0.0)));
+        self.divider.ohm(share) / flat_ohm
     }
 
     /// What the calibration makes of this part's rise: 1 is right.
     #[cfg(test)]
     pub(super) fn gain(&self) -> f64 {
-        self.reaching * self.rise / nominal_rise()
+        self.strip.part.reaching * self.strip.part.rise_per_rad / StripPart::nominal_rise()
     }
 }
 
@@ -139,8 +83,8 @@ mod tests {
     use super::super::physical_like::GRIPPER;
     use super::*;
 
-    fn strip(settings: &PhysicalLike) -> FlexStrip {
-        FlexStrip::new(settings, 0, Streams { gripper: 1, trial: 1, channel: "curvature_left" })
+    fn strip(settings: &PhysicalLike) -> ReadStrip {
+        ReadStrip::new(settings, 0, Streams { gripper: 1, trial: 1, channel: "curvature_left" })
     }
 
     #[test]
@@ -181,7 +125,7 @@ mod tests {
         let gain = |gripper, side: usize| {
             let settings = PhysicalLike { asymmetry: true, parts: true, ..PhysicalLike::OFF };
             let channel = ["curvature_left", "curvature_right"][side];
-            FlexStrip::new(&settings, side, Streams { gripper, trial: 0, channel }).gain()
+            ReadStrip::new(&settings, side, Streams { gripper, trial: 0, channel }).gain()
         };
         let right = |g: &u64| (0..2).all(|side| (gain(*g, side) / REACHING[side] - 1.0).abs() < 0.02);
         assert_eq!((0..).find(right), Some(GRIPPER));

@@ -1,8 +1,7 @@
 //! The force-sensing pad that reads force or pressure: Ohmite FSR07CE (paper, section IV-B).
 //!
-//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b, until it saturates.
-//! It is read in a divider with R_m to ground, share = G R_m / (1 + G R_m), amplified so that the converter meets its
-//! rail where the pad saturates. Loads are counted here as shares u of the load that saturates the nominal pad:
+//! Its law stands in [`crate::sensing::electronics`]; here it saturates at last, and the divider is amplified so that the
+//! converter meets its rail where the pad saturates. Loads are counted here as shares u of the load that saturates the nominal pad:
 //! G = G_full u^b.
 //!
 //! Recordings of the real gripper know three levels: idle, touched, and saturated soon after the touch. No circuit or
@@ -10,17 +9,17 @@
 //! [`PhysicalLike::full_pressure`]. Pads of this kind saturate by pressure, small contacts first (Interlink's guide).
 //! The calibration knows the nominal a and b: two points of a straight line in logarithms.
 
-use super::converter::Converter;
+use super::input::Input;
 use super::physical_like::PhysicalLike;
 use super::sampling::SAMPLE_HZ;
 use super::streams::Streams;
+use crate::sensing::electronics::{Divider, ForcePad, PadPart};
 
-/// Least force that a pad feels, left and right (N). Data sheet: less than 15 g, 0.15 N, actuates. The right is assumed
-/// a third duller.
-const LEAST_FORCE: [f64; 2] = [0.15, 0.20];
+/// Least force that a pad feels, left and right (N). The right is assumed a third duller.
+const LEAST_FORCE: [f64; 2] = [PadPart::LEAST_FORCE, 0.20];
 
-/// Least pressure that a pad feels, left and right (Pa): 15 g on the 170 mm² of the pad are 0.9 kPa.
-const LEAST_PRESSURE: [f64; 2] = [0.9e3, 1.2e3];
+/// Least pressure that a pad feels, left and right (Pa).
+const LEAST_PRESSURE: [f64; 2] = [PadPart::LEAST_PRESSURE, 1.2e3];
 
 /// From the least load that a pad feels to the one that saturates it, in the unit of its channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,118 +43,63 @@ impl PadRange {
 /// Share of the load that reaches the pad, left and right. Assumed: the right pad is mounted as poorly as its strip.
 const REACHING: [f64; 2] = [1.0, 0.7];
 
-/// Conductance at the load that saturates, G_full (S): 6 kOhm at 1 N (Interlink 402, the table of Adafruit; there is
-/// none for the FSR07).
-const FULL_SIEMENS: f64 = 1.0 / 6e3;
-
-/// Exponent b from part to part: 0.8 to 1 (the same table; Interlink's guide). The nominal part is in the middle.
-const EXPONENT: [f64; 2] = [0.8, 1.0];
-
-/// How far a part's conductance is from nominal, at most, as a share of it (data sheet, parts of one batch).
-const GAIN_TOLERANCE: f64 = 0.04;
-
 /// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
 const SLIP: f64 = 0.02;
 
-/// How much more an unloading pad reads than a loading one, as a share of the load (data sheet).
-const HYSTERESIS: f64 = 0.05;
-
-/// Growth of the conductance for every tenfold time under load (data sheet, 1 % per log time).
-const DRIFT_PER_DECADE: f64 = 0.01;
-
-/// Time under load at which that growth sets in (s). Assumed; a data sheet counts from hours.
-const DRIFT_FROM_S: f64 = 0.1;
-
-/// Resistor of the divider, R_m (ohm): the value recommended for the lowest tenth of the pad's range.
-const DIVIDER_OHM: f64 = 4.7e3;
+/// The divider's resistor over the pad's at the load that saturates, G_full R_m. That load is assumed to make of the pad
+/// what 1 N makes of a common one.
+const FULL_RATIO: f64 = PadPart::DIVIDER_OHM * PadPart::NOMINAL_SIEMENS;
 
 /// Voltage over R_m at the load that saturates, as a share of the supply.
-const FULL_SHARE: f64 = DIVIDER_OHM * FULL_SIEMENS / (1.0 + DIVIDER_OHM * FULL_SIEMENS);
+const FULL_SHARE: f64 = FULL_RATIO / (1.0 + FULL_RATIO);
 
-/// The exponent that the calibration believes in.
-const NOMINAL_EXPONENT: f64 = 0.5 * (EXPONENT[0] + EXPONENT[1]);
-
-/// One pad on its finger during one grasp.
+/// One pad on its finger during one grasp, and its calibration.
 #[derive(Clone, Debug)]
-pub(super) struct ForcePad {
-    full: f64,
-    threshold: Option<f64>,
-    reaching: f64,
-    /// Conductance over nominal.
-    gain: f64,
-    exponent: f64,
-    hysteretic: bool,
-    drifts: bool,
-    saturates: bool,
-    /// The load that shows, with hysteresis.
-    shown: f64,
-    /// How long it has conducted (s).
-    loaded_s: f64,
-    converter: Converter,
+pub(super) struct ReadPad {
+    pad: ForcePad,
+    /// Counts conductances in the one at saturation.
+    divider: Divider,
+    input: Input,
 }
 
-impl ForcePad {
+impl ReadPad {
     /// The pad of a channel.
     pub(super) fn new(settings: &PhysicalLike, range: PadRange, side: usize, streams: Streams<'_>) -> Self {
         let mounted = if settings.asymmetry { side } else { 0 };
         let slip = if settings.slip { 1.0 + SLIP * streams.of_trial("slip").normal() } else { 1.0 };
-        let (part, exponent) = if settings.parts {
-            let off = streams.of_gripper("gain").within(-GAIN_TOLERANCE, GAIN_TOLERANCE);
-            (1.0 + off, streams.of_gripper("exponent").within(EXPONENT[0], EXPONENT[1]))
+        let (gain, exponent) = if settings.parts {
+            let off = streams.of_gripper("gain").within(-PadPart::GAIN_TOLERANCE, PadPart::GAIN_TOLERANCE);
+            (1.0 + off, streams.of_gripper("exponent").within(PadPart::EXPONENT[0], PadPart::EXPONENT[1]))
         } else {
-            (1.0, NOMINAL_EXPONENT)
+            (1.0, PadPart::NOMINAL_EXPONENT)
         };
-        Self {
+        let part = PadPart {
             full: range.full,
+            gain: gain * slip,
+            exponent,
             threshold: settings.threshold.then_some(range.least[mounted]),
             reaching: REACHING[mounted],
-            gain: part * slip,
-            exponent,
-            hysteretic: settings.hysteresis,
-            drifts: settings.drift,
-            saturates: settings.saturation,
-            shown: 0.0,
-            loaded_s: 0.0,
-            converter: Converter::new(settings, streams),
-        }
+        };
+        let mut pad = ForcePad::new(part, SAMPLE_HZ);
+        pad.hysteretic = settings.hysteresis;
+        pad.drifts = settings.drift;
+        pad.ceiling = settings.saturation.then_some(1.0);
+        let gain = if settings.saturation { 1.0 / FULL_SHARE } else { 1.0 };
+        Self { pad, divider: Divider { gain, ..Divider::of_pad(FULL_RATIO) }, input: Input::new(settings, streams) }
     }
 
     /// The load that is reported of a true one at the next sample, in the channel's unit. A pull counts as no load.
     pub(super) fn read(&mut self, load: f64) -> f64 {
-        let load = self.hysteresis(load.max(0.0));
-        let conductance = self.conductance(load);
-        self.full * self.convert(conductance).powf(1.0 / NOMINAL_EXPONENT)
-    }
-
-    /// The load that shows: rising with it, but falling only once it has fallen by the hysteresis.
-    fn hysteresis(&mut self, load: f64) -> f64 {
-        let most = if self.hysteretic { (1.0 + HYSTERESIS) * load } else { load };
-        self.shown = self.shown.clamp(load, most);
-        self.shown
-    }
-
-    /// Conductance under a load, as a share of the nominal one at saturation.
-    fn conductance(&mut self, load: f64) -> f64 {
-        if load <= 0.0 || self.threshold.is_some_and(|least| load < least) {
-            self.loaded_s = 0.0;
-            return 0.0;
-        }
-        let decades = if self.drifts { (1.0 + self.loaded_s / DRIFT_FROM_S).log10() } else { 0.0 };
-        self.loaded_s += 1.0 / SAMPLE_HZ;
-        let law = (load * self.reaching / self.full).powf(self.exponent);
-        let conductance = self.gain * (1.0 + DRIFT_PER_DECADE * decades) * law;
-        if self.saturates { conductance.min(1.0) } else { conductance }
+        let conductance = self.pad.conductance(load);
+        self.pad.part.full * self.convert(conductance).powf(1.0 / PadPart::NOMINAL_EXPONENT)
     }
 
     /// A conductance through divider, amplifier and converter and back, both as shares of the one at saturation.
     fn convert(&mut self, conductance: f64) -> f64 {
-        if self.converter.is_perfect() {
+        if self.input.is_perfect() {
             return conductance;
         }
-        let amplified = if self.saturates { 1.0 / FULL_SHARE } else { 1.0 };
-        let ratio = DIVIDER_OHM * FULL_SIEMENS * conductance;
-        let share = self.converter.read(amplified * ratio / (1.0 + ratio)) / amplified;
-        share / (1.0 - share) / (DIVIDER_OHM * FULL_SIEMENS)
+        self.divider.siemens(self.input.read(self.divider.share_of_siemens(conductance)))
     }
 }
 
@@ -167,8 +111,8 @@ mod tests {
         [PadRange::force(&PhysicalLike::OFF), PadRange::pressure(&PhysicalLike::OFF)]
     }
 
-    fn pad(settings: &PhysicalLike, range: PadRange, side: usize) -> ForcePad {
-        ForcePad::new(settings, range, side, Streams { gripper: 1, trial: 1, channel: "force_left" })
+    fn pad(settings: &PhysicalLike, range: PadRange, side: usize) -> ReadPad {
+        ReadPad::new(settings, range, side, Streams { gripper: 1, trial: 1, channel: "force_left" })
     }
 
     #[test]
@@ -217,7 +161,7 @@ mod tests {
         let held: Vec<f64> = (0..=45).map(|_| pad.read(0.5)).collect();
         assert!((held[0] - 0.5).abs() < 1e-12);
         // 45 samples are 0.9 s: 1 + 0.9 / 0.1 is one decade.
-        let grown = 1.01_f64.powf(1.0 / NOMINAL_EXPONENT);
+        let grown = 1.01_f64.powf(1.0 / PadPart::NOMINAL_EXPONENT);
         assert!((held[45] / 0.5 - grown).abs() < 1e-9);
         pad.read(0.0);
         assert!((pad.read(0.5) - 0.5).abs() < 1e-12);

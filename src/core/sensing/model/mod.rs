@@ -24,9 +24,9 @@
 //! A number without a source is marked as assumed. They were settled from data sheets and from what is known of the
 //! real recordings, before any recogniser saw the result.
 
-mod converter;
 mod flex;
 mod force_pad;
+mod input;
 mod physical_like;
 mod sampling;
 mod stepping;

@@ -1,7 +1,7 @@
 //! Sensors such as a real gripper has, each of their faults a switch.
 
-use super::flex::FlexStrip;
-use super::force_pad::{ForcePad, PadRange};
+use super::flex::ReadStrip;
+use super::force_pad::{PadRange, ReadPad};
 use super::sampling::{Trace, instants};
 use super::stepping::stepped;
 use super::streams::Streams;
@@ -108,8 +108,8 @@ impl PhysicalLike {
 
 /// A sensor of either kind, or none.
 enum Sensor {
-    Strip(FlexStrip),
-    Pad(ForcePad),
+    Strip(ReadStrip),
+    Pad(ReadPad),
     None,
 }
 
@@ -120,9 +120,9 @@ impl Sensor {
         let quantity = words.next();
         let side = usize::from(words.next() == Some("right"));
         match quantity {
-            Some("curvature") => Self::Strip(FlexStrip::new(settings, side, streams)),
-            Some("force") => Self::Pad(ForcePad::new(settings, PadRange::force(settings), side, streams)),
-            Some("pressure") => Self::Pad(ForcePad::new(settings, PadRange::pressure(settings), side, streams)),
+            Some("curvature") => Self::Strip(ReadStrip::new(settings, side, streams)),
+            Some("force") => Self::Pad(ReadPad::new(settings, PadRange::force(settings), side, streams)),
+            Some("pressure") => Self::Pad(ReadPad::new(settings, PadRange::pressure(settings), side, streams)),
             _ => Self::None,
         }
     }

@@ -1,0 +1,21 @@
+//! The electronics of a sensorised gripper (paper, section IV-B): a part whose resistance follows what it feels, a
+//! divider that makes a voltage of it, a converter that makes counts.
+//!
+//! | step | flex strip | force pad |
+//! |---|---|---|
+//! | part | R = R0 (1 + s theta) | G = a F^b from a threshold on |
+//! | divider | R_f to the supply, strip to ground | pad to the supply, R_m to ground |
+//! | converter | count c of 2^bits stands for the share c / 2^bits of the supply | the same |
+//!
+//! Both who pretend to have such a gripper use it: the sensor model of simulated trials ([`super::model`]), and the
+//! pretended board that prints counts. Whatever is tuned or drawn at random stands with them; here is only the law.
+
+mod converter;
+mod divider;
+mod flex_strip;
+mod force_pad;
+
+pub use converter::Converter;
+pub use divider::{Divider, Wiring};
+pub use flex_strip::{FlexStrip, StripPart};
+pub use force_pad::{ForcePad, PadPart};
