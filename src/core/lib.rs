@@ -27,9 +27,10 @@
 //! | 8 | [`recording`] | the SQLite store, CSV in and out |
 //! | 9 | [`recognition`] | PMFs, the macro-layer on a kernel of our own, DS-LSTM and iDS-LSTM, rivals, metrics, models on disk |
 //! | 10 | [`grasping`] | one grasp on any rig, random poses, data sets, grasp after grasp until it is clear what is held |
-//! | 11 | [`study`] | measurements and comparisons as functions |
-//! | 12 | [`picture`] | scene and frame to [`drawing::DrawList`] |
-//! | 13 | [`workers`] | named threads: commands in, snapshots and rows out |
+//! | 11 | [`pretended`] | a gripper that is not there: its firmware, its hidden parts, its pseudo-terminal, its faults |
+//! | 12 | [`study`] | measurements and comparisons as functions |
+//! | 13 | [`picture`] | scene and frame to [`drawing::DrawList`] |
+//! | 14 | [`workers`] | named threads: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
 //!
@@ -61,6 +62,7 @@ pub mod objects;
 pub mod palette;
 pub mod physics;
 pub mod picture;
+pub mod pretended;
 pub mod recognition;
 pub mod recording;
 pub mod rig;

@@ -16,6 +16,7 @@ const LAYERS: &[&[&str]] = &[
     &["recording"],
     &["recognition"],
     &["grasping"],
+    &["pretended"],
     &["study"],
     &["picture"],
     &["workers"],
@@ -36,6 +37,7 @@ const TEST_FILES: &[&str] = &[
     "wire/decoder_tests.rs",
     "recording/board_tests.rs",
     "rig/serial/link_tests.rs",
+    "pretended/tests.rs",
 ];
 
 /// Where each third-party crate may be named.

@@ -4,6 +4,7 @@
 //! - `physics`: whole grasps of every object; no allocation in a step.
 //! - `determinism`: the same seed gives the same bytes.
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
+//! - `firmware`: the logic of the board, compiled and run against a stand-in for its pins.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
@@ -25,6 +26,7 @@ mod command_line;
 mod cpu_renderer;
 mod determinism;
 mod files;
+mod firmware;
 mod fuzz;
 mod golden;
 mod learning;

@@ -36,6 +36,7 @@ mod tests;
 
 pub use physical_like::{GRIPPER, PhysicalLike};
 pub use sampling::SAMPLE_HZ;
+pub use streams::Stream;
 
 use super::Signals;
 use serde::{Deserialize, Serialize};

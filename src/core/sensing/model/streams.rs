@@ -29,23 +29,23 @@ impl Streams<'_> {
 
 /// An endless row of random numbers.
 #[derive(Clone, Debug)]
-pub(super) struct Stream(ChaCha8Rng);
+pub struct Stream(ChaCha8Rng);
 
 impl Stream {
     /// The stream that a seed, a channel and an effect name.
-    pub(super) fn new(seed: u64, channel: &str, effect: &str) -> Self {
+    pub fn new(seed: u64, channel: &str, effect: &str) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(fnv1a([channel, "/", effect]));
         Self(random)
     }
 
     /// A number from `low` to `high`, all equally likely.
-    pub(super) fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
     /// A number of the normal distribution with mean 0 and deviation 1 (Box and Muller 1958).
-    pub(super) fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         // From (0, 1], so that the logarithm is finite.
         let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.0.random::<f64>()).cos()

@@ -1,0 +1,49 @@
+/* Palpate's firmware for an Arduino Due: two flex strips, two force pads, and, where it takes one, the line pressure of the
+ * control box. Wiring: README.md. What it does: gripper_logic.h; here are only the pins. */
+
+#include "gripper_logic.h"
+
+/* SerialUSB is the native port (USB 2341:003e), which does not reset the board when it is opened. Serial is the
+ * programming port (2341:003d) at 115200 baud. */
+#define HOST SerialUSB
+
+/* Highest line pressure that is ever put out, in steps of 0.05 bar: 20 is 1.0 bar. 0 when no control box is wired; the
+ * board then refuses to be told a pressure. Never above what the fingers bear: 30 is 1.5 bar. */
+#define MOST_STEPS 0
+
+/* Analogue output to the control box, 0.55 V to 2.75 V over 0 to 1.5 bar. DAC0 cannot reach 0 V: the box must take
+ * 0.55 V as no pressure. With a box that takes 0 to 10 V, amplify and shift by an op-amp. */
+#define PRESSURE_PIN DAC0
+#define STEPS_AT_FULL_SCALE 30
+
+static const uint8_t pins_read[] = {A0, A1, A2, A3};
+static const char *const names[] = {"flexL", "flexR", "fsrL", "fsrR"};
+static const uint32_t divider_ohm[] = {47000, 47000, 4700, 4700};
+
+static uint16_t convert(uint8_t channel) { return (uint16_t)analogRead(pins_read[channel]); }
+
+static void put_pressure(uint8_t steps) {
+#if MOST_STEPS > 0
+  analogWrite(PRESSURE_PIN, (uint32_t)steps * 4095 / STEPS_AT_FULL_SCALE);
+#else
+  (void)steps;
+#endif
+}
+
+static void print(const char *text, size_t length) { HOST.write((const uint8_t *)text, length); }
+
+static const GripperPins pins = {convert, put_pressure, print};
+static const GripperSetup gripper = {20000, 4, names, divider_ohm, 12, MOST_STEPS};
+static GripperState state;
+
+void setup() {
+  HOST.begin(115200); /* the native port ignores the rate */
+  analogReadResolution(12);
+  analogWriteResolution(12);
+  gripper_begin(&state, &gripper, &pins, micros());
+}
+
+void loop() {
+  while (HOST.available()) gripper_hear(&state, &gripper, &pins, (char)HOST.read(), micros());
+  gripper_poll(&state, &gripper, &pins, micros());
+}

@@ -1,0 +1,283 @@
+/* What the board of the gripper does, in plain C: no Arduino in it, so that a test can compile it against a stand-in for
+ * the pins (tests/suite/firmware.rs). due_gripper.ino gives it the real ones.
+ *
+ * Every period it reads each channel: one conversion thrown away, for the multiplexer to settle behind a high-impedance
+ * divider, then eight that are averaged. It prints
+ *
+ *     t_us:20000,seq:1,flexL:512.1,flexR:498.0,fsrL:30.4,fsrR:28.0,p_bar:0.55
+ *
+ * It obeys lines from the host:
+ *
+ *     P 0.55   line pressure, bar, in steps of 0.05      ->  # ok p=0.55
+ *     V        vent                                      ->  # ok p=0.00
+ *     K        still here; at least every 500 ms         ->  # ok p=0.55
+ *     ?        who are you                               ->  # tactile-gripper fw=1 ...
+ *
+ * and answers anything else with "# refused reason=...". Pressure that is on goes off when no line that it understood
+ * came for a second: "# vent reason=watchdog".
+ *
+ * Time is the 32 bits of micros(), which wrap after 71.6 minutes: times are compared by their difference only.
+ */
+#ifndef GRIPPER_LOGIC_H
+#define GRIPPER_LOGIC_H
+
+#include <stdint.h>
+#include <stddef.h>
+
+#define GRIPPER_FIRMWARE 1
+#define GRIPPER_MOST_CHANNELS 8
+#define GRIPPER_OVERSAMPLE 8         /* conversions that are averaged */
+#define GRIPPER_WATCHDOG_US 1000000u /* pressure goes off after this long without a line */
+#define GRIPPER_LONGEST_HEARD 32     /* bytes of a host's line */
+#define GRIPPER_STEP_CENTIBAR 5      /* the control box knows multiples of 0.05 bar */
+
+/* What the logic needs from the board it runs on. */
+typedef struct {
+  uint16_t (*convert)(uint8_t channel);            /* one conversion of a channel: counts */
+  void (*put_pressure)(uint8_t steps);             /* to the control box, in steps of 0.05 bar */
+  void (*print)(const char *text, size_t length);  /* to the host */
+} GripperPins;
+
+/* How this board is wired and set. */
+typedef struct {
+  uint32_t period_us;             /* from sample to sample: 20000 is 50 Hz */
+  uint8_t channels;               /* how many are read */
+  const char *const *names;       /* what they are called, in order */
+  const uint32_t *divider_ohm;    /* fixed resistor of each */
+  uint8_t bits;                   /* of the converter */
+  uint8_t most_steps;             /* highest pressure, in steps of 0.05 bar; 0: no control box is wired */
+} GripperSetup;
+
+typedef struct {
+  uint32_t next_us;   /* when the next sample is due */
+  uint32_t heard_us;  /* when the last line came that was understood */
+  uint32_t seq;       /* number of the next sample */
+  uint8_t steps;      /* pressure that is on */
+  uint8_t heard;      /* bytes of the host's line so far */
+  uint8_t overlong;   /* the line is too long: wait for its end */
+  char line[GRIPPER_LONGEST_HEARD];
+} GripperState;
+
+/* A line for the host that is being written; what does not fit is left out, but never its end. */
+typedef struct {
+  char text[192];
+  size_t length;
+} GripperText;
+
+static void gripper_put(GripperText *out, const char *text) {
+  while (*text && out->length + 1 < sizeof out->text) out->text[out->length++] = *text++;
+}
+
+static void gripper_put_number(GripperText *out, uint32_t number) {
+  char digits[11];
+  uint8_t at = sizeof digits - 1;
+  digits[at] = 0;
+  do {
+    digits[--at] = (char)('0' + number % 10);
+    number /= 10;
+  } while (number);
+  gripper_put(out, digits + at);
+}
+
+/* 0.05 bar a step, with two decimals. */
+static void gripper_put_bar(GripperText *out, uint8_t steps) {
+  uint32_t centibar = (uint32_t)steps * GRIPPER_STEP_CENTIBAR;
+  char decimals[4] = {'.', (char)('0' + centibar / 10 % 10), (char)('0' + centibar % 10), 0};
+  gripper_put_number(out, centibar / 100);
+  gripper_put(out, decimals);
+}
+
+static void gripper_send(const GripperPins *pins, GripperText *out) {
+  out->text[out->length++] = '\n';
+  pins->print(out->text, out->length);
+}
+
+static void gripper_say(const GripperPins *pins, const char *text) {
+  GripperText out = {{0}, 0};
+  gripper_put(&out, text);
+  gripper_send(pins, &out);
+}
+
+static void gripper_say_ok(const GripperState *state, const GripperPins *pins) {
+  GripperText out = {{0}, 0};
+  gripper_put(&out, "# ok p=");
+  gripper_put_bar(&out, state->steps);
+  gripper_send(pins, &out);
+}
+
+static void gripper_say_hello(const GripperSetup *setup, const GripperPins *pins) {
+  GripperText out = {{0}, 0};
+  uint8_t channel;
+  gripper_put(&out, "# tactile-gripper fw=");
+  gripper_put_number(&out, GRIPPER_FIRMWARE);
+  gripper_put(&out, " adc=");
+  gripper_put_number(&out, setup->bits);
+  gripper_put(&out, " vref=3.3 rate=");
+  gripper_put_number(&out, 1000000u / setup->period_us);
+  for (channel = 0; channel < setup->channels; channel++) {
+    gripper_put(&out, channel ? "," : " ch=");
+    gripper_put(&out, setup->names[channel]);
+  }
+  for (channel = 0; channel < setup->channels; channel++) {
+    gripper_put(&out, channel ? "," : " rm=");
+    gripper_put_number(&out, setup->divider_ohm[channel]);
+  }
+  if (setup->most_steps) {
+    gripper_put(&out, " p_max=");
+    gripper_put_bar(&out, setup->most_steps);
+  }
+  gripper_send(pins, &out);
+}
+
+static void gripper_set_pressure(GripperState *state, const GripperPins *pins, uint8_t steps) {
+  state->steps = steps;
+  pins->put_pressure(steps);
+}
+
+/* To be called once: vents, says hello, and takes the first sample now. */
+static void gripper_begin(GripperState *state, const GripperSetup *setup, const GripperPins *pins, uint32_t now_us) {
+  GripperState fresh = {0};
+  *state = fresh;
+  state->next_us = now_us;
+  state->heard_us = now_us;
+  gripper_set_pressure(state, pins, 0);
+  gripper_say_hello(setup, pins);
+}
+
+/* "0.55" in hundredths, or -1: one digit or two, then at most two decimals, and nothing else. */
+static int32_t gripper_centibar(const char *text) {
+  int32_t number = 0, decimals = -1, digits = 0;
+  for (; *text; text++) {
+    if (*text == '.' && decimals < 0 && digits) {
+      decimals = 0;
+    } else if (*text >= '0' && *text <= '9' && digits < 4 && decimals < 2) {
+      number = number * 10 + (*text - '0');
+      digits++;
+      if (decimals >= 0) decimals++;
+    } else {
+      return -1;
+    }
+  }
+  if (!digits) return -1;
+  for (decimals = decimals < 0 ? 0 : decimals; decimals < 2; decimals++) number *= 10;
+  return number;
+}
+
+/* Answers a pressure that was asked for; true when it was one. */
+static uint8_t gripper_press(GripperState *state, const GripperSetup *setup, const GripperPins *pins, const char *text) {
+  int32_t centibar = gripper_centibar(text);
+  if (centibar < 0) {
+    gripper_say(pins, "# refused reason=not-understood");
+    return 0;
+  }
+  if (!setup->most_steps) {
+    gripper_say(pins, "# refused reason=no-control-box");
+  } else if (centibar % GRIPPER_STEP_CENTIBAR) {
+    gripper_say(pins, "# refused reason=not-a-step step=0.05");
+  } else if (centibar / GRIPPER_STEP_CENTIBAR > setup->most_steps) {
+    GripperText out = {{0}, 0};
+    gripper_put(&out, "# refused reason=above-maximum max=");
+    gripper_put_bar(&out, setup->most_steps);
+    gripper_send(pins, &out);
+  } else {
+    gripper_set_pressure(state, pins, (uint8_t)(centibar / GRIPPER_STEP_CENTIBAR));
+    gripper_say_ok(state, pins);
+  }
+  return 1;
+}
+
+/* Answers one line of the host; true when it was understood. */
+static uint8_t gripper_obey(GripperState *state, const GripperSetup *setup, const GripperPins *pins, const char *line) {
+  if (line[0] == 'P' && line[1] == ' ') return gripper_press(state, setup, pins, line + 2);
+  if (line[0] && !line[1]) {
+    switch (line[0]) {
+      case 'V':
+        gripper_set_pressure(state, pins, 0);
+        gripper_say_ok(state, pins);
+        return 1;
+      case 'K':
+        gripper_say_ok(state, pins);
+        return 1;
+      case '?':
+        gripper_say_hello(setup, pins);
+        return 1;
+    }
+  }
+  gripper_say(pins, "# refused reason=not-understood");
+  return 0;
+}
+
+/* Takes one byte from the host. */
+static void gripper_hear(GripperState *state, const GripperSetup *setup, const GripperPins *pins, char byte,
+                         uint32_t now_us) {
+  if (byte == '\r') return;
+  if (byte != '\n') {
+    if (state->heard + 1u >= sizeof state->line) {
+      state->overlong = 1;
+    } else {
+      state->line[state->heard++] = byte ? byte : '\1'; /* a zero would end the line early */
+    }
+    return;
+  }
+  state->line[state->heard] = 0;
+  if (state->overlong) {
+    gripper_say(pins, "# refused reason=too-long");
+  } else if (state->heard && gripper_obey(state, setup, pins, state->line)) {
+    state->heard_us = now_us;
+  }
+  state->heard = 0;
+  state->overlong = 0;
+}
+
+/* Average of the kept conversions of a channel, in tenths of a count, rounded. */
+static uint32_t gripper_tenths(const GripperPins *pins, uint8_t channel) {
+  uint32_t sum = 0;
+  uint8_t i;
+  pins->convert(channel);
+  for (i = 0; i < GRIPPER_OVERSAMPLE; i++) sum += pins->convert(channel);
+  return (sum * 10 + GRIPPER_OVERSAMPLE / 2) / GRIPPER_OVERSAMPLE;
+}
+
+static void gripper_sample(const GripperState *state, const GripperSetup *setup, const GripperPins *pins,
+                           uint32_t now_us) {
+  GripperText out = {{0}, 0};
+  uint8_t channel;
+  gripper_put(&out, "t_us:");
+  gripper_put_number(&out, now_us);
+  gripper_put(&out, ",seq:");
+  gripper_put_number(&out, state->seq);
+  for (channel = 0; channel < setup->channels; channel++) {
+    uint32_t tenths = gripper_tenths(pins, channel);
+    gripper_put(&out, ",");
+    gripper_put(&out, setup->names[channel]);
+    gripper_put(&out, ":");
+    gripper_put_number(&out, tenths / 10);
+    gripper_put(&out, ".");
+    gripper_put_number(&out, tenths % 10);
+  }
+  if (setup->most_steps) {
+    gripper_put(&out, ",p_bar:");
+    gripper_put_bar(&out, state->steps);
+  }
+  gripper_send(pins, &out);
+}
+
+/* To be called as often as possible: samples when one is due, vents when the host has gone silent. A sample is due at
+ * whole periods after the beginning, however late the last one was; those that were missed altogether are counted in
+ * seq, so that the host knows. */
+static void gripper_poll(GripperState *state, const GripperSetup *setup, const GripperPins *pins, uint32_t now_us) {
+  if (state->steps && now_us - state->heard_us > GRIPPER_WATCHDOG_US) {
+    gripper_set_pressure(state, pins, 0);
+    gripper_say(pins, "# vent reason=watchdog");
+  }
+  if ((int32_t)(now_us - state->next_us) < 0) return;
+  while (now_us - state->next_us >= setup->period_us) {
+    state->next_us += setup->period_us;
+    state->seq++;
+  }
+  gripper_sample(state, setup, pins, now_us);
+  state->next_us += setup->period_us;
+  state->seq++;
+}
+
+#endif

@@ -1,0 +1,175 @@
+//! What may go wrong on the way from a sensor to the host, on request: `NAME[=VALUE]@SECONDS[/DURATION]`, separated by
+//! commas, as in `vanish@5,garbage@7/2,stuck=2@10`. One table says what there is.
+
+use std::fmt;
+
+/// The kinds, by the stage at which they strike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FaultKind {
+    /// A channel keeps its reading.
+    Stuck,
+    /// A channel is at the upper rail.
+    Rail,
+    /// A channel's sensor has come off.
+    Open,
+    /// A channel is printed as `nan`.
+    Nan,
+    /// Each channel takes a share of the one read before it.
+    Crosstalk,
+    /// The converter is left at its default of 10 bits.
+    TenBit,
+    /// The board's clock is fast.
+    Clock,
+    /// The board restarts: silent for a second, then hello; its clock and counter begin anew.
+    Reset,
+    /// Lines are lost.
+    Loss,
+    /// Lines are cut somewhere.
+    Partial,
+    /// Random bytes stand in for lines.
+    Garbage,
+    /// The board sends at another rate than the host reads.
+    Baud,
+    /// Lines come in bunches.
+    Burst,
+    /// Nothing is sent.
+    Silent,
+    /// The port goes away and comes back, perhaps under another number.
+    Vanish,
+}
+
+/// What a kind is called, what its value means and is unless given, how long it lasts unless said (s).
+struct Row {
+    kind: FaultKind,
+    name: &'static str,
+    value: f64,
+    duration_s: f64,
+    words: &'static str,
+}
+
+const FOR_EVER: f64 = f64::INFINITY;
+
+const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, words: &'static str) -> Row {
+    Row { kind, name, value, duration_s, words }
+}
+
+const TABLE: [Row; 15] = [
+    row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE keeps its reading"),
+    row(FaultKind::Rail, "rail", 0.0, FOR_EVER, "channel VALUE is at the upper rail"),
+    row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE has come off"),
+    row(FaultKind::Nan, "nan", 0.0, FOR_EVER, "channel VALUE is printed as nan"),
+    row(FaultKind::Crosstalk, "crosstalk", 0.2, FOR_EVER, "each channel takes a share VALUE of the one before"),
+    row(FaultKind::TenBit, "tenbit", 0.0, FOR_EVER, "the converter gives 10 bits"),
+    row(FaultKind::Clock, "clock", 200.0, FOR_EVER, "the board's clock is fast by VALUE ppm"),
+    row(FaultKind::Reset, "reset", 0.0, 1.0, "the board restarts"),
+    row(FaultKind::Loss, "loss", 0.1, 1.0, "a share VALUE of the lines is lost"),
+    row(FaultKind::Partial, "partial", 0.5, 1.0, "a share VALUE of the lines is cut"),
+    row(FaultKind::Garbage, "garbage", 0.0, 0.5, "random bytes instead of lines"),
+    row(FaultKind::Baud, "baud", 2.0, 2.0, "the board sends VALUE times faster than the host reads"),
+    row(FaultKind::Burst, "burst", 0.25, 2.0, "lines are held back and come every VALUE s"),
+    row(FaultKind::Silent, "silent", 0.0, 2.0, "nothing is sent"),
+    row(FaultKind::Vanish, "vanish", 0.0, 1.0, "the port goes away and comes back"),
+];
+
+impl FaultKind {
+    /// The name used on the command line.
+    pub fn name(self) -> &'static str {
+        TABLE.iter().find(|row| row.kind == self).map_or("", |row| row.name)
+    }
+}
+
+/// One fault and when it strikes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What happens.
+    pub kind: FaultKind,
+    /// What it takes a number for; see [`fault_help`].
+    pub value: f64,
+    /// From when (s since the first host).
+    pub from_s: f64,
+    /// Until when (s).
+    pub until_s: f64,
+}
+
+impl Fault {
+    /// Whether it is on at a time (s).
+    pub fn is_on(&self, t: f64) -> bool {
+        (self.from_s..self.until_s).contains(&t)
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}@{}", self.kind.name(), self.value, self.from_s)?;
+        if self.until_s.is_finite() { write!(f, "/{}", self.until_s - self.from_s) } else { Ok(()) }
+    }
+}
+
+/// Lines that say which faults there are.
+pub fn fault_help() -> String {
+    let line = |row: &Row| {
+        let lasts = if row.duration_s.is_finite() { format!("{} s", row.duration_s) } else { "for ever".to_owned() };
+        format!("  {:<10} {} (VALUE {}, lasts {lasts})", row.name, row.words, row.value)
+    };
+    TABLE.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Reads a list of faults.
+pub fn parse_faults(text: &str) -> Result<Vec<Fault>, String> {
+    text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse_fault).collect()
+}
+
+fn parse_fault(text: &str) -> Result<Fault, String> {
+    let wrong =
+        |what: &str| format!("the fault \"{text}\" {what}; write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2");
+    let (named, times) = text.split_once('@').ok_or_else(|| wrong("does not say when"))?;
+    let (name, value) = named.split_once('=').map_or((named, None), |(name, value)| (name, Some(value)));
+    let row = TABLE.iter().find(|row| row.name == name).ok_or_else(|| {
+        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
+        wrong(&format!("is not one of {}", names.join(", ")))
+    })?;
+    let (from, duration) = times.split_once('/').map_or((times, None), |(from, lasts)| (from, Some(lasts)));
+    let number = |text: Option<&str>, usual: f64| match text {
+        Some(text) => {
+            text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or_else(|| wrong("has a wrong number"))
+        }
+        None => Ok(usual),
+    };
+    let from_s = number(Some(from), 0.0)?;
+    let until_s = from_s + number(duration, row.duration_s)?;
+    Ok(Fault { kind: row.kind, value: number(value, row.value)?, from_s, until_s })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_of_faults_is_read() {
+        let faults = parse_faults("vanish@5, garbage@7/2,stuck=2@10").expect("sound");
+        let garbage = Fault { kind: FaultKind::Garbage, value: 0.0, from_s: 7.0, until_s: 9.0 };
+        assert_eq!((faults.len(), faults[1]), (3, garbage));
+        assert_eq!((faults[0].kind, faults[0].until_s), (FaultKind::Vanish, 6.0));
+        assert!(faults[2].value == 2.0 && faults[2].until_s.is_infinite() && faults[2].is_on(1e9));
+        assert!(garbage.is_on(7.0) && !garbage.is_on(9.0) && !garbage.is_on(6.9));
+        for fault in faults {
+            assert_eq!(parse_faults(&fault.to_string()), Ok(vec![fault]));
+        }
+    }
+
+    #[test]
+    fn every_kind_has_one_row_and_a_line_of_help() {
+        for row in &TABLE {
+            assert_eq!(TABLE.iter().filter(|other| other.name == row.name || other.kind == row.kind).count(), 1);
+            assert!(fault_help().contains(row.words));
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_fault_is_said() {
+        for (text, word) in [("vanish", "when"), ("vnish@3", "vanish"), ("loss=x@3", "number"), ("loss@-1", "number")] {
+            let told = parse_faults(text).expect_err(text);
+            assert!(told.contains(word) && told.contains(text), "{told}");
+        }
+    }
+}
