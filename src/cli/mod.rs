@@ -3,6 +3,7 @@
 mod bench;
 mod collect;
 mod demo;
+mod emulate;
 mod evaluate;
 mod grasp;
 mod interrupt;
@@ -67,6 +68,8 @@ enum Command {
     Scene(scene::SceneCommandArguments),
     /// List, show, export, delete and restore recorded trials.
     Trials(trials::TrialsArguments),
+    /// Pretend to be a gripper on a serial port, with parts nobody knows and faults on request (Unix).
+    Emulate(emulate::EmulateArguments),
     /// Measure what things cost on this machine, in CPU time.
     Bench(bench::BenchArguments),
     /// Run an experiment and print what came out.
@@ -140,6 +143,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
+        Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study)?,
         Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,

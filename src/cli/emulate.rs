@@ -1,0 +1,276 @@
+//! `palpate emulate`: a gripper that is not there, on a pseudo-terminal. Unix only.
+
+use super::Failure;
+use super::setup::SceneArguments;
+use super::terminal::{say, say_json};
+use palpate_core::objects::{anchored, catalogue};
+use palpate_core::pretended::{
+    Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
+};
+use std::path::PathBuf;
+
+/// Arguments of `palpate emulate`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = after_help())]
+pub(super) struct EmulateArguments {
+    /// Make FILE a symbolic link to the terminal: what a host opens as its port.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_secrets")]
+    link: Option<PathBuf>,
+    /// What is grasped, one after the other: names or files, separated by commas; without it the sixteen in turn.
+    #[arg(long = "object", value_name = "A,B,..", value_delimiter = ',')]
+    objects: Vec<String>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Names poses, parts, noise and faults.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Samples per second.
+    #[arg(long, value_name = "HZ", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rate: u32,
+    /// Channels: the four sensors, then spare inputs that swing slowly.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
+    channels: u8,
+    /// From one grasp of its own to the next (s); 0: it waits for a host to drive it.
+    #[arg(long, value_name = "S", default_value_t = 6.0, value_parser = seconds)]
+    grasp_every: f64,
+    /// Bench procedure, as text or a file: angle=30 hold=2; load=0.1kg hold=3; close empty. `-` takes steps from standard input
+    /// as they come.
+    #[arg(long, value_name = "STEPS|FILE|-")]
+    script: Option<String>,
+    /// What goes wrong and when: NAME[=VALUE]@SECONDS[/DURATION], separated by commas, as in vanish@5,garbage@7/2; see below.
+    #[arg(long, value_name = "LIST", value_parser = parse_faults_once, default_value = "")]
+    faults: Faults,
+    /// Take the hidden values of strips, pads and dividers from this file instead of drawing them.
+    #[arg(long, value_name = "F.json")]
+    secrets: Option<PathBuf>,
+    /// Print the hidden values as JSON and stop.
+    #[arg(long)]
+    print_secrets: bool,
+    /// Leave out noise, hysteresis, drift, or several of them separated by commas.
+    #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
+    without: Vec<Imperfection>,
+    /// Highest pressure that the board puts out (bar); 0: the control box is worked by hand, and the board refuses to be told.
+    #[arg(long, value_name = "BAR", default_value_t = 1.5, value_parser = pressure)]
+    max_bar: f64,
+    /// Rate of its serial line (bit/s): a host that reads at another gets nonsense. Without it, any will do, as on the native port.
+    #[arg(long, value_name = "BAUD")]
+    baud: Option<u32>,
+    /// Silence after a host has opened the port (s), as on the programming port, which restarts the board.
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = seconds)]
+    boot: f64,
+    /// What the board's 32-bit clock shows at first (µs): near 4294967295 it wraps soon.
+    #[arg(long, value_name = "US", default_value_t = 0)]
+    clock_start: u32,
+    /// Seconds of the gripper per second.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    speed: f64,
+    /// Write every line that the board prints to FILE, whole, whatever happens to it on the way.
+    #[arg(long, value_name = "FILE")]
+    sent: Option<PathBuf>,
+    /// Print what happens as JSON, one object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The faults of one argument.
+#[derive(Clone, Debug)]
+struct Faults(Vec<Fault>);
+
+fn parse_faults_once(text: &str) -> Result<Faults, String> {
+    parse_faults(text).map(Faults)
+}
+
+/// What the sensors need not have.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Imperfection {
+    Noise,
+    Hysteresis,
+    Drift,
+}
+
+fn after_help() -> String {
+    format!("Faults, VALUE and duration where they are left out:\n{}", fault_help())
+}
+
+fn number(text: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| format!("write a number from {} to {}", range.start(), range.end()))
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=3600.0)
+}
+
+fn pressure(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=1.5)
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    number(text, 0.01..=100.0)
+}
+
+pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
+    let parts = parts(arguments)?;
+    if arguments.print_secrets {
+        return say_json(&parts);
+    }
+    let script = script(arguments)?;
+    let objects = match arguments.objects.as_slice() {
+        [] => catalogue().iter().map(|object| object.name.clone()).collect(),
+        named => named.iter().map(|name| anchored(name)).collect(),
+    };
+    let hand = HandPlan {
+        scene: arguments.scene.scene(None)?,
+        objects,
+        seed: arguments.seed,
+        grasp_every_s: Some(arguments.grasp_every).filter(|every| *every > 0.0),
+        script,
+    };
+    let gripper = PretendedGripper::new(PretendedSetup {
+        hand,
+        parts,
+        rate_hz: arguments.rate,
+        channels: usize::from(arguments.channels),
+        most_steps: (arguments.max_bar * 20.0).round() as u8,
+        clock_start_us: arguments.clock_start,
+        faults: arguments.faults.0.clone(),
+        seed: arguments.seed,
+    })?;
+    serve(arguments, gripper)
+}
+
+/// The hidden parts: from a file, or drawn, less what is to be left out.
+fn parts(arguments: &EmulateArguments) -> Result<HiddenParts, Failure> {
+    let mut parts = match &arguments.secrets {
+        None => HiddenParts::drawn(arguments.seed),
+        Some(path) => {
+            let wrong = |why: String| {
+                format!("{}: {why}. `palpate emulate --print-secrets` shows how it looks", path.display())
+            };
+            let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+            let parts: HiddenParts = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+            parts.check().map_err(wrong)?;
+            parts
+        }
+    };
+    for left_out in &arguments.without {
+        match left_out {
+            Imperfection::Noise => parts.noise_counts = 0.0,
+            Imperfection::Hysteresis => parts.hysteresis = false,
+            Imperfection::Drift => parts.drift = false,
+        }
+    }
+    Ok(parts)
+}
+
+/// The script, from the argument or the file that it names.
+fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
+    let Some(given) = arguments.script.as_deref().filter(|script| *script != "-") else { return Ok(Vec::new()) };
+    let path = std::path::Path::new(given);
+    let text = if path.is_file() { std::fs::read_to_string(path)? } else { given.to_owned() };
+    let mut steps = parse_script(&text)?;
+    for step in &mut steps {
+        if let Step::Grasp { object, .. } = step {
+            *object = anchored(object);
+        }
+    }
+    Ok(steps)
+}
+
+#[cfg(not(unix))]
+fn serve(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
+    Err("emulate needs a pseudo-terminal, which only Unix systems have: run it on Linux or macOS".into())
+}
+
+#[cfg(unix)]
+fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
+    use palpate_core::pretended::{Served, serve};
+    use std::io::Write as _;
+
+    let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
+    let stop = super::interrupt::stop_flag()?;
+    let typed = (arguments.script.as_deref() == Some("-")).then(typed_steps);
+    let mut sent = arguments.sent.as_ref().map(std::fs::File::create).transpose()?;
+    if !arguments.json {
+        let link = link.display();
+        say(format!("pretended gripper at {link}; connect with: palpate record --port {link} --seconds 10"))?;
+        say("Ctrl+C ends it")?;
+    }
+    let served = Served { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
+    let mut failure: Option<Failure> = None;
+    serve(&mut gripper, &served, &stop, &mut |gripper| {
+        let mut turn = || -> Result<(), Failure> {
+            for happened in gripper.take_happened() {
+                tell(&happened, arguments.json)?;
+            }
+            let printed = gripper.take_printed();
+            if let Some(file) = &mut sent {
+                file.write_all(printed.as_bytes())?;
+            }
+            while let Some(line) = typed.as_ref().and_then(|lines| lines.try_recv().ok()) {
+                take_steps(gripper, &line)?;
+            }
+            Ok(())
+        };
+        if let Err(error) = turn() {
+            failure = Some(error);
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+    })?;
+    failure.map_or(Ok(()), Err)
+}
+
+/// Lines from standard input, as they are typed.
+#[cfg(unix)]
+fn typed_steps() -> std::sync::mpsc::Receiver<String> {
+    let (lines, typed) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lines().map_while(Result::ok) {
+            if lines.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    typed
+}
+
+/// Adds the steps of a typed line; one that is not understood is complained about, and nothing else happens.
+#[cfg(unix)]
+fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure> {
+    match parse_script(line) {
+        Ok(steps) => {
+            for mut step in steps {
+                if let Step::Grasp { object, .. } = &mut step {
+                    *object = anchored(object);
+                }
+                gripper.add_step(step)?;
+            }
+        }
+        Err(error) => super::terminal::warn(&error.to_string()),
+    }
+    Ok(())
+}
+
+/// Says what happened.
+#[cfg(unix)]
+fn tell(happened: &palpate_core::pretended::Happened, json: bool) -> Result<(), Failure> {
+    use palpate_core::pretended::Happening;
+    if json {
+        return say(serde_json::to_string(happened)?);
+    }
+    let what = match &happened.what {
+        Happening::Grasp { number, object } => format!("grasp {number}: {object}"),
+        Happening::Hold { bend_deg: [left, right], load_n, seconds } => {
+            format!("holds {left:.0} and {right:.0} degrees, {:.2} and {:.2} N, for {seconds} s", load_n[0], load_n[1])
+        }
+        Happening::ScriptDone => "the script is done".to_owned(),
+        Happening::Fault { fault } => format!("fault {fault}"),
+        Happening::Watchdog => "the board vents: the host fell silent".to_owned(),
+        Happening::Failed { reason } => format!("the fingers stay as they are: {reason}"),
+        Happening::HostCame => "a host opened the port".to_owned(),
+        Happening::HostLeft => "the host closed the port".to_owned(),
+        Happening::Port { path } => format!("the port is {path}"),
+        Happening::Overrun { bytes } => format!("{bytes} bytes given up: the host does not read"),
+    };
+    say(format!("{:>9.3} s  {what}", happened.t_s))
+}
