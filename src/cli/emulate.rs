@@ -191,15 +191,18 @@ fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<
     let stop = super::interrupt::stop_flag()?;
     let typed = (arguments.script.as_deref() == Some("-")).then(typed_steps);
     let mut sent = arguments.sent.as_ref().map(std::fs::File::create).transpose()?;
-    if !arguments.json {
+    let mut greeting = (!arguments.json).then(|| {
         let link = link.display();
-        say(format!("pretended gripper at {link}; connect with: palpate record --port {link} --seconds 10"))?;
-        say("Ctrl+C ends it")?;
-    }
+        format!("pretended gripper at {link}, until Ctrl+C; look at it with: palpate doctor {link}")
+    });
     let served = Served { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
     let mut failure: Option<Failure> = None;
     serve(&mut gripper, &served, &stop, &mut |gripper| {
         let mut turn = || -> Result<(), Failure> {
+            // Only once there is something to connect to.
+            if let Some(greeting) = greeting.take() {
+                say(greeting)?;
+            }
             for happened in gripper.take_happened() {
                 tell(&happened, arguments.json)?;
             }

@@ -3,6 +3,7 @@
 mod bench;
 mod collect;
 mod demo;
+mod doctor;
 mod emulate;
 mod evaluate;
 mod grasp;
@@ -68,6 +69,8 @@ enum Command {
     Scene(scene::SceneCommandArguments),
     /// List, show, export, delete and restore recorded trials.
     Trials(trials::TrialsArguments),
+    /// Find out what is wrong between the gripper's board and this computer, and what to do about it.
+    Doctor(doctor::DoctorArguments),
     /// Pretend to be a gripper on a serial port, with parts nobody knows and faults on request (Unix).
     Emulate(emulate::EmulateArguments),
     /// Measure what things cost on this machine, in CPU time.
@@ -143,6 +146,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
+        Some(Command::Doctor(doctor)) => return doctor::run(doctor),
         Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study)?,

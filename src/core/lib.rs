@@ -28,6 +28,7 @@
 //! | 9 | [`recognition`] | PMFs, the macro-layer on a kernel of our own, DS-LSTM and iDS-LSTM, rivals, metrics, models on disk |
 //! | 10 | [`grasping`] | one grasp on any rig, random poses, data sets, grasp after grasp until it is clear what is held |
 //! | 11 | [`pretended`] | a gripper that is not there: its firmware, its hidden parts, its pseudo-terminal, its faults |
+//! | 11 | [`doctor`] | what is wrong between board and computer, with cause and fix |
 //! | 12 | [`study`] | measurements and comparisons as functions |
 //! | 13 | [`picture`] | scene and frame to [`drawing::DrawList`] |
 //! | 14 | [`workers`] | named threads: commands in, snapshots and rows out |
@@ -54,6 +55,7 @@
 //! - What comes from outside is checked where it comes in; after that, a wrong number is our own bug.
 
 pub mod board;
+pub mod doctor;
 pub mod drawing;
 pub mod geometry;
 pub mod grasping;

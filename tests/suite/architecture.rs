@@ -16,7 +16,7 @@ const LAYERS: &[&[&str]] = &[
     &["recording"],
     &["recognition"],
     &["grasping"],
-    &["pretended"],
+    &["pretended", "doctor"],
     &["study"],
     &["picture"],
     &["workers"],

@@ -296,7 +296,8 @@ impl LiveGrasp {
             }
         }
         let [(before_s, before), (after_s, after)] = self.frames;
-        if !after_s.is_finite() {
+        // Before the first frame there is nothing to go from.
+        if !after_s.is_finite() || after_s <= before_s {
             return after;
         }
         before.towards(after, ((t - before_s) / (after_s - before_s)).clamp(0.0, 1.0))
@@ -359,6 +360,7 @@ mod tests {
         let open = run(&mut hand, 1.5, 3.0, 0.0);
         assert!(open.kappa[0].abs() < 0.6, "{open:?}");
         run(&mut hand, 3.0, 3.1, 0.5);
+        assert!((0..50).all(|k| hand.at(3.1 + 0.02 * f64::from(k), 0.5).kappa[0].is_finite()));
         let began = hand.take_began();
         assert_eq!(began.len(), 2, "a new grasp after it has let go: {began:?}");
     }

@@ -167,3 +167,13 @@ fn a_thousand_samples_a_second_on_eight_channels() {
     assert_eq!(lines.len(), 1001);
     assert!(lines.iter().all(|line| line.split(',').count() == 11 && number(line, "aux4").is_some()));
 }
+
+#[test]
+fn sensors_with_a_memory_follow_a_grasp_from_its_first_sample_on() {
+    let setup = PretendedSetup { parts: HiddenParts::drawn(1), ..setup("close empty", "") };
+    assert!(setup.parts.hysteresis && setup.parts.drift && setup.parts.noise_counts > 0.0);
+    let told = text(setup, 4.5);
+    let count = |k: usize| number(samples(&told)[k], "flexL").expect("printed");
+    // 11.7 1/m at 1 bar: a bend of 0.65 rad, which raises the resistance by four tenths.
+    assert!(count(140) > count(0) + 250.0 && (count(224) - count(0)).abs() < 40.0, "{} {}", count(140), count(224));
+}

@@ -46,7 +46,7 @@ pub struct PortError {
 /// A rule that keeps ModemManager away from the boards of Arduino.
 pub const MODEM_MANAGER_RULE: &str = "ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"";
 /// Puts that rule where udev finds it.
-const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
+pub const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
      sudo tee /etc/udev/rules.d/77-palpate.rules && sudo udevadm control --reload";
 
 impl PortError {
@@ -90,7 +90,7 @@ impl PortError {
     }
 
     fn busy(path: &Path) -> Self {
-        if runs("ModemManager") {
+        if is_running("ModemManager") {
             let fix = format!(
                 "ModemManager asks each new port whether it is a modem, for half a minute: wait and connect again, or keep \
                  it away from boards with the udev rule {MODEM_MANAGER_RULE}"
@@ -165,7 +165,7 @@ fn group_of(_path: &Path) -> Option<String> {
 }
 
 /// True where a program by this name runs, as far as the system tells (Linux).
-pub(super) fn runs(program: &str) -> bool {
+pub fn is_running(program: &str) -> bool {
     let Ok(processes) = std::fs::read_dir("/proc") else { return false };
     let comm = |entry: std::fs::DirEntry| std::fs::read_to_string(entry.path().join("comm")).unwrap_or_default();
     // The system cuts names after fifteen letters.
@@ -207,6 +207,6 @@ mod tests {
         let groups = ["/dev/tty", "/dev/ptmx", "/etc/passwd"].map(|path| group_of(Path::new(path)));
         assert!(groups.iter().flatten().all(|group| !group.is_empty() && group != "root"), "{groups:?}");
         let own = std::fs::read_to_string("/proc/self/comm").unwrap_or_default();
-        assert!(runs(own.trim_end()) && !runs("no such program"));
+        assert!(is_running(own.trim_end()) && !is_running("no such program"));
     }
 }

@@ -1,0 +1,641 @@
+//! The checks, each from what was seen to what it means.
+
+use super::{Finding, Observations, Trace, Verdict};
+use crate::board::{Board, Sensor};
+use crate::rig::serial::{LinkState, LinkStatus, MODEM_MANAGER_COMMAND, PortTrouble};
+use crate::units::three_digits;
+use crate::wire::Rail;
+
+/// A clock that is farther off than this is worth a note (ppm): crystals are within 50, resonators within 5000.
+const CRYSTAL_PPM: f64 = 100.0;
+
+/// A clock that is farther off than this does not count microseconds (ppm).
+const NO_CLOCK_PPM: f64 = 10_000.0;
+
+/// A rate that is farther from what the board says than this share is another rate.
+const RATE_SHARE: f64 = 0.02;
+
+/// Share of readings that may be lost before it is more than a hiccup.
+const LOST_SHARE: f64 = 1e-3;
+
+/// Least correlation at which a pad is said to follow the channel before it.
+const FOLLOWS: f64 = 0.95;
+
+/// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
+const IDLE_COUNTS: f64 = 20.0;
+
+/// One check.
+#[derive(Clone, Copy, Debug)]
+pub struct Check {
+    /// What it is called.
+    pub name: &'static str,
+    /// What it looks for, in a few words.
+    pub about: &'static str,
+    look: fn(&Observations) -> Told,
+}
+
+impl Check {
+    /// Looks.
+    pub fn look(&self, seen: &Observations) -> Finding {
+        let Told { verdict, seen, cause, fix, command } = (self.look)(seen);
+        Finding { check: self.name, verdict, seen, cause, fix, command }
+    }
+}
+
+/// All of them.
+pub const CHECKS: &[Check] = &[
+    Check { name: "port", about: "there is a board", look: port },
+    Check { name: "permission", about: "you may open it", look: permission },
+    Check { name: "busy", about: "nobody else has it", look: busy },
+    Check { name: "modem-manager", about: "nobody takes it for a modem", look: modem_manager },
+    Check { name: "silence", about: "it says something", look: silence },
+    Check { name: "baud", about: "at a rate that can be read", look: baud },
+    Check { name: "lines", about: "in lines that can be read", look: lines },
+    Check { name: "firmware", about: "and says what it is", look: firmware },
+    Check { name: "bits", about: "the converter gives 12 bits", look: bits },
+    Check { name: "saturation", about: "no channel is at its upper end", look: saturation },
+    Check { name: "open-circuit", about: "every sensor is connected", look: open_circuit },
+    Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk },
+    Check { name: "rate", about: "samples come as often as they should", look: rate },
+    Check { name: "clock", about: "the board's clock can be relied on", look: clock },
+];
+
+/// A finding without its name.
+struct Told {
+    verdict: Verdict,
+    seen: String,
+    cause: Option<String>,
+    fix: Option<String>,
+    command: Option<String>,
+}
+
+impl Told {
+    fn new(verdict: Verdict, seen: impl Into<String>) -> Self {
+        Self { verdict, seen: seen.into(), cause: None, fix: None, command: None }
+    }
+
+    fn good(seen: impl Into<String>) -> Self {
+        Self::new(Verdict::Good, seen)
+    }
+
+    fn not_seen(seen: impl Into<String>) -> Self {
+        Self::new(Verdict::NotSeen, seen)
+    }
+
+    fn note(seen: impl Into<String>) -> Self {
+        Self::new(Verdict::Note, seen)
+    }
+
+    fn wrong(seen: impl Into<String>) -> Self {
+        Self::new(Verdict::Wrong, seen)
+    }
+
+    fn because(self, cause: impl Into<String>, fix: impl Into<String>) -> Self {
+        Self { cause: Some(cause.into()), fix: Some(fix.into()), ..self }
+    }
+
+    fn with(self, command: impl Into<String>) -> Self {
+        Self { command: Some(command.into()), ..self }
+    }
+}
+
+/// The trouble that kept the port from being opened, if it is one of these.
+fn refusal(seen: &Observations, troubles: &[PortTrouble]) -> Option<Told> {
+    let refused = seen.refused.as_ref().filter(|refused| troubles.contains(&refused.trouble))?;
+    let told = Told::wrong(refused.what.clone()).because(refused.cause.clone(), refused.fix.clone());
+    Some(Told { command: refused.command.clone(), ..told })
+}
+
+/// How the link stands, or that there is none.
+fn link(seen: &Observations) -> Result<&LinkStatus, Told> {
+    seen.link.as_ref().ok_or_else(|| Told::not_seen("the port could not be opened"))
+}
+
+/// The same where lines were read.
+fn readings(seen: &Observations) -> Result<&LinkStatus, Told> {
+    let link = link(seen)?;
+    if link.cadence.samples > 0 { Ok(link) } else { Err(Told::not_seen("nothing could be read")) }
+}
+
+/// A check that may end early because there is nothing to see.
+fn or_not_seen(told: Result<Told, Told>) -> Told {
+    told.unwrap_or_else(|not_seen| not_seen)
+}
+
+fn port(seen: &Observations) -> Told {
+    let troubles = [
+        PortTrouble::NotFound,
+        PortTrouble::NoBoard,
+        PortTrouble::Several,
+        PortTrouble::NotSerial,
+        PortTrouble::Capture,
+        PortTrouble::System,
+    ];
+    if let Some(told) = refusal(seen, &troubles) {
+        return told;
+    }
+    match &seen.link {
+        Some(link) => {
+            let (path, title) = (link.port.path.display(), &link.port.title);
+            match &link.state {
+                LinkState::Lost { cause } => Told::wrong(format!("{path} went away")).because(
+                    cause.clone(),
+                    "Check cable and plug; a cable that charges a phone may have no wires for data",
+                ),
+                LinkState::Waiting
+                | LinkState::Listening
+                | LinkState::Silent { .. }
+                | LinkState::Unreadable { .. }
+                | LinkState::Ended { .. } => Told::good(format!("{path}: {title}")),
+            }
+        }
+        None => Told::good("it is there"),
+    }
+}
+
+fn permission(seen: &Observations) -> Told {
+    refusal(seen, &[PortTrouble::Permission])
+        .unwrap_or_else(|| or_not_seen(link(seen).map(|_| Told::good("it can be opened"))))
+}
+
+fn busy(seen: &Observations) -> Told {
+    refusal(seen, &[PortTrouble::Busy])
+        .unwrap_or_else(|| or_not_seen(link(seen).map(|_| Told::good("it is ours alone"))))
+}
+
+fn modem_manager(seen: &Observations) -> Told {
+    let is_usb = |port: &crate::rig::serial::PortInfo| port.usb.is_some();
+    let concerns = seen.link.as_ref().map_or_else(|| seen.ports.iter().any(is_usb), |link| is_usb(&link.port));
+    match (seen.modem_manager, concerns) {
+        (false, _) => Told::good("it does not run"),
+        (true, false) => Told::good("it runs, but this is no USB port"),
+        (true, true) => Told::note("ModemManager runs")
+            .because(
+                "It asks every new port whether it is a modem: for half a minute after plugging in the port is busy, or \
+                 the board hears nonsense",
+                "Tell it to leave boards alone, then plug the board in again",
+            )
+            .with(MODEM_MANAGER_COMMAND),
+    }
+}
+
+fn silence(seen: &Observations) -> Told {
+    let link = match link(seen) {
+        Ok(link) => link,
+        Err(not_seen) => return not_seen,
+    };
+    let silent = matches!(link.state, LinkState::Silent { .. } | LinkState::Waiting) && link.cadence.samples == 0;
+    if !silent {
+        return Told::good("it speaks");
+    }
+    let told = Told::wrong(format!("nothing came in {} s", three_digits(seen.listened_s)));
+    if link.port.kind.native {
+        told.because(
+            "The native port sends only while the host holds DTR, which it does; so the sketch is not running, or prints on \
+             the other port",
+            "Press the board's reset button once; upload assets/firmware/due_gripper, or set HOST to the port in use",
+        )
+    } else {
+        told.because(
+            "The board is not running a sketch that prints, or prints on its other port",
+            "Upload assets/firmware/due_gripper; on a Due, plug the cable into the native port (next to the reset button)",
+        )
+    }
+}
+
+fn baud(seen: &Observations) -> Told {
+    let link = match link(seen) {
+        Ok(link) => link,
+        Err(not_seen) => return not_seen,
+    };
+    let printable = 100.0 * link.cadence.printable_share;
+    match (&link.state, link.baud) {
+        (LinkState::Unreadable { .. }, _) => {
+            Told::wrong(format!("bytes come, but no lines: {printable:.0} % of them are text")).because(
+                "The board sends at a rate that is none of the usual ones, or something else than text",
+                "Set the sketch to Serial.begin(115200), or name its rate with --baud",
+            )
+        }
+        _ if link.cadence.samples == 0 => Told::not_seen("nothing came"),
+        (_, Some(rate)) if rate != 115_200 && !link.port.kind.native => Told::note(format!(
+            "the board speaks at {rate} bit/s"
+        ))
+        .because(
+            "Its sketch says so; it was found by trying",
+            format!("Name the rate with --baud {rate} to save the trying, or set the sketch to Serial.begin(115200)"),
+        ),
+        _ => Told::good(format!("{printable:.0} % of the bytes are text")),
+    }
+}
+
+fn lines(seen: &Observations) -> Told {
+    let told = link(seen).and_then(|link| {
+        let cadence = &link.cadence;
+        let bad = cadence.bad_lines;
+        let all = bad + cadence.samples;
+        if all == 0 {
+            return Err(Told::not_seen("no lines came"));
+        }
+        let share = bad as f64 / all as f64;
+        let why = link.detected.as_ref().map_or_else(String::new, |detected| format!(": {}", detected.why));
+        Ok(if share > 0.02 {
+            Told::wrong(format!("{bad} of {all} lines could not be read")).because(
+                "Bytes are lost or damaged on the way: a long or bad cable, a hub, a ground that floats, or two programs on one port",
+                "Use a short cable straight into the computer; see the raw lines in the console",
+            )
+        } else if bad > 2 {
+            Told::note(format!("{bad} of {all} lines could not be read")).because(
+                "A few damaged lines; they are left out, and shown as gaps",
+                "Nothing, unless there are more of them: then a short cable straight into the computer",
+            )
+        } else {
+            Told::good(format!("{} lines were read{why}", cadence.samples))
+        })
+    });
+    or_not_seen(told)
+}
+
+fn firmware(seen: &Observations) -> Told {
+    or_not_seen(readings(seen).map(|link| match &link.board.firmware {
+        Some(version) => Told::good(format!("tactile-gripper, version {version}")),
+        None => Told::note("the board does not say what it is").because(
+            "It runs a sketch of its own: bits, reference voltage and resistors are taken for granted",
+            "Print a hello line as assets/firmware/due_gripper does, or upload that",
+        ),
+    }))
+}
+
+fn bits(seen: &Observations) -> Told {
+    or_not_seen(readings(seen).map(|link| {
+        let full = link.board.full_scale;
+        if link.looks_10_bit {
+            let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
+            return Told::wrong(format!("no count was above {most:.0}; the converter is said to go to {full}"))
+                .because(
+                    "analogRead gives 10 bits until it is told otherwise",
+                    "Call analogReadResolution(12) in setup()",
+                );
+        }
+        if full < 4095 {
+            return Told::note(format!("the converter goes to {full}")).because(
+                "The board says so",
+                "A Due has 12 bits: call analogReadResolution(12), and say adc=12 in the hello line",
+            );
+        }
+        Told::good(format!("counts up to {full}"))
+    }))
+}
+
+/// The sensor on a channel.
+fn sensor(board: &Board, channel: usize) -> Option<Sensor> {
+    Sensor::ALL.into_iter().find(|sensor| board.channel_of(*sensor) == Some(channel))
+}
+
+/// Names of the channels for which something holds.
+fn named(link: &LinkStatus, holds: impl Fn(usize, Option<Sensor>) -> bool) -> Vec<String> {
+    let channels = link.board.channels.iter().enumerate();
+    let held = channels.filter(|(channel, _)| holds(*channel, sensor(&link.board, *channel)));
+    held.map(|(_, name)| name.clone()).collect()
+}
+
+fn rail(link: &LinkStatus, channel: usize) -> Option<Rail> {
+    link.rails.get(channel).copied().flatten()
+}
+
+fn saturation(seen: &Observations) -> Told {
+    or_not_seen(readings(seen).map(|link| {
+        // A strip at the upper end has come off, which is another check's.
+        let high = named(link, |channel, sensor| {
+            rail(link, channel) == Some(Rail::High) && !sensor.is_some_and(Sensor::is_flex)
+        });
+        if high.is_empty() {
+            return Told::good("none");
+        }
+        Told::wrong(format!("{} at the upper end for more than half a second", high.join(", "))).because(
+            "The divider is fed from 5 V, which the pins of a Due do not bear; or the pad is shorted; or its resistor to ground is \
+             missing or far too large",
+            "Pull the plug and measure: the divider belongs to 3.3 V, with 4.7 kOhm from the pin to ground",
+        )
+    }))
+}
+
+fn open_circuit(seen: &Observations) -> Told {
+    or_not_seen(readings(seen).map(|link| {
+        let trace = |channel: usize| seen.traces.channels.get(channel).copied().unwrap_or_default();
+        let without = named(link, |channel, _| trace(channel).without > trace(channel).numbers);
+        let off = named(link, |channel, sensor| {
+            sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Rail::High)
+        });
+        let shorted = named(link, |channel, sensor| {
+            sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Rail::Low)
+        });
+        if !off.is_empty() {
+            return Told::wrong(format!("{} at the upper end", off.join(", "))).because(
+                "The strip has come off: nothing pulls the pin to ground",
+                "Look at the crimp of the strip, which is brittle, and at the wire from it to ground",
+            );
+        }
+        if !without.is_empty() {
+            return Told::wrong(format!("{} without a number in most lines", without.join(", "))).because(
+                "The sketch has nothing to print: the sensor is not connected",
+                "Look at the plug and the wires of that sensor; the other channels go on",
+            );
+        }
+        if !shorted.is_empty() {
+            return Told::wrong(format!("{} at zero", shorted.join(", "))).because(
+                "The pin is shorted to ground, or the resistor to 3.3 V is missing",
+                "Measure 47 kOhm from 3.3 V to the pin, and 17 to 70 kOhm from the pin to ground",
+            );
+        }
+        let idle =
+            named(link, |channel, sensor| sensor.is_some_and(|sensor| !sensor.is_flex()) && trace(channel).most <= 0.5);
+        if idle.is_empty() {
+            return Told::good("every channel gives numbers");
+        }
+        Told::note(format!("{} never above zero", idle.join(", "))).because(
+            "A pad that is not touched reads zero, and so does one that has come off",
+            "Press each pad while the doctor listens",
+        )
+    }))
+}
+
+fn crosstalk(seen: &Observations) -> Told {
+    let told = readings(seen).map(|link| {
+        let scale = f64::from(link.board.full_scale) / 4095.0;
+        let pads = (1..link.board.channels.len()).filter(|channel| {
+            // A channel at the rail says nothing of its neighbour, nor does its neighbour.
+            let railed = |channel: usize| rail(link, channel) == Some(Rail::High);
+            sensor(&link.board, *channel).is_some_and(|sensor| !sensor.is_flex())
+                && !railed(*channel)
+                && !railed(channel - 1)
+        });
+        let found = pads.filter_map(|channel| bleeding(link, channel, seen.traces.channels.get(channel)?, scale));
+        let found: Vec<Told> = found.collect();
+        found.into_iter().max_by_key(|told| told.verdict).unwrap_or_else(|| Told::good("idle pads read nothing"))
+    });
+    or_not_seen(told)
+}
+
+/// What a pad shows that should read nothing at times: it never does, and goes with the channel before it.
+fn bleeding(link: &LinkStatus, channel: usize, trace: &Trace, scale: f64) -> Option<Told> {
+    if trace.numbers == 0 || trace.least <= IDLE_COUNTS * scale {
+        return None;
+    }
+    let (name, before) = (&link.board.channels[channel], &link.board.channels[channel - 1]);
+    let least = trace.least;
+    if let Some((slope, _)) = trace.following().filter(|(slope, r)| *r > FOLLOWS && (0.01..1.0).contains(slope)) {
+        let percent = 100.0 * slope;
+        let seen = format!("{name} takes {percent:.0} % of {before}, and is never below {least:.0} counts");
+        return Some(Told::wrong(seen).because(
+            "The converter's multiplexer does not settle behind the high resistance of the divider",
+            "Solder 100 nF from each pin to ground, and throw away the first conversion of each channel, as our firmware does",
+        ));
+    }
+    Some(Told::note(format!("{name} is never below {least:.0} counts")).because(
+        format!("Something presses the pad all the time, or {before} bleeds into it"),
+        "Bend one finger by hand while the doctor listens: it then says which",
+    ))
+}
+
+fn rate(seen: &Observations) -> Told {
+    or_not_seen(readings(seen).map(|link| {
+        let cadence = &link.cadence;
+        let (measured, jitter) = (cadence.rate_hz, cadence.jitter_p95_ms);
+        let lost = cadence.lost as f64 / (cadence.samples + cadence.lost).max(1) as f64;
+        let [bytes, rows] = link.dropped;
+        if lost > LOST_SHARE {
+            let seen = format!("{} of {} samples did not arrive", cadence.lost, cadence.samples + cadence.lost);
+            let cause = if bytes + rows > 0 {
+                "This computer was too slow to take them"
+            } else {
+                "The board skips samples, or the line between loses them"
+            };
+            return Told::wrong(seen)
+                .because(cause, "Lower the rate in the sketch, close other programs, use a short cable");
+        }
+        match link.board.rate_hz {
+            Some(said) if (measured / said - 1.0).abs() > RATE_SHARE => {
+                Told::wrong(format!("{} samples a second; the board says {said}", three_digits(measured))).because(
+                    "The sketch does more in a period than fits, or waits by delay()",
+                    "Keep its schedule from micros(), as our firmware does, or lower the rate",
+                )
+            }
+            _ => Told::good(format!(
+                "{} samples a second, jitter {} ms (95 %)",
+                three_digits(measured),
+                three_digits(jitter)
+            )),
+        }
+    }))
+}
+
+fn clock(seen: &Observations) -> Told {
+    or_not_seen(readings(seen).map(|link| {
+        let Some(ppm) = link.cadence.drift_ppm else {
+            return Told::note("the board sends no time").because(
+                "Its lines have no t_us: times are taken from when bytes arrive, which is later by some milliseconds now and then",
+                "Print t_us:, as our firmware does",
+            );
+        };
+        let told = format!("{ppm:+.0} ppm against this computer's");
+        if ppm.abs() > NO_CLOCK_PPM {
+            Told::wrong(told).because("t_us does not count microseconds", "Print micros() as t_us")
+        } else if ppm.abs() > CRYSTAL_PPM {
+            Told::note(told).because(
+                "The board's clock comes from a resonator, or it was measured for a few seconds only",
+                "Nothing: it is taken into account",
+            )
+        } else {
+            Told::good(told)
+        }
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Traces, findings};
+    use super::*;
+    use crate::board::Reading;
+    use crate::rig::serial::{BoardKind, PortError, PortInfo, UsbIdentity};
+    use crate::wire::Cadence;
+    use std::path::PathBuf;
+
+    /// A sound gripper, its left finger bent meanwhile, its left pad touched.
+    fn sound() -> Observations {
+        let board = Board {
+            rate_hz: Some(50.0),
+            divider_ohm: vec![47e3, 47e3, 4.7e3, 4.7e3],
+            firmware: Some("1".to_owned()),
+            ..Board::default()
+        };
+        let usb = UsbIdentity { vid: 0x2341, pid: 0x003e, serial: None };
+        let kind = BoardKind { rank: 3, native: true };
+        let port = PortInfo { path: PathBuf::from("/dev/ttyACM0"), title: "Due".to_owned(), usb: Some(usb), kind };
+        let cadence =
+            Cadence { samples: 400, rate_hz: 50.0, printable_share: 1.0, drift_ppm: Some(20.0), ..Cadence::default() };
+        let link = LinkStatus {
+            state: LinkState::Listening,
+            port: port.clone(),
+            baud: Some(115_200),
+            board,
+            detected: None,
+            cadence,
+            rails: vec![None; 4],
+            looks_10_bit: false,
+            reconnects: 0,
+            dropped: [0; 2],
+        };
+        let traces = moving(|bend| [1400.0 + bend, 1500.0, 3.0 * bend, 2.0]);
+        Observations {
+            ports: vec![port],
+            refused: None,
+            modem_manager: false,
+            link: Some(link),
+            listened_s: 8.0,
+            traces,
+        }
+    }
+
+    /// Four channels while a finger is bent by up to 400 counts.
+    fn moving(counts: impl Fn(f32) -> [f32; 4]) -> Traces {
+        let mut traces = Traces::default();
+        for k in 0..100_u8 {
+            let counts = counts(4.0 * f32::from(k)).map(Some).to_vec();
+            traces.add(&Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts, line_bar: None });
+        }
+        traces
+    }
+
+    /// The checks that do not find everything good.
+    fn complaints(seen: &Observations) -> Vec<(&'static str, Verdict)> {
+        let told = findings(seen).into_iter().filter(|finding| finding.verdict != Verdict::Good);
+        let told: Vec<Finding> = told.collect();
+        for finding in told.iter().filter(|finding| finding.verdict > Verdict::Good) {
+            assert!(finding.cause.is_some() && finding.fix.is_some(), "{finding:?}");
+        }
+        told.iter().map(|finding| (finding.check, finding.verdict)).collect()
+    }
+
+    fn changed(change: impl Fn(&mut LinkStatus)) -> Observations {
+        let mut seen = sound();
+        seen.link.iter_mut().for_each(change);
+        seen
+    }
+
+    #[test]
+    fn nothing_is_wrong_with_a_sound_gripper() {
+        assert_eq!(complaints(&sound()), []);
+    }
+
+    #[test]
+    fn a_port_that_does_not_open_is_told_once_and_the_rest_is_not_seen() {
+        for (trouble, check) in [
+            (PortTrouble::NotFound, "port"),
+            (PortTrouble::Several, "port"),
+            (PortTrouble::Permission, "permission"),
+            (PortTrouble::Busy, "busy"),
+        ] {
+            let refused = PortError {
+                trouble,
+                what: "cannot open".to_owned(),
+                cause: "why".to_owned(),
+                fix: "what to do".to_owned(),
+                command: Some("sudo".to_owned()),
+            };
+            let seen = Observations { refused: Some(refused), link: None, ..sound() };
+            let told = findings(&seen);
+            let wrong: Vec<&Finding> = told.iter().filter(|finding| finding.verdict == Verdict::Wrong).collect();
+            assert!(wrong.len() == 1 && wrong[0].check == check, "{wrong:?}");
+            assert_eq!((wrong[0].command.as_deref(), wrong[0].cause.as_deref()), (Some("sudo"), Some("why")));
+            assert!(told.iter().filter(|finding| finding.verdict == Verdict::NotSeen).count() >= 10);
+        }
+    }
+
+    #[test]
+    fn modem_manager_is_worth_a_note_where_it_can_do_harm() {
+        let seen = Observations { modem_manager: true, ..sound() };
+        assert_eq!(complaints(&seen), [("modem-manager", Verdict::Note)]);
+        let mut terminal = changed(|link| link.port.usb = None);
+        terminal.modem_manager = true;
+        assert_eq!(complaints(&terminal), []);
+    }
+
+    #[test]
+    fn a_silent_port_is_told_by_what_it_is() {
+        let silent = |native| {
+            let mut seen = changed(|link| {
+                link.state = LinkState::Silent { hint: String::new() };
+                link.cadence = Cadence::default();
+                link.port.kind.native = native;
+            });
+            seen.traces = Traces::default();
+            let told =
+                findings(&seen).into_iter().find(|finding| finding.verdict == Verdict::Wrong).expect("one is wrong");
+            assert_eq!(told.check, "silence");
+            told.cause.unwrap_or_default()
+        };
+        assert!(silent(true).contains("DTR") && !silent(false).contains("DTR"));
+    }
+
+    #[test]
+    fn each_trouble_is_found_by_its_own_check() {
+        let high = |channel: usize| changed(|link| link.rails[channel] = Some(Rail::High));
+        let wrong = |check| vec![(check, Verdict::Wrong)];
+        assert_eq!(complaints(&high(2)), wrong("saturation"));
+        assert_eq!(complaints(&high(0)), wrong("open-circuit"));
+        assert_eq!(complaints(&changed(|link| link.rails[1] = Some(Rail::Low))), wrong("open-circuit"));
+        assert_eq!(complaints(&changed(|link| link.rails[3] = Some(Rail::Low))), [], "an idle pad is at zero");
+        assert_eq!(complaints(&changed(|link| link.looks_10_bit = true)), wrong("bits"));
+        assert_eq!(complaints(&changed(|link| link.cadence.lost = 10)), wrong("rate"));
+        assert_eq!(complaints(&changed(|link| link.cadence.rate_hz = 42.0)), wrong("rate"));
+        assert_eq!(complaints(&changed(|link| link.cadence.bad_lines = 40)), wrong("lines"));
+        assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = Some(-1e6))), wrong("clock"));
+        let lost = |link: &mut LinkStatus| link.state = LinkState::Lost { cause: "unplugged".to_owned() };
+        assert_eq!(complaints(&changed(lost)), wrong("port"));
+    }
+
+    #[test]
+    fn what_is_worth_knowing_is_no_error() {
+        let note = |check| vec![(check, Verdict::Note)];
+        assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = Some(200.0))), note("clock"));
+        assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = None)), note("clock"));
+        assert_eq!(complaints(&changed(|link| link.board.firmware = None)), note("firmware"));
+        assert_eq!(complaints(&changed(|link| link.board.full_scale = 1023)), note("bits"));
+        assert_eq!(complaints(&changed(|link| link.cadence.bad_lines = 4)), note("lines"));
+        let slow = |link: &mut LinkStatus| (link.baud, link.port.kind.native) = (Some(57_600), false);
+        assert_eq!(complaints(&changed(slow)), note("baud"));
+        let untouched = Observations { traces: moving(|bend| [1400.0 + bend, 1500.0, 0.0, 0.0]), ..sound() };
+        assert_eq!(complaints(&untouched), note("open-circuit"));
+    }
+
+    #[test]
+    fn a_pad_that_follows_the_strip_before_it_is_crosstalk_and_one_that_is_pressed_is_not() {
+        let bled =
+            Observations { traces: moving(|bend| [1400.0, 1500.0 + bend, 0.2 * (1500.0 + bend), 2.0]), ..sound() };
+        assert_eq!(complaints(&bled), [("crosstalk", Verdict::Wrong)]);
+        let pressed = Observations { traces: moving(|bend| [1400.0 + bend, 1500.0, 700.0, 2.0]), ..sound() };
+        assert_eq!(complaints(&pressed), [("crosstalk", Verdict::Note)]);
+        // A grasp: the pad follows the strip, but from nothing.
+        let grasped = moving(|bend| [1400.0 + bend, 1500.0 + bend, (8.0 * (bend - 200.0)).max(0.0), 2.0]);
+        assert_eq!(complaints(&Observations { traces: grasped, ..sound() }), []);
+    }
+
+    #[test]
+    fn nonsense_is_told_as_a_wrong_rate() {
+        let mut seen = changed(|link| {
+            link.state = LinkState::Unreadable { hint: String::new() };
+            link.cadence = Cadence { printable_share: 0.4, bad_lines: 30, ..Cadence::default() };
+        });
+        seen.traces = Traces::default();
+        let told = complaints(&seen);
+        assert!(told.contains(&("baud", Verdict::Wrong)) && told.contains(&("lines", Verdict::Wrong)), "{told:?}");
+    }
+
+    #[test]
+    fn every_check_has_a_name_of_its_own() {
+        for check in CHECKS {
+            assert_eq!(CHECKS.iter().filter(|other| other.name == check.name).count(), 1);
+            assert!(!check.about.is_empty());
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What is wrong between the gripper's board and this computer: one look at the port, then a list of checks, each a small
+//! function from what was seen to a finding with cause and fix. A terminal and a window show the same list.
+//!
+//! To add a check, write it in `checks` and add one line to [`CHECKS`].
+
+mod checks;
+mod examine;
+mod traces;
+
+pub use checks::{CHECKS, Check};
+pub use examine::examine;
+pub use traces::{Trace, Traces};
+
+use crate::rig::serial::{LinkStatus, PortError, PortInfo};
+use serde::Serialize;
+
+/// What a check came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing could be seen, because of what an earlier check found, or because nothing moved.
+    NotSeen,
+    /// As it should be.
+    Good,
+    /// Nothing is wrong, but it is worth knowing.
+    Note,
+    /// Something is wrong.
+    Wrong,
+}
+
+impl Verdict {
+    /// In a word or two.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotSeen => "not seen",
+            Self::Good => "good",
+            Self::Note => "note",
+            Self::Wrong => "WRONG",
+        }
+    }
+}
+
+/// What a check found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Name of the check.
+    pub check: &'static str,
+    /// What it came to.
+    pub verdict: Verdict,
+    /// What was seen, in a sentence.
+    pub seen: String,
+    /// Why that is so, where something is wrong or worth knowing.
+    pub cause: Option<String>,
+    /// What to do about it.
+    pub fix: Option<String>,
+    /// A command that does it, to be copied.
+    pub command: Option<String>,
+}
+
+/// Everything that the checks look at.
+#[derive(Clone, Debug)]
+pub struct Observations {
+    /// The ports that there are.
+    pub ports: Vec<PortInfo>,
+    /// Why none could be chosen or opened; none where one was.
+    pub refused: Option<PortError>,
+    /// ModemManager runs.
+    pub modem_manager: bool,
+    /// How the link stood at the end; none where it was not opened.
+    pub link: Option<LinkStatus>,
+    /// How long it was listened to (s).
+    pub listened_s: f64,
+    /// What was read meanwhile.
+    pub traces: Traces,
+}
+
+/// All checks, in the order in which they are told.
+pub fn findings(seen: &Observations) -> Vec<Finding> {
+    CHECKS.iter().map(|check| check.look(seen)).collect()
+}
