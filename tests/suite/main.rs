@@ -7,6 +7,7 @@
 //! - `firmware`: the logic of the board, compiled and run against a stand-in for its pins.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
+//! - `pretended`: the pretended gripper, with every fault, recorded and diagnosed.
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
@@ -34,6 +35,7 @@ mod panels;
 mod peers;
 mod physics;
 mod pictures;
+mod pretended;
 mod program;
 mod recognition_panel;
 mod scripted;

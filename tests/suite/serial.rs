@@ -23,7 +23,7 @@ fn pair() -> (TTYPort, TTYPort) {
     (board.try_clone_native().unwrap(), port.try_clone_native().unwrap())
 }
 
-fn start(mut command: Command) -> Child {
+pub(crate) fn start(mut command: Command) -> Child {
     let _alone = STARTING.lock().unwrap();
     command.spawn().unwrap()
 }

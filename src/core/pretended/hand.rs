@@ -288,6 +288,8 @@ impl LiveGrasp {
                     self.rig.command(bar, phase);
                 }
                 Ok(Event::Sampled(frame)) => self.frames = [self.frames[1], (frame.t, self.feel(&frame))],
+                // A simulation has no board.
+                Ok(Event::Heard(_) | Event::Commanded(_)) => {}
                 Ok(Event::Finished) => self.frames[1].0 = f64::INFINITY,
                 Err(error) => {
                     self.failed = Some(error.to_string());
