@@ -15,6 +15,8 @@ use std::sync::LazyLock;
 enum Happening {
     /// It is polled at a time of its clock (µs).
     Poll(u32),
+    /// Only the watchdog's timer comes round, at a time of its clock (µs).
+    Watch(u32),
     /// Bytes come from the host.
     Hear(Vec<u8>),
 }
@@ -68,6 +70,7 @@ fn in_c(setup: &BoardSetup, start_us: u32, happenings: &[Happening]) -> String {
     for happening in happenings {
         match happening {
             Happening::Poll(us) => writeln!(script, "t {us}").unwrap(),
+            Happening::Watch(us) => writeln!(script, "w {us}").unwrap(),
             Happening::Hear(bytes) => {
                 let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
                 writeln!(script, "x {hex}").unwrap();
@@ -105,6 +108,8 @@ fn in_rust(setup: &BoardSetup, start_us: u32, happenings: &[Happening]) -> Strin
                 now = *us;
                 board.poll(now, &mut convert, &mut out);
             }
+            // The pretended board is never stuck: it is watched when it is polled.
+            Happening::Watch(_) => {}
             Happening::Hear(bytes) => bytes.iter().for_each(|byte| {
                 board.hear(*byte, now, &mut out);
             }),
@@ -212,6 +217,15 @@ fn silence_of_the_host_vents_within_a_second_but_a_sign_of_life_does_not() {
     // Rubbish is no sign of life: a host whose line is broken must not hold the pressure.
     assert!(vents(&[after(0), on(), after(900_000), hear("%&/"), after(1_100_000)]));
     assert!(!vents(&[after(0), on(), hear("V"), after(5_000_000)]), "nothing to vent");
+}
+
+#[test]
+fn the_watchdog_vents_without_a_word_while_the_loop_is_stuck_and_says_so_later() {
+    let stuck = [Happening::Poll(0), hear("P 0.50"), Happening::Watch(900_000), Happening::Watch(1_000_001)];
+    let told = in_c(&setup(20_000, 4, 30), 0, &stuck);
+    assert!(told.contains("# ok p=0.50\n!pressure 0\n!conversions"), "{told}");
+    let told = in_c(&setup(20_000, 4, 30), 0, &[&stuck[..], &[Happening::Poll(1_020_000)]].concat());
+    assert!(printed(&told)[3] == "# vent reason=watchdog" && told.matches("!pressure 0").count() == 2, "{told}");
 }
 
 #[test]

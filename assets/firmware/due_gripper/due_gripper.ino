@@ -36,6 +36,14 @@ static const GripperPins pins = {convert, put_pressure, print};
 static const GripperSetup gripper = {20000, 4, names, divider_ohm, 12, MOST_STEPS};
 static GripperState state;
 
+#if MOST_STEPS > 0
+/* The core calls this from an interrupt every millisecond. */
+extern "C" int sysTickHook(void) {
+  gripper_watch(&state, &pins, micros());
+  return 0;
+}
+#endif
+
 void setup() {
   HOST.begin(115200); /* the native port ignores the rate */
   analogReadResolution(12);

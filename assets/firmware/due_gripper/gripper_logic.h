@@ -49,12 +49,13 @@ typedef struct {
 } GripperSetup;
 
 typedef struct {
-  uint32_t next_us;   /* when the next sample is due */
-  uint32_t heard_us;  /* when the last line came that was understood */
-  uint32_t seq;       /* number of the next sample */
-  uint8_t steps;      /* pressure that is on */
-  uint8_t heard;      /* bytes of the host's line so far */
-  uint8_t overlong;   /* the line is too long: wait for its end */
+  uint32_t next_us;            /* when the next sample is due */
+  uint32_t seq;                /* number of the next sample */
+  volatile uint32_t heard_us;  /* when the last line came that was understood */
+  volatile uint8_t steps;      /* pressure that is on */
+  volatile uint8_t vented;     /* the watchdog has vented, and the host has not been told */
+  uint8_t heard;               /* bytes of the host's line so far */
+  uint8_t overlong;            /* the line is too long: wait for its end */
   char line[GRIPPER_LONGEST_HEARD];
 } GripperState;
 
@@ -222,8 +223,11 @@ static void gripper_hear(GripperState *state, const GripperSetup *setup, const G
   state->line[state->heard] = 0;
   if (state->overlong) {
     gripper_say(pins, "# refused reason=too-long");
-  } else if (state->heard && gripper_obey(state, setup, pins, state->line)) {
+  } else if (state->heard) {
+    /* Before it is obeyed, so that the watchdog does not take a pressure that is put on just now for an old one. */
+    uint32_t before = state->heard_us;
     state->heard_us = now_us;
+    if (!gripper_obey(state, setup, pins, state->line)) state->heard_us = before;
   }
   state->heard = 0;
   state->overlong = 0;
@@ -262,12 +266,22 @@ static void gripper_sample(const GripperState *state, const GripperSetup *setup,
   gripper_send(pins, &out);
 }
 
+/* Vents when the host has gone silent. It is short and prints nothing, so that a timer's interrupt may call it: printing can
+ * wait for a host that hangs, and the hand must open nevertheless. */
+static void gripper_watch(GripperState *state, const GripperPins *pins, uint32_t now_us) {
+  if (state->steps && now_us - state->heard_us > GRIPPER_WATCHDOG_US) {
+    gripper_set_pressure(state, pins, 0);
+    state->vented = 1;
+  }
+}
+
 /* To be called as often as possible: samples when one is due, vents when the host has gone silent. A sample is due at
  * whole periods after the beginning, however late the last one was; those that were missed altogether are counted in
  * seq, so that the host knows. */
 static void gripper_poll(GripperState *state, const GripperSetup *setup, const GripperPins *pins, uint32_t now_us) {
-  if (state->steps && now_us - state->heard_us > GRIPPER_WATCHDOG_US) {
-    gripper_set_pressure(state, pins, 0);
+  gripper_watch(state, pins, now_us);
+  if (state->vented) {
+    state->vented = 0;
     gripper_say(pins, "# vent reason=watchdog");
   }
   if ((int32_t)(now_us - state->next_us) < 0) return;

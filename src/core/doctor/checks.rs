@@ -24,6 +24,9 @@ const FOLLOWS: f64 = 0.95;
 /// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
 const IDLE_COUNTS: f64 = 20.0;
 
+/// What noise may take from a channel at the upper end, as a share of the range: 4 of 4095.
+const NOISE_AT_THE_END: f64 = 1e-3;
+
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
@@ -302,11 +305,18 @@ fn rail(link: &LinkStatus, channel: usize) -> Option<Rail> {
     link.rails.get(channel).copied().flatten()
 }
 
+/// Whether a channel stands at the upper end: lately, or all the time within what noise takes from it.
+fn is_high(seen: &Observations, link: &LinkStatus, channel: usize) -> bool {
+    let full = f64::from(link.board.full_scale);
+    let always = |trace: &Trace| trace.numbers > 0 && trace.least >= full * (1.0 - NOISE_AT_THE_END);
+    rail(link, channel) == Some(Rail::High) || seen.traces.channels.get(channel).is_some_and(always)
+}
+
 fn saturation(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         // A strip at the upper end has come off, which is another check's.
         let high = named(link, |channel, sensor| {
-            rail(link, channel) == Some(Rail::High) && !sensor.is_some_and(Sensor::is_flex)
+            is_high(seen, link, channel) && !sensor.is_some_and(Sensor::is_flex)
         });
         if high.is_empty() {
             return Told::good("none");
@@ -323,9 +333,7 @@ fn open_circuit(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         let trace = |channel: usize| seen.traces.channels.get(channel).copied().unwrap_or_default();
         let without = named(link, |channel, _| trace(channel).without > trace(channel).numbers);
-        let off = named(link, |channel, sensor| {
-            sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Rail::High)
-        });
+        let off = named(link, |channel, sensor| sensor.is_some_and(Sensor::is_flex) && is_high(seen, link, channel));
         let shorted = named(link, |channel, sensor| {
             sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Rail::Low)
         });
@@ -347,13 +355,14 @@ fn open_circuit(seen: &Observations) -> Told {
                 "Measure 47 kOhm from 3.3 V to the pin, and 17 to 70 kOhm from the pin to ground",
             );
         }
-        let idle =
-            named(link, |channel, sensor| sensor.is_some_and(|sensor| !sensor.is_flex()) && trace(channel).most <= 0.5);
+        let idle = named(link, |channel, sensor| {
+            sensor.is_some_and(|sensor| !sensor.is_flex()) && trace(channel).most <= IDLE_COUNTS
+        });
         if idle.is_empty() {
             return Told::good("every channel gives numbers");
         }
-        Told::note(format!("{} never above zero", idle.join(", "))).because(
-            "A pad that is not touched reads zero, and so does one that has come off",
+        Told::note(format!("{} never pressed", idle.join(", "))).because(
+            "A pad that is not touched reads nothing, and so does one that has come off",
             "Press each pad while the doctor listens",
         )
     }))
@@ -364,7 +373,7 @@ fn crosstalk(seen: &Observations) -> Told {
         let scale = f64::from(link.board.full_scale) / 4095.0;
         let pads = (1..link.board.channels.len()).filter(|channel| {
             // A channel at the rail says nothing of its neighbour, nor does its neighbour.
-            let railed = |channel: usize| rail(link, channel) == Some(Rail::High);
+            let railed = |channel: usize| is_high(seen, link, channel);
             sensor(&link.board, *channel).is_some_and(|sensor| !sensor.is_flex())
                 && !railed(*channel)
                 && !railed(channel - 1)
@@ -460,7 +469,7 @@ mod tests {
     use crate::wire::Cadence;
     use std::path::PathBuf;
 
-    /// A sound gripper, its left finger bent meanwhile, its left pad touched.
+    /// A sound gripper, its left finger bent meanwhile, its pads pressed.
     fn sound() -> Observations {
         let board = Board {
             rate_hz: Some(50.0),
@@ -485,7 +494,7 @@ mod tests {
             reconnects: 0,
             dropped: [0; 2],
         };
-        let traces = moving(|bend| [1400.0 + bend, 1500.0, 3.0 * bend, 2.0]);
+        let traces = moving(|bend| [1400.0 + bend, 1500.0, 3.0 * bend, bend]);
         Observations {
             ports: vec![port],
             refused: None,
@@ -611,12 +620,12 @@ mod tests {
     #[test]
     fn a_pad_that_follows_the_strip_before_it_is_crosstalk_and_one_that_is_pressed_is_not() {
         let bled =
-            Observations { traces: moving(|bend| [1400.0, 1500.0 + bend, 0.2 * (1500.0 + bend), 2.0]), ..sound() };
+            Observations { traces: moving(|bend| [1400.0, 1500.0 + bend, 0.2 * (1500.0 + bend), bend]), ..sound() };
         assert_eq!(complaints(&bled), [("crosstalk", Verdict::Wrong)]);
-        let pressed = Observations { traces: moving(|bend| [1400.0 + bend, 1500.0, 700.0, 2.0]), ..sound() };
+        let pressed = Observations { traces: moving(|bend| [1400.0 + bend, 1500.0, 700.0, bend]), ..sound() };
         assert_eq!(complaints(&pressed), [("crosstalk", Verdict::Note)]);
         // A grasp: the pad follows the strip, but from nothing.
-        let grasped = moving(|bend| [1400.0 + bend, 1500.0 + bend, (8.0 * (bend - 200.0)).max(0.0), 2.0]);
+        let grasped = moving(|bend| [1400.0 + bend, 1500.0 + bend, (8.0 * (bend - 200.0)).max(0.0), bend]);
         assert_eq!(complaints(&Observations { traces: grasped, ..sound() }), []);
     }
 

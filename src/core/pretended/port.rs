@@ -10,16 +10,20 @@ use serialport::{SerialPort as _, TTYPort};
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
 /// How long a look for bytes from the host takes at most: the grain of everything that happens on the port.
 const GRAIN: Duration = Duration::from_millis(1);
 
-/// Pieces of output that wait for a host that does not read, beyond what the terminal itself holds; then they are given up,
-/// as a real board gives them up.
-const MOST_WAITING: usize = 256;
+/// Bytes that wait for a host that does not read, beyond what the terminal itself holds: two seconds at 1 kHz on eight
+/// channels. What comes then is given up, as drivers and boards give it up.
+const MOST_WAITING: usize = 1 << 18;
+
+/// How often it is told that something was given up.
+const TELL_EVERY: Duration = Duration::from_secs(1);
 
 /// How the gripper is reached.
 #[derive(Clone, Debug)]
@@ -172,8 +176,8 @@ impl<'a> Port<'a> {
             _ => bytes,
         };
         terminal.send(bytes);
-        if terminal.given_up > 0 {
-            gripper.tell(Happening::Overrun { bytes: std::mem::take(&mut terminal.given_up) });
+        if let Some(bytes) = terminal.take_given_up() {
+            gripper.tell(Happening::Overrun { bytes });
         }
     }
 }
@@ -224,8 +228,12 @@ fn leads_to_a_terminal(path: &Path) -> bool {
 /// One pseudo-terminal: our end of it, and a thread that writes, so that a host that does not read holds up nobody.
 struct Terminal {
     near: TTYPort,
-    output: SyncSender<Vec<u8>>,
+    output: Sender<Vec<u8>>,
+    /// Bytes that were handed to the writer and that the terminal has not taken.
+    waiting: Arc<AtomicUsize>,
+    /// Bytes that were given up and not told of, and when that was done last.
     given_up: u64,
+    told: Instant,
 }
 
 impl Terminal {
@@ -234,17 +242,20 @@ impl Terminal {
         near.set_timeout(GRAIN)?;
         let name = far.name().unwrap_or_default();
         let mut writer = near.try_clone_native()?;
-        let (output, pieces) = sync_channel::<Vec<u8>>(MOST_WAITING);
+        let (output, pieces) = channel::<Vec<u8>>();
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let left = Arc::clone(&waiting);
         std::thread::Builder::new()
             .name("pretended-port".to_owned())
             .spawn(move || {
                 for piece in pieces {
                     write(&mut writer, &piece);
+                    left.fetch_sub(piece.len(), Ordering::Relaxed);
                 }
             })
             .map_err(|cause| PortError::Link { path: link.path.clone(), cause })?;
         link.lead_to(&name)?;
-        Ok((Self { near, output, given_up: 0 }, name))
+        Ok((Self { near, output, waiting, given_up: 0, told: Instant::now() }, name))
     }
 
     /// Hands bytes to the host; what it does not read in time is given up.
@@ -252,9 +263,23 @@ impl Terminal {
         if bytes.is_empty() {
             return;
         }
-        if let Err(TrySendError::Full(lost) | TrySendError::Disconnected(lost)) = self.output.try_send(bytes) {
-            self.given_up += lost.len() as u64;
+        let size = bytes.len();
+        if self.waiting.load(Ordering::Relaxed) + size <= MOST_WAITING {
+            self.waiting.fetch_add(size, Ordering::Relaxed);
+            if self.output.send(bytes).is_ok() {
+                return;
+            }
         }
+        self.given_up += size as u64;
+    }
+
+    /// Bytes that were given up since this was asked for last, once in a while.
+    fn take_given_up(&mut self) -> Option<u64> {
+        if self.given_up == 0 || self.told.elapsed() < TELL_EVERY {
+            return None;
+        }
+        self.told = Instant::now();
+        Some(std::mem::take(&mut self.given_up))
     }
 }
 

@@ -2,6 +2,7 @@
  * output. Arguments: period in us, channels, bits, most steps, start of the clock in us.
  *
  *     t 20000     it is so late now, in us: poll
+ *     w 20000     it is so late now, and only the timer comes round: the loop is stuck
  *     x 4b0a      these bytes come from the host now
  *
  * Beside the board's lines it prints "!pressure N" when the control box is told, and at the end "!conversions N". */
@@ -48,6 +49,9 @@ int main(int argc, char **argv) {
     if (command[0] == 't') {
       now = (uint32_t)strtoul(command + 2, NULL, 10);
       gripper_poll(&state, &setup, &pins, now);
+    } else if (command[0] == 'w') {
+      now = (uint32_t)strtoul(command + 2, NULL, 10);
+      gripper_watch(&state, &pins, now);
     } else {
       const char *hex = command + 2;
       unsigned byte;
