@@ -38,6 +38,7 @@ const TEST_FILES: &[&str] = &[
     "recording/board_tests.rs",
     "rig/serial/link_tests.rs",
     "pretended/tests.rs",
+    "doctor/tests.rs",
 ];
 
 /// Where each third-party crate may be named.

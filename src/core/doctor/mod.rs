@@ -5,6 +5,8 @@
 
 mod checks;
 mod examine;
+#[cfg(test)]
+mod tests;
 mod traces;
 
 pub use checks::{CHECKS, Check};
