@@ -411,6 +411,11 @@ fn rate(seen: &Observations) -> Told {
         let [bytes, rows] = link.dropped;
         if lost > LOST_SHARE {
             let seen = format!("{} of {} samples did not arrive", cadence.lost, cadence.samples + cadence.lost);
+            if cadence.bad_lines > 0 {
+                // Another check's: what is unreadable is missing.
+                return Told::note(seen)
+                    .because("Some lines could not be read", "See what the check of lines says first");
+            }
             let cause = if bytes + rows > 0 {
                 "This computer was too slow to take them"
             } else {

@@ -126,6 +126,8 @@ fn each_trouble_is_found_by_its_own_check() {
     assert_eq!(complaints(&changed(|link| link.looks_10_bit = true)), wrong("bits"));
     assert_eq!(complaints(&changed(|link| link.cadence.lost = 10)), wrong("rate"));
     assert_eq!(complaints(&changed(|link| link.cadence.rate_hz = 42.0)), wrong("rate"));
+    let unreadable = |link: &mut LinkStatus| (link.cadence.lost, link.cadence.bad_lines) = (40, 40);
+    assert_eq!(complaints(&changed(unreadable)), [("lines", Verdict::Wrong), ("rate", Verdict::Note)]);
     assert_eq!(complaints(&changed(|link| link.cadence.bad_lines = 40)), wrong("lines"));
     assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = Some(-1e6))), wrong("clock"));
     let lost = |link: &mut LinkStatus| link.state = LinkState::Lost { cause: "unplugged".to_owned() };
