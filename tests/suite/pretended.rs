@@ -262,7 +262,7 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
         ("tenbit@0", &[], "6", "bits"),
         ("silent@0/60", &[], "3", "silence"),
     ];
-    let another_rate = std::thread::spawn(|| diagnosed(&["--baud", "250000"], "6"));
+    let another_rate = std::thread::spawn(|| diagnosed(&["--baud", "250000"], "9"));
     std::thread::scope(|scope| {
         let look = |(faults, more, seconds, _): &(&str, &[&str], &str, &str)| {
             let arguments = [&["--faults", faults, "--script", moving], *more].concat();

@@ -21,6 +21,9 @@ const LOST_SHARE: f64 = 1e-3;
 /// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
 const IDLE_COUNTS: f64 = 20.0;
 
+/// Largest counts that speak for a converter of ten bits; with fewer nothing is connected.
+const TEN_BITS: std::ops::RangeInclusive<f64> = 128.0..=1023.0;
+
 /// What noise may take from a channel at the upper end, as a share of the range: 4 of 4095.
 const NOISE_AT_THE_END: f64 = 1e-3;
 
@@ -268,8 +271,9 @@ fn firmware(seen: &Observations) -> Told {
 fn bits(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         let full = link.board.full_scale;
-        if link.looks_10_bit {
-            let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
+        let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
+        // Whatever the board says: a strip at rest is above a quarter of the range.
+        if link.looks_10_bit || full >= 4095 && TEN_BITS.contains(&most) {
             return Told::wrong(format!("no count was above {most:.0}; the converter is said to go to {full}"))
                 .because(
                     "analogRead gives 10 bits until it is told otherwise",
