@@ -29,6 +29,7 @@ fn sound() -> Observations {
         rails: vec![None; 4],
         looks_10_bit: false,
         reconnects: 0,
+        now_s: 8.0,
         dropped: [0; 2],
     };
     let traces = moving(|bend| [1400.0 + bend, 1500.0, 3.0 * bend, bend]);
