@@ -109,6 +109,23 @@ pub(super) fn born_inside(conditions: &Conditions) -> Findings {
         findings.push(Finding::at_most(format!("most energy over the first {at}"), most / start, 1.0 + 1e-9));
         findings.push(missed(&run));
     }
+    // A plate of 1 mm that the axis of the left finger has just come through: the finger goes back the way it came.
+    let mut scene = bare(10);
+    scene.object.fixed = true;
+    scene.gripper.mount.offset = [0.0508, 0.0, 0.0];
+    let half = DVec3::new(0.0005, 0.02, 0.03);
+    let plate = ObjectModel::from_primitive("plate", Primitive::Cuboid { half }, 400.0, 0.6);
+    let mut run = stepped(&scene, Some(&plate), conditions);
+    let start = run.energy();
+    let (mut forward, mut most) = (f64::NEG_INFINITY, 0.0f64);
+    for _ in 0..(conditions.span(0.3) / conditions.h()).ceil() as usize {
+        run.step(&Drive::default())?;
+        forward = forward.max(run.tip().0);
+        most = most.max(run.energy());
+    }
+    findings.push(Finding::at_most("way on through a plate [m]", forward, 0.0));
+    findings.push(Finding::at_most("most energy over the first at a plate", most / start, 1.0 + 1e-9));
+    findings.push(missed(&run));
     Ok(findings)
 }
 
