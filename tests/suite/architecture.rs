@@ -38,6 +38,9 @@ const TEST_FILES: &[&str] = &[
     "recording/board_tests.rs",
     "rig/serial/link_tests.rs",
     "pretended/tests.rs",
+    "study/finger_fit/tests.rs",
+    "sensing/calibration/pad_curve_tests.rs",
+    "sensing/calibration/readout_tests.rs",
     "doctor/tests.rs",
 ];
 
@@ -91,7 +94,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("serde", &["src"]),
     ("serde_json", &["src"]),
     ("smartcore", &["src/core/recognition/rivals"]),
-    ("statrs", &["src/core/recognition/metrics"]),
+    ("statrs", &["src/core/recognition/metrics", "src/core/sensing/calibration/straight_line.rs"]),
     ("stl_io", &["src/core/geometry"]),
     ("strsim", &["src/core/objects", "src/core/scene"]),
     ("thiserror", &["src"]),

@@ -2,6 +2,7 @@
 //!
 //! Nothing here is stored. A trial keeps joint angles and taxel forces, so that any layout can be derived later.
 
+pub mod calibration;
 mod curvature;
 pub mod electronics;
 mod layout;

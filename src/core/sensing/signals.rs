@@ -29,6 +29,18 @@ impl Signals {
         &self.values[sample * width..(sample + 1) * width]
     }
 
+    /// Some of the channels, by their names and in that order; none where one is missing.
+    pub fn chosen(&self, channels: &[String]) -> Option<Self> {
+        let column = |name: &String| self.channels.iter().position(|own| own == name);
+        let columns: Vec<usize> = channels.iter().map(column).collect::<Option<_>>()?;
+        let mut chosen = Self { channels: channels.to_vec(), ..Self::default() };
+        for (sample, t) in self.t_s.iter().enumerate() {
+            let row = self.row(sample);
+            chosen.push(*t, &columns.iter().map(|column| row[*column]).collect::<Vec<f32>>());
+        }
+        Some(chosen)
+    }
+
     /// The first part of them, up to a time (s).
     pub fn until(mut self, t: f64) -> Self {
         let count = self.t_s.partition_point(|own| *own <= t);

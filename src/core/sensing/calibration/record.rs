@@ -1,0 +1,142 @@
+//! What is known of a part: the points that were measured, and the curve through them.
+
+use super::flex_curve::FlexCurve;
+use super::input::Input;
+use super::pad_curve::{BendingZero, PadCurve};
+use super::point::{Kind, Point};
+use super::{Fault, Rail};
+use crate::board::Sensor;
+use serde::{Deserialize, Serialize};
+
+/// Longest name of a part that is kept (characters).
+const LONGEST_NAME: usize = 80;
+
+/// What was measured of a part. This is what is stored and exchanged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Name of the part, such as what is written on its tail.
+    pub part: String,
+    /// What it is.
+    pub kind: Kind,
+    /// The input and converter it was measured with.
+    pub input: Input,
+    /// The known angles (rad) or forces (N), and what was read.
+    pub points: Vec<Point>,
+    /// How the zero of a pad moves with the bending of its finger, where an empty close was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bending: Option<BendingZero>,
+    /// Whatever should be known besides.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+}
+
+/// The curve through the points.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Curve {
+    /// Of a flex strip.
+    Flex(FlexCurve),
+    /// Of a force pad.
+    Pad(PadCurve),
+}
+
+/// A record with the curve fitted to it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// What was measured.
+    #[serde(flatten)]
+    pub record: Record,
+    /// What came out.
+    pub curve: Curve,
+    /// What should be known of it, in sentences.
+    pub warnings: Vec<String>,
+}
+
+impl Calibration {
+    /// Fits the curve; refuses what such a part cannot be.
+    pub fn fit(record: Record) -> Result<Self, Fault> {
+        if record.part.trim().is_empty() || record.part.chars().count() > LONGEST_NAME {
+            return Err(Fault::NoName);
+        }
+        let (curve, warnings) = match record.kind {
+            Kind::Flex => {
+                let (curve, warnings) = FlexCurve::fit(&record.points, &record.input)?;
+                (Curve::Flex(curve), warnings)
+            }
+            Kind::Pad => {
+                let (curve, warnings) = PadCurve::fit(&record.points, &record.input)?;
+                (Curve::Pad(curve), warnings)
+            }
+        };
+        match &record.bending {
+            Some(_) if record.kind == Kind::Flex => Err(Fault::NoBending),
+            Some(bending) if !bending.is_possible() => Err(Fault::BendingTooShort { have: 0, span: 0.0 }),
+            _ => Ok(Self { record, curve, warnings }),
+        }
+    }
+
+    /// Refuses to be used for a sensor of the other kind.
+    pub fn check_fits(&self, sensor: Sensor) -> Result<(), Fault> {
+        let wanted = Kind::of(sensor);
+        if self.record.kind == wanted {
+            return Ok(());
+        }
+        let (made, part) = (self.record.kind.label(), self.record.part.clone());
+        Err(Fault::WrongKind { part, made, place: sensor.label(), wanted: wanted.label() })
+    }
+
+    /// What a reading comes to through a input: an angle (rad) or a force (N), without any zero. None where the reading
+    /// is at an end of the range; a pad that does not conduct is unloaded.
+    pub fn stimulus(&self, input: &Input, counts: f64) -> Option<f64> {
+        match (&self.curve, input.rail(counts)) {
+            (Curve::Flex(curve), None) => Some(curve.angle(input.ohm(counts))),
+            (Curve::Pad(curve), None | Some(Rail::Open)) => {
+                Some(curve.force(input.siemens(counts) - curve.idle_siemens))
+            }
+            (Curve::Flex(_), Some(_)) | (Curve::Pad(_), Some(Rail::Short)) => None,
+        }
+    }
+
+    /// Residuals of its points, in the same order, read less set: in rad, or as a share of the force; none where a
+    /// pad did not conduct.
+    pub fn residuals(&self) -> Vec<Option<f64>> {
+        match &self.curve {
+            Curve::Flex(curve) => curve.residuals.iter().map(|r| Some(*r)).collect(),
+            Curve::Pad(curve) => curve.residuals.clone(),
+        }
+    }
+
+    /// How uncertain its gain is: half the width of the 95 % interval as a share, at the middle of the usual range; none
+    /// where the points do not tell.
+    pub fn gain_interval(&self) -> Option<f64> {
+        match &self.curve {
+            Curve::Flex(curve) => curve.gain_interval(),
+            Curve::Pad(curve) => curve.force_interval(1.0),
+        }
+    }
+
+    /// What came out, in a line.
+    pub fn summary(&self) -> String {
+        let often = |interval: Option<f64>, unit: &str| {
+            interval.map_or_else(|| ", interval unknown".to_owned(), |half| format!(" ± {half:.2} {unit} (95 %)"))
+        };
+        match &self.curve {
+            Curve::Flex(curve) => {
+                let middle = std::f64::consts::FRAC_PI_4;
+                format!(
+                    "{:.2} kOhm flat, {:.2} times that at 90 degrees; 45 degrees{}",
+                    curve.flat_ohm * 1e-3,
+                    curve.bent_over_flat(),
+                    often(curve.angle_interval(middle).map(f64::to_degrees), "degrees")
+                )
+            }
+            Curve::Pad(curve) => format!(
+                "G = {:.1} µS (F / 1 N)^{:.3} from {:.2} N; 1 N{}",
+                curve.gain * 1e6,
+                curve.exponent,
+                curve.threshold,
+                often(curve.force_interval(1.0), "N")
+            ),
+        }
+    }
+}
