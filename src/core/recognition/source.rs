@@ -1,12 +1,12 @@
 //! Data sets out of the store: which trials, seen through which sensors.
 
 use super::data::{Class, DataCard, Dataset, Example, Labels, Sequence};
-use crate::gripper::Phase;
+use crate::gripper::{Gripper, Phase};
 use crate::objects::{EMPTY, catalogue};
 use crate::recording::{BOARD_RIG, Store, StoreError, TrialId, TrialRow};
 use crate::scene::{Between, PRESETS, PoseSpread, Scene};
 use crate::sensing::model::SensorModel;
-use crate::sensing::{LayoutError, PressureArea, SensorLayout, Sensors, Signals};
+use crate::sensing::{Channel, LayoutError, PressureArea, SensorLayout, Sensors, Signals};
 use crate::trial::Trial;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -97,6 +97,24 @@ pub enum DatasetError {
         /// And its channels.
         other_channels: String,
     },
+    /// A trial of the real gripper whose channels cannot be derived.
+    #[error("trial {id} of the real gripper does not give the channels of layout {layout}: {why}")]
+    Uncalibrated {
+        /// The trial.
+        id: TrialId,
+        /// What was wanted.
+        layout: String,
+        /// What is missing, in words.
+        why: String,
+    },
+    /// Trials of the real gripper, none of which can be derived.
+    #[error(
+        "none of the {left_out} trials of the real gripper can be read: `palpate calibrate list` shows which parts are calibrated"
+    )]
+    NoneCalibrated {
+        /// How many fit.
+        left_out: usize,
+    },
     /// An object in the list that no trial is of.
     #[error("no trial in the store is of \"{object}\"; `palpate trials list` shows what is there")]
     NoSuchObject {
@@ -141,9 +159,7 @@ impl Source {
     fn fits(&self, row: &TrialRow) -> bool {
         let in_collection =
             |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
-        // Counts of a board mean nothing without a calibration.
         row.state == "complete"
-            && row.rig != BOARD_RIG
             && self.collection.as_ref().is_none_or(in_collection)
             && (self.objects.is_empty() || self.objects.contains(&row.object))
             && !(self.without_empty && row.object == EMPTY)
@@ -213,10 +229,17 @@ impl Source {
         let mut channels: Option<(TrialId, Vec<String>)> = None;
         let mut named = BTreeMap::new();
         let mut read = Vec::new();
-        let mut origins = BTreeSet::new();
+        let (mut origins, mut uncalibrated) = (BTreeSet::new(), 0);
         for (k, row) in rows.iter().enumerate() {
             tell(k, rows.len());
-            let (signals, origin) = signals_of(store, row, view)?;
+            let (signals, origin) = match signals_of(store, row, view) {
+                // Counts of a board mean nothing without a calibration; others may have one.
+                Err(DatasetError::Uncalibrated { .. }) if rows.len() > 1 => {
+                    uncalibrated += 1;
+                    continue;
+                }
+                outcome => outcome?,
+            };
             origins.insert(origin);
             let (first, known) = channels.get_or_insert_with(|| (row.id, signals.channels.clone()));
             if *known != signals.channels {
@@ -234,9 +257,13 @@ impl Source {
         let example = |(id, object, grasp): (TrialId, String, Sequence)| {
             Some(Example { id, class: labels.class(&object)?, grasp: Arc::new(grasp) })
         };
+        if read.is_empty() {
+            return Err(DatasetError::NoneCalibrated { left_out: uncalibrated });
+        }
         let examples = read.into_iter().filter_map(example).collect();
         let channels = channels.map(|(_, channels)| channels).unwrap_or_default();
         let collections: BTreeSet<String> = rows.iter().filter_map(|row| row.collection.clone()).collect();
+        let left_out = left_out + uncalibrated;
         let about = DataCard { left_out, ..card(&origins, view, collections.into_iter().collect(), rows.len()) };
         Ok(Dataset { channels, labels, examples, about })
     }
@@ -289,6 +316,9 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     if let Some(signals) = store.readings(row.id).map_err(|cause| DatasetError::Store { cause })? {
         return Ok((signals, Origin::Recorded));
     }
+    if row.rig == BOARD_RIG {
+        return Ok((board_signals(store, row.id, view)?, Origin::Recorded));
+    }
     let trial = store.load(row.id).map_err(|cause| DatasetError::Store { cause })?;
     let scene = Scene::from_toml(&trial.info.scene)
         .map_err(|error| DatasetError::Scene { id: row.id, cause: error.to_string() })?;
@@ -296,6 +326,22 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
     let signals = view.signals(&trial, &scene).map_err(|cause| DatasetError::Layout { cause })?;
     Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
+}
+
+/// What a real gripper felt, by the calibrations of its parts, in the channels of the layout and to the end of the hold.
+fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, DatasetError> {
+    let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
+    // One that says it is of a board, and has nothing of it, has nothing at all.
+    let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1 })?;
+    let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
+    let channels = layout.channels(&Gripper::default()).map_err(|cause| DatasetError::Layout { cause })?;
+    let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
+    let signals = read.derived.signals.chosen(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
+        id,
+        layout: layout.full_name(),
+        why: read.derived.warnings.join("; "),
+    })?;
+    Ok(signals.until(read.release_s.unwrap_or(f64::INFINITY)))
 }
 
 impl View {

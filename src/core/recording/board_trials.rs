@@ -106,6 +106,7 @@ impl Store {
         let sql = "INSERT INTO board_trials (trial, about) VALUES (?1, ?2)";
         transaction.execute(sql, params![id, json(about)]).map_err(fault)?;
         transaction.commit().map_err(fault)?;
+        self.note_parts(id)?;
         Ok(id)
     }
 

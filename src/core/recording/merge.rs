@@ -41,6 +41,19 @@ const COPY_CHUNKS: &str = "
     JOIN other.trials AS theirs ON theirs.id = incoming.id
     JOIN main.trials AS ours ON ours.uid = theirs.uid
     JOIN other.readings AS readings ON readings.trial = theirs.id;
+    INSERT INTO main.parts (trial, sensor, part)
+    SELECT ours.id, parts.sensor, parts.part FROM temp.incoming
+    JOIN other.trials AS theirs ON theirs.id = incoming.id
+    JOIN main.trials AS ours ON ours.uid = theirs.uid
+    JOIN other.parts AS parts ON parts.trial = theirs.id;
+";
+
+/// Calibrations come along, so that trials can be derived here too. Where parts sit now is a matter of each gripper.
+const COPY_CALIBRATIONS: &str = "
+    INSERT INTO main.calibrations (uid, part, version, created, withdrawn, record)
+    SELECT uid, part, version + coalesce((SELECT max(version) FROM main.calibrations AS ours
+        WHERE ours.part = theirs.part), 0), created, withdrawn, record
+    FROM other.calibrations AS theirs WHERE uid NOT IN (SELECT uid FROM main.calibrations) ORDER BY id;
 ";
 
 impl Store {
@@ -62,6 +75,7 @@ impl Store {
             transaction.execute_batch(CHOOSE_INCOMING).map_err(fault)?;
             let added = transaction.execute(COPY_TRIALS, []).map_err(fault)? as u64;
             transaction.execute_batch(COPY_CHUNKS).map_err(fault)?;
+            transaction.execute_batch(COPY_CALIBRATIONS).map_err(fault)?;
             transaction.execute_batch(COPY_BOARD_TRIALS).map_err(fault)?;
             transaction.execute_batch("DROP TABLE temp.incoming").map_err(fault)?;
             transaction.commit().map_err(fault)?;

@@ -5,6 +5,7 @@
 //! trials   one row each: what is known of a trial; `state` is 'recording' until its last chunk is in
 //! chunks   its frames, about a second each, as described in `blob`
 //! readings channels of an imported trial, which has no frames
+//! calibrations, mountings, parts: what is known of the real gripper's sensors; see `calibrations`
 //! board_*  what the board of a real gripper sent; see `board_trials`
 //! ```
 //!
@@ -12,6 +13,7 @@
 
 use super::blob::{decode_frames, encode_frames};
 use super::board_trials::BOARD_TABLES;
+use super::calibrations::CALIBRATION_TABLES;
 use super::store_error::{StoreError, fault, plain};
 use crate::geometry::Pose;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
@@ -34,7 +36,7 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 5] = [
+const MIGRATIONS: [&str; 6] = [
     TABLES,
     "ALTER TABLE trials ADD COLUMN collection TEXT;
      CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
@@ -47,6 +49,7 @@ const MIGRATIONS: [&str; 5] = [
      );",
     "ALTER TABLE trials ADD COLUMN plan TEXT NOT NULL DEFAULT '[]';",
     BOARD_TABLES,
+    CALIBRATION_TABLES,
 ];
 
 const TABLES: &str = "

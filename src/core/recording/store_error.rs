@@ -1,6 +1,7 @@
 //! What can go wrong with the store, in sentences for the user.
 
 use super::blob::BlobError;
+use super::calibrations::CalibrationId;
 use super::disk::is_full;
 use super::store::{PATIENCE, SCHEMA_VERSION, TrialId};
 use rusqlite::ErrorCode;
@@ -98,6 +99,20 @@ pub enum StoreError {
     BadInfo {
         /// The trial.
         id: TrialId,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// No such calibration.
+    #[error("there is no calibration {id} in the store; `palpate calibrate list` shows what is there")]
+    NoCalibration {
+        /// The number asked for.
+        id: CalibrationId,
+    },
+    /// A calibration that cannot be read.
+    #[error("calibration {id} is damaged: {cause}")]
+    BadCalibration {
+        /// The calibration.
+        id: CalibrationId,
         /// What is wrong with it.
         cause: String,
     },
