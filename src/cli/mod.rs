@@ -1,11 +1,13 @@
 //! The command line: every headless command, and the door to the window. Exit codes: 0 done, 1 failed, 2 wrong use.
 
 mod bench;
+mod calibrate;
 mod collect;
 mod demo;
 mod doctor;
 mod emulate;
 mod evaluate;
+mod fit;
 mod grasp;
 mod interrupt;
 mod learning;
@@ -69,6 +71,10 @@ enum Command {
     Scene(scene::SceneCommandArguments),
     /// List, show, export, delete and restore recorded trials.
     Trials(trials::TrialsArguments),
+    /// Calibrate a flex strip or force pad of the real gripper, and manage what is known of its parts.
+    Calibrate(calibrate::CalibrateArguments),
+    /// Fit the simulated finger to recorded grasps of the real one.
+    Fit(fit::FitArguments),
     /// Find out what is wrong between the gripper's board and this computer, and what to do about it.
     Doctor(doctor::DoctorArguments),
     /// Pretend to be a gripper on a serial port, with parts nobody knows and faults on request (Unix).
@@ -146,6 +152,8 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
+        Some(Command::Calibrate(calibrate)) => calibrate::run(calibrate, store)?,
+        Some(Command::Fit(fit)) => fit::run(fit, store)?,
         Some(Command::Doctor(doctor)) => return doctor::run(doctor),
         Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,

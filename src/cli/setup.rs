@@ -46,6 +46,13 @@ impl SceneArguments {
         self.with_file(self.scene.as_deref(), object)
     }
 
+    /// True where anything was asked for.
+    pub(super) fn says_something(&self) -> bool {
+        let Self { scene, accuracy, engine, fixed, preset, settings } = self;
+        let named = scene.is_some() || accuracy.is_some() || engine.is_some() || preset.is_some();
+        named || *fixed || !settings.is_empty()
+    }
+
     /// The same on top of another scene file.
     pub(super) fn with_file(&self, file: Option<&Path>, object: Option<&str>) -> Result<Scene, Failure> {
         let mut scene = match file {

@@ -24,6 +24,11 @@ pub(super) fn warn(line: &str) {
     let _unheard = writeln!(std::io::stderr(), "warning: {line}");
 }
 
+/// Prints what is going on, or what to do next, beside the results.
+pub(super) fn note(line: &str) {
+    let _unheard = writeln!(std::io::stderr(), "{line}");
+}
+
 /// Shows what the program itself logs as a warning or worse on standard error; libraries keep their thoughts to
 /// themselves.
 pub(super) fn show_log() {

@@ -1,0 +1,185 @@
+//! `palpate calibrate`: what a part of the real gripper reads at known angles or weights, and what is known of all parts.
+
+mod guided;
+mod shelf;
+
+use super::Failure;
+use super::setup::open_store;
+use super::terminal::{say, say_json, table, warn};
+use palpate_core::board::{Board, Sensor};
+use palpate_core::recording::{CalibrationId, Store, StoredCalibration, read_points_csv};
+use palpate_core::sensing::calibration::{Calibration, Input, Kind, Record};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate calibrate`.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(super) struct CalibrateArguments {
+    #[command(subcommand)]
+    what: Option<shelf::What>,
+    /// Which sensor: flexL, flexR, fsrL or fsrR.
+    #[arg(required = true, value_parser = parse_sensor)]
+    sensor: Option<Sensor>,
+    /// Name of the part that sits there, such as the number on its tail; the one that is known to sit there where it is
+    /// left out. Calibrations belong to parts: parts get swapped.
+    #[arg(long, value_name = "NAME")]
+    part: Option<String>,
+    /// Take the points from a CSV file with the columns angle_deg (or load_kg, load_g) and counts, instead of from the
+    /// board.
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
+    #[command(flatten)]
+    live: guided::LiveArguments,
+    /// The fixed resistor beside the sensor (ohm), where the board does not say: 47000 for strips and 4700 for pads.
+    #[arg(long, value_name = "OHM")]
+    resistor: Option<f64>,
+    /// The largest count of the converter, where points come from a file.
+    #[arg(long, value_name = "COUNTS", default_value_t = 4095, value_parser = clap::value_parser!(u32).range(255..=16_777_215))]
+    full_scale: u32,
+    /// Whatever should be kept beside it.
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    note: String,
+    /// Say what would come out, and store nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A sensor by the name of its channel.
+fn parse_sensor(text: &str) -> Result<Sensor, String> {
+    let found = Sensor::ALL.into_iter().find(|sensor| sensor.channel().eq_ignore_ascii_case(text));
+    found.ok_or_else(|| "choose flexL, flexR, fsrL or fsrR".to_owned())
+}
+
+pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let mut store = open_store(store)?;
+    if let Some(what) = &arguments.what {
+        return shelf::run(what, &mut store);
+    }
+    let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
+    let part = part_name(arguments, sensor, &store)?;
+    let record = match &arguments.points {
+        Some(file) => record_of_file(arguments, sensor, &part, file)?,
+        None => guided::record(arguments, sensor, &part, &store)?,
+    };
+    let calibration = Calibration::fit(Record { note: arguments.note.clone(), ..record })?;
+    let stored = if arguments.dry_run { None } else { Some(keep(&mut store, sensor, &calibration)?) };
+    if arguments.json {
+        return say_json(&Told { id: stored.as_ref().map(|s| s.id), version: stored.map(|s| s.version), calibration });
+    }
+    tell(&calibration)?;
+    match stored {
+        Some(stored) => say(format!(
+            "stored as calibration {}, version {} of \"{}\", which is now the {}",
+            stored.id,
+            stored.version,
+            stored.record.part,
+            sensor.label()
+        )),
+        None => say("not stored"),
+    }
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Told {
+    id: Option<CalibrationId>,
+    version: Option<i64>,
+    #[serde(flatten)]
+    calibration: Calibration,
+}
+
+fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: &Store) -> Result<String, Failure> {
+    let mounted = || -> Result<Option<String>, Failure> { Ok(store.mounted_parts()?[sensor as usize].clone()) };
+    let name = match &arguments.part {
+        Some(name) => Some(name.trim().to_owned()),
+        None => mounted()?,
+    };
+    Ok(name.ok_or_else(|| {
+        let (place, channel) = (sensor.label(), sensor.channel());
+        format!(
+            "it is not known which part is the {place}: give it a name, as in palpate calibrate {channel} --part A7"
+        )
+    })?)
+}
+
+fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, file: &Path) -> Result<Record, Failure> {
+    let kind = Kind::of(sensor);
+    let board = Board { full_scale: arguments.full_scale, ..Board::default() };
+    let mut input = Input::on(&board, sensor);
+    input.divider.fixed_ohm = arguments.resistor.unwrap_or(input.divider.fixed_ohm);
+    let points = read_points_csv(file, kind)?;
+    Ok(Record { part: part.to_owned(), kind, input, points, bending: None, note: String::new() })
+}
+
+/// Stores a calibration, and that its part sits where it was calibrated.
+fn keep(store: &mut Store, sensor: Sensor, calibration: &Calibration) -> Result<StoredCalibration, Failure> {
+    let stored = store.add_calibration(&calibration.record)?;
+    if store.mounted_parts()?[sensor as usize].as_ref() != Some(&stored.record.part) {
+        store.mount_part(sensor, &stored.record.part)?;
+    }
+    Ok(stored)
+}
+
+/// The points with their residuals, and what came out.
+fn tell(calibration: &Calibration) -> Result<(), Failure> {
+    let kind = calibration.record.kind;
+    let residual = |residual: Option<f64>| match (kind, residual) {
+        (_, None) => String::new(),
+        (Kind::Flex, Some(off)) => format!("{:+.2}", off.to_degrees()),
+        (Kind::Pad, Some(off)) => format!("{:+.1}", 100.0 * off),
+    };
+    let worst = match kind {
+        Kind::Flex => 3f64.to_radians(),
+        Kind::Pad => 0.1,
+    };
+    let rows: Vec<Vec<String>> = calibration
+        .record
+        .points
+        .iter()
+        .zip(calibration.residuals())
+        .map(|(point, off)| {
+            let ohm = calibration.record.input.ohm(point.counts);
+            let kilo = if ohm < 1e6 { format!("{:.2}", ohm * 1e-3) } else { "open".to_owned() };
+            let shown = format!("{:.3}", kind.shown(point.stimulus));
+            vec![shown, format!("{:.1}", point.counts), kilo, residual(off), bar(off.unwrap_or(0.0) / worst)]
+        })
+        .collect();
+    let (stimulus, off) = match kind {
+        Kind::Flex => ("angle [deg]", "off [deg]"),
+        Kind::Pad => ("load [kg]", "off [%]"),
+    };
+    table(&[stimulus, "counts", "kOhm", off, "     -  0  +"], &rows)?;
+    say(calibration.summary())?;
+    for warning in &calibration.warnings {
+        warn(warning);
+    }
+    Ok(())
+}
+
+/// A residual as a bar to the left or right of the middle; its ends are what is worth a word.
+fn bar(share: f64) -> String {
+    const HALF: i32 = 8;
+    let at = (share.clamp(-1.0, 1.0) * f64::from(HALF)).round() as i32;
+    let cell = |place: i32| match place {
+        0 => '|',
+        place if (place > 0 && place <= at) || (place < 0 && place >= at) => '#',
+        _ => ' ',
+    };
+    (-HALF..=HALF).map(cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn residuals_stand_left_and_right_of_the_middle() {
+        assert_eq!(bar(0.0), "        |        ");
+        assert_eq!(bar(0.5), "        |####    ");
+        assert_eq!(bar(-9.0), "########|        ");
+    }
+}

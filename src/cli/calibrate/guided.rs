@@ -1,0 +1,296 @@
+//! Calibrating with the board connected: asks for the next angle or weight, watches until the reading has settled, and takes it
+//! when told to, or by itself.
+
+use super::super::Failure;
+use super::super::terminal::{note, warn};
+use super::CalibrateArguments;
+use palpate_core::board::{Board, Reading, Sensor};
+use palpate_core::gripper::Side;
+use palpate_core::recording::Store;
+use palpate_core::rig::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
+use palpate_core::sensing::calibration::{BendingZero, Kind, Procedure, Readout, Record};
+use palpate_core::wire::Heard;
+use std::collections::VecDeque;
+use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::{Duration, Instant};
+
+/// Where the readings come from, and who says when.
+#[derive(Debug, clap::Args)]
+pub(super) struct LiveArguments {
+    /// The port of the board, or a file of captured bytes; the only likely port where it is left out.
+    #[arg(long, value_name = "PORT|FILE", conflicts_with = "points")]
+    port: Option<PathBuf>,
+    /// Angles (degrees) or weights (kg) to set, separated by commas, instead of the usual ones.
+    #[arg(long, value_name = "A,B,..", value_delimiter = ',', conflicts_with = "points")]
+    plan: Vec<f64>,
+    /// Take each point by itself, as soon as the reading has changed and settled; without it, Enter takes it.
+    #[arg(long, conflicts_with = "points")]
+    auto: bool,
+    /// Of a pad: watch the empty hand close for so many seconds afterwards, to learn how its zero moves with bending. The
+    /// strip of the same finger must be calibrated.
+    #[arg(long, value_name = "S", conflicts_with = "points")]
+    empty_close: Option<f64>,
+}
+
+/// How long a board may take to say what it is (s).
+const PATIENCE_S: f64 = 8.0;
+
+/// How long a hands-free procedure waits for a change (s).
+const AUTO_PATIENCE_S: f64 = 60.0;
+
+/// The board, and whoever sits at the keyboard.
+struct Bench {
+    link: SerialLink,
+    keys: Receiver<String>,
+    shows_progress: bool,
+    state: LinkState,
+    /// Readings that came and were not looked at yet.
+    pending: VecDeque<Reading>,
+}
+
+/// What was typed.
+enum Wish {
+    Take(Option<f64>),
+    Skip,
+    Undo,
+    Quit,
+}
+
+pub(super) fn record(
+    arguments: &CalibrateArguments,
+    sensor: Sensor,
+    part: &str,
+    store: &Store,
+) -> Result<Record, Failure> {
+    let live = &arguments.live;
+    let mut bench = Bench::open(live)?;
+    let board = bench.board()?;
+    let mut procedure = Procedure::new(&board, sensor, part, arguments.resistor).ok_or_else(|| {
+        let (wanted, has) = (sensor.channel(), board.channels.join(", "));
+        format!(
+            "the board has no channel \"{wanted}\"; it has {has}. Name its channels in the sketch, or in a header line"
+        )
+    })?;
+    if !live.plan.is_empty() {
+        let plan: Vec<f64> = live.plan.iter().map(|shown| Kind::of(sensor).stimulus(*shown)).collect();
+        procedure = procedure.with_plan(&plan);
+    }
+    note(&format!(
+        "calibrating \"{part}\", the {}; Enter takes a point, a number takes it as that angle or weight,",
+        sensor.label()
+    ));
+    note("s leaves it out, u takes the last one back, q ends");
+    while procedure.next().is_some() {
+        bench.one_point(&mut procedure, live.auto)?;
+    }
+    if let Some(seconds) = live.empty_close {
+        let bending = bench.empty_close(&board, &procedure, store, live.auto, seconds)?;
+        procedure.set_bending(bending);
+    }
+    Ok(procedure.record().clone())
+}
+
+impl Bench {
+    fn open(live: &LiveArguments) -> Result<Self, Failure> {
+        let captured = live.port.as_ref().is_some_and(|path| path.is_file());
+        let replay_speed = if captured && live.auto { f64::INFINITY } else { 1.0 };
+        let link = SerialLink::open(&LinkOptions { path: live.port.clone(), replay_speed, ..LinkOptions::default() })?;
+        let (told, keys) = channel();
+        if !live.auto {
+            // Ends with the program: a read of the keyboard cannot be interrupted.
+            std::thread::Builder::new().name("keys".to_owned()).spawn(move || {
+                for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+                    if told.send(line).is_err() {
+                        return;
+                    }
+                }
+            })?;
+        }
+        Ok(Self {
+            link,
+            keys,
+            shows_progress: std::io::stderr().is_terminal(),
+            state: LinkState::Waiting,
+            pending: VecDeque::new(),
+        })
+    }
+
+    /// What the board says of itself, once readings come.
+    fn board(&mut self) -> Result<Board, Failure> {
+        let start = Instant::now();
+        loop {
+            self.listen()?;
+            if !self.pending.is_empty() {
+                return Ok(self.link.status().board);
+            }
+            if start.elapsed().as_secs_f64() > PATIENCE_S {
+                let said = self.link.status().state.sentence();
+                return Err(format!("no readings from the board within {PATIENCE_S:.0} s. {said}").into());
+            }
+        }
+    }
+
+    /// Takes in what has come since the last call; says when the link changes its state.
+    fn listen(&mut self) -> Result<(), Failure> {
+        let events = self.link.take(Duration::from_millis(100));
+        let state = self.link.status().state;
+        if state != self.state {
+            if !matches!(state, LinkState::Listening | LinkState::Ended { .. }) {
+                note(&state.sentence());
+            }
+            self.state = state;
+        }
+        if events.is_empty() && self.pending.is_empty() && self.link.is_over() {
+            return Err(
+                format!("the board's stream is over before all points were taken. {}", self.state.sentence()).into()
+            );
+        }
+        let reading = |event| match event {
+            LinkEvent::Heard(Heard::Reading(reading)) => Some(reading),
+            LinkEvent::Heard(Heard::Gap(_) | Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => None,
+        };
+        self.pending.extend(events.into_iter().filter_map(reading));
+        Ok(())
+    }
+
+    fn wish(&self) -> Result<Option<Wish>, Failure> {
+        let line = match self.keys.try_recv() {
+            Ok(line) => line,
+            Err(TryRecvError::Empty) => return Ok(None),
+            Err(TryRecvError::Disconnected) => {
+                return Err(
+                    "standard input has ended: nobody is there to set angles or weights; --auto needs nobody".into()
+                );
+            }
+        };
+        Ok(match line.trim() {
+            "" => Some(Wish::Take(None)),
+            "s" => Some(Wish::Skip),
+            "u" => Some(Wish::Undo),
+            "q" => Some(Wish::Quit),
+            text => match text.parse::<f64>() {
+                Ok(number) => Some(Wish::Take(Some(number))),
+                Err(_) => {
+                    warn(&format!("\"{text}\" is not understood: Enter, a number, s, u or q"));
+                    None
+                }
+            },
+        })
+    }
+
+    /// One step of the procedure: a point taken, left out or taken back.
+    fn one_point(&mut self, procedure: &mut Procedure, auto: bool) -> Result<(), Failure> {
+        let Some(planned) = procedure.next() else { return Ok(()) };
+        let kind = procedure.record().kind;
+        note(&format!("{} ({} left)", procedure.instruction(), procedure.left()));
+        let start = Instant::now();
+        loop {
+            // One by one, so that a hands-free procedure sees each plateau however fast the stream is.
+            self.listen()?;
+            while let Some(reading) = self.pending.pop_front() {
+                procedure.feed(&reading);
+                if auto && procedure.has_changed() && procedure.settled().is_ok() {
+                    return self.take(procedure, planned);
+                }
+            }
+            self.show(procedure);
+            if auto {
+                if start.elapsed().as_secs_f64() > AUTO_PATIENCE_S {
+                    let why =
+                        procedure.settled().err().map_or_else(|| "nothing has changed".to_owned(), |e| e.to_string());
+                    return Err(format!("{} was not seen: {why}", kind.told(planned)).into());
+                }
+                continue;
+            }
+            match self.wish()? {
+                None => {}
+                Some(Wish::Take(number)) => {
+                    let stimulus = number.map_or(planned, |number| kind.stimulus(number));
+                    match procedure.settled() {
+                        Ok(_) => return self.take(procedure, stimulus),
+                        Err(why) => warn(&format!("not taken: {why}")),
+                    }
+                }
+                Some(Wish::Skip) => {
+                    procedure.skip();
+                    return Ok(());
+                }
+                Some(Wish::Undo) => {
+                    let undone = procedure.undo().map(|point| kind.told(point.stimulus));
+                    note(
+                        &undone.map_or_else(
+                            || "there is no point yet".to_owned(),
+                            |at| format!("{at} is to be taken again"),
+                        ),
+                    );
+                    return Ok(());
+                }
+                Some(Wish::Quit) => return Err("ended by you; nothing was stored".into()),
+            }
+        }
+    }
+
+    fn take(&self, procedure: &mut Procedure, stimulus: f64) -> Result<(), Failure> {
+        let point = procedure.take(stimulus)?;
+        self.clear_line();
+        let at = procedure.record().kind.told(stimulus);
+        note(&format!("  {at}: {:.1} counts, noise {:.1}, {} readings", point.counts, point.spread, point.readings));
+        Ok(())
+    }
+
+    /// The reading as it stands, on a line that is written over; nothing where nobody looks.
+    fn show(&self, procedure: &Procedure) {
+        if !self.shows_progress {
+            return;
+        }
+        let counts = procedure.latest().map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
+        let state = match procedure.settled() {
+            Ok(point) => format!("settled at {:.1}: press Enter", point.counts),
+            Err(why) => why.to_string(),
+        };
+        let _unseen = write!(std::io::stderr(), "\r\x1b[K  {counts} counts, {state}");
+    }
+
+    fn clear_line(&self) {
+        if self.shows_progress {
+            let _unseen = write!(std::io::stderr(), "\r\x1b[K");
+        }
+    }
+
+    /// How the zero of a pad moves while its finger bends.
+    fn empty_close(
+        &mut self,
+        board: &Board,
+        procedure: &Procedure,
+        store: &Store,
+        auto: bool,
+        seconds: f64,
+    ) -> Result<BendingZero, Failure> {
+        let sensor = procedure.sensor();
+        let side = if matches!(sensor, Sensor::PadRight | Sensor::FlexRight) { Side::Right } else { Side::Left };
+        let strip = Kind::Flex.on(side);
+        let mut calibrations = store.serving(None, &[])?.calibrations;
+        if !calibrations.iter().any(|(own, _)| *own == strip) {
+            return Err(format!("the {} is not calibrated: do that first", strip.label()).into());
+        }
+        calibrations.retain(|(own, _)| *own != sensor);
+        calibrations.push((sensor, procedure.fit()?));
+        let readout = Readout::new(board, &calibrations)?;
+        note("take everything away and let the empty hand close to about half a bar, so that the fingers do not touch");
+        if !auto {
+            note("press Enter and begin");
+            while self.wish()?.is_none() {
+                self.listen()?;
+            }
+            self.pending.clear();
+        }
+        let mut readings: Vec<Reading> = Vec::new();
+        while readings.last().zip(readings.first()).is_none_or(|(last, first)| last.t_s - first.t_s < seconds) {
+            self.listen()?;
+            readings.extend(self.pending.drain(..));
+        }
+        Ok(BendingZero::from_empty_close(&readout.bending(side, &readings))?)
+    }
+}
