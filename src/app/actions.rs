@@ -3,7 +3,7 @@
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
 use palpate_core::scene::Scene;
-use palpate_core::workers::Command;
+use palpate_core::workers::{CalibrationWish, Command};
 use std::path::PathBuf;
 
 /// A wish of the user's.
@@ -23,6 +23,8 @@ pub enum Action {
     SaveScene,
     /// Measure what the effects of the scene cost and change.
     MeasureEffects,
+    /// Calibrate a sensor of the real gripper.
+    Calibrate(CalibrationWish),
     /// Look from here.
     SetCamera(Camera),
     /// Show the whole gripper.

@@ -29,7 +29,7 @@ pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_core::recognition::shipped_model;
 use palpate_core::scene::Scene;
-use palpate_core::workers::explain_scene;
+use palpate_core::workers::{explain_scene, listen_to_port};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -70,6 +70,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             view,
             model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
             explain: Arc::new(explain_scene),
+            listen: Arc::new(listen_to_port),
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

@@ -22,8 +22,8 @@ use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::trial::Frame as TrialFrame;
 use palpate_core::workers::{
-    Command, EffectsWorker, Explain, GhostGrasp, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup,
-    Snapshot, Wake,
+    Calibrator, Command, EffectsWorker, Explain, GhostGrasp, Listen, MeasuredAccuracy, NotSent, Notice, Refusal,
+    SimWorker, SimWorkerSetup, Snapshot, Wake,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -44,6 +44,8 @@ pub struct WorkbenchSetup<'a> {
     pub model: Result<Arc<Model>, String>,
     /// Measures what effects cost and change.
     pub explain: Explain,
+    /// Listens to the board of a real gripper.
+    pub listen: Listen,
     /// Whether the first grasp runs by itself.
     pub playing: bool,
     /// Asks for the window to be drawn again; called from other threads.
@@ -65,6 +67,7 @@ const PICTURE_SCALE: f32 = 2.0;
 pub struct Workbench {
     worker: SimWorker,
     effects: EffectsWorker,
+    calibrator: Calibrator,
     wake: Wake,
     scene: Scene,
     /// A scene that the busy worker has not taken yet.
@@ -95,7 +98,7 @@ impl Workbench {
         let worker = SimWorker::start(SimWorkerSetup {
             scene: setup.scene.clone(),
             layout,
-            store: setup.store,
+            store: setup.store.clone(),
             recording: true,
             grasps: GRASPS,
             model: setup.model.as_ref().ok().cloned(),
@@ -105,6 +108,8 @@ impl Workbench {
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
         let effects = EffectsWorker::start(setup.explain, Arc::clone(&setup.wake))
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
+        let calibrator = Calibrator::start(setup.store, setup.listen, Arc::clone(&setup.wake))
+            .map_err(|e| format!("the calibration could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -117,6 +122,7 @@ impl Workbench {
         let mut workbench = Self {
             worker,
             effects,
+            calibrator,
             wake: setup.wake,
             scene: setup.scene,
             unsent: false,
@@ -248,6 +254,7 @@ impl Workbench {
             accuracy,
             scene: &self.scene,
             effects: &self.effects,
+            calibrator: &self.calibrator,
             traces: &self.traces,
             view: &self.view,
             thumbnails: &self.thumbnails,
@@ -336,6 +343,7 @@ impl Workbench {
             Action::SaveScene => self.ask(Ask::SaveScene),
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
+            Action::Calibrate(wish) => self.calibrator.wish(wish),
             Action::SetCamera(camera) => self.view.camera = camera,
             Action::FrameAll => {
                 if let Some(snapshot) = self.worker.snapshot() {

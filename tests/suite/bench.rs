@@ -8,7 +8,7 @@ use palpate_core::palette::Theme;
 use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::study::{Explanation, Measuring};
-use palpate_core::workers::{Command, Snapshot, explain_scene};
+use palpate_core::workers::{Command, Listen, Snapshot, explain_scene, listen_to_port};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -23,12 +23,15 @@ pub(crate) struct BenchSetup {
     pub(crate) render_state: Option<egui_wgpu::RenderState>,
     /// What recognises, or why nothing does.
     pub(crate) model: Result<Arc<Model>, String>,
+    /// Listens to the board of a real gripper.
+    pub(crate) listen: Listen,
 }
 
 impl Default for BenchSetup {
     fn default() -> Self {
         let model = Ok(scripted::model());
-        Self { object: "lemon", theme: Theme::Dark, size: [1280.0, 820.0], panel: None, render_state: None, model }
+        let (size, listen) = ([1280.0, 820.0], Arc::new(listen_to_port));
+        Self { object: "lemon", theme: Theme::Dark, size, panel: None, render_state: None, model, listen }
     }
 }
 
@@ -58,7 +61,7 @@ impl Bench {
         let (wake, woken) = channel();
         let mut scene = Scene::default();
         setup.object.clone_into(&mut scene.object.source);
-        let BenchSetup { theme, panel, render_state, size, model, .. } = setup;
+        let BenchSetup { theme, panel, render_state, size, model, listen, .. } = setup;
         let draw = move |ui: &mut egui::Ui, workbench: &mut Option<Workbench>| {
             let ctx = ui.ctx().clone();
             let workbench = workbench.get_or_insert_with(|| {
@@ -69,6 +72,7 @@ impl Bench {
                     view: ViewState { theme, ..ViewState::default() },
                     model: model.clone(),
                     explain: Arc::new(explain_steadily),
+                    listen: Arc::clone(&listen),
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.
@@ -119,6 +123,14 @@ impl Bench {
     pub(crate) fn until_effects_are_measured(&mut self) {
         while self.harness.query_by_label_contains("of CPU time").is_none() {
             self.woken.recv_timeout(Duration::from_secs(60)).expect("the measurement is alive");
+            self.harness.step();
+        }
+    }
+
+    /// Draws until something is on the screen, or is there no more.
+    pub(crate) fn until_shown(&mut self, shown: bool, text: &str) {
+        while self.harness.query_by_label_contains(text).is_some() != shown {
+            self.woken.recv_timeout(Duration::from_secs(60)).expect("something goes on");
             self.harness.step();
         }
     }

@@ -12,6 +12,7 @@
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
+//! - `calibration`: the pretended gripper calibrated and fitted.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -23,6 +24,7 @@
 mod allocations;
 mod architecture;
 mod bench;
+mod calibration;
 mod command_line;
 mod cpu_renderer;
 mod determinism;

@@ -1,6 +1,7 @@
 //! One file per panel. Adding one is adding a file and a line in [`ALL`]; it then has a tab, a place that is
 //! remembered, and a test that draws it in both themes.
 
+mod calibration;
 mod curvature;
 mod effects;
 mod force;
@@ -19,7 +20,7 @@ use egui::Ui;
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use palpate_core::scene::Scene;
 use palpate_core::trial::Frame;
-use palpate_core::workers::{EffectsWorker, MeasuredAccuracy, Snapshot};
+use palpate_core::workers::{Calibrator, EffectsWorker, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
 
 /// What panels may read.
@@ -32,6 +33,8 @@ pub struct PanelContext<'a> {
     pub scene: &'a Scene,
     /// Measures what effects cost and change.
     pub effects: &'a EffectsWorker,
+    /// Calibrates the sensors of the real gripper.
+    pub calibrator: &'a Calibrator,
     /// Traces of the last grasps.
     pub traces: &'a Traces,
     /// How the user looks at things.
@@ -55,7 +58,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 10] = [
+pub const ALL: [PanelKind; 11] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -66,6 +69,7 @@ pub const ALL: [PanelKind; 10] = [
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
     PanelKind { name: "effects", title: "Effects", ui: effects::ui },
+    PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
 ];
 
 /// A panel by its name.
@@ -80,11 +84,11 @@ pub(super) fn default_layout() -> Tree<String> {
     let (objects, view, curvature) = (pane("objects"), pane("view"), pane("curvature"));
     let (pressure, force, line) = (pane("pressure"), pane("force"), pane("line"));
     let (recognition, grasp) = (pane("recognition"), pane("grasp"));
-    let (scene, effects) = (pane("scene"), pane("effects"));
+    let (scene, effects, calibration) = (pane("scene"), pane("effects"), pane("calibration"));
     let [view, curvature] = [vec![view], vec![curvature]].map(|panes| tiles.insert_tab_tile(panes));
     let loads = tiles.insert_tab_tile(vec![pressure, force, line]);
-    let [left, right] =
-        [vec![objects, scene], vec![recognition, grasp, effects]].map(|panes| tiles.insert_tab_tile(panes));
+    let [left, right] = [vec![objects, scene], vec![recognition, grasp, effects, calibration]]
+        .map(|panes| tiles.insert_tab_tile(panes));
     let middle = insert_linear(&mut tiles, LinearDir::Vertical, &[(view, 0.58), (curvature, 0.21), (loads, 0.21)]);
     let root = insert_linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.185), (middle, 0.555), (right, 0.26)]);
     Tree::new(egui::Id::unique("workbench"), root, tiles)

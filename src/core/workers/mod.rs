@@ -13,9 +13,12 @@
 //! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks. A thread "ghost"
 //! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
+//! A thread "calibrate" talks to the board of a real gripper while one of its sensors is calibrated.
+//!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
+mod calibrator;
 mod companion;
 mod current;
 mod effects;
@@ -34,6 +37,10 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 
+pub use calibrator::{
+    BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, Calibrator, Listen, RunningCalibration,
+    listen_to_port,
+};
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
 pub use ghost::GhostGrasp;
 pub use latest::Latest;

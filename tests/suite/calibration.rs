@@ -1,0 +1,435 @@
+//! The pretended gripper calibrated and fitted: what is hidden in its parts and fingers is found again from what its
+//! board prints.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::cpu_renderer::CpuRenderer;
+use crate::golden::compare;
+use crate::program::{json, palpate, ran, refused, run};
+use egui_kittest::kittest::Queryable as _;
+use palpate::app::ALL_PANELS;
+use palpate_core::board::{Board, Reading, Sensor};
+use palpate_core::gripper::Phase;
+use palpate_core::gripper::{Gripper, Side, TorquePoint};
+use palpate_core::objects::{EMPTY, ObjectModel};
+use palpate_core::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_script};
+use palpate_core::recording::{BoardChunk, BoardInfo, Store, TrialId};
+use palpate_core::scene::Scene;
+use palpate_core::sensing::calibration::Input;
+use palpate_core::sensing::calibration::{BendingZero, Calibration, Kind, Procedure, Readout};
+use palpate_core::study::{FingerFit, Known, Observation, Trust, fit_finger};
+use palpate_core::trial::PhaseMark;
+use palpate_core::wire::{CAPTURE_MAGIC, Captured, Decoder, Heard};
+use palpate_core::workers::{BoardStream, Listen};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// What a board prints while a script is done on the bench, read as a host reads it.
+fn readings(parts: &HiddenParts, scene: &Scene, script: &str, seconds: f64, seed: u64) -> (Board, Vec<Reading>) {
+    let script = parse_script(script).unwrap();
+    let hand = HandPlan { scene: scene.clone(), objects: vec![EMPTY.to_owned()], seed, grasp_every_s: None, script };
+    let setup = PretendedSetup {
+        hand,
+        parts: parts.clone(),
+        rate_hz: 50,
+        channels: 4,
+        most_steps: 30,
+        clock_start_us: 0,
+        faults: vec![],
+        seed,
+    };
+    let mut gripper = PretendedGripper::new(setup).unwrap();
+    let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+    for k in 1..=(seconds / 0.005) as u32 {
+        let now = 0.005 * f64::from(k);
+        gripper.advance(now);
+        decoder.push(&gripper.take_bytes(), now, &mut heard);
+    }
+    let reading = |heard| match heard {
+        Heard::Reading(reading) => Some(reading),
+        Heard::Gap(_) | Heard::Board(_) | Heard::Said(_) => None,
+    };
+    (decoder.board().clone(), heard.into_iter().filter_map(reading).collect())
+}
+
+/// The steps of a script that hold angles (degrees) and then loads (kg), 2 s each.
+fn holds(angles: &[f64], loads: &[f64]) -> String {
+    let angles = angles.iter().map(|angle| format!("angle={angle} hold=2; "));
+    angles.chain(loads.iter().map(|load| format!("load={load}kg hold=2; "))).collect()
+}
+
+/// The usual procedure for all four sensors at once, hands-free; pads learn their zero from an empty close.
+fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor, Calibration)>) {
+    let steps = |kind: Kind| {
+        let plan = palpate_core::sensing::calibration::plan(kind);
+        plan.into_iter().map(|stimulus| kind.shown(stimulus)).collect::<Vec<f64>>()
+    };
+    let mut calibrations = Vec::new();
+    let mut board = Board::default();
+    for kind in [Kind::Flex, Kind::Pad] {
+        let plan = steps(kind);
+        let script = if kind == Kind::Flex { holds(&plan, &[]) } else { holds(&[], &plan) };
+        let (own, stream) = readings(parts, &Scene::default(), &script, 2.0 * plan.len() as f64, seed);
+        board = own;
+        for side in Side::BOTH {
+            let sensor = kind.on(side);
+            let mut procedure = Procedure::new(&board, sensor, sensor.channel(), None).unwrap();
+            for reading in &stream {
+                procedure.feed(reading);
+                if let Some(next) = procedure.next().filter(|_| procedure.has_changed() && procedure.settled().is_ok())
+                {
+                    procedure.take(next).unwrap();
+                }
+            }
+            assert_eq!(procedure.left(), 0, "{sensor:?}: {:?}", procedure.record().points);
+            calibrations.push((sensor, procedure.fit().unwrap()));
+        }
+    }
+    let readout = Readout::new(&board, &calibrations).unwrap();
+    let (_, close) = readings(parts, &Scene::default(), "rest=0.5; close empty bar=0.5", 4.0, seed + 1);
+    for side in Side::BOTH {
+        let (_, calibration) = &mut calibrations[2 + side.index()];
+        let mut record = calibration.record.clone();
+        record.bending = Some(BendingZero::from_empty_close(&readout.bending(side, &close)).unwrap());
+        *calibration = Calibration::fit(record).unwrap();
+    }
+    (board, calibrations)
+}
+
+fn parts(seed: u64, faults: bool) -> HiddenParts {
+    HiddenParts { hysteresis: faults, drift: faults, ..HiddenParts::drawn(seed) }
+}
+
+/// Largest errors of angle (degrees) and force (share), over holds between the points of the calibration.
+fn errors(parts: &HiddenParts, seed: u64) -> [f64; 2] {
+    let (board, calibrations) = calibrated(parts, seed);
+    let readout = Readout::new(&board, &calibrations).unwrap();
+    // Up and down, so that hysteresis shows.
+    let angles = [5.0, 20.0, 45.0, 75.0, 90.0, 60.0, 35.0, 10.0];
+    let loads = [0.0306, 0.08, 0.16, 0.32, 0.5, 0.4, 0.24, 0.0306];
+    let (_, stream) = readings(parts, &Scene::default(), &holds(&angles, &loads), 32.0, seed + 2);
+    let mut worst = [0.0f64; 2];
+    for (step, stimulus) in angles.iter().map(|a| (0, *a)).chain(loads.iter().map(|l| (1, *l))).enumerate() {
+        let (from, to) = (2.0 * step as f64 + 1.2, 2.0 * step as f64 + 1.9);
+        let held: Vec<&Reading> = stream.iter().filter(|reading| (from..to).contains(&reading.t_s)).collect();
+        assert!(held.len() > 30);
+        for side in 0..2 {
+            let mean = |value: &dyn Fn(&Reading) -> Option<f64>| {
+                held.iter().map(|reading| value(reading).unwrap()).sum::<f64>() / held.len() as f64
+            };
+            let (kind, shown) = stimulus;
+            let error = match kind {
+                0 => mean(&|reading| readout.felt(reading).angle[side]).to_degrees() - shown,
+                _ => mean(&|reading| readout.felt(reading).force[side]) / Kind::Pad.stimulus(shown) - 1.0,
+            };
+            worst[kind] = worst[kind].max(error.abs());
+        }
+    }
+    worst
+}
+
+#[test]
+fn hidden_parts_are_read_within_a_degree_and_5_per_cent_through_noise() {
+    for seed in [1, 2, 3] {
+        let [angle, force] = errors(&parts(seed, false), seed);
+        assert!(angle < 1.0 && force < 0.05, "seed {seed}: {angle} degrees, {force}");
+        // With hysteresis and drift the promise is smaller: the data sheet's 5 % and what repeats not.
+        let [angle, force] = errors(&parts(seed, true), seed);
+        println!("seed {seed} with hysteresis and drift: {angle:.2} degrees, {:.1} %", 100.0 * force);
+        assert!(angle < 1.5 && force < 0.10, "seed {seed}: {angle} degrees, {force}");
+    }
+}
+
+#[test]
+fn a_resistor_that_is_not_what_the_board_says_is_told() {
+    let mut wrong = parts(4, false);
+    wrong.pads[1].divider_ohm = 1e3;
+    let plan = palpate_core::sensing::calibration::plan(Kind::Pad);
+    let loads: Vec<f64> = plan.iter().map(|force| Kind::Pad.shown(*force)).collect();
+    let (mut board, stream) = readings(&wrong, &Scene::default(), &holds(&[], &loads), 16.0, 1);
+    // The hello line says what the maker believed.
+    board.divider_ohm = vec![47e3, 47e3, 4.7e3, 47e3];
+    let mut procedure = Procedure::new(&board, Sensor::PadRight, "P2", None).unwrap();
+    for reading in &stream {
+        procedure.feed(reading);
+        if let Some(next) = procedure.next().filter(|_| procedure.has_changed() && procedure.settled().is_ok()) {
+            procedure.take(next).unwrap();
+        }
+    }
+    let told = procedure.fit().expect_err("no such pad").to_string();
+    assert!(told.contains("is not the 47.0 kOhm it is said to be"), "{told}");
+}
+
+/// The twin's scene, and the one with the hidden finger.
+fn scenes() -> [Scene; 2] {
+    let mut known = Scene::default();
+    // What is pressed against stands where the scene says.
+    (known.pose.shift, known.pose.yaw_deg) = ([0.0; 3], 0.0);
+    let mut hidden = known.clone();
+    hidden.gripper.finger.bending_stiffness *= 0.82;
+    hidden.gripper.finger.damping_time = 0.03;
+    hidden.gripper.actuation.filling_time = 0.06;
+    hidden.gripper.actuation.curve =
+        [(0.0, 0.0), (0.4, 0.018), (0.8, 0.042)].map(|(bar, torque)| TorquePoint { bar, torque }).to_vec();
+    [known, hidden]
+}
+
+/// A grasp of the pretended gripper as the fit takes it.
+fn observed(parts: &HiddenParts, readout: &Readout, script: &str, fixed: bool, seed: u64) -> Observation {
+    let [mut known, mut hidden] = scenes();
+    let object = if fixed { "bigball" } else { EMPTY };
+    for scene in [&mut known, &mut hidden] {
+        scene.set_object_fixed(fixed);
+        scene.object.source = object.to_owned();
+    }
+    let (_, readings) = readings(parts, &hidden, script, 5.0, seed);
+    let line = readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();
+    let object: Option<ObjectModel> = known.load_object().unwrap();
+    Observation {
+        name: script.to_owned(),
+        signals: readout.derive(&readings, None).signals,
+        line,
+        scene: known,
+        object,
+    }
+}
+
+fn off(fit: &FingerFit) -> f64 {
+    let [_, hidden] = scenes();
+    fit.gripper.finger.bending_stiffness / hidden.gripper.finger.bending_stiffness - 1.0
+}
+
+/// An empty close and a press of a gripper with these parts, fitted.
+fn fitted(parts: &HiddenParts, seed: u64) -> FingerFit {
+    let (board, calibrations) = calibrated(parts, seed);
+    let readout = Readout::new(&board, &calibrations).unwrap();
+    let recordings = [
+        observed(parts, &readout, "rest=0.5; close empty bar=0.6", false, seed + 3),
+        observed(parts, &readout, "rest=0.5; grasp bigball bar=0.8", true, seed + 4),
+        observed(parts, &readout, "rest=0.5; grasp bigball bar=0.7", true, seed + 5),
+    ];
+    // These pads repeat better than the data sheet says: their gain is known as well as they are calibrated.
+    fit_finger(&recordings, &Trust { pad_gain: [0.005; 2], strip_gain: [0.005; 2] }).unwrap()
+}
+
+#[test]
+fn the_hidden_finger_is_fitted_within_3_per_cent() {
+    let fit = fitted(&parts(5, false), 5);
+    println!("{:+.4} {:?} {} steps {:?}", off(&fit), fit.estimates, fit.steps, fit.remainders);
+    assert!(off(&fit).abs() < 0.03 && fit.estimates[0].known == Known::Well, "{}", off(&fit));
+    assert_ne!(fit.gripper, Gripper::default());
+}
+
+/// A file of a strip's points, as `palpate calibrate --points` takes them.
+fn write_points(folder: &Path, name: &str, record: &palpate_core::sensing::calibration::Record) {
+    let column = if record.kind == Kind::Flex { "angle_deg" } else { "load_kg" };
+    let rows = record.points.iter().map(|p| format!("{},{}\n", record.kind.shown(p.stimulus), p.counts));
+    std::fs::write(folder.join(name), format!("{column},counts\n{}", rows.collect::<String>())).unwrap();
+}
+
+#[test]
+fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (_, calibrations) = calibrated(&parts(6, false), 6);
+    write_points(at, "strip.csv", &calibrations[0].1.record);
+    write_points(at, "pad.csv", &calibrations[2].1.record);
+    let made = json(at, &["calibrate", "flexL", "--part", "A7", "--points", "strip.csv", "--json"]);
+    assert_eq!((&made["id"], &made["version"], &made["part"]), (&1.into(), &1.into(), &"A7".into()));
+    assert!(made["curve"]["flex"]["flat_ohm"].as_f64().unwrap() > 17.5e3);
+    // The part is known to sit there now.
+    let text = run(at, &["calibrate", "flexL", "--points", "strip.csv"]);
+    assert!(
+        text.code == Some(0) && text.out.contains("version 2 of \"A7\", which is now the left flex strip"),
+        "{text:?}"
+    );
+    assert_eq!(run(at, &["calibrate", "fsrL", "--part", "P1", "--points", "pad.csv", "--dry-run"]).code, Some(0));
+    let listed = json(at, &["calibrate", "list", "--json"]);
+    assert_eq!((listed["calibrations"].as_array().unwrap().len(), &listed["mounted"]["flexL"]), (2, &"A7".into()));
+    assert_eq!(run(at, &["calibrate", "export", "--out", "c.json"]).code, Some(0));
+    assert_eq!(run(at, &["calibrate", "withdraw", "2"]).code, Some(0));
+    assert!(run(at, &["calibrate", "list"]).out.contains("withdrawn"));
+    assert!(run(at, &["calibrate", "show", "1"]).out.contains("kOhm flat"));
+    let mut other = palpate(&at.join("other.sqlite"));
+    let taken = ran(&other.args(["calibrate", "import", "c.json", "c.json"]).current_dir(at).output().unwrap());
+    assert!(
+        taken.code == Some(0) && taken.out.contains("2 calibration(s) added") && taken.out.contains("2 were here"),
+        "{taken:?}"
+    );
+    let mounted = run(at, &["calibrate", "mount", "flexR", "A9"]);
+    assert!(mounted.out.contains("right flex strip") && mounted.err.contains("has no calibration"), "{mounted:?}");
+    // What goes wrong is told with a cause and what to do.
+    refused(at, &["calibrate", "fsrL", "--part", "P1", "--points", "strip.csv"], &["no column load_kg", "angle_deg"]);
+    refused(at, &["calibrate", "flexL", "--points", "strip.csv", "--resistor", "1000"], &["is not the 1.00 kOhm"]);
+    refused(at, &["calibrate", "fsrL", "--points", "pad.csv"], &["give it a name"]);
+    refused(at, &["calibrate", "show", "77"], &["no calibration 77", "calibrate list"]);
+    refused(at, &["calibrate", "import", "strip.csv"], &["strip.csv", "calibrate export"]);
+    refused(at, &["calibrate", "flexL", "--port", "nowhere", "--auto"], &["nowhere"]);
+}
+
+#[test]
+fn a_captured_stream_is_calibrated_hands_free() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let parts = parts(7, true);
+    let script = parse_script("rest=2; angle=0 hold=2; angle=50 hold=3; angle=90 hold=3").unwrap();
+    let hand =
+        HandPlan { scene: Scene::default(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script };
+    let (channels, most_steps, clock_start_us) = (4, 30, 0);
+    let setup = PretendedSetup {
+        hand,
+        parts: parts.clone(),
+        rate_hz: 50,
+        channels,
+        most_steps,
+        clock_start_us,
+        faults: vec![],
+        seed: 1,
+    };
+    let mut gripper = PretendedGripper::new(setup).unwrap();
+    let mut file = CAPTURE_MAGIC.to_vec();
+    for k in 1..=1000 {
+        let arrived_s = 0.01 * f64::from(k);
+        gripper.advance(arrived_s);
+        Captured::Bytes { arrived_s, bytes: gripper.take_bytes() }.write(&mut file).unwrap();
+    }
+    std::fs::write(at.join("bench.bytes"), file).unwrap();
+    let arguments =
+        ["calibrate", "flexR", "--part", "B", "--port", "bench.bytes", "--auto", "--plan", "0,50,90", "--json"];
+    let made = json(at, &arguments);
+    let flat = made["curve"]["flex"]["flat_ohm"].as_f64().unwrap();
+    assert!((flat / parts.strips[1].part.flat_ohm - 1.0).abs() < 0.01, "{flat}");
+    let missing = [&arguments[..8], &["0,50,90,10"]].concat();
+    refused(at, &missing, &["over before all points were taken"]);
+}
+
+/// Stores readings as `palpate record` does.
+fn stored(
+    store: &mut Store,
+    board: &Board,
+    readings: Vec<Reading>,
+    scene: &Scene,
+    object: &str,
+    closing_s: f64,
+) -> TrialId {
+    let mut info = palpate_core::grasping::prepare(scene, None, 0).info().clone();
+    (info.rig, info.object) = ("serial".to_owned(), object.to_owned());
+    let phases = vec![PhaseMark { from_s: closing_s, phase: Phase::Close, line_bar: None }];
+    let about = BoardInfo { board: board.clone(), phases, ..BoardInfo::default() };
+    let id = store.begin_board(&info, &about).unwrap();
+    store.append_board(id, &about, &BoardChunk { readings, ..BoardChunk::default() }).unwrap();
+    store.finish_board(id, &about, &[]).unwrap();
+    id
+}
+
+#[test]
+fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let parts = parts(8, false);
+    let (board, calibrations) = calibrated(&parts, 8);
+    let [known, hidden] = scenes();
+    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    let press = |bar: &str| format!("rest=0.5; grasp bigball bar={bar}");
+    let close = "rest=0.5; close empty bar=0.6".to_owned();
+    let grasps = [(close, EMPTY), (press("0.8"), "bigball"), (press("0.7"), "bigball")];
+    for (script, object) in grasps {
+        let of = |scene: &Scene| {
+            let mut scene = scene.clone();
+            scene.set_object_fixed(object != EMPTY);
+            scene.object.source = object.to_owned();
+            scene
+        };
+        let (_, readings) = readings(&parts, &of(&hidden), &script, 5.0, 3);
+        stored(&mut store, &board, readings, &of(&known), object, 0.5);
+    }
+    drop(store);
+    refused(at, &["recognise", "1"], &["trial 1", "it is not known which part is the left flex strip"]);
+    refused(at, &["fit", "1", "2"], &["no curvature"]);
+    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    for (sensor, calibration) in &calibrations {
+        store.add_calibration(&calibration.record).unwrap();
+        store.mount_part(*sensor, &calibration.record.part).unwrap();
+    }
+    let kappa = |store: &Store| {
+        let signals = store.board_signals(1, &[]).unwrap().unwrap().derived.signals;
+        (0..signals.len()).map(|k| signals.row(k)[0]).fold(0.0, f32::max)
+    };
+    let before = kappa(&store);
+    let fit = json(at, &["fit", "1", "2", "3", "--pad-gain", "0.5", "--json", "--out", "twin.toml"]);
+    let stiffness = fit["estimates"][0]["value"].as_f64().unwrap();
+    assert!((stiffness / hidden.gripper.finger.bending_stiffness - 1.0).abs() < 0.03, "{stiffness} {fit}");
+    let twin = Scene::from_file(&at.join("twin.toml")).unwrap();
+    assert_eq!(twin.gripper.finger.bending_stiffness, stiffness);
+    let told = run(at, &["recognise", "1", "2"]);
+    assert!(told.code == Some(0) && told.out.contains("bigball"), "{told:?}");
+    // Another strip calibration, and the old trial reads differently.
+    let mut record = calibrations[0].1.record.clone();
+    record.points.iter_mut().for_each(|point| point.stimulus *= 0.9);
+    store.add_calibration(&record).unwrap();
+    assert!((kappa(&store) / before - 0.9).abs() < 0.01, "{} {before}", kappa(&store));
+}
+
+/// A board whose right strip reads what the test sets, fifty readings at a time.
+struct Scripted {
+    counts: Arc<Mutex<f64>>,
+    taken: u32,
+}
+
+impl BoardStream for Scripted {
+    fn take(&mut self, _: Duration) -> Vec<Reading> {
+        std::thread::sleep(Duration::from_millis(2));
+        let counts = *self.counts.lock().unwrap() as f32;
+        let counts = vec![Some(1400.0), Some(counts), Some(0.0), Some(0.0)];
+        self.taken += 1;
+        let time = |k: u32| f64::from(self.taken) + 0.02 * f64::from(k);
+        let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None };
+        (0..50).map(|k| reading(time(k))).collect()
+    }
+
+    fn board(&self) -> Board {
+        Board::default()
+    }
+
+    fn state(&self) -> String {
+        "Listening".to_owned()
+    }
+}
+
+#[test]
+fn the_window_calibrates_step_by_step() {
+    let counts = Arc::new(Mutex::new(0.0));
+    let read = Arc::clone(&counts);
+    let listen: Listen = Arc::new(move |_| Ok(Box::new(Scripted { counts: Arc::clone(&read), taken: 0 })));
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "calibration");
+    let setup = BenchSetup { panel, size: [340.0, 520.0], listen, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.harness.get_by_label("right flex strip").click();
+    bench.harness.get_by_label("Part").focus();
+    bench.harness.step();
+    bench.harness.get_by_label("Part").type_text("A7");
+    bench.harness.step();
+    let input = Input::on(&Board::default(), Sensor::FlexRight);
+    // A strip of 24 kOhm that rises to 2.2 times that, and has slipped a little at 60 degrees.
+    let ohm = |degrees: f64| 24e3 * (1.0 + 1.2 * degrees / 90.0);
+    let holds = [("hang straight", 0.0), ("by 30 degrees", 30.0), ("by 60 degrees", 61.5), ("by 90 degrees", 90.0)];
+    *counts.lock().unwrap() = input.counts(ohm(0.0));
+    bench.harness.get_by_label("Begin calibration").click();
+    bench.harness.step();
+    for (instruction, degrees) in holds {
+        let wanted = input.counts(ohm(degrees));
+        *counts.lock().unwrap() = wanted;
+        bench.until_shown(true, instruction);
+        bench.until_shown(true, &format!("{wanted:.0} counts, settled"));
+        bench.harness.get_by_label("Take point").click();
+        bench.harness.step();
+        bench.until_shown(false, instruction);
+    }
+    bench.until_shown(true, "all points are taken");
+    bench.until_shown(true, "kOhm flat");
+    bench.until_shown(true, "counts, settled");
+    compare("calibration_done", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
+    bench.harness.get_by_label("Keep").click();
+    bench.harness.step();
+    bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
+}
