@@ -273,6 +273,32 @@ impl Ray {
         self.trace(self.foot, self.axis, margin, |p| other.distance(p), |p| other.normal(p))
     }
 
+    /// The foot has come through a thin body: the strand is compressed down to where it went in, and pushes back the way it
+    /// came.
+    #[cold]
+    fn trace_back(
+        &self,
+        foot: DVec3,
+        axis: DVec3,
+        mut gap: f64,
+        distance: impl Fn(DVec3) -> f64,
+        normal: impl Fn(DVec3) -> DVec3,
+    ) -> Option<Hit> {
+        let mut back = 0.0;
+        for _ in 0..MOST_STEPS {
+            if gap > 0.0 {
+                break;
+            }
+            back += (-gap).max(CLOSE);
+            gap = distance(foot - axis * back) - self.radius;
+        }
+        let centre = foot - axis * back;
+        let surface_normal = normal(centre);
+        let cosine = (-surface_normal.dot(axis)).max(LEAST_COSINE);
+        let point = centre - surface_normal * (self.radius + gap);
+        Some(Hit { compression: (self.rest + back) * cosine - gap, normal: surface_normal, point, cosine })
+    }
+
     /// Sphere tracing from `foot` along `axis`, both in the frame of the distance.
     #[inline]
     fn trace(
@@ -303,9 +329,7 @@ impl Ray {
         let surface_normal = normal(centre);
         let cosine = -surface_normal.dot(axis);
         if cosine < FROM_BEHIND && t == 0.0 {
-            // The foot has come through a thin body: keep pushing back the way it came.
-            let compression = self.rest - gap;
-            return Some(Hit { compression, normal: -axis, point: foot, cosine: 1.0 });
+            return self.trace_back(foot, axis, gap, distance, normal);
         }
         // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
         let compression = (self.rest - t) * cosine - gap;
