@@ -41,6 +41,14 @@ struct Hit {
     cosine: f64,
 }
 
+/// How a ray meets a surface.
+enum Met {
+    /// Coming from outside.
+    InFront(Hit),
+    /// Its foot has come through; the ball about it overlaps the surface by -`gap` (m).
+    Behind { gap: f64 },
+}
+
 /// A strand that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays finite, and
 /// its force vanishes with the compression along the normal.
 const LEAST_COSINE: f64 = 0.25;
@@ -253,7 +261,11 @@ impl Ray {
         let foot = solid.local(self.foot);
         let axis = solid.object_from_gripper * self.axis;
         let field = &solid.body.field;
-        let hit = self.trace(foot, axis, margin, |p| field.distance(p), |p| field.normal(p))?;
+        let (distance, normal) = (|p| field.distance(p), |p| field.normal(p));
+        let hit = match self.trace(foot, axis, margin, distance, normal)? {
+            Met::InFront(hit) => hit,
+            Met::Behind { gap } => self.trace_back(foot, axis, gap, distance, normal),
+        };
         let to_gripper = solid.object_from_gripper.transpose();
         Some(Hit {
             compression: hit.compression,
@@ -266,11 +278,23 @@ impl Ray {
     fn cast_environment(&self, model: &Model, margin: f64) -> Option<Hit> {
         let environment = &model.environment;
         let (distance, normal) = (|p| environment.distance(p), |p| environment.normal(p));
-        self.trace(self.foot, self.axis, margin, distance, normal)
+        let met = self.trace(self.foot, self.axis, margin, distance, normal)?;
+        Some(self.in_front_or_pushed(met))
     }
 
     fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
-        self.trace(self.foot, self.axis, margin, |p| other.distance(p), |p| other.normal(p))
+        let met = self.trace(self.foot, self.axis, margin, |p| other.distance(p), |p| other.normal(p))?;
+        Some(self.in_front_or_pushed(met))
+    }
+
+    /// What has no thickness to go back through, a table or the front of a finger, pushes along the strand.
+    fn in_front_or_pushed(&self, met: Met) -> Hit {
+        match met {
+            Met::InFront(hit) => hit,
+            Met::Behind { gap } => {
+                Hit { compression: self.rest - gap, normal: -self.axis, point: self.foot, cosine: 1.0 }
+            }
+        }
     }
 
     /// The foot has come through a thin body: the strand is compressed down to where it went in, and pushes back the way it
@@ -283,7 +307,7 @@ impl Ray {
         mut gap: f64,
         distance: impl Fn(DVec3) -> f64,
         normal: impl Fn(DVec3) -> DVec3,
-    ) -> Option<Hit> {
+    ) -> Hit {
         let mut back = 0.0;
         for _ in 0..MOST_STEPS {
             if gap > 0.0 {
@@ -296,7 +320,7 @@ impl Ray {
         let surface_normal = normal(centre);
         let cosine = (-surface_normal.dot(axis)).max(LEAST_COSINE);
         let point = centre - surface_normal * (self.radius + gap);
-        Some(Hit { compression: (self.rest + back) * cosine - gap, normal: surface_normal, point, cosine })
+        Hit { compression: (self.rest + back) * cosine - gap, normal: surface_normal, point, cosine }
     }
 
     /// Sphere tracing from `foot` along `axis`, both in the frame of the distance.
@@ -308,7 +332,7 @@ impl Ray {
         margin: f64,
         distance: impl Fn(DVec3) -> f64,
         normal: impl Fn(DVec3) -> DVec3,
-    ) -> Option<Hit> {
+    ) -> Option<Met> {
         let limit = self.rest + margin;
         let mut t = 0.0;
         let mut gap = distance(foot) - self.radius;
@@ -329,13 +353,13 @@ impl Ray {
         let surface_normal = normal(centre);
         let cosine = -surface_normal.dot(axis);
         if cosine < FROM_BEHIND && t == 0.0 {
-            return self.trace_back(foot, axis, gap, distance, normal);
+            return Some(Met::Behind { gap });
         }
         // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
         let compression = (self.rest - t) * cosine - gap;
         let point = centre - surface_normal * (self.radius + gap);
         let cosine = cosine.max(LEAST_COSINE);
-        (compression > -margin).then_some(Hit { compression, normal: surface_normal, point, cosine })
+        (compression > -margin).then_some(Met::InFront(Hit { compression, normal: surface_normal, point, cosine }))
     }
 }
 
