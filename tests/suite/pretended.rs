@@ -262,7 +262,6 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
         ("tenbit@0", &[], "6", "bits"),
         ("silent@0/60", &[], "3", "silence"),
     ];
-    let another_rate = std::thread::spawn(|| diagnosed(&["--baud", "250000"], "9"));
     std::thread::scope(|scope| {
         let look = |(faults, more, seconds, _): &(&str, &[&str], &str, &str)| {
             let arguments = [&["--faults", faults, "--script", moving], *more].concat();
@@ -277,8 +276,8 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
             assert_eq!((code, &wrong), (i32::from(!want.is_empty()), &want), "{faults}: {told:#}");
         }
     });
-    // It is found by trying, and worth a note.
-    let (code, wrong, told) = another_rate.join().unwrap();
+    // It is found by trying, and worth a note. Not beside the others: a host that is late loses bytes at speeds it tries.
+    let (code, wrong, told) = diagnosed(&["--baud", "250000"], "9");
     assert!(code == 0 && wrong.contains(&("baud".to_owned(), "note".to_owned())), "{told:#}");
 }
 
