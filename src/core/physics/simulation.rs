@@ -45,7 +45,7 @@ pub struct Simulation {
 pub enum Refinement {
     /// As the scene says.
     None,
-    /// More finely, to estimate an error from; see [`Solver::companion`].
+    /// More finely, to estimate an error from; see [`crate::scene::Solver::companion`].
     Companion,
 }
 
