@@ -1,13 +1,16 @@
 //! What panels ask for. Nothing in a panel changes anything: it pushes an action, and the workbench applies it.
 
+use super::modes::Mode;
+use super::panels::Source;
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
+use palpate_core::rig::serial::Control;
 use palpate_core::scene::Scene;
-use palpate_core::workers::{CalibrationWish, Command};
+use palpate_core::workers::{Command, GripperWish};
 use std::path::PathBuf;
 
 /// A wish of the user's.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub enum Action {
     /// Tell the simulation something.
     Simulation(Command),
@@ -23,8 +26,22 @@ pub enum Action {
     SaveScene,
     /// Measure what the effects of the scene cost and change.
     MeasureEffects,
-    /// Calibrate a sensor of the real gripper.
-    Calibrate(CalibrationWish),
+    /// Tell the real gripper's thread something.
+    Gripper(GripperWish),
+    /// Begin a trial of the real gripper, or once more the one that goes on.
+    BeginTrial,
+    /// Give up the trial that goes on, or throw the last one away.
+    DiscardTrial,
+    /// Stop everything: vent the fingers, and close what is open over the window.
+    Stop,
+    /// Who moves the fingers of the real gripper.
+    SetControl(Control),
+    /// From which probability on a class is taken as certain.
+    SetThreshold(f64),
+    /// Go to another mode.
+    SetMode(Mode),
+    /// Show the simulated or the real gripper.
+    Show(Source),
     /// Look from here.
     SetCamera(Camera),
     /// Show the whole gripper.

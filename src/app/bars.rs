@@ -1,12 +1,16 @@
-//! The bar above the panels (what this is, where data come from) and the bar below (time).
+//! The bar above the panels (what this is, where data come from) and the bar below (time, or the trial that goes on).
+
+mod trial;
 
 use super::actions::Action;
 use super::icons::{self, Icon};
-use super::panels::PanelContext;
+use super::modes::{self, Mode};
+use super::panels::{PanelContext, Source, stop_button};
 use super::theme::{colour, veil};
 use egui::{Align, Layout, RichText, Ui};
 use palpate_core::palette::Theme;
-use palpate_core::workers::{Command, Status};
+use palpate_core::rig::serial::LinkState;
+use palpate_core::workers::{Command, GripperView, Status};
 
 /// Speeds that can be chosen, as multiples of real time.
 pub(super) const SPEEDS: [f64; 8] = [1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -24,16 +28,10 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Act
     let colours = context.view.theme.colours();
     ui.horizontal_centered(|ui| {
         ui.label(RichText::new("Palpate").heading().strong());
-        badge(ui, "SIMULATED", veil(colours.accent, 0.22), colour(colours.text));
-        let object = context.snapshot.and_then(|s| s.object.as_deref());
-        if let Some(object) = object.filter(|_| context.view.truth_shown) {
-            ui.label(&object.title);
-        }
-        if let Some(snapshot) = context.snapshot {
-            let status = &snapshot.status;
-            // With a model a round ends as soon as it is clear what is in the hand.
-            let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
-            ui.weak(format!("grasp {} {of} {}", status.grasp_of_round.max(1), status.grasps));
+        modes_ui(ui, context, actions);
+        sources_ui(ui, context, actions);
+        if context.source == Source::Simulation {
+            simulated_ui(ui, context);
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui.button("?").on_hover_text("Keys (F1)").clicked() {
@@ -49,12 +47,68 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Act
             if ui.button("Reset layout").on_hover_text("Put all panels back").clicked() {
                 actions.push(Action::ResetLayout);
             }
+            if context.gripper.is_some_and(GripperView::is_connected) {
+                stop_button(ui, context.view.theme, actions);
+            }
             if let Some(driver) = context.driver.filter(|_| ui.available_width() > 240.0) {
                 let quiet = RichText::new(driver).small().color(colour(colours.quiet_text));
                 ui.add(egui::Label::new(quiet).truncate());
             }
         });
     });
+}
+
+/// The tabs of the modes.
+fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    ui.spacing_mut().item_spacing.x = 2.0;
+    for kind in &modes::ALL {
+        let chosen = context.view.mode == kind.mode;
+        if ui.selectable_label(chosen, kind.title).on_hover_text(kind.about).clicked() && !chosen {
+            actions.push(Action::SetMode(kind.mode));
+        }
+    }
+    ui.spacing_mut().item_spacing.x = 8.0;
+}
+
+/// Where the data come from. While a gripper is connected, a click on the other source shows that one.
+fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let colours = context.view.theme.colours();
+    let link = context.gripper.and_then(|gripper| gripper.link.as_ref());
+    let Some(link) = link else {
+        return badge(ui, "SIMULATED", veil(colours.accent, 0.22), colour(colours.text));
+    };
+    let listening = link.state == LinkState::Listening;
+    let cadence = &link.cadence;
+    let real = match listening {
+        true => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
+        false => "REAL GRIPPER: no readings".to_owned(),
+    };
+    let about = format!("{}: {}", link.port.path.display(), link.state.sentence());
+    for (source, text, about) in [
+        (Source::Gripper, real, about),
+        (Source::Simulation, "SIMULATED".to_owned(), "Show the simulation instead".to_owned()),
+    ] {
+        let chosen = context.source == source;
+        let ink = if source == Source::Gripper && !listening { colours.error } else { colours.text };
+        let text = RichText::new(text).small().color(colour(ink));
+        if ui.selectable_label(chosen, text).on_hover_text(about).clicked() {
+            actions.push(Action::Show(source));
+        }
+    }
+}
+
+/// What the simulation has in the hand, and how far its round is.
+fn simulated_ui(ui: &mut Ui, context: &PanelContext<'_>) {
+    let object = context.snapshot.and_then(|s| s.object.as_deref());
+    if let Some(object) = object.filter(|_| context.view.truth_shown) {
+        ui.label(&object.title);
+    }
+    if let Some(snapshot) = context.snapshot {
+        let status = &snapshot.status;
+        // With a model a round ends as soon as it is clear what is in the hand.
+        let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
+        ui.weak(format!("grasp {} {of} {}", status.grasp_of_round.max(1), status.grasps));
+    }
 }
 
 fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
@@ -64,6 +118,9 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
 }
 
 pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    if context.source == Source::Gripper || context.view.mode == Mode::Label {
+        return trial::ui(ui, context, actions);
+    }
     let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
     let t = context.snapshot.map_or(0.0, |s| s.frame.t);
     ui.horizontal_centered(|ui| {

@@ -2,16 +2,29 @@
 
 use super::actions::Action;
 use super::bars::SPEEDS;
+use super::modes::Mode;
 use super::panels::PanelContext;
 use egui::{Key, KeyboardShortcut, Modifiers};
 use palpate_core::drawing::{Camera, StandardView};
-use palpate_core::workers::Command;
+use palpate_core::workers::{Command, GripperWish};
 
 /// A key, what it does, and how.
 pub(super) struct Binding {
     pub(super) shortcut: KeyboardShortcut,
     pub(super) does: &'static str,
+    /// The only mode in which it does so; in all of them where none is named.
+    only: Option<Mode>,
     act: fn(&PanelContext<'_>) -> Option<Action>,
+}
+
+impl Binding {
+    const fn only_in(self, mode: Mode) -> Self {
+        Self { only: Some(mode), ..self }
+    }
+
+    fn counts_in(&self, mode: Mode) -> bool {
+        self.only.is_none_or(|only| only == mode)
+    }
 }
 
 const fn key(
@@ -20,11 +33,20 @@ const fn key(
     does: &'static str,
     act: fn(&PanelContext<'_>) -> Option<Action>,
 ) -> Binding {
-    Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, act }
+    Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, only: None, act }
 }
 
 /// All keys. Those with more modifiers come first, so that they win.
-pub(super) const ALL: [Binding; 20] = [
+pub(super) const ALL: [Binding; 26] = [
+    key(Modifiers::COMMAND, Key::Num1, "mode Demo", |_| Some(Action::SetMode(Mode::Demo))),
+    key(Modifiers::COMMAND, Key::Num3, "mode Label", |_| Some(Action::SetMode(Mode::Label))),
+    key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or begin it anew", |_| Some(Action::BeginTrial)),
+    key(Modifiers::NONE, Key::Q, "end the trial, and keep it", |c| {
+        c.gripper?.trial.as_ref()?;
+        Some(Action::Gripper(GripperWish::End))
+    }),
+    key(Modifiers::NONE, Key::D, "discard the trial", |_| Some(Action::DiscardTrial)),
+    key(Modifiers::NONE, Key::T, "tare the real gripper's sensors", |_| Some(Action::Gripper(GripperWish::Tare))),
     key(Modifiers::NONE, Key::Space, "play or pause", |c| {
         let playing = c.snapshot?.status.playing;
         Some(Action::Simulation(if playing { Command::Pause } else { Command::Play }))
@@ -33,7 +55,7 @@ pub(super) const ALL: [Binding; 20] = [
     key(Modifiers::NONE, Key::Backspace, "back to the start", |_| Some(Action::Simulation(Command::Reset))),
     key(Modifiers::NONE, Key::Minus, "slower", |c| next_speed(c, -1)),
     key(Modifiers::NONE, Key::Equals, "faster", |c| next_speed(c, 1)),
-    key(Modifiers::NONE, Key::N, "next object", |_| Some(Action::NextObject)),
+    key(Modifiers::NONE, Key::N, "next object", |_| Some(Action::NextObject)).only_in(Mode::Demo),
     key(Modifiers::COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(Action::PickFile)),
     key(Modifiers::COMMAND, Key::S, "save the scene", |_| Some(Action::SaveScene)),
     key(Modifiers::COMMAND, Key::P, "save a picture of the 3-D view", |_| Some(Action::SavePicture)),
@@ -48,7 +70,7 @@ pub(super) const ALL: [Binding; 20] = [
         Some(Action::SetCamera(Camera { parallel: !c.view.camera.parallel, ..c.view.camera }))
     }),
     key(Modifiers::NONE, Key::F1, "this sheet", |c| Some(Action::ShowKeys(!c.view.keys_shown))),
-    key(Modifiers::NONE, Key::Escape, "close this sheet", |c| c.view.keys_shown.then_some(Action::ShowKeys(false))),
+    key(Modifiers::NONE, Key::Escape, "STOP: vent the real gripper; close this sheet", |_| Some(Action::Stop)),
     key(Modifiers::NONE, Key::F11, "full screen", |_| None),
 ];
 
@@ -73,20 +95,24 @@ fn object_framed(context: &PanelContext<'_>) -> Option<Camera> {
 /// Actions for the keys pressed in this frame.
 pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Action> {
     if ctx.text_edit_focused() {
-        return Vec::new();
+        // Whoever has to stop the gripper does not look where the cursor is.
+        let stop = ctx.input(|i| i.key_pressed(Key::Escape));
+        return if stop { vec![Action::Stop] } else { Vec::new() };
     }
+    let mode = context.view.mode;
     if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F11)) {
         let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
         ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
     }
     ALL.iter()
+        .filter(|binding| binding.counts_in(mode))
         .filter(|binding| ctx.input_mut(|i| i.consume_shortcut(&binding.shortcut)))
         .filter_map(|binding| (binding.act)(context))
         .collect()
 }
 
 /// The sheet of keys and of what the mouse does.
-pub(super) fn sheet(ctx: &egui::Context, shown: bool, actions: &mut Vec<Action>) {
+pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut Vec<Action>) {
     let mut open = shown;
     let room = ctx.content_rect().height() - 90.0;
     egui::Window::new("Keys").open(&mut open).collapsible(false).resizable(false).default_width(330.0).show(
@@ -94,7 +120,7 @@ pub(super) fn sheet(ctx: &egui::Context, shown: bool, actions: &mut Vec<Action>)
         |ui| {
             egui::ScrollArea::vertical().max_height(room).show(ui, |ui| {
                 egui::Grid::new("keys").num_columns(2).spacing([22.0, 4.0]).show(ui, |ui| {
-                    for binding in &ALL {
+                    for binding in ALL.iter().filter(|binding| binding.counts_in(mode)) {
                         ui.monospace(ctx.format_shortcut(&binding.shortcut));
                         ui.label(binding.does);
                         ui.end_row();
@@ -126,7 +152,8 @@ mod tests {
     #[test]
     fn no_key_does_two_things() {
         for (k, a) in ALL.iter().enumerate() {
-            assert!(ALL[k + 1..].iter().all(|b| a.shortcut != b.shortcut), "{}", a.does);
+            let together = |b: &&Binding| a.only.is_none() || b.only.is_none() || a.only == b.only;
+            assert!(ALL[k + 1..].iter().filter(together).all(|b| a.shortcut != b.shortcut), "{}", a.does);
         }
     }
 }

@@ -10,6 +10,7 @@ mod bars;
 mod files;
 mod icons;
 mod keys;
+mod modes;
 mod panels;
 mod plots;
 mod startup;
@@ -21,7 +22,8 @@ mod viewport;
 mod workbench;
 
 pub use actions::Action;
-pub use panels::{ALL as ALL_PANELS, PanelContext, PanelKind};
+pub use modes::Mode;
+pub use panels::{ALL as ALL_PANELS, PanelContext, PanelKind, Source};
 pub use startup::{Surroundings, check_surroundings};
 pub use view_state::ViewState;
 pub use viewport::Viewport;

@@ -49,10 +49,10 @@ const BAND: f32 = 0.3;
 const NARROWEST: f64 = 0.05;
 
 pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>, plot: &TimePlot<'_>) {
-    let duration = context.snapshot.map_or(4.0, |s| s.status.duration);
+    let span = context.time_span();
     // A window from before the trial became shorter shows nothing that is there.
-    let fits = |[from, to]: &[f64; 2]| *from >= 0.0 && to - from >= 0.5 * NARROWEST && *to <= duration + 1e-9;
-    let [from, to] = context.view.time_window.filter(fits).unwrap_or([0.0, duration]);
+    let fits = |[from, to]: &[f64; 2]| *from >= span[0] && to - from >= 0.5 * NARROWEST && *to <= span[1] + 1e-9;
+    let [from, to] = context.view.time_window.filter(fits).unwrap_or(span);
     let theme = context.view.theme;
     let [low, high] = value_range(context, plot, [from, to]);
     let unit = plot.unit;
@@ -84,6 +84,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
         plot_ui.set_plot_bounds_x(from..=to);
         plot_ui.set_plot_bounds_y(low..=high);
         add_hold(plot_ui, context, high - 0.04 * (high - low));
+        add_gaps(plot_ui, context);
         for trace in context.traces.earlier() {
             add_curves(plot_ui, trace, plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0, false);
         }
@@ -104,7 +105,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
     response
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, format!("{} over time", plot.id)));
-    if let Some(window) = moved_window(ui, &response.response, &response.inner, [from, to], duration) {
+    if let Some(window) = moved_window(ui, &response.response, &response.inner, [from, to], span) {
         actions.push(Action::SetTimeWindow(window));
     }
 }
@@ -121,13 +122,13 @@ fn moved_window(
     response: &egui::Response,
     drag: &TimeDrag,
     [from, to]: [f64; 2],
-    duration: f64,
+    [first, last]: [f64; 2],
 ) -> Option<Option<[f64; 2]>> {
     if response.double_clicked() {
         return Some(None);
     }
     let shifted = |by: f64| {
-        let by = by.clamp(-from, (duration - to).max(-from));
+        let by = by.clamp(first - from, (last - to).max(first - from));
         Some(Some([from + by, to + by]))
     };
     if response.dragged() && drag.dragged != 0.0 {
@@ -137,9 +138,9 @@ fn moved_window(
     if response.hovered() && wheel != 0.0 {
         let about = drag.pointer?.clamp(from, to);
         let factor = (-f64::from(wheel) * 0.004).exp().max(NARROWEST / drag.width);
-        let start = (about - (about - from) * factor).clamp(0.0, (duration - NARROWEST).max(0.0));
-        let end = (about + (to - about) * factor).clamp(start + NARROWEST, (start + NARROWEST).max(duration));
-        let whole = start <= 0.0 && end >= duration;
+        let start = (about - (about - from) * factor).clamp(first, (last - NARROWEST).max(first));
+        let end = (about + (to - about) * factor).clamp(start + NARROWEST, (start + NARROWEST).max(last));
+        let whole = start <= first && end >= last;
         return Some((!whole).then_some([start, end]));
     }
     None
@@ -153,19 +154,25 @@ fn plain(value: f64) -> String {
 
 /// Shades the hold, so that it can be told from closing and release.
 fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, height: f64) {
-    let Some(snapshot) = context.snapshot else { return };
-    let programme = &snapshot.scene.programme;
-    let tick = 1.0 / f64::from(snapshot.scene.timing.actuation_hz.max(1));
-    let closed = f64::from(programme.close_ticks()) * tick;
-    let released = (closed + f64::from(programme.hold_ticks) * tick).min(snapshot.status.duration);
-    if closed >= released {
-        return;
-    }
+    let Some([closed, released]) = context.hold() else { return };
     let quiet = context.view.theme.colours().quiet_text;
     plot_ui.add(Span::new("", closed..=released).fill(veil(quiet, 0.09)).border_width(0.0));
     let place = PlotPoint::new(closed, height);
     let word = egui::RichText::new(" hold").small();
     plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
+}
+
+/// Shades the stretches in which readings are missing, so that nobody takes them for quiet ones.
+fn add_gaps(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>) {
+    let colours = context.view.theme.colours();
+    for [from, to] in context.traces.current().map(GraspTrace::gaps).unwrap_or_default() {
+        plot_ui.add(
+            Span::new("", from..=to)
+                .fill(veil(colours.error, 0.16))
+                .border_width(1.0)
+                .border_color(veil(colours.error, 0.5)),
+        );
+    }
 }
 
 fn add_curves(

@@ -11,6 +11,8 @@ const KEPT: usize = 4;
 pub struct GraspTrace {
     /// Which grasp.
     pub grasp: u64,
+    /// It belongs to no grasp: only its last seconds are kept.
+    pub rolling: bool,
     /// Times (s).
     pub t: Vec<f64>,
     /// Line pressures (bar).
@@ -19,6 +21,34 @@ pub struct GraspTrace {
     pub channels: Vec<Vec<f32>>,
     /// Estimated numerical errors, channel by channel; empty without a companion.
     pub errors: Vec<Vec<f32>>,
+}
+
+/// What is kept of a trace that belongs to no grasp (s), and how much more may gather before it is cut.
+const ROLLING_S: [f64; 2] = [12.0, 4.0];
+
+impl GraspTrace {
+    /// Stretches of time without readings (s): a row without any number marks where one begins.
+    pub fn gaps(&self) -> Vec<[f64; 2]> {
+        let empty = |k: &usize| !self.channels.is_empty() && self.channels.iter().all(|channel| channel[*k].is_nan());
+        let end = |k: usize| self.t.get(k + 1).copied();
+        let marks = (0..self.t.len()).filter(|k| self.line_bar[*k].is_nan() && empty(k));
+        marks.filter_map(|k| Some([self.t[k], end(k)?])).filter(|[from, to]| to > from).collect()
+    }
+
+    /// Forgets what is long ago.
+    fn cut(&mut self) {
+        let [kept, more] = ROLLING_S;
+        let Some(last) = self.t.last().copied() else { return };
+        if self.t.first().is_some_and(|first| last - first <= kept + more) {
+            return;
+        }
+        let old = self.t.partition_point(|t| *t < last - kept);
+        self.t.drain(..old);
+        self.line_bar.drain(..old);
+        for channel in self.channels.iter_mut().chain(&mut self.errors) {
+            channel.drain(..old.min(channel.len()));
+        }
+    }
 }
 
 /// The traces of the last grasps, oldest first.
@@ -31,12 +61,20 @@ impl Traces {
     /// Adds a sample; a new grasp begins a new trace and pushes out the oldest.
     pub fn push(&mut self, row: &TraceRow) {
         if self.grasps.back().is_none_or(|last| last.grasp != row.grasp) {
+            // What was watched before a grasp is nothing to compare it with.
+            self.grasps.retain(|trace| !trace.rolling);
             if self.grasps.len() == KEPT {
                 self.grasps.pop_front();
             }
             let channels = vec![Vec::new(); row.values.len()];
             let errors = vec![Vec::new(); row.errors.len()];
-            self.grasps.push_back(GraspTrace { grasp: row.grasp, channels, errors, ..GraspTrace::default() });
+            self.grasps.push_back(GraspTrace {
+                grasp: row.grasp,
+                rolling: row.rolling,
+                channels,
+                errors,
+                ..GraspTrace::default()
+            });
         }
         let Some(last) = self.grasps.back_mut() else { return };
         last.t.push(row.t);
@@ -47,6 +85,9 @@ impl Traces {
         }
         for (channel, error) in last.errors.iter_mut().zip(row.errors.iter()) {
             channel.push(*error);
+        }
+        if last.rolling {
+            last.cut();
         }
     }
 
@@ -60,9 +101,11 @@ impl Traces {
         self.grasps.back()
     }
 
-    /// The grasps before it, oldest first.
+    /// The grasps before it, oldest first; none beside what belongs to no grasp.
     pub fn earlier(&self) -> impl Iterator<Item = &GraspTrace> {
-        self.grasps.iter().take(self.grasps.len().saturating_sub(1))
+        let rolling = self.current().is_some_and(|current| current.rolling);
+        let many = if rolling { 0 } else { self.grasps.len().saturating_sub(1) };
+        self.grasps.iter().take(many)
     }
 }
 
@@ -78,6 +121,7 @@ mod tests {
                 let t = f64::from(k) * 0.1;
                 traces.push(&TraceRow {
                     grasp,
+                    rolling: false,
                     t,
                     line_bar: 0.5,
                     values: Box::new([grasp as f32, f32::NAN]),
@@ -90,5 +134,23 @@ mod tests {
         assert_eq!(earlier, [3, 4, 5]);
         traces.clear();
         assert!(traces.current().is_none());
+    }
+
+    #[test]
+    fn what_is_only_watched_is_bounded_and_has_gaps() {
+        let mut traces = Traces::default();
+        let mut push = |t: f64, value: f32| {
+            let line_bar = if value.is_nan() { f64::NAN } else { 0.0 };
+            let values = Box::new([value]);
+            traces.push(&TraceRow { grasp: 1, rolling: true, t, line_bar, values, errors: Box::default() });
+        };
+        for k in 0..100_000u32 {
+            push(0.01 * f64::from(k), 1.0);
+        }
+        push(1000.0, f32::NAN);
+        push(1002.5, 1.0);
+        let trace = traces.current().unwrap();
+        assert!(trace.t.len() <= 1700 && trace.channels[0].len() == trace.t.len());
+        assert_eq!(trace.gaps(), [[1000.0, 1002.5]]);
     }
 }

@@ -1,10 +1,13 @@
 //! How the user looks at things: remembered between runs, never written into a trial.
 
-use super::panels;
+use super::modes::Mode;
+use super::panels::Source;
 use egui_tiles::Tree;
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
+use palpate_core::rig::serial::Control;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Camera, theme, layout and the like.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -20,8 +23,15 @@ pub struct ViewState {
     pub ghost: bool,
     /// What is in the hand in truth is told in words.
     pub truth_shown: bool,
-    /// Which panels are where; panes are the names of panels.
-    pub layout: Tree<String>,
+    /// What the window is used for.
+    pub mode: Mode,
+    /// Which panels are where in each mode; panes are the names of panels.
+    pub layouts: BTreeMap<Mode, Tree<String>>,
+    /// Which gripper is shown.
+    #[serde(skip)]
+    pub source: Source,
+    /// Who moves the fingers of the real gripper.
+    pub control: Control,
     /// The stretch of time that all plots show (s); `None` for the whole grasp.
     #[serde(skip)]
     pub time_window: Option<[f64; 2]>,
@@ -43,7 +53,10 @@ impl Default for ViewState {
             forces: true,
             ghost: false,
             truth_shown: true,
-            layout: panels::default_layout(),
+            mode: Mode::default(),
+            layouts: BTreeMap::new(),
+            source: Source::default(),
+            control: Control::ByHand,
             time_window: None,
             keys_shown: false,
             recent: Vec::new(),
@@ -52,6 +65,15 @@ impl Default for ViewState {
 }
 
 impl ViewState {
+    /// Forgets layouts of other versions.
+    pub fn check_layouts(&mut self) {
+        self.layouts.retain(|mode, layout| mode.is_complete(layout));
+    }
+
+    /// Takes the layout of the mode out, to be drawn and put back.
+    pub fn take_layout(&mut self) -> Tree<String> {
+        self.layouts.remove(&self.mode).unwrap_or_else(|| self.mode.default_layout())
+    }
     /// Puts a file in front of the list of recent ones.
     pub fn remember_file(&mut self, path: &str) {
         self.recent.retain(|known| known != path);

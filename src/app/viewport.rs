@@ -34,6 +34,8 @@ pub(super) struct Key {
     pub(super) sample: f64,
     /// Time of the ghost's frame, where one is drawn (s).
     pub(super) ghost: Option<f64>,
+    /// Curvature of the real fingers, where they are drawn (1/m).
+    pub(super) real: Option<[Option<f64>; 2]>,
     pub(super) view: PictureView,
     pub(super) pixels: [u32; 2],
     pub(super) pixels_per_point: f32,

@@ -3,7 +3,8 @@
 
 use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
-use super::panels::{self, PanelContext, PanelKind};
+use super::modes::Mode;
+use super::panels::{PanelContext, PanelKind, Source};
 use super::theme::{self, colour};
 use super::tiling::{Tiling, panel_frame};
 use super::traces::Traces;
@@ -15,6 +16,7 @@ use egui_notify::Toasts;
 use glam::Vec2;
 use palpate_core::drawing::Camera;
 use palpate_core::grasping::ObjectDeck;
+use palpate_core::gripper::Phase;
 use palpate_core::objects::{EMPTY, anchored, catalogue, thumbnail};
 use palpate_core::picture::PictureView;
 use palpate_core::recognition::Model;
@@ -22,8 +24,8 @@ use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::trial::Frame as TrialFrame;
 use palpate_core::workers::{
-    Calibrator, Command, EffectsWorker, Explain, GhostGrasp, Listen, MeasuredAccuracy, NotSent, Notice, Refusal,
-    SimWorker, SimWorkerSetup, Snapshot, Wake,
+    Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, Listen,
+    MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, TrialPart, TrialRequest, Wake,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -67,7 +69,12 @@ const PICTURE_SCALE: f32 = 2.0;
 pub struct Workbench {
     worker: SimWorker,
     effects: EffectsWorker,
-    calibrator: Calibrator,
+    gripper: GripperWorker,
+    /// Traces of the real gripper.
+    felt: Traces,
+    /// The part of the trial that was seen last: the simulation closes its fingers with the real ones.
+    trial_part: Option<TrialPart>,
+    connected: bool,
     wake: Wake,
     scene: Scene,
     /// A scene that the busy worker has not taken yet.
@@ -86,6 +93,14 @@ pub struct Workbench {
     seen: Option<String>,
     /// What comes next when anything may.
     deck: ObjectDeck,
+}
+
+/// The newest of what other threads have published.
+struct Shown<'a> {
+    snapshot: Option<&'a Snapshot>,
+    accuracy: Option<&'a MeasuredAccuracy>,
+    ghost: Option<&'a GhostGrasp>,
+    gripper: Option<&'a GripperView>,
 }
 
 /// Messages that are kept.
@@ -108,21 +123,29 @@ impl Workbench {
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
         let effects = EffectsWorker::start(setup.explain, Arc::clone(&setup.wake))
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
-        let calibrator = Calibrator::start(setup.store, setup.listen, Arc::clone(&setup.wake))
-            .map_err(|e| format!("the calibration could not be started: {e}"))?;
+        let gripper = GripperWorker::start(GripperSetup {
+            scene: setup.scene.clone(),
+            store: setup.store,
+            model: setup.model.as_ref().ok().cloned(),
+            grasps: GRASPS,
+            listen: setup.listen,
+            wake: Arc::clone(&setup.wake),
+        })
+        .map_err(|e| format!("the gripper's thread could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
         });
         let mut view = setup.view;
-        if !panels::is_complete(&view.layout) {
-            view.layout = panels::default_layout();
-        }
+        view.check_layouts();
         theme::apply(ctx, view.theme);
         let mut workbench = Self {
             worker,
             effects,
-            calibrator,
+            gripper,
+            felt: Traces::default(),
+            trial_part: None,
+            connected: false,
             wake: setup.wake,
             scene: setup.scene,
             unsent: false,
@@ -184,9 +207,16 @@ impl Workbench {
         }
         let mut actions = Vec::new();
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
-        let mut layout = std::mem::replace(&mut self.view.layout, egui_tiles::Tree::empty(egui::Id::unique("drawing")));
-        let (accuracy, ghost) = (self.worker.accuracy(), self.ghost());
-        let context = self.panel_context(snapshot.as_deref(), accuracy.as_deref(), ghost.as_deref());
+        let mode = self.view.mode;
+        let mut layout = self.view.take_layout();
+        let (accuracy, ghost, gripper) = (self.worker.accuracy(), self.ghost(), self.gripper.view());
+        let shown = Shown {
+            snapshot: snapshot.as_deref(),
+            accuracy: accuracy.as_deref(),
+            ghost: ghost.as_deref(),
+            gripper: gripper.as_deref(),
+        };
+        let context = self.panel_context(&shown);
         actions.extend(keys::pressed(&ctx, &context));
         let colours = self.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
@@ -196,9 +226,9 @@ impl Workbench {
         CentralPanel::default().frame(ground).show(ui, |ui| {
             layout.ui(&mut Tiling { context: &context, actions: &mut actions }, ui);
         });
-        keys::sheet(&ctx, self.view.keys_shown, &mut actions);
+        keys::sheet(&ctx, self.view.keys_shown, self.view.mode, &mut actions);
         drop_hint(&ctx);
-        self.view.layout = layout;
+        self.view.layouts.insert(mode, layout);
         for action in actions {
             self.apply(&ctx, action);
         }
@@ -214,8 +244,14 @@ impl Workbench {
         let mut actions = Vec::new();
         panel_frame(panel, self.view.theme).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            let accuracy = self.worker.accuracy();
-            let context = self.panel_context(snapshot.as_deref(), accuracy.as_deref(), ghost.as_deref());
+            let (accuracy, gripper) = (self.worker.accuracy(), self.gripper.view());
+            let shown = Shown {
+                snapshot: snapshot.as_deref(),
+                accuracy: accuracy.as_deref(),
+                ghost: ghost.as_deref(),
+                gripper: gripper.as_deref(),
+            };
+            let context = self.panel_context(&shown);
             (panel.ui)(ui, &context, &mut actions);
         });
         for action in actions {
@@ -243,23 +279,24 @@ impl Workbench {
         self.seen = Some(source.clone());
     }
 
-    fn panel_context<'a>(
-        &'a self,
-        snapshot: Option<&'a Snapshot>,
-        accuracy: Option<&'a MeasuredAccuracy>,
-        ghost: Option<&'a GhostGrasp>,
-    ) -> PanelContext<'a> {
+    fn panel_context<'a>(&'a self, shown: &Shown<'a>) -> PanelContext<'a> {
+        let source = self.view.source;
         PanelContext {
-            snapshot,
-            accuracy,
+            snapshot: shown.snapshot,
+            accuracy: shown.accuracy,
             scene: &self.scene,
             effects: &self.effects,
-            calibrator: &self.calibrator,
-            traces: &self.traces,
+            gripper: shown.gripper,
+            source,
+            blind: false,
+            traces: match source {
+                Source::Simulation => &self.traces,
+                Source::Gripper => &self.felt,
+            },
             view: &self.view,
             thumbnails: &self.thumbnails,
             driver: self.driver.as_deref(),
-            ghost: ghost_of(snapshot, ghost),
+            ghost: ghost_of(shown.snapshot, shown.ghost),
         }
     }
 
@@ -271,7 +308,8 @@ impl Workbench {
         for row in self.worker.rows() {
             self.traces.push(&row);
         }
-        let notices: Vec<Notice> = self.worker.notices().collect();
+        self.gather_gripper();
+        let notices: Vec<Notice> = self.worker.notices().chain(self.gripper.notices()).collect();
         for notice in notices {
             match notice {
                 Notice::Warning(text) => self.tell(Message::Warning(text)),
@@ -290,6 +328,39 @@ impl Workbench {
         }
         if self.unsent {
             self.send_scene();
+        }
+    }
+
+    /// Takes in what the real gripper has felt, and lets the simulated one close its fingers with it.
+    fn gather_gripper(&mut self) {
+        if self.gripper.take_rows_lost() {
+            self.felt.clear();
+        }
+        for row in self.gripper.rows() {
+            self.felt.push(&row);
+        }
+        let Some(gripper) = self.gripper.view() else { return };
+        if self.connected != gripper.is_connected() {
+            self.connected = gripper.is_connected();
+            self.view.source = if self.connected { Source::Gripper } else { Source::Simulation };
+        }
+        let part = gripper.trial.as_ref().map(|trial| trial.part);
+        if self.trial_part != part {
+            self.trial_part = part;
+            if part == Some(TrialPart::Phase(Phase::Close)) {
+                self.close_twin();
+            }
+        }
+    }
+
+    /// The simulated fingers do what the real ones do, so that one lies over the other.
+    fn close_twin(&mut self) {
+        for command in
+            [Command::SetRecording(false), Command::SetGrasps(1), Command::SetSpeed(1.0), Command::Reset, Command::Play]
+        {
+            if let Err(cause) = self.worker.send(command) {
+                self.tell(Message::Warning(cause.to_string()));
+            }
         }
     }
 
@@ -334,6 +405,9 @@ impl Workbench {
             }
             Action::SetScene(scene) => self.set_scene(*scene),
             Action::OpenObject(source) => self.open(&source),
+            Action::NextObject if self.view.source == Source::Gripper => {
+                self.gripper.wish(GripperWish::AnotherObject);
+            }
             Action::NextObject => {
                 let next = self.deck.next(&self.scene.object.source);
                 self.open(next);
@@ -343,7 +417,22 @@ impl Workbench {
             Action::SaveScene => self.ask(Ask::SaveScene),
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
-            Action::Calibrate(wish) => self.calibrator.wish(wish),
+            Action::Gripper(wish) => self.gripper.wish(wish),
+            Action::BeginTrial => self.begin_trial(),
+            Action::DiscardTrial => self.gripper.wish(GripperWish::Discard),
+            Action::Stop => {
+                self.view.keys_shown = false;
+                if self.connected {
+                    self.gripper.wish(GripperWish::Vent);
+                }
+            }
+            Action::SetControl(control) => self.view.control = control,
+            Action::SetThreshold(threshold) => {
+                self.gripper.wish(GripperWish::SetThreshold(threshold));
+                self.apply(ctx, Action::Simulation(Command::SetThreshold(threshold)));
+            }
+            Action::SetMode(mode) => self.view.mode = mode,
+            Action::Show(source) => self.view.source = source,
             Action::SetCamera(camera) => self.view.camera = camera,
             Action::FrameAll => {
                 if let Some(snapshot) = self.worker.snapshot() {
@@ -362,10 +451,15 @@ impl Workbench {
             Action::SetTimeWindow(window) => self.view.time_window = window,
             Action::ShowTruth(shown) => self.view.truth_shown = shown,
             Action::ShowKeys(shown) => self.view.keys_shown = shown,
-            Action::ResetLayout => self.view.layout = panels::default_layout(),
+            Action::ResetLayout => self.view.layouts.clear(),
             Action::Tell(message) => self.tell(message),
         }
         ctx.request_repaint();
+    }
+
+    fn begin_trial(&mut self) {
+        let request = TrialRequest { object: None, control: self.view.control, adds: self.view.mode == Mode::Demo };
+        self.gripper.wish(GripperWish::Begin(request));
     }
 
     fn frame_all(&mut self, snapshot: &Snapshot) {
@@ -415,6 +509,7 @@ impl Workbench {
         }
         self.scene = scene;
         self.effects.give_up();
+        self.gripper.wish(GripperWish::SetScene(Box::new(self.scene.clone())));
         self.send_scene();
     }
 

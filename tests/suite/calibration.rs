@@ -5,6 +5,7 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use crate::program::{json, palpate, ran, refused, run};
+use crate::streams::Scripted;
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::ALL_PANELS;
 use palpate_core::board::{Board, Reading, Sensor};
@@ -19,7 +20,7 @@ use palpate_core::sensing::calibration::{BendingZero, Calibration, Kind, Procedu
 use palpate_core::study::{FingerFit, Known, Observation, Trust, fit_finger};
 use palpate_core::trial::PhaseMark;
 use palpate_core::wire::{CAPTURE_MAGIC, Captured, Decoder, Heard};
-use palpate_core::workers::{BoardStream, Listen};
+use palpate_core::workers::Listen;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -59,7 +60,7 @@ fn holds(angles: &[f64], loads: &[f64]) -> String {
 }
 
 /// The usual procedure for all four sensors at once, hands-free; pads learn their zero from an empty close.
-fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor, Calibration)>) {
+pub(crate) fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor, Calibration)>) {
     let steps = |kind: Kind| {
         let plan = palpate_core::sensing::calibration::plan(kind);
         plan.into_iter().map(|stimulus| kind.shown(stimulus)).collect::<Vec<f64>>()
@@ -96,7 +97,7 @@ fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor, Calibratio
     (board, calibrations)
 }
 
-fn parts(seed: u64, faults: bool) -> HiddenParts {
+pub(crate) fn parts(seed: u64, faults: bool) -> HiddenParts {
     HiddenParts { hysteresis: faults, drift: faults, ..HiddenParts::drawn(seed) }
 }
 
@@ -370,37 +371,15 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     assert!((kappa(&store) / before - 0.9).abs() < 0.01, "{} {before}", kappa(&store));
 }
 
-/// A board whose right strip reads what the test sets, fifty readings at a time.
-struct Scripted {
-    counts: Arc<Mutex<f64>>,
-    taken: u32,
-}
-
-impl BoardStream for Scripted {
-    fn take(&mut self, _: Duration) -> Vec<Reading> {
-        std::thread::sleep(Duration::from_millis(2));
-        let counts = *self.counts.lock().unwrap() as f32;
-        let counts = vec![Some(1400.0), Some(counts), Some(0.0), Some(0.0)];
-        self.taken += 1;
-        let time = |k: u32| f64::from(self.taken) + 0.02 * f64::from(k);
-        let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None };
-        (0..50).map(|k| reading(time(k))).collect()
-    }
-
-    fn board(&self) -> Board {
-        Board::default()
-    }
-
-    fn state(&self) -> String {
-        "Listening".to_owned()
-    }
-}
-
 #[test]
 fn the_window_calibrates_step_by_step() {
     let counts = Arc::new(Mutex::new(0.0));
     let read = Arc::clone(&counts);
-    let listen: Listen = Arc::new(move |_| Ok(Box::new(Scripted { counts: Arc::clone(&read), taken: 0 })));
+    let listen: Listen = Arc::new(move |_| {
+        let read = Arc::clone(&read);
+        let counts = move || vec![Some(1400.0), Some(*read.lock().unwrap() as f32), Some(0.0), Some(0.0)];
+        Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+    });
     let panel = ALL_PANELS.iter().find(|panel| panel.name == "calibration");
     let setup = BenchSetup { panel, size: [340.0, 520.0], listen, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());

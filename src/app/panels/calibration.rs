@@ -9,15 +9,15 @@ use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_core::board::Sensor;
 use palpate_core::sensing::calibration::{Calibration, Curve, Kind, Point};
 use palpate_core::units::three_digits;
-use palpate_core::workers::{CalibrationPlan, CalibrationView, CalibrationWish, RunningCalibration};
+use palpate_core::workers::{CalibrationPlan, CalibrationView, CalibrationWish, GripperWish, RunningCalibration};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let view = context.calibrator.view();
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match view.as_deref() {
+    let view = context.gripper.and_then(|gripper| gripper.calibration.as_deref());
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match view {
         Some(CalibrationView { running: Some(running), .. }) => running_ui(ui, context, running, actions),
-        Some(CalibrationView { running: None, ended }) => begin_ui(ui, ended.as_ref(), actions),
-        None => begin_ui(ui, None, actions),
+        Some(CalibrationView { running: None, ended }) => begin_ui(ui, context, ended.as_ref(), actions),
+        None => begin_ui(ui, context, None, actions),
     });
 }
 
@@ -35,7 +35,12 @@ impl Default for Form {
     }
 }
 
-fn begin_ui(ui: &mut Ui, ended: Option<&Result<String, String>>, actions: &mut Vec<Action>) {
+fn begin_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    ended: Option<&Result<String, String>>,
+    actions: &mut Vec<Action>,
+) {
     let id = egui::Id::unique("calibration form");
     let mut form = ui.data_mut(|data| data.get_temp::<Form>(id)).unwrap_or_default();
     match ended {
@@ -66,7 +71,14 @@ fn begin_ui(ui: &mut Ui, ended: Option<&Result<String, String>>, actions: &mut V
         ui.add(TextEdit::singleline(&mut form.part).hint_text(hint).char_limit(80)).labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Port");
-        ui.add(TextEdit::singleline(&mut form.port).hint_text("the only one there is")).labelled_by(label.id);
+        match context.gripper.and_then(|gripper| gripper.link.as_ref()) {
+            Some(link) => {
+                ui.add(Label::new(link.port.path.display().to_string()).truncate());
+            }
+            None => {
+                ui.add(TextEdit::singleline(&mut form.port).hint_text("the only one there is")).labelled_by(label.id);
+            }
+        }
         ui.end_row();
     });
     let named = !form.part.trim().is_empty();
@@ -74,7 +86,7 @@ fn begin_ui(ui: &mut Ui, ended: Option<&Result<String, String>>, actions: &mut V
     if begin.on_disabled_hover_text("Calibrations belong to parts: give this one a name").clicked() {
         let port = Some(form.port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
         let plan = CalibrationPlan { sensor: form.sensor, part: form.part.trim().to_owned(), port };
-        actions.push(Action::Calibrate(CalibrationWish::Begin(plan)));
+        actions.push(Action::Gripper(GripperWish::Calibrate(CalibrationWish::Begin(plan))));
     }
     ui.data_mut(|data| data.insert_temp(id, form));
 }
@@ -86,6 +98,9 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
     let state = running.settled.as_ref().map_or_else(String::as_str, |_| "settled");
     wrapped(ui, RichText::new(format!("{counts} counts, {state}")));
     ui.horizontal_wrapped(|ui| buttons_ui(ui, running, actions));
+    if let Some(why) = &running.not_taken {
+        wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
+    }
     let kind = Kind::of(running.plan.sensor);
     let fit = running.fit.as_deref().ok();
     match &running.fit {
@@ -107,14 +122,14 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
 fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Vec<Action>) {
     let mut button = |ready: bool, text: &str, about: &str, wish: Option<CalibrationWish>| {
         let clicked = ui.add_enabled(ready && wish.is_some(), Button::new(text)).on_hover_text(about).clicked();
-        actions.extend(wish.filter(|_| clicked).map(Action::Calibrate));
+        actions.extend(wish.filter(|_| clicked).map(|wish| Action::Gripper(GripperWish::Calibrate(wish))));
     };
     let take = running.next.map(CalibrationWish::Take);
     button(running.settled.is_ok(), "Take point", "Once the reading has settled", take);
     button(running.next.is_some(), "Leave out", "Go on without this one", Some(CalibrationWish::Skip));
     button(!running.points.is_empty(), "Take back", "Measure the last one again", Some(CalibrationWish::Undo));
     button(running.fit.is_ok(), "Keep", "Store it; old trials are read by it too", Some(CalibrationWish::Keep));
-    button(true, "Stop", "Forget it, and give the port back", Some(CalibrationWish::Stop));
+    button(true, "Stop", "Forget it", Some(CalibrationWish::Stop));
 }
 
 fn wrapped(ui: &mut Ui, text: RichText) {

@@ -2,10 +2,13 @@
 //! remembered, and a test that draws it in both themes.
 
 mod calibration;
+mod console;
+mod counts;
 mod curvature;
 mod effects;
 mod force;
 mod grasp;
+mod gripper;
 mod line_pressure;
 mod objects;
 mod pressure;
@@ -13,15 +16,20 @@ mod recognition;
 mod scene;
 mod view3d;
 
+pub(super) use gripper::stop_button;
+
 use super::actions::Action;
-use super::traces::Traces;
+use super::traces::{GraspTrace, Traces};
 use super::view_state::ViewState;
 use egui::Ui;
-use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
+use palpate_core::grasping::IdentificationView;
+use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::scene::Scene;
+use palpate_core::sensing::Channel;
 use palpate_core::trial::Frame;
-use palpate_core::workers::{Calibrator, EffectsWorker, MeasuredAccuracy, Snapshot};
+use palpate_core::workers::{EffectsWorker, GripperView, LEAD_S, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What panels may read.
 pub struct PanelContext<'a> {
@@ -33,9 +41,13 @@ pub struct PanelContext<'a> {
     pub scene: &'a Scene,
     /// Measures what effects cost and change.
     pub effects: &'a EffectsWorker,
-    /// Calibrates the sensors of the real gripper.
-    pub calibrator: &'a Calibrator,
-    /// Traces of the last grasps.
+    /// Where the real gripper stands; absent until its thread has begun.
+    pub gripper: Option<&'a GripperView>,
+    /// Which gripper the plots and the recognition are of.
+    pub source: Source,
+    /// What the model says is hidden until the label is given.
+    pub blind: bool,
+    /// Traces of the last grasps of that gripper.
     pub traces: &'a Traces,
     /// How the user looks at things.
     pub view: &'a ViewState,
@@ -45,6 +57,113 @@ pub struct PanelContext<'a> {
     pub driver: Option<&'a str>,
     /// The other engine's sample at the same time, where it is to be drawn.
     pub ghost: Option<&'a Frame>,
+}
+
+/// Which gripper is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Source {
+    /// The simulated one.
+    #[default]
+    Simulation,
+    /// The real one.
+    Gripper,
+}
+
+/// What is recognised, of the gripper that is shown.
+pub(super) struct Recognised<'a> {
+    /// The newest answers; none where nothing is recognised.
+    pub(super) view: Option<&'a Arc<IdentificationView>>,
+    /// Why nothing is.
+    pub(super) off: Option<&'a str>,
+    /// The object in the hand by the name of its class and its title, where that is known.
+    pub(super) truth: Option<(&'a str, String)>,
+    /// What is going on before the first answer.
+    pub(super) waiting: &'static str,
+    /// No further grasp comes by itself.
+    pub(super) finished: bool,
+}
+
+impl<'a> PanelContext<'a> {
+    /// What is recognised of the gripper that is shown.
+    pub(super) fn recognised(&self) -> Option<Recognised<'a>> {
+        match self.source {
+            Source::Simulation => self.snapshot.map(|snapshot| {
+                let truth = snapshot.truth();
+                let title = snapshot.object.as_ref().map_or_else(|| title_of(truth), |object| object.title.clone());
+                let playing = snapshot.status.playing;
+                Recognised {
+                    view: snapshot.identification.as_ref(),
+                    off: snapshot.recognition_off.as_deref(),
+                    truth: Some((truth, title)),
+                    waiting: if playing { "the fingers close" } else { "it begins with the grasp: press play" },
+                    finished: snapshot.status.finished,
+                }
+            }),
+            Source::Gripper => self.gripper.map(|gripper| {
+                let closing = gripper.trial.is_some();
+                Recognised {
+                    view: gripper.identification.as_ref(),
+                    off: gripper.recognition_off.as_deref(),
+                    truth: None,
+                    waiting: if closing { "the fingers close" } else { "it begins with a grasp: press R" },
+                    finished: false,
+                }
+            }),
+        }
+    }
+
+    /// What the values of the traces shown are; counts of a board's channels may follow them.
+    pub(super) fn channels(&self) -> &'a [Channel] {
+        match self.source {
+            Source::Simulation => self.snapshot.map_or(&[], |snapshot| &snapshot.channels),
+            Source::Gripper => self.gripper.map_or(&[], |gripper| &gripper.channels),
+        }
+    }
+
+    /// All the time that plots can show (s).
+    pub(super) fn time_span(&self) -> [f64; 2] {
+        match self.source {
+            Source::Simulation => [0.0, self.snapshot.map_or(4.0, |snapshot| snapshot.status.duration)],
+            Source::Gripper => gripper_span(self.traces.current()),
+        }
+    }
+
+    /// When the hold begins and ends in what the plots show (s), where that is known.
+    pub(super) fn hold(&self) -> Option<[f64; 2]> {
+        let rolling = self.traces.current().is_none_or(|trace| trace.rolling);
+        if self.source == Source::Gripper && rolling {
+            return None;
+        }
+        let scene = match self.source {
+            Source::Simulation => &self.snapshot?.scene,
+            Source::Gripper => self.scene,
+        };
+        let tick = 1.0 / f64::from(scene.timing.actuation_hz.max(1));
+        let closed = f64::from(scene.programme.close_ticks()) * tick;
+        let released = (closed + f64::from(scene.programme.hold_ticks) * tick).min(self.time_span()[1]);
+        (closed < released).then_some([closed, released])
+    }
+}
+
+/// Stretch of a stream that is shown while no trial goes on (s).
+const ROLLING_S: f64 = 10.0;
+/// A trial is shown at least this long (s).
+const TRIAL_S: f64 = 4.0;
+
+/// A trial from its rest before the closing, or the last seconds of a stream.
+fn gripper_span(trace: Option<&GraspTrace>) -> [f64; 2] {
+    let last = |trace: &GraspTrace| trace.t.last().copied().unwrap_or(0.0);
+    match trace {
+        Some(trace) if !trace.rolling => [-LEAD_S, last(trace).max(TRIAL_S)],
+        Some(trace) => [last(trace).max(ROLLING_S) - ROLLING_S, last(trace).max(ROLLING_S)],
+        None => [0.0, ROLLING_S],
+    }
+}
+
+/// What people call an object, by the name of its class.
+pub(super) fn title_of(name: &str) -> String {
+    let built_in = catalogue().iter().find(|b| b.name == name).map(|b| b.title.as_str());
+    built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
 
 /// A kind of panel.
@@ -58,7 +177,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 11] = [
+pub const ALL: [PanelKind; 14] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -69,68 +188,13 @@ pub const ALL: [PanelKind; 11] = [
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
     PanelKind { name: "effects", title: "Effects", ui: effects::ui },
+    PanelKind { name: "gripper", title: "Gripper", ui: gripper::ui },
+    PanelKind { name: "counts", title: "Counts", ui: counts::ui },
+    PanelKind { name: "console", title: "Console", ui: console::ui },
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
 ];
 
 /// A panel by its name.
 pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
     ALL.iter().find(|panel| panel.name == name)
-}
-
-/// What is grasped on the left, the view over two plots in the middle, what comes out of it on the right.
-pub(super) fn default_layout() -> Tree<String> {
-    let mut tiles = Tiles::default();
-    let mut pane = |name: &str| tiles.insert_pane(name.to_owned());
-    let (objects, view, curvature) = (pane("objects"), pane("view"), pane("curvature"));
-    let (pressure, force, line) = (pane("pressure"), pane("force"), pane("line"));
-    let (recognition, grasp) = (pane("recognition"), pane("grasp"));
-    let (scene, effects, calibration) = (pane("scene"), pane("effects"), pane("calibration"));
-    let [view, curvature] = [vec![view], vec![curvature]].map(|panes| tiles.insert_tab_tile(panes));
-    let loads = tiles.insert_tab_tile(vec![pressure, force, line]);
-    let [left, right] = [vec![objects, scene], vec![recognition, grasp, effects, calibration]]
-        .map(|panes| tiles.insert_tab_tile(panes));
-    let middle = insert_linear(&mut tiles, LinearDir::Vertical, &[(view, 0.58), (curvature, 0.21), (loads, 0.21)]);
-    let root = insert_linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.185), (middle, 0.555), (right, 0.26)]);
-    Tree::new(egui::Id::unique("workbench"), root, tiles)
-}
-
-fn insert_linear(tiles: &mut Tiles<String>, direction: LinearDir, children: &[(TileId, f32)]) -> TileId {
-    let mut linear = Linear::new(direction, children.iter().map(|(id, _)| *id).collect());
-    for (id, share) in children {
-        linear.shares.set_share(*id, *share);
-    }
-    tiles.insert_container(linear)
-}
-
-/// True when every panel stands somewhere in a stored layout, and nothing unknown does.
-pub(super) fn is_complete(layout: &Tree<String>) -> bool {
-    let mut found: Vec<&str> = Vec::new();
-    for tile in layout.tiles.tiles() {
-        match tile {
-            Tile::Pane(name) if named(name).is_some() && !found.contains(&name.as_str()) => found.push(name),
-            Tile::Pane(_) => return false,
-            Tile::Container(_) => {}
-        }
-    }
-    layout.root().is_some() && found.len() == ALL.len()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_default_layout_holds_every_panel_once() {
-        assert!(is_complete(&default_layout()));
-        let stored = serde_json::to_string(&default_layout()).unwrap();
-        let read: Tree<String> = serde_json::from_str(&stored).unwrap();
-        assert!(is_complete(&read));
-    }
-
-    #[test]
-    fn layouts_of_other_versions_are_recognised() {
-        let mut tiles = Tiles::default();
-        let unknown = tiles.insert_pane("from the future".to_owned());
-        assert!(!is_complete(&Tree::new(egui::Id::unique("workbench"), unknown, tiles)));
-    }
 }

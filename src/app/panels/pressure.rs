@@ -15,7 +15,7 @@ pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Ve
 
 /// The curves of all channels of one kind, their values multiplied by `factor`.
 pub(super) fn curves_of(context: &PanelContext<'_>, quantity: Quantity, factor: f64) -> Vec<Curve> {
-    let channels = context.snapshot.map(|s| s.channels.iter().enumerate()).into_iter().flatten();
+    let channels = context.channels().iter().enumerate();
     channels
         .filter(|(_, channel)| channel.quantity == quantity)
         .map(|(index, channel)| Curve {

@@ -1,7 +1,7 @@
 //! The 3-D view: drag turns, the right or middle button shifts, the wheel zooms, a double click shows everything,
 //! Ctrl and drag pulls at the object.
 
-use super::PanelContext;
+use super::{PanelContext, Source};
 use crate::app::actions::Action;
 use crate::app::theme::colour;
 use crate::app::viewport::{Key, Paint};
@@ -102,6 +102,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
         grasp: snapshot.grasp,
         sample: snapshot.frame.t,
         ghost: context.ghost.map(|ghost| ghost.t),
+        real: real_curvature(context),
         view: picture.clone(),
         pixels,
         pixels_per_point,
@@ -110,7 +111,31 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
     if let Some(ghost) = context.ghost {
         list.ghosts = snapshot.stage.ghosts(ghost, context.view.theme);
     }
+    if let Some(curvature) = key.real {
+        list.ghosts.extend(snapshot.stage.reconstructed(curvature, context.view.theme));
+    }
+    let reconstructed = key.real.is_some();
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
+    if reconstructed {
+        let text = "Translucent: the real fingers, reconstructed from their flex strips as arcs. Solid: simulated.";
+        let ink = colour(context.view.theme.colours().text);
+        let galley = ui.painter().layout(
+            text.to_owned(),
+            egui::FontId::proportional(12.0),
+            ink,
+            (rect.width() - 24.0).max(80.0),
+        );
+        let place = rect.left_bottom() + egui::vec2(12.0, -60.0 - galley.size().y);
+        let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
+        ui.painter().rect_filled(ground, 4.0, crate::app::theme::veil(context.view.theme.colours().background, 0.7));
+        ui.painter().galley(place, galley, ink);
+    }
+}
+
+/// Curvature of the real fingers (1/m), while they are shown and read.
+fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
+    let felt = context.gripper?.latest.as_ref()?.felt;
+    (context.source == Source::Gripper && felt.curvature.iter().any(Option::is_some)).then_some(felt.curvature)
 }
 
 /// Standard views and switches, in the upper left corner of the picture.

@@ -117,7 +117,7 @@ impl Identification {
         }
     }
 
-    /// Another grasp of the same object begins.
+    /// Another grasp of the same object begins, on a gripper that is modelled; frames follow with [`Self::push`].
     pub fn begin_grasp(&mut self, scene: &Scene) -> Result<(), IdentifyError> {
         self.closed = true;
         let layout = self.model.card.data.layout.as_deref().unwrap_or("C1+F");
@@ -125,8 +125,17 @@ impl Identification {
             .and_then(|layout| Sensors::new(&layout, &scene.gripper, PressureArea::Participation))
             .map_err(|cause| IdentifyError::Layout { cause })?;
         let names: Vec<String> = sensors.channels().iter().map(Channel::name).collect();
-        self.model.check_channels(&names).map_err(|cause| IdentifyError::Channels { cause })?;
+        self.begin_grasp_of(&names)?;
         self.sensors = Some(sensors);
+        Ok(())
+    }
+
+    /// Another grasp of the same object begins, on a gripper whose readings have these channels; rows of them follow with
+    /// [`Self::push_row`].
+    pub fn begin_grasp_of(&mut self, channels: &[String]) -> Result<(), IdentifyError> {
+        self.closed = true;
+        self.model.check_channels(channels).map_err(|cause| IdentifyError::Channels { cause })?;
+        self.sensors = None;
         self.readings = Sequence::default();
         self.verdict = None;
         self.closed = false;
@@ -147,10 +156,17 @@ impl Identification {
         }
         let Some(sensors) = &self.sensors else { return false };
         let row: Vec<f32> = sensors.read(frame).into_iter().map(|v| v.unwrap_or_default() as f32).collect();
-        let t = frame.t as f32;
+        self.push_row(frame.t as f32, &row)
+    }
+
+    /// Takes in a row of channels at a time since the closing began (s); true when there is a new answer.
+    pub fn push_row(&mut self, t: f32, row: &[f32]) -> bool {
+        if self.closed {
+            return false;
+        }
         self.readings.t_s.push(t);
-        self.readings.values.extend_from_slice(&row);
-        let answer = self.live.as_mut().and_then(|live| live.push(t, &row));
+        self.readings.values.extend_from_slice(row);
+        let answer = self.live.as_mut().and_then(|live| live.push(t, row));
         let new = answer.is_some();
         self.verdict = answer.or_else(|| self.verdict.take());
         new

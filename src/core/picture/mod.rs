@@ -6,6 +6,7 @@ mod forces;
 mod furniture;
 mod ghost;
 mod gripper_model;
+mod reconstructed;
 
 pub use furniture::SCALE_STEPS;
 
@@ -13,7 +14,7 @@ use crate::drawing::{Camera, DrawList, Ground, Overlay, Solid};
 use crate::geometry::{Pose, SurfaceMesh};
 use crate::gripper::Gripper;
 use crate::objects::ObjectModel;
-use crate::palette::{Rgb, Theme};
+use crate::palette::{Rgb, Theme, Trace};
 use crate::scene::{Scene, SupportKind};
 use crate::trial::Frame;
 use glam::{Mat4, Vec2, Vec3};
@@ -124,6 +125,17 @@ impl Stage {
             ghosts.push(solid(Arc::clone(mesh), matrix(pose)));
         }
         ghosts
+    }
+
+    /// The real fingers as their flex strips tell (1/m), left and right, to be laid over a picture as
+    /// [`DrawList::ghosts`]. A finger whose strip is not read is left out.
+    pub fn reconstructed(&self, curvature: [Option<f64>; 2], theme: Theme) -> Vec<Solid> {
+        let frame = reconstructed::evenly_bent(&self.gripper, curvature);
+        let colour = Trace::Curvature.colour(theme);
+        let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, &frame, 1.0);
+        let read = fingers.iter().zip(curvature).filter(|(_, kappa)| kappa.is_some());
+        let mesh = read.map(|(finger, _)| Arc::new(ghost::finger(finger, colour)));
+        mesh.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY, gloss: 0.0 }).collect()
     }
 
     fn solids(&self, frame: &Frame) -> Vec<Solid> {

@@ -328,7 +328,8 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
 }
 
-/// What a real gripper felt, by the calibrations of its parts, in the channels of the layout and to the end of the hold.
+/// What a real gripper felt, by the calibrations of its parts, in the channels of the layout, from the beginning of the
+/// closing, where it is known, to the end of the hold: what is heard while a grasp goes on, and what is simulated.
 fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, DatasetError> {
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
     // One that says it is of a board, and has nothing of it, has nothing at all.
@@ -341,7 +342,11 @@ fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, Dat
         layout: layout.full_name(),
         why: read.derived.warnings.join("; "),
     })?;
-    Ok(signals.until(read.release_s.unwrap_or(f64::INFINITY)))
+    let until = signals.until(read.release_s.unwrap_or(f64::INFINITY));
+    Ok(match read.closing_s {
+        Some(closing_s) => until.since(closing_s),
+        None => until,
+    })
 }
 
 impl View {

@@ -17,6 +17,8 @@ pub struct BoardSignals {
     /// Line pressure, time (s) and pressure from then on (bar): as commanded, or else as the board reported; empty where
     /// nobody says.
     pub line: Vec<(f64, f64)>,
+    /// When the closing began (s), where it is known.
+    pub closing_s: Option<f64>,
     /// When the release began (s), where it is known.
     pub release_s: Option<f64>,
 }
@@ -46,6 +48,6 @@ impl Store {
         if line.is_empty() {
             line = trial.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();
         }
-        Ok(Some(BoardSignals { derived, serving, line, release_s }))
+        Ok(Some(BoardSignals { derived, serving, line, closing_s, release_s }))
     }
 }

@@ -49,10 +49,35 @@ impl Signals {
         self
     }
 
+    /// What comes from a time on (s), which then counts as zero.
+    pub fn since(mut self, t: f64) -> Self {
+        let first = self.t_s.partition_point(|own| *own < t);
+        self.t_s.drain(..first);
+        self.values.drain(..first * self.channels.len());
+        self.t_s.iter_mut().for_each(|own| *own -= t);
+        self
+    }
+
     /// Adds a sample.
     pub fn push(&mut self, t: f64, row: &[f32]) {
         debug_assert_eq!(row.len(), self.channels.len());
         self.t_s.push(t);
         self.values.extend_from_slice(row);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_of_time_is_cut_out_and_counted_from_its_beginning() {
+        let mut signals = Signals { channels: vec!["a".to_owned(), "b".to_owned()], ..Signals::default() };
+        for k in 0..10u8 {
+            signals.push(0.5 * f64::from(k), &[f32::from(k), -f32::from(k)]);
+        }
+        let cut = signals.until(3.0).since(1.0);
+        assert_eq!(cut.t_s, [0.0, 0.5, 1.0, 1.5, 2.0]);
+        assert_eq!((cut.row(0), cut.row(4)), (&[2.0f32, -2.0][..], &[6.0f32, -6.0][..]));
     }
 }

@@ -1,7 +1,7 @@
 //! Recognition beside the simulation: it listens to the frames that are sampled, changes nothing about them, and says
 //! when a round of grasps is enough.
 
-use crate::grasping::{Identification, IdentificationView};
+use crate::grasping::{Identification, IdentificationView, IdentifyError};
 use crate::recognition::{Model, StopReason, StopRule};
 use crate::scene::Scene;
 use crate::trial::Frame;
@@ -47,19 +47,43 @@ impl Listener {
     /// A grasp begins. The text, which comes once for each scene, says why nothing will be recognised.
     pub(super) fn begin_grasp(&mut self, scene: &Scene) -> Option<String> {
         let begun = self.identification.begin_grasp(scene);
+        self.begun(begun, "in this scene")
+    }
+
+    /// The same on a gripper whose readings have these channels, or more than the model reads.
+    pub(super) fn begin_grasp_of(&mut self, channels: &[String]) -> Option<String> {
+        let own = self.channels();
+        let known: Vec<String> = own.iter().filter(|name| channels.contains(name)).cloned().collect();
+        let begun = self.identification.begin_grasp_of(&known);
+        self.begun(begun, "on the gripper as it is calibrated")
+    }
+
+    fn begun(&mut self, begun: Result<(), IdentifyError>, place: &str) -> Option<String> {
         self.refresh();
         let Err(cause) = begun else {
             self.off = None;
             return None;
         };
-        let text = format!("nothing is recognised in this scene: {cause}");
+        let text = format!("nothing is recognised {place}: {cause}");
         self.off = Some(Arc::from(text.as_str()));
         (!std::mem::replace(&mut self.told, true)).then_some(text)
+    }
+
+    /// The channels that the model reads, in its order.
+    pub(super) fn channels(&self) -> &[String] {
+        &self.identification.model().card.channels
     }
 
     /// Listens to a frame.
     pub(super) fn push(&mut self, frame: &Frame) {
         if self.off.is_none() && self.identification.push(frame) {
+            self.refresh();
+        }
+    }
+
+    /// Listens to a row of the model's channels, at a time since the closing began (s).
+    pub(super) fn push_row(&mut self, t: f32, row: &[f32]) {
+        if self.off.is_none() && self.identification.push_row(t, row) {
             self.refresh();
         }
     }

@@ -85,6 +85,8 @@ pub enum NotSent {
 pub struct TraceRow {
     /// Which grasp it belongs to; rises by one with each.
     pub grasp: u64,
+    /// It belongs to no grasp: the gripper is watched, and what is long ago is of no interest.
+    pub rolling: bool,
     /// Time in the grasp (s).
     pub t: f64,
     /// Line pressure (bar).

@@ -13,17 +13,17 @@
 //! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks. A thread "ghost"
 //! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
-//! A thread "calibrate" talks to the board of a real gripper while one of its sensors is calibrated.
+//! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
-mod calibrator;
 mod companion;
 mod current;
 mod effects;
 mod gauge;
 mod ghost;
+mod gripper;
 mod held_object;
 mod latest;
 mod listener;
@@ -37,12 +37,13 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 
-pub use calibrator::{
-    BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, Calibrator, Listen, RunningCalibration,
-    listen_to_port,
-};
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
 pub use ghost::GhostGrasp;
+pub use gripper::{
+    BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, EndedTrial, GripperSetup, GripperView, GripperWish,
+    GripperWorker, LEAD_S, LatestReading, Listen, RunningCalibration, TrialPart, TrialRequest, TrialView,
+    listen_to_port,
+};
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{

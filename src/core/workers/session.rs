@@ -430,7 +430,7 @@ impl Session {
         let read = current.sensors.read(&frame);
         let errors = current.companion.as_mut().map(|c| c.errors(frame.t, &read, &current.sensors)).unwrap_or_default();
         let values = read.into_iter().map(|v| v.map_or(f32::NAN, |v| v as f32)).collect();
-        let row = TraceRow { grasp: self.grasp, t: frame.t, line_bar: frame.line_bar, values, errors };
+        let row = TraceRow { grasp: self.grasp, rolling: false, t: frame.t, line_bar: frame.line_bar, values, errors };
         current.frame = Arc::new(frame);
         if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
             self.outlets.rows_lost.store(true, Ordering::Relaxed);

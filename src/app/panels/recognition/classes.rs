@@ -6,7 +6,7 @@ use crate::app::actions::Action;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_core::recognition::Pmf;
-use palpate_core::workers::{Command, THRESHOLDS};
+use palpate_core::workers::THRESHOLDS;
 
 /// Size of letters where there is room (points).
 const LETTERS: f32 = 12.5;
@@ -111,7 +111,7 @@ fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
         let wanted = stepped(f64::from((pointer.x - from) / (to - from)));
         if wanted != threshold {
-            part.actions.push(Action::Simulation(Command::SetThreshold(wanted)));
+            part.actions.push(Action::SetThreshold(wanted));
         }
     }
 }

@@ -6,15 +6,15 @@ mod properties;
 mod strip;
 mod words;
 
-use super::PanelContext;
+use super::{PanelContext, Recognised, Source};
 use crate::app::actions::Action;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_core::grasping::IdentificationView;
-use palpate_core::workers::{Command, Snapshot, THRESHOLDS};
+use palpate_core::workers::THRESHOLDS;
 use std::sync::Arc;
-use words::{Headline, percent, reason, title_of};
+use words::{Headline, percent, reason};
 
 /// Time that bars take to follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -84,20 +84,27 @@ impl Measures {
 }
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let Some(snapshot) = context.snapshot else {
+    let Some(recognised) = context.recognised() else {
         ui.weak("Waiting for the first grasp ..");
         return;
     };
+    if context.blind {
+        ui.heading("Blind");
+        ui.label("What the model takes it for is hidden until you have said what it is.");
+        return;
+    }
     let room = ui.available_size();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let measures = Measures::fitting(room);
         ui.spacing_mut().item_spacing.y = measures.gap;
-        match &snapshot.identification {
+        match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
-                let mut part = Part { context, snapshot, view: &view, measures, actions };
+                let mut part = Part { context, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
-                part.truth_ui(ui);
+                if let Some(truth) = &recognised.truth {
+                    part.truth_ui(ui, truth);
+                }
                 properties::ui(ui, &part);
                 let has_properties = !view.labels.sizes.is_empty();
                 let lines = measures.lines(room.y, view.labels.classes.len(), has_properties);
@@ -105,23 +112,28 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);
             }
-            None => off_ui(ui, snapshot),
+            None => off_ui(ui, recognised.off),
         }
-        let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
-        let next = egui::Button::new("Next object").fill(fill);
-        let hint = "Grasp another of the sixteen, drawn at random (N)";
-        if ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint).clicked() {
-            actions.push(Action::NextObject);
-        }
+        next_ui(ui, context, measures, actions);
     });
 }
 
-fn off_ui(ui: &mut Ui, snapshot: &Snapshot) {
-    ui.heading("Recognition is off");
-    match &snapshot.recognition_off {
-        Some(why) => ui.label(why.as_ref()),
-        None => ui.label("There is no model to recognise with. Grasps are simulated and stored all the same."),
+/// The button that ends with this object and goes on with another.
+fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Vec<Action>) {
+    let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
+    let hint = match context.source {
+        Source::Simulation => "Grasp another of the sixteen, drawn at random (N)",
+        Source::Gripper => "Another object is in the hand: begin anew (N)",
     };
+    let next = egui::Button::new("Next object").fill(fill);
+    if ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint).clicked() {
+        actions.push(Action::NextObject);
+    }
+}
+
+fn off_ui(ui: &mut Ui, why: Option<&str>) {
+    ui.heading("Recognition is off");
+    ui.label(why.unwrap_or("There is no model to recognise with. Grasps are recorded all the same."));
 }
 
 /// The newest answer, but no more than ten different ones a second.
@@ -142,7 +154,7 @@ fn calmed(ui: &Ui, view: &Arc<IdentificationView>) -> Arc<IdentificationView> {
 /// What every part of the panel draws from.
 struct Part<'a, 'b> {
     context: &'a PanelContext<'b>,
-    snapshot: &'a Snapshot,
+    recognised: &'a Recognised<'a>,
     view: &'a IdentificationView,
     measures: &'static Measures,
     actions: &'a mut Vec<Action>,
@@ -191,7 +203,7 @@ impl Part<'_, '_> {
         if let Some(number) = number {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
-        let why = reason(self.view, &self.snapshot.status);
+        let why = reason(self.view, self.recognised);
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
         let font = FontId::proportional(measures.reason_letters);
         // A number keeps its unit.
@@ -200,11 +212,10 @@ impl Part<'_, '_> {
     }
 
     /// Whether it is right: the simulation knows. Set apart from everything that was felt.
-    fn truth_ui(&mut self, ui: &mut Ui) {
+    fn truth_ui(&mut self, ui: &mut Ui, (truth, title): &(&str, String)) {
         let colours = self.colours();
         let shown = self.context.view.truth_shown;
-        let right = words::is_right(self.view, self.snapshot.truth()).filter(|_| shown);
-        let title = self.snapshot.object.as_ref().map_or_else(|| title_of(self.snapshot.truth()), |o| o.title.clone());
+        let right = words::is_right(self.view, truth).filter(|_| shown);
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
@@ -267,7 +278,7 @@ impl Part<'_, '_> {
                 .suffix(" %");
             let hint = "Probability from which on a class is taken as certain; its line can be dragged, too";
             if ui.add(drag).labelled_by(label.id).on_hover_text(hint).changed() {
-                self.actions.push(Action::Simulation(Command::SetThreshold(classes::stepped(threshold / 100.0))));
+                self.actions.push(Action::SetThreshold(classes::stepped(threshold / 100.0)));
             }
         });
     }

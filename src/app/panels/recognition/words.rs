@@ -1,9 +1,8 @@
 //! What recognition has to say, in words. Nothing is drawn here.
 
+use crate::app::panels::{Recognised, title_of};
 use palpate_core::grasping::IdentificationView;
-use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::recognition::{Labels, Pmf, StopReason};
-use palpate_core::workers::Status;
 
 /// Below this probability a first grasp that still goes on has no leader worth naming.
 const WORTH_NAMING: f64 = 0.4;
@@ -51,14 +50,11 @@ pub(super) fn newest(view: &IdentificationView) -> Option<&Pmf> {
 }
 
 /// Why it goes on, or why it has stopped.
-pub(super) fn reason(view: &IdentificationView, status: &Status) -> String {
+pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let (threshold, most) = (percent(view.rule.threshold), view.rule.most_grasps);
     let Some(now) = newest(view) else {
-        return match (status.playing, status.finished) {
-            (_, true) => "the grasp failed, so there is nothing to go by".to_owned(),
-            (true, false) => "the fingers close".to_owned(),
-            (false, false) => "it begins with the grasp: press play".to_owned(),
-        };
+        let failed = "the grasp failed, so there is nothing to go by";
+        return if recognised.finished { failed } else { recognised.waiting }.to_owned();
     };
     let p = now.top().1;
     let certain = p >= view.rule.threshold;
@@ -72,7 +68,7 @@ pub(super) fn reason(view: &IdentificationView, status: &Status) -> String {
             Some(before) => format!("{grasp}; before it: {}", leaders(&view.labels, before)),
             None => format!("{grasp}; it is sure from {threshold} on"),
         },
-        None if status.finished => format!("stopped before it was sure: {}", leaders(&view.labels, now)),
+        None if recognised.finished => format!("stopped before it was sure: {}", leaders(&view.labels, now)),
         None if certain => format!("{}, but the grasps do not agree yet: one more", percent(p)),
         None => format!("one more grasp: {}", leaders(&view.labels, now)),
     }
@@ -88,12 +84,6 @@ pub(super) fn is_right(view: &IdentificationView, truth: &str) -> Option<bool> {
 /// What people call a class.
 pub(super) fn title(labels: &Labels, class: usize) -> String {
     labels.classes.get(class).map_or_else(String::new, |class| title_of(&class.name))
-}
-
-/// What people call an object, by the name of its class.
-pub(super) fn title_of(name: &str) -> String {
-    let built_in = catalogue().iter().find(|b| b.name == name).map(|b| b.title.as_str());
-    built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
 
 /// A probability as a percentage, rounded down so that what falls short of a threshold never looks as if it reached

@@ -1,6 +1,7 @@
 //! The real gripper's board on a serial port.
 
 mod baud;
+mod conductor;
 mod link;
 #[cfg(all(test, unix))]
 mod link_tests;
@@ -13,6 +14,7 @@ mod rig;
 mod scan;
 
 pub use baud::Baud;
+pub use conductor::{Conductor, VENT};
 pub use link::{LinkOptions, LinkState, LinkStatus, SendError, SerialLink};
 pub use port_error::{MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};

@@ -1,6 +1,7 @@
 //! The real gripper as a rig: its board's readings, and its control box. The box is driven from here where the board
 //! passes pressure on; else by hand, and the programme only says what should be done when. Time is this computer's.
 
+use super::conductor::{Conductor, VENT};
 use super::link::{LinkState, LinkStatus, SerialLink};
 use super::queue::LinkEvent;
 use crate::gripper::Phase;
@@ -35,8 +36,6 @@ pub struct SerialPlan {
     pub seconds: Option<f64>,
 }
 
-/// The board vents when it hears nothing for a second; this leaves it time (s).
-const KEEP_ALIVE: Duration = Duration::from_millis(400);
 /// How long the rig waits for the board at a time.
 const PATIENCE: Duration = Duration::from_millis(20);
 /// How long the board may take to send its first readings.
@@ -57,9 +56,7 @@ pub struct SerialRig {
     began_s: f64,
     heard: VecDeque<LinkEvent>,
     marks: VecDeque<PhaseMark>,
-    asked: Option<u32>,
-    commanded: Option<(f64, Phase)>,
-    sent: Instant,
+    conductor: Conductor,
     notes: Vec<String>,
     over: bool,
 }
@@ -89,9 +86,9 @@ impl SerialRig {
                 return Err(RigError::Board(format!("nothing was heard from \"{path}\": {why}")));
             }
         };
-        let sent = Instant::now();
+        let conductor = Conductor::new(plan.control, plan.actuation_hz, began_s);
         let (marks, notes) = (VecDeque::new(), Vec::new());
-        Ok(Self { link, plan, stop, began_s, heard, marks, asked: None, commanded: None, sent, notes, over: false })
+        Ok(Self { link, plan, stop, began_s, heard, marks, conductor, notes, over: false })
     }
 
     /// When it began, on the clock of the readings (s).
@@ -108,32 +105,12 @@ impl SerialRig {
         self.plan.seconds.map_or(f64::INFINITY, |seconds| self.began_s + seconds)
     }
 
-    /// The actuation tick that is due and was not asked for.
-    fn tick(&mut self) -> Option<u32> {
-        if self.plan.control == Control::Free {
-            return None;
-        }
-        let tick = ((self.link.now_s() - self.began_s).max(0.0) * self.plan.actuation_hz) as u32;
-        (self.asked != Some(tick)).then(|| {
-            self.asked = Some(tick);
-            tick
-        })
-    }
-
     fn send(&mut self, line: &str) {
-        self.sent = Instant::now();
         if let Err(error) = self.link.send(line) {
             let note = format!("{line}: {error}");
             if !self.notes.contains(&note) {
                 self.notes.push(note);
             }
-        }
-    }
-
-    fn keep_alive(&mut self) {
-        let pressed = self.commanded.is_some_and(|(bar, _)| bar > 0.0);
-        if self.plan.control == Control::Driven && pressed && self.sent.elapsed() >= KEEP_ALIVE {
-            self.send("K");
         }
     }
 
@@ -194,7 +171,8 @@ impl Rig for SerialRig {
             if let Some(mark) = self.marks.pop_front() {
                 return Ok(Event::Commanded(mark));
             }
-            if let Some(tick) = self.tick().filter(|_| !self.over) {
+            let now_s = self.link.now_s();
+            if let Some(tick) = self.conductor.tick(now_s).filter(|_| !self.over) {
                 return Ok(Event::ActuationDue { tick });
             }
             if let Some(event) = self.heard.pop_front() {
@@ -206,22 +184,20 @@ impl Rig for SerialRig {
             if self.is_over() {
                 return Ok(Event::Finished);
             }
-            self.keep_alive();
+            if let Some(line) = self.conductor.keep_alive(now_s) {
+                self.send(line);
+            }
             self.heard = self.link.take(PATIENCE).into();
         }
     }
 
     fn command(&mut self, bar: f64, phase: Phase) {
-        if self.commanded == Some((bar, phase)) {
-            return;
+        if let Some((mark, line)) = self.conductor.command(bar, phase, self.link.now_s()) {
+            if let Some(line) = line {
+                self.send(&line);
+            }
+            self.marks.push_back(mark);
         }
-        let driven = self.plan.control == Control::Driven;
-        if driven {
-            self.send(&format!("P {bar:.2}"));
-        }
-        self.commanded = Some((bar, phase));
-        // The board tells the pressure itself where it knows it; by hand, the programme's is only what was wished for.
-        self.marks.push_back(PhaseMark { from_s: self.link.now_s(), phase, line_bar: driven.then_some(bar) });
     }
 
     fn quality(&self) -> Quality {
@@ -236,7 +212,7 @@ impl Rig for SerialRig {
 impl Drop for SerialRig {
     fn drop(&mut self) {
         if self.plan.control == Control::Driven
-            && let Err(error) = self.link.send("V")
+            && let Err(error) = self.link.send(VENT)
         {
             // A board that cannot be told vents by itself within a second.
             tracing::debug!("{error}");

@@ -25,8 +25,8 @@ pub struct Felt {
 }
 
 impl Felt {
-    /// The value of a channel of the layout C1+F.
-    fn of(&self, channel: &Channel) -> Option<f64> {
+    /// The value of a channel of the layout C1+F, in its unit.
+    pub fn of(&self, channel: &Channel) -> Option<f64> {
         let side = channel.side.index();
         match channel.quantity {
             Quantity::Curvature => self.curvature[side],
@@ -57,8 +57,8 @@ struct Wired {
     calibration: Calibration,
 }
 
-/// A board with calibrated parts on it.
-#[derive(Clone, Debug, PartialEq)]
+/// A board with calibrated parts on it; by default none.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Readout {
     /// In the order of [`Sensor::ALL`].
     wired: [Option<Wired>; 4],
@@ -197,7 +197,7 @@ impl Readout {
         };
         warnings.extend(self.saturated(readings));
         let mut channels = Vec::new();
-        for channel in all_channels().into_iter().filter(|channel| self.has(channel)) {
+        for channel in self.channels() {
             let missing = felt.iter().filter(|felt| felt.of(&channel).is_none()).count();
             if missing as f64 > MOST_MISSING * felt.len() as f64 {
                 let (name, all) = (channel.name(), felt.len());
@@ -237,6 +237,11 @@ impl Readout {
                 .then(|| format!("the {label} is saturated in {count} of {all} readings: forces are larger there"))
         })
         .collect()
+    }
+
+    /// The channels of layout C1+F that can be read.
+    pub fn channels(&self) -> Vec<Channel> {
+        all_channels().into_iter().filter(|channel| self.has(channel)).collect()
     }
 
     /// True when the sensor that a channel needs is there.
@@ -283,7 +288,7 @@ impl Wired {
 }
 
 /// The channels of layout C1+F on any gripper.
-fn all_channels() -> Vec<Channel> {
+pub fn all_channels() -> Vec<Channel> {
     let pair = |quantity| Side::BOTH.map(|side| Channel { quantity, side, span: Span::WHOLE });
     [Quantity::Curvature, Quantity::Pressure, Quantity::Force].map(pair).concat()
 }

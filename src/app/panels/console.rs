@@ -1,0 +1,41 @@
+//! The lines of the real gripper's board as they come, with what was made of them.
+
+use super::PanelContext;
+use crate::app::actions::Action;
+use egui::{RichText, ScrollArea, TextWrapMode, Ui};
+use palpate_core::wire::Verdict;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Action>) {
+    let lines = context.gripper.map(|gripper| &gripper.console).filter(|lines| !lines.is_empty());
+    let Some(lines) = lines else {
+        ui.weak("What the board says, line by line: connect it in the panel Gripper.");
+        return;
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.weak(format!("the last {} lines, newest last; marked: what could not be read", lines.len()));
+        if ui.small_button("Copy").on_hover_text("Copy them all").clicked() {
+            let text: Vec<String> =
+                lines.iter().map(|line| format!("{:.3} {}", 1e-3 * line.arrived_ms as f64, line.text)).collect();
+            ui.ctx().copy_text(text.join("\n"));
+        }
+    });
+    let height = ui.text_style_height(&egui::TextStyle::Monospace);
+    ScrollArea::both().auto_shrink(false).stick_to_bottom(true).show_rows(ui, height, lines.len(), |ui, rows| {
+        ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+        for line in &lines[rows] {
+            let time = format!("{:9.3}", 1e-3 * line.arrived_ms as f64);
+            ui.horizontal(|ui| {
+                ui.label(RichText::new(time).monospace().weak());
+                let text = RichText::new(&line.text).monospace();
+                match line.verdict {
+                    Verdict::Read => ui.label(text),
+                    Verdict::Said => ui.label(text.color(ui.visuals().hyperlink_color)),
+                    Verdict::Bad(why) => ui.label(text.color(ui.visuals().error_fg_color)).on_hover_text(why),
+                };
+                if let Verdict::Bad(why) = line.verdict {
+                    ui.weak(why);
+                }
+            });
+        }
+    });
+}

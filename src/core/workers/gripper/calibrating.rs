@@ -1,0 +1,149 @@
+//! A calibration on the link that everybody shares: it listens to readings, is told what was set, and comes to a curve.
+
+use crate::board::{Board, Reading, Sensor};
+use crate::recording::Store;
+use crate::sensing::calibration::{Calibration, Point, Procedure};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What the user wants of a calibration.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CalibrationWish {
+    /// Begin with a part in its place.
+    Begin(CalibrationPlan),
+    /// Take the settled reading as that of an angle (rad) or force (N).
+    Take(f64),
+    /// Leave out what is next.
+    Skip,
+    /// Take the last point back.
+    Undo,
+    /// Store what came out.
+    Keep,
+    /// Forget it.
+    Stop,
+}
+
+/// What is calibrated, and where it is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibrationPlan {
+    /// Where it sits.
+    pub sensor: Sensor,
+    /// Name of the part.
+    pub part: String,
+    /// The port, or a file of captured bytes, where none is open yet; the only likely port where nothing is named.
+    pub port: Option<PathBuf>,
+}
+
+/// Where a calibration stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CalibrationView {
+    /// What is being calibrated; none while nothing is.
+    pub running: Option<RunningCalibration>,
+    /// How the last one ended, in a sentence.
+    pub ended: Option<Result<String, String>>,
+}
+
+/// A calibration that goes on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunningCalibration {
+    /// What is calibrated.
+    pub plan: CalibrationPlan,
+    /// State of the link, in a sentence.
+    pub link: String,
+    /// What to do next.
+    pub instruction: String,
+    /// The angle (rad) or force (N) to set next; none when all are done.
+    pub next: Option<f64>,
+    /// The newest reading (counts).
+    pub latest: Option<f64>,
+    /// The settled reading (counts), or why there is none yet.
+    pub settled: Result<f64, String>,
+    /// Why the point that was to be taken last was not taken.
+    pub not_taken: Option<String>,
+    /// The points so far.
+    pub points: Vec<Point>,
+    /// What they come to, or why they come to nothing yet.
+    pub fit: Result<Arc<Calibration>, String>,
+}
+
+/// A calibration that goes on in the gripper's thread.
+pub(super) struct Calibrating {
+    plan: CalibrationPlan,
+    /// From the first reading on.
+    procedure: Option<Procedure>,
+    not_taken: Option<String>,
+    /// The port was opened for it, and is given back with it.
+    pub(super) owns_port: bool,
+}
+
+impl Calibrating {
+    pub(super) fn new(plan: CalibrationPlan, owns_port: bool) -> Self {
+        Self { plan, procedure: None, not_taken: None, owns_port }
+    }
+
+    /// Takes in a reading; fails where the board has no such channel.
+    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), String> {
+        let procedure = match &mut self.procedure {
+            Some(procedure) => procedure,
+            empty @ None => empty.insert(begin(&self.plan, board)?),
+        };
+        procedure.feed(reading);
+        Ok(())
+    }
+
+    /// Takes a point, leaves one out, or takes one back.
+    pub(super) fn grant(&mut self, wish: &CalibrationWish) {
+        let Some(procedure) = &mut self.procedure else { return };
+        self.not_taken = None;
+        match wish {
+            CalibrationWish::Take(stimulus) => {
+                self.not_taken = procedure.take(*stimulus).err().map(|why| format!("not taken: {why}"));
+            }
+            CalibrationWish::Skip => procedure.skip(),
+            CalibrationWish::Undo => {
+                procedure.undo();
+            }
+            CalibrationWish::Begin(_) | CalibrationWish::Keep | CalibrationWish::Stop => {}
+        }
+    }
+
+    /// Stores what came out, and that the part sits where it was calibrated; none before the first reading.
+    pub(super) fn keep(&self, store: &mut Store) -> Option<Result<String, String>> {
+        let procedure = self.procedure.as_ref()?;
+        let stored = procedure.fit().map_err(|fault| fault.to_string()).and_then(|calibration| {
+            let stored = store.add_calibration(&calibration.record).map_err(|error| error.to_string())?;
+            store.mount_part(procedure.sensor(), &stored.record.part).map_err(|error| error.to_string())?;
+            Ok(stored)
+        });
+        Some(stored.map(|stored| {
+            let (id, version, part) = (stored.id, stored.version, &stored.record.part);
+            format!("calibration {id} stored: version {version} of \"{part}\", the {}", procedure.sensor().label())
+        }))
+    }
+
+    pub(super) fn view(&self, link: String) -> RunningCalibration {
+        let procedure = self.procedure.as_ref();
+        let waiting = || Err("no readings yet".to_owned());
+        RunningCalibration {
+            plan: self.plan.clone(),
+            instruction: procedure.map_or_else(|| link.clone(), Procedure::instruction),
+            link,
+            next: procedure.and_then(Procedure::next),
+            latest: procedure.and_then(Procedure::latest),
+            settled: procedure.map_or_else(waiting, |p| p.settled().map(|p| p.counts).map_err(|why| why.to_string())),
+            not_taken: self.not_taken.clone(),
+            points: procedure.map(|procedure| procedure.record().points.clone()).unwrap_or_default(),
+            fit: procedure.map_or_else(
+                || Err("no points yet".to_owned()),
+                |procedure| procedure.fit().map(Arc::new).map_err(|fault| fault.to_string()),
+            ),
+        }
+    }
+}
+
+fn begin(plan: &CalibrationPlan, board: &Board) -> Result<Procedure, String> {
+    Procedure::new(board, plan.sensor, &plan.part, None).ok_or_else(|| {
+        let (wanted, has) = (plan.sensor.channel(), board.channels.join(", "));
+        format!("the board has no channel \"{wanted}\"; it has {has}")
+    })
+}

@@ -1,0 +1,198 @@
+//! A trial that goes on: what is recorded, what the control box is to do, and where it stands.
+
+use super::messages::{EndedTrial, LEAD_S, TrialPart, TrialRequest, TrialView};
+use super::recent::Recent;
+use crate::gripper::{Phase, Programme};
+use crate::recording::{BoardRecorder, BoardTrialPlan, Store, StoreError};
+use crate::rig::serial::{Conductor, Control, LinkEvent, LinkStatus};
+use crate::scene::Scene;
+use crate::trial::PhaseMark;
+use crate::wire::{Cadence, Heard};
+
+/// What came before the button was pressed and belongs to the trial (s).
+const BEFORE_S: f64 = 0.3;
+/// What is recorded when the programme is done (s).
+const SETTLE_S: f64 = 0.4;
+/// Length that is reserved for a trial of unknown length (s).
+const FREE_S: f64 = 60.0;
+
+/// A trial that goes on.
+pub(super) struct Running {
+    request: TrialRequest,
+    recorder: BoardRecorder,
+    conductor: Conductor,
+    programme: Programme,
+    tick_s: f64,
+    /// When the closing will begin or began (s); none where nobody says.
+    pub(super) closing_s: Option<f64>,
+    /// When the first reading was taken (s).
+    pub(super) began_s: f64,
+    phase: Option<Phase>,
+    /// Commanded line pressure (bar), where this program commands it.
+    line_bar: Option<f64>,
+    notes: Vec<String>,
+}
+
+impl Running {
+    /// Begins to record, with what came just before `from_s`.
+    pub(super) fn begin(
+        store: &mut Store,
+        request: TrialRequest,
+        scene: &Scene,
+        status: &LinkStatus,
+        recent: &Recent,
+        from_s: f64,
+    ) -> Result<Self, StoreError> {
+        let tick_s = 1.0 / f64::from(scene.timing.actuation_hz.max(1));
+        let programme = scene.programme.clone();
+        let conducted = request.control != Control::Free;
+        let length_s = LEAD_S + tick_s * f64::from(programme.total_ticks()) + SETTLE_S;
+        let plan = BoardTrialPlan {
+            object: request.object.clone().unwrap_or_default(),
+            scene: scene.to_toml(),
+            seconds: Some(if conducted { length_s } else { FREE_S }),
+        };
+        let before = recent.since(from_s - BEFORE_S);
+        let first = before.iter().find_map(|event| match event {
+            LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
+            LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+        });
+        let began_s = first.unwrap_or(from_s);
+        let mut recorder = BoardRecorder::begin(store, &plan, status, began_s)?;
+        before.into_iter().for_each(|event| recorder.take(event));
+        let closing_s = conducted.then_some(from_s + LEAD_S);
+        let conductor = Conductor::new(request.control, 1.0 / tick_s, from_s + LEAD_S);
+        Ok(Self {
+            request,
+            recorder,
+            conductor,
+            programme,
+            tick_s,
+            closing_s,
+            began_s,
+            phase: None,
+            line_bar: None,
+            notes: Vec::new(),
+        })
+    }
+
+    /// Takes in what the link has heard.
+    pub(super) fn take(&mut self, event: LinkEvent) {
+        if let LinkEvent::Heard(Heard::Said(text)) = &event
+            && (text.starts_with("refused") || text.starts_with("vent"))
+        {
+            self.note(format!("the board said: {text}"));
+        }
+        self.recorder.take(event);
+    }
+
+    /// Does what is due by now: the line for the board, and the phase that begins, if any.
+    pub(super) fn conduct(&mut self, now_s: f64) -> (Option<String>, Option<Phase>) {
+        let due = self.conductor.tick(now_s).map(|tick| self.programme.command(tick));
+        let Some((mark, line)) = due.and_then(|(bar, phase)| self.conductor.command(bar, phase, now_s)) else {
+            return (self.conductor.keep_alive(now_s).map(str::to_owned), None);
+        };
+        let new = self.mark(mark);
+        (line, new)
+    }
+
+    /// Notes what the control box does; the phase, where it is a new one.
+    pub(super) fn mark(&mut self, mark: PhaseMark) -> Option<Phase> {
+        let phase = mark.phase;
+        let new = self.phase != Some(phase);
+        if new && phase == Phase::Close {
+            self.closing_s = Some(mark.from_s);
+        }
+        self.phase = Some(phase);
+        self.line_bar = mark.line_bar;
+        self.recorder.mark(mark);
+        new.then_some(phase)
+    }
+
+    /// Something that should be known of it.
+    pub(super) fn note(&mut self, text: String) {
+        if !self.notes.contains(&text) {
+            self.notes.push(text);
+        }
+    }
+
+    /// True when the programme is done and everything has come to rest.
+    pub(super) fn is_over(&self, now_s: f64) -> bool {
+        self.programme_ends_s().is_some_and(|end_s| now_s > end_s + SETTLE_S)
+    }
+
+    /// Writes what waits, where it is time.
+    pub(super) fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
+        if self.recorder.is_due() { self.recorder.flush(store) } else { Ok(()) }
+    }
+
+    /// Ends it, and keeps it or gives it up.
+    pub(super) fn finish(
+        self,
+        store: &mut Store,
+        status: &LinkStatus,
+        discarded: bool,
+    ) -> Result<EndedTrial, StoreError> {
+        let recorded = self.recorder.finish(store, status, self.notes)?;
+        if discarded {
+            store.delete(&[recorded.id])?;
+        }
+        let cadence = cadence_line(&recorded.about.cadence);
+        Ok(EndedTrial { id: recorded.id, request: self.request, discarded, warnings: recorded.warnings, cadence })
+    }
+
+    /// Line pressure as this program commands it (bar).
+    pub(super) fn line_bar(&self) -> Option<f64> {
+        self.line_bar
+    }
+
+    pub(super) fn request(&self) -> &TrialRequest {
+        &self.request
+    }
+
+    /// Whether the fingers may be under pressure through this trial.
+    pub(super) fn is_driven(&self) -> bool {
+        self.request.control == Control::Driven
+    }
+
+    fn programme_ends_s(&self) -> Option<f64> {
+        let conducted = self.request.control != Control::Free;
+        self.closing_s
+            .filter(|_| conducted)
+            .map(|closing_s| closing_s + self.tick_s * f64::from(self.programme.total_ticks()))
+    }
+
+    pub(super) fn view(&self, now_s: f64) -> TrialView {
+        let closing_s = self.closing_s.unwrap_or(self.began_s);
+        let end_s = self.programme_ends_s();
+        let (part, until_s) = match (end_s, self.phase) {
+            (None, phase) => (phase.map_or(TrialPart::Free, TrialPart::Phase), None),
+            (Some(end_s), _) if now_s >= end_s => (TrialPart::Settling, Some(end_s + SETTLE_S)),
+            (Some(_), None) => (TrialPart::Ready, Some(closing_s)),
+            (Some(end_s), Some(phase)) => {
+                let closed_s = closing_s + self.tick_s * f64::from(self.programme.close_ticks());
+                let until_s = match phase {
+                    Phase::Close => closed_s,
+                    Phase::Hold => closed_s + self.tick_s * f64::from(self.programme.hold_ticks),
+                    Phase::Release => end_s,
+                };
+                (TrialPart::Phase(phase), Some(until_s))
+            }
+        };
+        TrialView {
+            id: self.recorder.id(),
+            request: self.request.clone(),
+            part,
+            left_s: until_s.map(|until_s| (until_s - now_s).max(0.0)),
+            t_s: now_s - closing_s,
+            length_s: end_s.map(|end_s| end_s + SETTLE_S - closing_s),
+            samples: self.recorder.samples(),
+        }
+    }
+}
+
+/// How well a board kept time, in a line.
+fn cadence_line(cadence: &Cadence) -> String {
+    let Cadence { rate_hz, jitter_p95_ms, lost, bad_lines, .. } = cadence;
+    format!("{rate_hz:.1} Hz, jitter {jitter_p95_ms:.1} ms, {lost} lost, {bad_lines} bad lines")
+}

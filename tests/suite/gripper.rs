@@ -1,0 +1,308 @@
+//! The thread that owns the board of the real gripper: one link for the live view, trials, recognition and a calibration,
+//! tried on the pretended gripper with a clock of its own.
+
+use crate::calibration::{calibrated, parts};
+use crate::scripted;
+use crate::streams::Pretended;
+use palpate_core::board::Sensor;
+use palpate_core::gripper::Phase;
+use palpate_core::objects::EMPTY;
+use palpate_core::pretended::{HandPlan, HiddenParts, PretendedSetup};
+use palpate_core::recording::Store;
+use palpate_core::rig::serial::Control;
+use palpate_core::scene::{Accuracy, Scene};
+use palpate_core::workers::{
+    CalibrationPlan, CalibrationWish, GripperSetup, GripperView, GripperWish, GripperWorker, Listen, Notice, TraceRow,
+    TrialPart, TrialRequest,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+/// A worker on the pretended gripper, and what it has said.
+struct Desk {
+    worker: GripperWorker,
+    woken: Receiver<()>,
+    store: PathBuf,
+    notices: Vec<Notice>,
+    rows: Vec<TraceRow>,
+    folder: tempfile::TempDir,
+}
+
+/// Views after which something that was waited for will not come any more.
+const MOST_VIEWS: u32 = 3000;
+
+fn scene() -> Scene {
+    let mut scene = Scene::default();
+    scene.solver.accuracy = Accuracy::Draft;
+    scene
+}
+
+fn board(parts: &HiddenParts) -> Listen {
+    let parts = parts.clone();
+    Arc::new(move |port| {
+        if let Some(port) = port {
+            return Err(format!("there is no {}", port.display()));
+        }
+        let hand =
+            HandPlan { scene: scene(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script: vec![] };
+        let setup = PretendedSetup {
+            hand,
+            parts: parts.clone(),
+            rate_hz: 50,
+            channels: 4,
+            most_steps: 30,
+            clock_start_us: 0,
+            faults: vec![],
+            seed: 1,
+        };
+        Ok(Box::new(Pretended::new(setup, Duration::from_micros(100))))
+    })
+}
+
+impl Desk {
+    fn on(listen: Listen) -> Self {
+        Self::with(listen, "trials.sqlite")
+    }
+
+    fn with(listen: Listen, store: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let store = folder.path().join(store);
+        let (wake, woken) = channel();
+        let worker = GripperWorker::start(GripperSetup {
+            scene: scene(),
+            store: store.clone(),
+            model: Some(scripted::model()),
+            grasps: 4,
+            listen,
+            wake: Arc::new(move || {
+                // The test may have stopped listening.
+                let _heard = wake.send(());
+            }),
+        });
+        Self { worker: worker.unwrap(), woken, store, notices: Vec::new(), rows: Vec::new(), folder }
+    }
+
+    fn wish(&self, wish: GripperWish) {
+        self.worker.wish(wish);
+    }
+
+    /// Waits until everything stands as wanted.
+    fn until(&mut self, wanted: impl Fn(&GripperView) -> bool) -> Arc<GripperView> {
+        // The thread wakes whoever listens thirty times a second: this many are minutes.
+        for _ in 0..MOST_VIEWS {
+            self.notices.extend(self.worker.notices());
+            self.rows.extend(self.worker.rows());
+            if let Some(view) = self.worker.view().filter(|view| wanted(view)) {
+                return view;
+            }
+            self.woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+        }
+        panic!(
+            "never so: {:?}, {:?}",
+            self.notices,
+            self.worker.view().map(|view| GripperView { console: Arc::new([]), ..(*view).clone() })
+        )
+    }
+
+    fn until_said(&mut self, text: &str) {
+        while !self.notices.iter().any(|notice| format!("{notice:?}").contains(text)) {
+            self.woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+            self.notices.extend(self.worker.notices());
+        }
+    }
+
+    fn connect(&mut self) {
+        self.wish(GripperWish::Connect(None));
+        self.until(|view| view.latest.is_some());
+    }
+
+    /// A whole trial.
+    fn trial(&mut self, control: Control, adds: bool) -> i64 {
+        let before = self.worker.view().and_then(|view| view.ended.as_ref().map(|ended| ended.id));
+        self.wish(GripperWish::Begin(TrialRequest { object: Some("lemon".to_owned()), control, adds }));
+        self.until(|view| view.trial.is_some());
+        let ended = self.until(|view| view.trial.is_none() && view.ended.as_ref().map(|e| e.id) != before);
+        ended.ended.as_ref().unwrap().id
+    }
+
+    fn store(&self) -> Store {
+        Store::open(&self.store).unwrap()
+    }
+}
+
+fn store_calibrations(path: &Path, parts: &HiddenParts) {
+    let mut store = Store::open(path).unwrap();
+    for (sensor, calibration) in calibrated(parts, 1).1 {
+        store.add_calibration(&calibration.record).unwrap();
+        store.mount_part(sensor, &calibration.record.part).unwrap();
+    }
+}
+
+#[test]
+fn a_driven_trial_is_recorded_with_its_rest_and_its_phases() {
+    let mut desk = Desk::on(board(&parts(1, false)));
+    desk.connect();
+    let id = desk.trial(Control::Driven, false);
+    let trial = desk.store().board_trial(id).unwrap().unwrap();
+    let mark = |phase: Phase| trial.about.phases.iter().find(|mark| mark.phase == phase).unwrap().from_s;
+    let (close, hold, release) = (mark(Phase::Close), mark(Phase::Hold), mark(Phase::Release));
+    assert!((hold - close - 2.0).abs() < 0.15 && (release - hold - 1.0).abs() < 0.15, "{close} {hold} {release}");
+    let first = trial.readings.first().unwrap().t_s;
+    assert!((1.5..2.2).contains(&(close - first)), "{}", close - first);
+    assert!(trial.readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 2e-3));
+    assert!(trial.gaps.is_empty() && trial.about.cadence.lost == 0);
+    let most = trial.readings.iter().filter_map(|reading| reading.line_bar).fold(0.0, f64::max);
+    assert!((most - 1.0).abs() < 1e-9, "{most} bar");
+    assert!(trial.readings.last().unwrap().line_bar < Some(0.01), "vented at the end");
+    // What was plotted: a stretch that is only watched, the trial from its rest on, and watching again.
+    desk.until(|view| view.grasp == 3);
+    let own: Vec<&TraceRow> = desk.rows.iter().filter(|row| row.grasp == 2).collect();
+    assert!(own.iter().all(|row| !row.rolling && row.values.len() == 6 + 4));
+    assert!(own[0].t < -0.9 && own.last().unwrap().t > 3.9, "{} to {}", own[0].t, own.last().unwrap().t);
+    assert!(desk.rows.iter().filter(|row| row.grasp == 1).all(|row| row.rolling));
+}
+
+#[test]
+fn stop_vents_ends_the_trial_and_says_so() {
+    let mut desk = Desk::on(board(&parts(1, false)));
+    desk.wish(GripperWish::Vent);
+    desk.until_said("no board is connected: vent at the control box");
+    desk.connect();
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
+    desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
+    desk.wish(GripperWish::Vent);
+    let view = desk.until(|view| view.trial.is_none());
+    desk.until_said("told to vent");
+    let ended = view.ended.clone().unwrap();
+    assert!(!ended.discarded && ended.warnings.iter().any(|text| text.contains("vented by the user")), "{ended:?}");
+    desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
+    let released = |mark: &palpate_core::trial::PhaseMark| mark.phase == Phase::Release;
+    assert!(!desk.store().board_info(ended.id).unwrap().unwrap().phases.iter().any(released));
+}
+
+#[test]
+fn trials_are_ended_begun_anew_and_given_up() {
+    let mut desk = Desk::on(board(&parts(1, false)));
+    let request = || TrialRequest { object: None, control: Control::ByHand, adds: false };
+    desk.wish(GripperWish::Begin(request()));
+    desk.until_said("connect the gripper first");
+    desk.connect();
+    desk.wish(GripperWish::Begin(request()));
+    let first = desk.until(|view| view.trial.is_some()).trial.clone().unwrap();
+    assert_eq!((first.part, first.length_s.map(|s| (s * 10.0).round())), (TrialPart::Ready, Some(44.0)));
+    // Another begins: the first ends there and is kept.
+    desk.wish(GripperWish::Begin(request()));
+    let second = desk.until(|view| view.trial.as_ref().is_some_and(|trial| trial.id != first.id));
+    let second = second.trial.clone().unwrap().id;
+    desk.wish(GripperWish::Discard);
+    desk.until(|view| view.trial.is_none());
+    desk.wish(GripperWish::Begin(TrialRequest { control: Control::Free, ..request() }));
+    desk.until(|view| view.trial.as_ref().is_some_and(|trial| trial.t_s > 7.0));
+    desk.wish(GripperWish::End);
+    let free = desk.until(|view| view.trial.is_none()).ended.clone().unwrap().id;
+    let rows = desk.store().list(true).unwrap();
+    let deleted: Vec<(i64, bool)> = rows.iter().map(|row| (row.id, row.deleted.is_some())).collect();
+    assert_eq!(deleted, [(first.id, false), (second, true), (free, false)]);
+    // Closing the window ends what goes on.
+    desk.wish(GripperWish::Begin(request()));
+    desk.until(|view| view.trial.is_some());
+    let Desk { worker, store, folder, .. } = desk;
+    drop(worker);
+    let store = Store::open(&store).unwrap();
+    let last = store.list(false).unwrap().pop().unwrap();
+    assert_eq!(last.state, "complete");
+    let warnings = store.load(last.id).unwrap().info.warnings;
+    assert!(warnings.iter().any(|text| text.contains("the window was closed")), "{warnings:?}");
+    drop(folder);
+}
+
+#[test]
+fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
+    let parts = parts(1, false);
+    let mut desk = Desk::on(board(&parts));
+    desk.connect();
+    desk.trial(Control::Driven, true);
+    let view = desk.until(|view| view.recognition_off.is_some());
+    assert!(view.recognition_off.as_deref().unwrap().contains("it needs curvature_left"), "{:?}", view.recognition_off);
+    desk.wish(GripperWish::Disconnect);
+    desk.until(|view| !view.is_connected());
+    store_calibrations(&desk.store, &parts);
+    desk.connect();
+    desk.trial(Control::Driven, true);
+    let once = desk.until(|view| view.identification.as_ref().is_some_and(|i| i.beliefs.len() == 1));
+    assert!(once.recognition_off.is_none() && once.drift.len() == 4, "{:?}", once.drift);
+    let mut grasps = 1;
+    let decided = loop {
+        grasps += 1;
+        desk.trial(Control::Driven, true);
+        let view = desk.until(|view| view.identification.as_ref().is_some_and(|i| i.beliefs.len() == grasps));
+        if let Some(decided) = view.identification.as_ref().and_then(|i| i.decided().map(str::to_owned)) {
+            break decided;
+        }
+    };
+    assert_eq!((decided.as_str(), grasps), ("lemon", 3));
+    // It has decided, so that the next grasp is of another object; and one that stands by itself starts over anyway.
+    for adds in [true, false] {
+        desk.trial(Control::Driven, adds);
+        desk.until(|view| view.identification.as_ref().is_some_and(|i| i.beliefs.len() == 1));
+    }
+    // At rest the fingers are straight, and nothing presses; in a close they bend inward, both alike.
+    let of_trial = desk.rows.iter().filter(|row| row.grasp == 5);
+    let most = |k: usize| of_trial.clone().map(|row| row.values[k]).fold(f32::MIN, f32::max);
+    assert!(most(0) > 3.0 && (most(0) - most(1)).abs() < 0.5, "{} {}", most(0), most(1));
+    desk.wish(GripperWish::Tare);
+    let tared =
+        desk.until(|view| view.latest.as_ref().is_some_and(|l| l.felt.curvature[0].is_some_and(|k| k.abs() < 0.3)));
+    assert!(tared.latest.as_ref().unwrap().felt.force[0].is_some_and(|force| force < 0.05));
+}
+
+#[test]
+fn a_calibration_shares_the_port_or_brings_its_own() {
+    let mut desk = Desk::on(board(&parts(1, false)));
+    let begin = |port: Option<&str>| {
+        let port = port.map(PathBuf::from);
+        let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A7".to_owned(), port };
+        GripperWish::Calibrate(CalibrationWish::Begin(plan))
+    };
+    let running = |view: &GripperView| view.calibration.as_ref().is_some_and(|c| c.running.is_some());
+    desk.wish(begin(Some("nowhere")));
+    let failed = desk.until(|view| view.calibration.as_ref().is_some_and(|c| c.ended.is_some()));
+    let ended = failed.calibration.as_ref().unwrap().ended.clone();
+    assert_eq!(ended, Some(Err("there is no nowhere".to_owned())));
+    desk.wish(begin(None));
+    // Twice at once: the second reading has not settled, and that is said.
+    desk.until(|view| {
+        let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
+        calibration.is_some_and(|c| c.settled.is_ok())
+    });
+    for _ in 0..2 {
+        desk.wish(GripperWish::Calibrate(CalibrationWish::Take(0.0)));
+    }
+    desk.until(|view| {
+        let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
+        calibration.is_some_and(|c| c.not_taken.as_ref().is_some_and(|text| text.starts_with("not taken: ")))
+    });
+    desk.wish(GripperWish::Calibrate(CalibrationWish::Stop));
+    desk.until(|view| !running(view) && !view.is_connected());
+    desk.connect();
+    desk.wish(begin(None));
+    desk.until(running);
+    desk.wish(GripperWish::Calibrate(CalibrationWish::Stop));
+    let view = desk.until(|view| !running(view));
+    assert!(view.is_connected(), "the live view goes on");
+}
+
+#[test]
+fn a_store_that_cannot_be_written_is_told_before_a_trial() {
+    let mut desk = Desk::with(board(&parts(1, false)), "notes.txt");
+    std::fs::write(&desk.store, "not a store".repeat(100)).unwrap();
+    desk.connect();
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
+    desk.until_said("not a store");
+    let view = desk.until(|view| view.latest.is_some());
+    assert!(view.trial.is_none() && view.is_connected());
+    desk.wish(GripperWish::Disconnect);
+    desk.until(|view| !view.is_connected());
+}

@@ -1,0 +1,126 @@
+//! Boards without a port, for what listens to one: readings that a test makes up, and the pretended gripper on a clock
+//! that runs as fast as it is asked.
+
+use palpate_core::board::{Board, Reading};
+use palpate_core::pretended::{PretendedGripper, PretendedSetup};
+use palpate_core::rig::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
+use palpate_core::wire::{Cadence, Captured, ConsoleLine, Decoder, Heard};
+use palpate_core::workers::BoardStream;
+use std::time::Duration;
+
+/// How a link stands that listens.
+fn listening(board: Board, cadence: Cadence, now_s: f64) -> LinkStatus {
+    LinkStatus {
+        state: LinkState::Listening,
+        port: PortInfo {
+            path: "/dev/pretended".into(),
+            title: "a board of the tests".to_owned(),
+            usb: None,
+            kind: BoardKind::default(),
+        },
+        baud: Some(115_200),
+        board,
+        detected: None,
+        cadence,
+        rails: Vec::new(),
+        looks_10_bit: false,
+        reconnects: 0,
+        now_s,
+        dropped: [0; 2],
+    }
+}
+
+/// Fifty readings of a second at a time, all alike.
+pub(crate) struct Scripted<F> {
+    pub(crate) counts: F,
+    pub(crate) t_s: f64,
+}
+
+impl<F: Fn() -> Vec<Option<f32>>> BoardStream for Scripted<F> {
+    fn take(&mut self, _: Duration) -> Vec<LinkEvent> {
+        std::thread::sleep(Duration::from_millis(2));
+        self.t_s += 1.0;
+        let counts = (self.counts)();
+        let time = |k: u32| self.t_s + 0.02 * f64::from(k);
+        let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None };
+        (0..50).map(|k| LinkEvent::Heard(Heard::Reading(reading(time(k))))).collect()
+    }
+
+    fn status(&self) -> LinkStatus {
+        listening(Board::default(), Cadence::default(), self.t_s)
+    }
+
+    fn now_s(&self) -> f64 {
+        self.t_s
+    }
+
+    fn send(&mut self, _: &str) -> Result<(), SendError> {
+        Ok(())
+    }
+
+    fn console(&self) -> Vec<ConsoleLine> {
+        Vec::new()
+    }
+
+    fn is_over(&self) -> bool {
+        false
+    }
+}
+
+/// The pretended gripper. Each look at it lets 10 ms of its time pass.
+pub(crate) struct Pretended {
+    gripper: PretendedGripper,
+    decoder: Decoder,
+    t_s: f64,
+    /// How long a look takes in truth.
+    look: Duration,
+}
+
+/// Time that passes with each look (s).
+const LOOK_S: f64 = 0.01;
+
+impl Pretended {
+    pub(crate) fn new(setup: PretendedSetup, look: Duration) -> Self {
+        let gripper = PretendedGripper::new(setup).unwrap();
+        Self { gripper, decoder: Decoder::default(), t_s: 0.0, look }
+    }
+}
+
+impl BoardStream for Pretended {
+    fn take(&mut self, _: Duration) -> Vec<LinkEvent> {
+        std::thread::sleep(self.look);
+        self.t_s += LOOK_S;
+        self.gripper.advance(self.t_s);
+        let (bytes, mut heard) = (self.gripper.take_bytes(), Vec::new());
+        if bytes.is_empty() {
+            return Vec::new();
+        }
+        self.decoder.push(&bytes, self.t_s, &mut heard);
+        let piece = LinkEvent::Captured(Captured::Bytes { arrived_s: self.t_s, bytes });
+        std::iter::once(piece).chain(heard.into_iter().map(LinkEvent::Heard)).collect()
+    }
+
+    fn status(&self) -> LinkStatus {
+        LinkStatus {
+            detected: self.decoder.detected(),
+            ..listening(self.decoder.board(), self.decoder.cadence(), self.t_s)
+        }
+    }
+
+    fn now_s(&self) -> f64 {
+        self.t_s
+    }
+
+    fn send(&mut self, line: &str) -> Result<(), SendError> {
+        self.gripper.hear(format!("{line}\n").as_bytes());
+        Ok(())
+    }
+
+    fn console(&self) -> Vec<ConsoleLine> {
+        self.decoder.console().cloned().collect()
+    }
+
+    fn is_over(&self) -> bool {
+        false
+    }
+}
