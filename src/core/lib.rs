@@ -24,6 +24,7 @@
 //! | 5 | [`physics`] | the convex implicit step, contact, placement, resting faces, and a simulation on a clock of whole ticks |
 //! | 6 | [`sensing`] | layouts, curvature and pressure, from a trial's raw frames; what real sensors make of them |
 //! | 7 | [`rig`] | a gripper that can be told a pressure and read: simulated, or replayed |
+//! | 7 | [`labelling`] | what to record next, where a grasp begins and ends, what is wrong with a trial, what to look at again |
 //! | 8 | [`recording`] | the SQLite store, CSV in and out |
 //! | 9 | [`recognition`] | PMFs, the macro-layer on a kernel of our own, DS-LSTM and iDS-LSTM, rivals, metrics, models on disk |
 //! | 10 | [`grasping`] | one grasp on any rig, random poses, data sets, grasp after grasp until it is clear what is held |
@@ -60,6 +61,7 @@ pub mod drawing;
 pub mod geometry;
 pub mod grasping;
 pub mod gripper;
+pub mod labelling;
 pub mod objects;
 pub mod palette;
 pub mod physics;

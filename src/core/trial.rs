@@ -5,6 +5,9 @@ use crate::geometry::Pose;
 use crate::gripper::{Phase, Side};
 use serde::{Deserialize, Serialize};
 
+/// Names a trial within its store.
+pub type TrialId = i64;
+
 /// Load on one taxel at one sample, in the axes of its segment: what the finger feels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaxelLoad {

@@ -176,19 +176,21 @@ impl Source {
         about
     }
 
-    /// Reads the data set. Trials that did not stay finite or did not converge are left out and counted. `tell` hears how many of
-    /// how many trials have been read.
+    /// Reads the data set. Trials without a label are no part of it; those that did not stay finite or did not converge are left
+    /// out and counted. `tell` hears how many of how many trials have been read.
     pub fn read(
         &self,
         store: &Store,
         view: &View,
         tell: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
-        let rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
+        let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
+        // Nobody has said yet what they are of.
+        rows.retain(|row| !row.object.is_empty());
         self.read_rows(store, &rows, view, tell)
     }
 
-    /// Reads one trial as a data set of its own.
+    /// Reads one trial as a data set of its own, labelled or not.
     pub fn read_trial(&self, store: &Store, id: TrialId, view: &View) -> Result<Dataset, DatasetError> {
         let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
         rows.retain(|row| row.id == id);

@@ -2,11 +2,13 @@
 //! when it is due, so that a kill loses at most a second.
 
 use super::board_trials::{BOARD_RIG, BoardChunk, BoardInfo};
+use super::calibrations::Serving;
 use super::disk::check_space;
 use super::store::{Store, TrialId};
 use super::store_error::StoreError;
 use crate::board::{Board, Gap};
 use crate::geometry::Pose;
+use crate::labelling::{Observed, Thinned, flags_of, sparkline};
 use crate::rig::serial::{LinkEvent, LinkStatus};
 use crate::trial::{PhaseMark, Plan, Quality, TrialInfo};
 use crate::wire::{Cadence, Captured, Heard};
@@ -18,6 +20,8 @@ const FLUSH_AFTER: Duration = Duration::from_millis(800);
 const BYTES_PER_S: f64 = 400e3;
 /// A board that was silent for longer than this before the end left a gap there (s).
 const SILENCE_S: f64 = 1.0;
+/// Gaps that are told of, at most; a line that loses every other reading has one to each.
+const MOST_GAPS: usize = 100;
 /// A trial of unknown length is given this long (s).
 const UNKNOWN_LENGTH_S: f64 = 600.0;
 
@@ -32,6 +36,10 @@ pub struct BoardRecorder {
     lost: u64,
     gaps: u64,
     interrupted: Vec<String>,
+    /// What its flags and its small picture are made from.
+    kept: Thinned,
+    newest_s: Option<f64>,
+    missing: Vec<Gap>,
     /// The newest reading's time (s), and why none has come since, where that is known.
     last: Option<(f64, Option<String>)>,
     /// Counts of the link when the trial began.
@@ -52,7 +60,7 @@ pub struct Recorded {
 /// What is known of a trial of a real gripper before it begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardTrialPlan {
-    /// Name of the object.
+    /// Name of the object; empty where nobody has said yet what it is of.
     pub object: String,
     /// The scene as TOML: the gripper as it is modelled, and its programme.
     pub scene: String,
@@ -97,6 +105,9 @@ impl BoardRecorder {
             lost: 0,
             gaps: 0,
             interrupted: Vec::new(),
+            kept: Thinned::default(),
+            newest_s: None,
+            missing: Vec::new(),
             last: None,
             before: (status.cadence.clone(), status.reconnects),
         })
@@ -125,12 +136,13 @@ impl BoardRecorder {
             LinkEvent::Heard(Heard::Reading(reading)) => {
                 self.samples += 1;
                 self.last = Some((reading.t_s, None));
+                self.kept.push(&reading);
+                self.newest_s = Some(reading.t_s);
                 self.chunk.readings.push(reading);
             }
             LinkEvent::Heard(Heard::Gap(gap)) => {
                 self.lost += gap.lost.unwrap_or(0);
-                self.gaps += 1;
-                self.chunk.gaps.push(gap);
+                self.note_gap(gap);
             }
             LinkEvent::Heard(Heard::Board(board)) => self.about.board = board,
             LinkEvent::Heard(Heard::Said(_)) => {}
@@ -174,6 +186,7 @@ impl BoardRecorder {
             bad_lines: status.cadence.bad_lines.saturating_sub(before.bad_lines),
             ..status.cadence.clone()
         };
+        self.examine(store);
         let mut warnings = self.warnings(status);
         warnings.extend(notes);
         store.finish_board(self.id, &self.about, &warnings)?;
@@ -187,8 +200,37 @@ impl BoardRecorder {
             return;
         };
         let cause = cause.unwrap_or_else(|| "nothing came any more".to_owned());
+        self.note_gap(Gap { from_s, to_s: status.now_s, lost: None, cause });
+    }
+
+    fn note_gap(&mut self, gap: Gap) {
         self.gaps += 1;
-        self.chunk.gaps.push(Gap { from_s, to_s: status.now_s, lost: None, cause });
+        if self.missing.len() < MOST_GAPS {
+            self.missing.push(gap.clone());
+        }
+        self.chunk.gaps.push(gap);
+    }
+
+    /// What a finished trial is flagged with, and its small picture.
+    fn examine(&mut self, store: &Store) {
+        // Without calibrations counts are judged: a damaged record is no reason not to end a trial.
+        let serving = store.serving(Some(self.id), &[]).unwrap_or_else(|error| {
+            tracing::warn!("the flags of trial {} are found without calibrations: {error}", self.id);
+            Serving::default()
+        });
+        let readings = self.kept.readings();
+        let observed = Observed {
+            board: &self.about.board,
+            readings,
+            gaps: &self.missing,
+            interruptions: &self.interrupted,
+            cadence: &self.about.cadence,
+            phases: &self.about.phases,
+            calibrations: &serving.calibrations,
+        };
+        self.about.flags = flags_of(&observed);
+        self.about.sparkline = sparkline(&self.about.board, readings);
+        self.about.seconds = self.newest_s.map_or(0.0, |newest| (newest - self.about.began_s).max(0.0));
     }
 
     fn warnings(&self, status: &LinkStatus) -> Vec<String> {

@@ -9,6 +9,7 @@ use super::board_blob::{decode_readings, encode_readings};
 use super::store::{Store, TrialId, insert_info, json, set_complete};
 use super::store_error::{StoreError, fault};
 use crate::board::{Board, Gap, Reading};
+use crate::labelling::{FlagRemark, Sparkline};
 use crate::trial::{PhaseMark, Quality, TrialInfo};
 use crate::wire::{CAPTURE_MAGIC, Cadence, CaptureReader, Captured, Detected};
 use rusqlite::{OptionalExtension, params};
@@ -65,6 +66,12 @@ pub struct BoardInfo {
     pub reconnects: u32,
     /// The phases of the grasp, where they are known.
     pub phases: Vec<PhaseMark>,
+    /// From its beginning to its last reading (s); zero for trials from before it was kept.
+    pub seconds: f64,
+    /// What is wrong with it, whatever it is of; found when it ended.
+    pub flags: Vec<FlagRemark>,
+    /// A small picture of it, made when it ended.
+    pub sparkline: Sparkline,
 }
 
 /// A trial of a real gripper.

@@ -1,6 +1,8 @@
 //! Joining stores: the parts of a data set that several machines have collected.
 
 use super::board_trials::COPY_BOARD_TRIALS;
+use super::journal::COPY_JOURNAL;
+use super::labels::COPY_GUESSES;
 use super::store::Store;
 use super::store_error::{StoreError, fault};
 use serde::Serialize;
@@ -24,9 +26,9 @@ const CHOOSE_INCOMING: &str = "
 
 const COPY_TRIALS: &str = "
     INSERT INTO main.trials (uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings,
-        version, samples, deleted, collection, size, shape, plan)
+        version, samples, deleted, collection, size, shape, plan, note, tags, unsure, reviewed)
     SELECT uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings, version, samples,
-        deleted, collection, size, shape, plan
+        deleted, collection, size, shape, plan, note, tags, unsure, reviewed
     FROM other.trials WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id;
 ";
 
@@ -77,6 +79,8 @@ impl Store {
             transaction.execute_batch(COPY_CHUNKS).map_err(fault)?;
             transaction.execute_batch(COPY_CALIBRATIONS).map_err(fault)?;
             transaction.execute_batch(COPY_BOARD_TRIALS).map_err(fault)?;
+            transaction.execute_batch(COPY_GUESSES).map_err(fault)?;
+            transaction.execute_batch(COPY_JOURNAL).map_err(fault)?;
             transaction.execute_batch("DROP TABLE temp.incoming").map_err(fault)?;
             transaction.commit().map_err(fault)?;
             Ok(Merged { added, known: total.cast_unsigned().saturating_sub(added) })

@@ -7,6 +7,7 @@
 //! readings channels of an imported trial, which has no frames
 //! calibrations, mountings, parts: what is known of the real gripper's sensors; see `calibrations`
 //! board_*  what the board of a real gripper sent; see `board_trials`
+//! guesses, label_plan, journal: labels and who changed what; see `labels` and `journal`
 //! ```
 //!
 //! Deleting marks; purging removes. Chunks are only ever added.
@@ -14,17 +15,17 @@
 use super::blob::{decode_frames, encode_frames};
 use super::board_trials::BOARD_TABLES;
 use super::calibrations::CALIBRATION_TABLES;
+use super::journal::{Change, JOURNAL_TABLES, JournalView, change, newest};
+use super::labels::LABEL_TABLES;
 use super::store_error::{StoreError, fault, plain};
 use crate::geometry::Pose;
+pub use crate::trial::TrialId;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// Names a trial within its store.
-pub type TrialId = i64;
 
 /// "Palp" in ASCII, in the header of the SQLite file.
 const APPLICATION_ID: i32 = 0x5061_6c70;
@@ -36,7 +37,7 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 6] = [
+const MIGRATIONS: [&str; 8] = [
     TABLES,
     "ALTER TABLE trials ADD COLUMN collection TEXT;
      CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
@@ -50,6 +51,8 @@ const MIGRATIONS: [&str; 6] = [
     "ALTER TABLE trials ADD COLUMN plan TEXT NOT NULL DEFAULT '[]';",
     BOARD_TABLES,
     CALIBRATION_TABLES,
+    LABEL_TABLES,
+    JOURNAL_TABLES,
 ];
 
 const TABLES: &str = "
@@ -113,6 +116,7 @@ pub struct Store {
     pub(super) connection: Connection,
     path: PathBuf,
     warnings: Vec<String>,
+    pub(super) journal: JournalView,
 }
 
 impl Store {
@@ -132,7 +136,8 @@ impl Store {
         }
         let connection =
             Connection::open(path).map_err(|e| StoreError::Open { path: path.to_owned(), cause: plain(&e) })?;
-        let mut store = Self { connection, path: path.to_owned(), warnings: Vec::new() };
+        let (path, journal) = (path.to_owned(), JournalView::default());
+        let mut store = Self { connection, path, warnings: Vec::new(), journal };
         store.prepare()?;
         Ok(store)
     }
@@ -176,7 +181,10 @@ impl Store {
         if version < SCHEMA_VERSION {
             transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
         }
-        transaction.commit().map_err(fault)
+        let seen = newest(&transaction).map_err(fault)?;
+        transaction.commit().map_err(fault)?;
+        self.journal.seen = seen;
+        Ok(())
     }
 
     /// Changing the journal takes the lock without waiting for it, so that two programs which make one store together
@@ -360,7 +368,7 @@ impl Store {
         Ok(frames)
     }
 
-    fn no_trial(&self, id: TrialId) -> StoreError {
+    pub(super) fn no_trial(&self, id: TrialId) -> StoreError {
         let sql = "SELECT deleted IS NOT NULL FROM trials WHERE id = ?1";
         match self.connection.query_row(sql, [id], |row| row.get::<_, bool>(0)) {
             Ok(true) => StoreError::NoTrial { id, hint: ": it was deleted; `palpate trials restore` brings it back" },
@@ -371,22 +379,20 @@ impl Store {
 
     /// Marks trials as deleted, all or none of them. They can be restored until they are purged.
     pub fn delete(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
-        let sql = "UPDATE trials SET deleted = strftime('%Y-%m-%dT%H:%M:%fZ', 'now') WHERE id = ?1 AND deleted IS NULL";
-        self.change_each(ids, sql)
+        self.change_each(ids, &Change::Discarded)
     }
 
     /// Takes deletions back, all or none of them.
     pub fn restore(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
-        self.change_each(ids, "UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL")
+        self.change_each(ids, &Change::Restored)
     }
 
-    fn change_each(&mut self, ids: &[TrialId], sql: &str) -> Result<(), StoreError> {
-        let path = self.path.clone();
+    fn change_each(&mut self, ids: &[TrialId], what: &Change) -> Result<(), StoreError> {
+        let (path, writer) = (self.path.clone(), self.journal.writer.clone());
         let transaction = self.write()?;
         let mut missing = None;
         for id in ids {
-            let changed = transaction.execute(sql, [id]).map_err(|e| fault(&path, &e))?;
-            if changed == 0 {
+            if !change(&transaction, &writer, *id, what, None).map_err(|e| fault(&path, &e))? {
                 missing = Some(*id);
                 break;
             }

@@ -4,6 +4,7 @@ use super::blob::BlobError;
 use super::calibrations::CalibrationId;
 use super::disk::is_full;
 use super::store::{PATIENCE, SCHEMA_VERSION, TrialId};
+use crate::labelling::{ClassNameError, PlanError, shown_name};
 use rusqlite::ErrorCode;
 use std::path::{Path, PathBuf};
 
@@ -115,6 +116,54 @@ pub enum StoreError {
         id: CalibrationId,
         /// What is wrong with it.
         cause: String,
+    },
+    /// A text that cannot be a label.
+    #[error(transparent)]
+    ClassName(#[from] ClassNameError),
+    /// A plan that cannot be.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A trial whose label is not for people to give.
+    #[error(
+        "trial {id} is of \"{object}\" by itself (it comes from \"{rig}\"): only trials of the real gripper are labelled",
+        object = shown_name(object)
+    )]
+    NotOfBoard {
+        /// The trial.
+        id: TrialId,
+        /// What it is of.
+        object: String,
+        /// Where it comes from.
+        rig: String,
+    },
+    /// A note that is no note any more.
+    #[error("a note of {length} characters is too long: {most} are allowed; write what belongs elsewhere into a file")]
+    LongNote {
+        /// Its length (characters).
+        length: usize,
+        /// What is allowed (characters).
+        most: usize,
+    },
+    /// Probabilities that are none.
+    #[error("what \"{model}\" said is not kept: its probabilities do not lie between 0 and 1, or sum to {sum}")]
+    BadGuess {
+        /// The model.
+        model: String,
+        /// What they sum to.
+        sum: f64,
+    },
+    /// Another program was there first.
+    #[error(
+        "\"{wanted}\" of trial {id} is not taken back: another program has changed the trial since ({since}). Look at it; \
+         what was done before can still be taken back"
+    )]
+    ChangedMeanwhile {
+        /// The trial.
+        id: TrialId,
+        /// What was to be taken back.
+        wanted: String,
+        /// What was done since.
+        since: String,
     },
     /// Anything else SQLite reports.
     #[error("the store \"{path}\" reports: {cause}", path = path.display())]

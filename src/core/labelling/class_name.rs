@@ -1,0 +1,61 @@
+//! What a label may be: the name of a class, as it stands in files, tables and on the axes of a confusion matrix.
+
+/// Most characters of a name.
+pub const LONGEST_NAME: usize = 80;
+
+/// A text that cannot be a label.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ClassNameError {
+    /// Nothing but blanks.
+    #[error("a label cannot be empty; write a name, or \"empty\" for the empty hand")]
+    Empty,
+    /// Too long for a table.
+    #[error("the label \"{beginning}...\" has {length} characters; {LONGEST_NAME} are allowed")]
+    TooLong {
+        /// How it begins.
+        beginning: String,
+        /// Its length (characters).
+        length: usize,
+    },
+    /// A tab, a line break or the like.
+    #[error("the label {name:?} holds a control character; write it in plain letters on one line")]
+    Control {
+        /// The name.
+        name: String,
+    },
+}
+
+/// A label as it is stored: without blanks around it.
+pub fn class_name(text: &str) -> Result<String, ClassNameError> {
+    let name = text.trim();
+    let length = name.chars().count();
+    if name.is_empty() {
+        Err(ClassNameError::Empty)
+    } else if name.contains(char::is_control) {
+        Err(ClassNameError::Control { name: name.chars().take(LONGEST_NAME).collect() })
+    } else if length > LONGEST_NAME {
+        Err(ClassNameError::TooLong { beginning: name.chars().take(20).collect(), length })
+    } else {
+        Ok(name.to_owned())
+    }
+}
+
+/// The object of a trial as it is shown: one without a label has an empty name in the store.
+pub fn shown_name(object: &str) -> &str {
+    if object.is_empty() { "unlabelled" } else { object }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_trimmed_and_nonsense_is_refused() {
+        assert_eq!(class_name("  big ball\n"), Ok("big ball".to_owned()));
+        assert_eq!(class_name(&"é".repeat(80)), Ok("é".repeat(80)));
+        assert_eq!(class_name(" \t "), Err(ClassNameError::Empty));
+        assert!(matches!(class_name(&"x".repeat(81)), Err(ClassNameError::TooLong { length: 81, .. })));
+        assert!(matches!(class_name("a\tb"), Err(ClassNameError::Control { .. })));
+        assert_eq!((shown_name(""), shown_name("lemon")), ("unlabelled", "lemon"));
+    }
+}
