@@ -1,5 +1,6 @@
 //! What panels ask for. Nothing in a panel changes anything: it pushes an action, and the workbench applies it.
 
+use super::gripper_tools::ToolWish;
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
 use palpate_core::scene::Scene;
@@ -25,6 +26,8 @@ pub enum Action {
     MeasureEffects,
     /// Calibrate a sensor of the real gripper.
     Calibrate(CalibrationWish),
+    /// Doctor, fit or training.
+    Tool(ToolWish),
     /// Look from here.
     SetCamera(Camera),
     /// Show the whole gripper.

@@ -3,6 +3,7 @@
 
 use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
+use super::gripper_tools::{GripperTools, GripperToolsSetup};
 use super::panels::{self, PanelContext, PanelKind};
 use super::theme::{self, colour};
 use super::tiling::{Tiling, panel_frame};
@@ -46,6 +47,8 @@ pub struct WorkbenchSetup<'a> {
     pub explain: Explain,
     /// Listens to the board of a real gripper.
     pub listen: Listen,
+    /// What doctor, fit and training start from.
+    pub tools: GripperToolsSetup,
     /// Whether the first grasp runs by itself.
     pub playing: bool,
     /// Asks for the window to be drawn again; called from other threads.
@@ -68,6 +71,7 @@ pub struct Workbench {
     worker: SimWorker,
     effects: EffectsWorker,
     calibrator: Calibrator,
+    tools: GripperTools,
     wake: Wake,
     scene: Scene,
     /// A scene that the busy worker has not taken yet.
@@ -110,6 +114,7 @@ impl Workbench {
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
         let calibrator = Calibrator::start(setup.store, setup.listen, Arc::clone(&setup.wake))
             .map_err(|e| format!("the calibration could not be started: {e}"))?;
+        let tools = GripperTools::start(setup.tools, &setup.wake)?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -123,6 +128,7 @@ impl Workbench {
             worker,
             effects,
             calibrator,
+            tools,
             wake: setup.wake,
             scene: setup.scene,
             unsent: false,
@@ -255,6 +261,7 @@ impl Workbench {
             scene: &self.scene,
             effects: &self.effects,
             calibrator: &self.calibrator,
+            tools: &self.tools,
             traces: &self.traces,
             view: &self.view,
             thumbnails: &self.thumbnails,
@@ -344,6 +351,7 @@ impl Workbench {
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
             Action::Calibrate(wish) => self.calibrator.wish(wish),
+            Action::Tool(wish) => self.tools.grant(wish),
             Action::SetCamera(camera) => self.view.camera = camera,
             Action::FrameAll => {
                 if let Some(snapshot) = self.worker.snapshot() {

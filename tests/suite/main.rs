@@ -13,6 +13,7 @@
 //! - `command_line`: exit codes, messages, JSON.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the pretended gripper calibrated and fitted.
+//! - `gripper_tools`: doctor, fit and training in the window.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -32,6 +33,7 @@ mod files;
 mod firmware;
 mod fuzz;
 mod golden;
+mod gripper_tools;
 mod learning;
 mod panels;
 mod peers;

@@ -3,6 +3,7 @@
 
 mod calibration;
 mod curvature;
+mod doctor;
 mod effects;
 mod force;
 mod grasp;
@@ -14,14 +15,16 @@ mod scene;
 mod view3d;
 
 use super::actions::Action;
+use super::gripper_tools::GripperTools;
 use super::traces::Traces;
 use super::view_state::ViewState;
-use egui::Ui;
+use egui::{Label, RichText, TextEdit, Ui};
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use palpate_core::scene::Scene;
 use palpate_core::trial::Frame;
 use palpate_core::workers::{Calibrator, EffectsWorker, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// What panels may read.
 pub struct PanelContext<'a> {
@@ -35,6 +38,8 @@ pub struct PanelContext<'a> {
     pub effects: &'a EffectsWorker,
     /// Calibrates the sensors of the real gripper.
     pub calibrator: &'a Calibrator,
+    /// Doctor, fit and training for the real gripper.
+    pub tools: &'a GripperTools,
     /// Traces of the last grasps.
     pub traces: &'a Traces,
     /// How the user looks at things.
@@ -58,7 +63,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 11] = [
+pub const ALL: [PanelKind; 12] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -70,11 +75,29 @@ pub const ALL: [PanelKind; 11] = [
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
     PanelKind { name: "effects", title: "Effects", ui: effects::ui },
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
+    PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
 ];
 
 /// A panel by its name.
 pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
     ALL.iter().find(|panel| panel.name == name)
+}
+
+/// Text that breaks its lines.
+fn wrapped(ui: &mut Ui, text: RichText) {
+    ui.add(Label::new(text).wrap());
+}
+
+/// A field for the port of the real gripper; nothing where it is left empty. What was typed is kept under `id`.
+fn port_field(ui: &mut Ui, id: egui::Id) -> Option<PathBuf> {
+    let mut port = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    ui.horizontal(|ui| {
+        let label = ui.label("Port");
+        ui.add(TextEdit::singleline(&mut port).hint_text("the only one there is")).labelled_by(label.id);
+    });
+    let named = Some(port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
+    ui.data_mut(|data| data.insert_temp(id, port));
+    named
 }
 
 /// What is grasped on the left, the view over two plots in the middle, what comes out of it on the right.
@@ -84,11 +107,12 @@ pub(super) fn default_layout() -> Tree<String> {
     let (objects, view, curvature) = (pane("objects"), pane("view"), pane("curvature"));
     let (pressure, force, line) = (pane("pressure"), pane("force"), pane("line"));
     let (recognition, grasp) = (pane("recognition"), pane("grasp"));
-    let (scene, effects, calibration) = (pane("scene"), pane("effects"), pane("calibration"));
+    let (scene, effects) = (pane("scene"), pane("effects"));
+    let of_gripper = ["calibration", "doctor"].map(&mut pane);
     let [view, curvature] = [vec![view], vec![curvature]].map(|panes| tiles.insert_tab_tile(panes));
     let loads = tiles.insert_tab_tile(vec![pressure, force, line]);
-    let [left, right] = [vec![objects, scene], vec![recognition, grasp, effects, calibration]]
-        .map(|panes| tiles.insert_tab_tile(panes));
+    let right = [recognition, grasp, effects].into_iter().chain(of_gripper).collect();
+    let [left, right] = [vec![objects, scene], right].map(|panes| tiles.insert_tab_tile(panes));
     let middle = insert_linear(&mut tiles, LinearDir::Vertical, &[(view, 0.58), (curvature, 0.21), (loads, 0.21)]);
     let root = insert_linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.185), (middle, 0.555), (right, 0.26)]);
     Tree::new(egui::Id::unique("workbench"), root, tiles)

@@ -13,7 +13,8 @@
 //! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks. A thread "ghost"
 //! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
-//! A thread "calibrate" talks to the board of a real gripper while one of its sensors is calibrated.
+//! A thread "calibrate" talks to the board of a real gripper while one of its sensors is calibrated; "examine" looks for what
+//! is wrong with it.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -21,7 +22,9 @@
 mod calibrator;
 mod companion;
 mod current;
+mod desk;
 mod effects;
+mod examiner;
 mod gauge;
 mod ghost;
 mod held_object;
@@ -41,7 +44,9 @@ pub use calibrator::{
     BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, Calibrator, Listen, RunningCalibration,
     listen_to_port,
 };
+pub use desk::Desk;
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
+pub use examiner::{Examination, Examine, ExamineRequest, Examiner, ExaminerView, examine_port};
 pub use ghost::GhostGrasp;
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
