@@ -2,6 +2,7 @@
 
 use super::modes::Mode;
 use super::panels::Source;
+use super::gripper_tools::ToolWish;
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
 use palpate_core::rig::serial::Control;
@@ -42,6 +43,8 @@ pub enum Action {
     SetMode(Mode),
     /// Show the simulated or the real gripper.
     Show(Source),
+    /// Doctor, fit or training.
+    Tool(ToolWish),
     /// Look from here.
     SetCamera(Camera),
     /// Show the whole gripper.

@@ -8,6 +8,7 @@ mod accuracy_dial;
 mod actions;
 mod bars;
 mod files;
+mod gripper_tools;
 mod icons;
 mod keys;
 mod modes;
@@ -22,6 +23,7 @@ mod viewport;
 mod workbench;
 
 pub use actions::Action;
+pub use gripper_tools::{GripperTools, GripperToolsSetup, ToolWish};
 pub use modes::Mode;
 pub use panels::{ALL as ALL_PANELS, PanelContext, PanelKind, Source};
 pub use startup::{Surroundings, check_surroundings};
@@ -31,7 +33,7 @@ pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_core::recognition::shipped_model;
 use palpate_core::scene::Scene;
-use palpate_core::workers::{explain_scene, listen_to_port};
+use palpate_core::workers::{examine_port, explain_scene, listen_to_port};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -73,6 +75,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
             explain: Arc::new(explain_scene),
             listen: Arc::new(listen_to_port),
+            tools: GripperToolsSetup { examine: Arc::new(examine_port) },
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

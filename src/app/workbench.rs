@@ -3,6 +3,7 @@
 
 use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
+use super::gripper_tools::{GripperTools, GripperToolsSetup};
 use super::modes::Mode;
 use super::panels::{PanelContext, PanelKind, Source};
 use super::theme::{self, colour};
@@ -48,6 +49,8 @@ pub struct WorkbenchSetup<'a> {
     pub explain: Explain,
     /// Listens to the board of a real gripper.
     pub listen: Listen,
+    /// What doctor, fit and training start from.
+    pub tools: GripperToolsSetup,
     /// Whether the first grasp runs by itself.
     pub playing: bool,
     /// Asks for the window to be drawn again; called from other threads.
@@ -69,6 +72,7 @@ const PICTURE_SCALE: f32 = 2.0;
 pub struct Workbench {
     worker: SimWorker,
     effects: EffectsWorker,
+    tools: GripperTools,
     gripper: GripperWorker,
     /// Traces of the real gripper.
     felt: Traces,
@@ -123,6 +127,7 @@ impl Workbench {
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
         let effects = EffectsWorker::start(setup.explain, Arc::clone(&setup.wake))
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
+        let tools = GripperTools::start(setup.tools, &setup.wake)?;
         let gripper = GripperWorker::start(GripperSetup {
             scene: setup.scene.clone(),
             store: setup.store,
@@ -142,6 +147,7 @@ impl Workbench {
         let mut workbench = Self {
             worker,
             effects,
+            tools,
             gripper,
             felt: Traces::default(),
             trial_part: None,
@@ -286,6 +292,7 @@ impl Workbench {
             accuracy: shown.accuracy,
             scene: &self.scene,
             effects: &self.effects,
+            tools: &self.tools,
             gripper: shown.gripper,
             source,
             blind: false,
@@ -417,6 +424,7 @@ impl Workbench {
             Action::SaveScene => self.ask(Ask::SaveScene),
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
+            Action::Tool(wish) => self.tools.grant(wish),
             Action::Gripper(wish) => self.gripper.wish(wish),
             Action::BeginTrial => self.begin_trial(),
             Action::DiscardTrial => self.gripper.wish(GripperWish::Discard),

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::terminal::{say, say_json};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::doctor::{Finding, Observations, Verdict, examine, findings};
+use palpate_core::doctor::{Finding, Observations, USUAL_LISTEN_S, examine, findings, is_sound, summary};
 use palpate_core::rig::serial::{Baud, LinkOptions};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub(super) struct DoctorArguments {
     /// The port, a link to one, or a file of captured bytes; the only likely port where it is left out.
     port: Option<PathBuf>,
     /// How long to listen (s). Bend a finger and press each pad meanwhile: more can be seen then.
-    #[arg(long, value_name = "S", default_value_t = 8.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = USUAL_LISTEN_S, value_parser = seconds)]
     seconds: f64,
     /// Rate of the board's serial line (bit/s); without it the usual ones are tried.
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     });
     bar.finish_and_clear();
     let found = findings(&seen);
-    let sound = found.iter().all(|finding| finding.verdict != Verdict::Wrong);
+    let sound = is_sound(&found);
     if arguments.json {
         let port = seen.link.as_ref().map(|link| link.port.path.as_path()).or(arguments.port.as_deref());
         say_json(&Told { port, listened_s: seen.listened_s, sound, findings: found })?;
@@ -81,10 +81,5 @@ fn tell(seen: &Observations, found: &[Finding]) -> Result<(), Failure> {
             }
         }
     }
-    let wrong = found.iter().filter(|finding| finding.verdict == Verdict::Wrong).count();
-    say(match wrong {
-        0 => "\nnothing is wrong".to_owned(),
-        1 => "\none thing is wrong".to_owned(),
-        more => format!("\n{more} things are wrong"),
-    })
+    say(format!("\n{}", summary(found)))
 }

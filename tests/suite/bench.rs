@@ -3,12 +3,12 @@
 use crate::scripted;
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
-use palpate::app::{Action, PanelKind, ViewState, Workbench, WorkbenchSetup};
+use palpate::app::{Action, GripperToolsSetup, PanelKind, ViewState, Workbench, WorkbenchSetup};
 use palpate_core::palette::Theme;
 use palpate_core::recognition::Model;
 use palpate_core::scene::Scene;
 use palpate_core::study::{Explanation, Measuring};
-use palpate_core::workers::{Command, Listen, Snapshot, explain_scene, listen_to_port};
+use palpate_core::workers::{Command, Examine, Listen, Snapshot, examine_port, explain_scene, listen_to_port};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -25,13 +25,15 @@ pub(crate) struct BenchSetup {
     pub(crate) model: Result<Arc<Model>, String>,
     /// Listens to the board of a real gripper.
     pub(crate) listen: Listen,
+    /// Looks at its port for the doctor.
+    pub(crate) examine: Examine,
 }
 
 impl Default for BenchSetup {
     fn default() -> Self {
         let model = Ok(scripted::model());
-        let (size, listen) = ([1280.0, 820.0], Arc::new(listen_to_port));
-        Self { object: "lemon", theme: Theme::Dark, size, panel: None, render_state: None, model, listen }
+        let (size, listen, examine) = ([1280.0, 820.0], Arc::new(listen_to_port), Arc::new(examine_port));
+        Self { object: "lemon", theme: Theme::Dark, size, panel: None, render_state: None, model, listen, examine }
     }
 }
 
@@ -61,7 +63,7 @@ impl Bench {
         let (wake, woken) = channel();
         let mut scene = Scene::default();
         setup.object.clone_into(&mut scene.object.source);
-        let BenchSetup { theme, panel, render_state, size, model, listen, .. } = setup;
+        let BenchSetup { theme, panel, render_state, size, model, listen, examine, .. } = setup;
         let draw = move |ui: &mut egui::Ui, workbench: &mut Option<Workbench>| {
             let ctx = ui.ctx().clone();
             let workbench = workbench.get_or_insert_with(|| {
@@ -73,6 +75,7 @@ impl Bench {
                     model: model.clone(),
                     explain: Arc::new(explain_steadily),
                     listen: Arc::clone(&listen),
+                    tools: GripperToolsSetup { examine: Arc::clone(&examine) },
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.

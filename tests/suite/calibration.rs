@@ -23,7 +23,6 @@ use palpate_core::wire::{CAPTURE_MAGIC, Captured, Decoder, Heard};
 use palpate_core::workers::Listen;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 /// What a board prints while a script is done on the bench, read as a host reads it.
 fn readings(parts: &HiddenParts, scene: &Scene, script: &str, seconds: f64, seed: u64) -> (Board, Vec<Reading>) {

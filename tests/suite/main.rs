@@ -14,6 +14,7 @@
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the pretended gripper calibrated and fitted.
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
+//! - `gripper_tools`: doctor, fit and training in the window.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -34,6 +35,7 @@ mod firmware;
 mod fuzz;
 mod golden;
 mod gripper;
+mod gripper_tools;
 mod learning;
 mod panels;
 mod peers;

@@ -40,7 +40,7 @@ fn every_panel_in_both_themes() {
     }
 }
 
-fn side_by_side(left: &RgbaImage, right: &RgbaImage) -> RgbaImage {
+pub(crate) fn side_by_side(left: &RgbaImage, right: &RgbaImage) -> RgbaImage {
     let mut pair = RgbaImage::new(left.width() + right.width(), left.height());
     image::imageops::replace(&mut pair, left, 0, 0);
     image::imageops::replace(&mut pair, right, i64::from(left.width()), 0);

@@ -1,10 +1,10 @@
 //! Calibrating the sensors of the real gripper, step by step: what to set next, the reading as it settles, the points with
 //! the curve through them, and what is left between.
 
-use super::PanelContext;
+use super::{PanelContext, wrapped};
 use crate::app::actions::Action;
 use crate::app::theme::colour;
-use egui::{Button, Color32, Grid, Label, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Color32, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_core::board::Sensor;
 use palpate_core::sensing::calibration::{Calibration, Curve, Kind, Point};
@@ -73,7 +73,7 @@ fn begin_ui(
         let label = ui.label("Port");
         match context.gripper.and_then(|gripper| gripper.link.as_ref()) {
             Some(link) => {
-                ui.add(Label::new(link.port.path.display().to_string()).truncate());
+                ui.add(egui::Label::new(link.port.path.display().to_string()).truncate());
             }
             None => {
                 ui.add(TextEdit::singleline(&mut form.port).hint_text("the only one there is")).labelled_by(label.id);
@@ -130,10 +130,6 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Vec<Actio
     button(!running.points.is_empty(), "Take back", "Measure the last one again", Some(CalibrationWish::Undo));
     button(running.fit.is_ok(), "Keep", "Store it; old trials are read by it too", Some(CalibrationWish::Keep));
     button(true, "Stop", "Forget it", Some(CalibrationWish::Stop));
-}
-
-fn wrapped(ui: &mut Ui, text: RichText) {
-    ui.add(Label::new(text).wrap());
 }
 
 /// What is read of a part, in the unit of the plot: kilohms of a strip, microsiemens of a pad.

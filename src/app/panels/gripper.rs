@@ -1,10 +1,10 @@
 //! The real gripper: its port, how well its board keeps time, what its sensors show, where their zeros are, and the key
 //! that stops everything.
 
-use super::PanelContext;
+use super::{PanelContext, wrapped};
 use crate::app::actions::Action;
 use crate::app::theme::{colour, veil};
-use egui::{Button, Grid, Label, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use palpate_core::board::Sensor;
 use palpate_core::palette::Theme;
 use palpate_core::rig::serial::{Control, LinkState, LinkStatus, PortInfo};
@@ -21,10 +21,6 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
             None => ports_ui(ui, context, actions),
         }
     });
-}
-
-fn wrapped(ui: &mut Ui, text: impl Into<RichText>) {
-    ui.add(Label::new(text.into()).wrap());
 }
 
 /// What can be connected to.

@@ -5,6 +5,7 @@ mod calibration;
 mod console;
 mod counts;
 mod curvature;
+mod doctor;
 mod effects;
 mod force;
 mod grasp;
@@ -19,9 +20,10 @@ mod view3d;
 pub(super) use gripper::stop_button;
 
 use super::actions::Action;
+use super::gripper_tools::GripperTools;
 use super::traces::{GraspTrace, Traces};
 use super::view_state::ViewState;
-use egui::Ui;
+use egui::{Label, RichText, TextEdit, Ui};
 use palpate_core::grasping::IdentificationView;
 use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::scene::Scene;
@@ -30,6 +32,7 @@ use palpate_core::trial::Frame;
 use palpate_core::workers::{EffectsWorker, GripperView, LEAD_S, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::path::PathBuf;
 
 /// What panels may read.
 pub struct PanelContext<'a> {
@@ -41,6 +44,8 @@ pub struct PanelContext<'a> {
     pub scene: &'a Scene,
     /// Measures what effects cost and change.
     pub effects: &'a EffectsWorker,
+    /// Doctor, fit and training for the real gripper.
+    pub tools: &'a GripperTools,
     /// Where the real gripper stands; absent until its thread has begun.
     pub gripper: Option<&'a GripperView>,
     /// Which gripper the plots and the recognition are of.
@@ -177,7 +182,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 14] = [
+pub const ALL: [PanelKind; 15] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -192,9 +197,27 @@ pub const ALL: [PanelKind; 14] = [
     PanelKind { name: "counts", title: "Counts", ui: counts::ui },
     PanelKind { name: "console", title: "Console", ui: console::ui },
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
+    PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
 ];
 
 /// A panel by its name.
 pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
     ALL.iter().find(|panel| panel.name == name)
+}
+
+/// Text that breaks its lines.
+fn wrapped(ui: &mut Ui, text: RichText) {
+    ui.add(Label::new(text).wrap());
+}
+
+/// A field for the port of the real gripper; nothing where it is left empty. What was typed is kept under `id`.
+fn port_field(ui: &mut Ui, id: egui::Id) -> Option<PathBuf> {
+    let mut port = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    ui.horizontal(|ui| {
+        let label = ui.label("Port");
+        ui.add(TextEdit::singleline(&mut port).hint_text("the only one there is")).labelled_by(label.id);
+    });
+    let named = Some(port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
+    ui.data_mut(|data| data.insert_temp(id, port));
+    named
 }

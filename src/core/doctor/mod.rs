@@ -76,6 +76,23 @@ pub struct Observations {
     pub traces: Traces,
 }
 
+/// How long to listen where nobody says (s): enough to bend a finger and press each pad.
+pub const USUAL_LISTEN_S: f64 = 8.0;
+
+/// True where nothing is wrong.
+pub fn is_sound(found: &[Finding]) -> bool {
+    found.iter().all(|finding| finding.verdict != Verdict::Wrong)
+}
+
+/// In a sentence: how much is wrong.
+pub fn summary(found: &[Finding]) -> String {
+    match found.iter().filter(|finding| finding.verdict == Verdict::Wrong).count() {
+        0 => "nothing is wrong".to_owned(),
+        1 => "one thing is wrong".to_owned(),
+        more => format!("{more} things are wrong"),
+    }
+}
+
 /// All checks, in the order in which they are told.
 pub fn findings(seen: &Observations) -> Vec<Finding> {
     CHECKS.iter().map(|check| check.look(seen)).collect()

@@ -294,7 +294,7 @@ proptest! {
         let path = folder.path().join("trials.sqlite");
         let mut store = store_with(&path, &["", "lemon", "cube"]).expect("made");
         // The model: all states, and which is now.
-        let (mut states, mut now) = (vec![seen(&store).expect("read")], 0);
+        let (mut states, mut now) = (vec![seen(&store).expect("read")], 0_usize);
         for deed in deeds {
             let before = seen(&store).expect("read");
             let outcome = match deed.clone() {

@@ -124,6 +124,13 @@ impl Listener {
         self.identification.decision().filter(|_| self.off.is_none())
     }
 
+    /// What the newest grasp was taken for: classes and their probabilities; none where nothing was heard.
+    pub(super) fn guess(&self) -> Option<Vec<(String, f64)>> {
+        let pmf = &self.identification.verdict().filter(|_| self.off.is_none())?.pmf;
+        let names = self.identification.model().card.labels.classes.iter().map(|class| class.name.clone());
+        Some(names.zip(pmf.probabilities().iter().copied()).collect())
+    }
+
     /// What can be shown; nothing where it cannot listen.
     pub(super) fn view(&self) -> Option<Arc<IdentificationView>> {
         self.off.is_none().then(|| Arc::clone(&self.view))

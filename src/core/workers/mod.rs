@@ -14,17 +14,21 @@
 //! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
+//! "examine" looks for what is wrong with it.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
 mod companion;
 mod current;
+mod desk;
 mod effects;
+mod examiner;
 mod gauge;
 mod ghost;
 mod gripper;
 mod held_object;
+mod labeller;
 mod latest;
 mod listener;
 #[cfg(test)]
@@ -37,13 +41,16 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 
+pub use desk::Desk;
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
+pub use examiner::{Examination, Examine, ExamineRequest, Examiner, ExaminerView, examine_port};
 pub use ghost::GhostGrasp;
 pub use gripper::{
     BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, EndedTrial, GripperSetup, GripperView, GripperWish,
     GripperWorker, LEAD_S, LatestReading, Listen, RunningCalibration, TrialPart, TrialRequest, TrialView,
     listen_to_port,
 };
+pub use labeller::{LabelView, LabelWish, Labeller, start_labeller};
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{

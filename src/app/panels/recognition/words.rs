@@ -143,7 +143,8 @@ mod tests {
 
     fn said(view: &IdentificationView) -> (String, String) {
         let text = Headline::of(view).text(&view.labels).0;
-        (text, reason(view, &Status { playing: true, ..Status::default() }))
+        let waiting = "the fingers close";
+        (text, reason(view, &Recognised { view: None, off: None, truth: None, waiting, finished: false }))
     }
 
     #[test]

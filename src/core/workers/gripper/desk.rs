@@ -4,11 +4,12 @@ use super::calibrating::{Calibrating, CalibrationPlan, CalibrationView, Calibrat
 use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialRequest};
 use super::plotted::{Plotted, Row};
 use super::recent::Recent;
-use super::running::Running;
+use super::running::{BEFORE_S, Running};
 use super::stream::{BoardStream, Listen};
 use super::worker::GripperSetup;
 use crate::board::{Board, Reading};
 use crate::gripper::Phase;
+use crate::labelling::{SegmentEvent, Segmenter};
 use crate::recording::Store;
 use crate::rig::serial::{LinkEvent, PortInfo, VENT, list_ports};
 use crate::scene::Scene;
@@ -58,6 +59,8 @@ struct Connection {
     drift: Vec<Drift>,
     latest: Option<LatestReading>,
     plotted: Plotted,
+    /// Tells when a grasp begins and ends by itself.
+    segmenter: Segmenter,
 }
 
 /// Everything the thread owns.
@@ -74,6 +77,8 @@ pub(super) struct Desk {
     refused: Option<String>,
     connection: Option<Connection>,
     running: Option<Running>,
+    /// Trials that were begun so far.
+    begun: u64,
     watching: Option<TrialRequest>,
     ended: Option<Arc<EndedTrial>>,
     calibrating: Option<Calibrating>,
@@ -101,6 +106,7 @@ impl Desk {
             refused: None,
             connection: None,
             running: None,
+            begun: 0,
             watching: None,
             ended: None,
             calibrating: None,
@@ -192,6 +198,7 @@ impl Desk {
                     drift: Vec::new(),
                     latest: None,
                     plotted: Plotted::new(Vec::new(), 0),
+                    segmenter: Segmenter::new(&Board::default()),
                 });
                 self.read_calibrations();
                 self.another_stretch(0.0);
@@ -228,6 +235,7 @@ impl Desk {
         };
         if let Some(connection) = &mut self.connection {
             connection.plotted = Plotted::new(self.channels.to_vec(), board.channels.len());
+            connection.segmenter.set_board(&board);
             connection.readout = readout;
             connection.remarks = remarks;
             connection.drift.clear();
@@ -256,6 +264,7 @@ impl Desk {
 
     fn hear(&mut self, event: LinkEvent) {
         let Some(connection) = &mut self.connection else { return };
+        let begun = self.begun;
         connection.recent.push(&event);
         match &event {
             LinkEvent::Heard(Heard::Reading(reading)) => {
@@ -272,7 +281,10 @@ impl Desk {
             }
             LinkEvent::Heard(Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => {}
         }
-        if let Some(running) = &mut self.running {
+        // What began a trial just now is among what it was begun with.
+        if begun == self.begun
+            && let Some(running) = &mut self.running
+        {
             running.take(event);
             self.write();
         }
@@ -286,11 +298,33 @@ impl Desk {
         let rows = connection.plotted.push(reading, &felt, line_bar);
         connection.latest = Some(LatestReading { counts: reading.counts.clone(), felt, line_bar });
         self.plot(rows);
+        self.watch(reading);
         self.recognise(reading.t_s, &felt);
         if let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection)
             && let Err(cause) = calibrating.feed(reading, &connection.board)
         {
             self.end_calibration(Some(Err(cause)));
+        }
+    }
+
+    /// Begins and ends trials by what the fingers do, where that is wanted.
+    fn watch(&mut self, reading: &Reading) {
+        let Some(connection) = &mut self.connection else { return };
+        let events = connection.segmenter.push(reading);
+        let Some(request) = self.watching.clone() else { return };
+        // A trial that was asked for goes its own way.
+        if self.running.as_ref().is_some_and(|running| *running.request() != request) {
+            return;
+        }
+        for event in events {
+            match event {
+                SegmentEvent::Began { from_s } => self.begin(request.clone(), Some(from_s)),
+                SegmentEvent::Phase(mark) => {
+                    let phase = self.running.as_mut().and_then(|running| running.mark(mark));
+                    phase.into_iter().for_each(|phase| self.begin_phase(phase, reading.t_s));
+                }
+                SegmentEvent::Ended { .. } => self.end(false, None),
+            }
         }
     }
 
@@ -340,7 +374,7 @@ impl Desk {
         }
         let over = running.is_over(now_s);
         if let Some(phase) = phase {
-            self.begin_phase(phase);
+            self.begin_phase(phase, f64::INFINITY);
         }
         self.write();
         if over {
@@ -348,11 +382,14 @@ impl Desk {
         }
     }
 
-    fn begin_phase(&mut self, phase: Phase) {
+    /// What was heard before `until_s` has been passed over.
+    fn begin_phase(&mut self, phase: Phase, until_s: f64) {
         match phase {
             Phase::Close => {
-                self.zero_from_rest();
+                let closing_s = self.running.as_ref().and_then(|running| running.closing_s).unwrap_or(f64::INFINITY);
+                self.zero_from_rest(closing_s);
                 self.begin_recognition();
+                self.catch_up(closing_s, until_s);
             }
             Phase::Hold => {}
             Phase::Release => {
@@ -366,10 +403,21 @@ impl Desk {
     // Zeros.
 
     /// The zeros of a trial are what the sensors show just before its closing.
-    fn zero_from_rest(&mut self) {
+    fn zero_from_rest(&mut self, closing_s: f64) {
         let Some(connection) = &mut self.connection else { return };
-        let zero = connection.readout.zero_from(&connection.recent.last(REST_S));
+        let zero = connection.readout.zero_from(&connection.recent.between(closing_s - REST_S, closing_s));
         connection.set_zero(zero);
+    }
+
+    /// Recognises what was heard since the closing began, where that was found out later.
+    fn catch_up(&mut self, closing_s: f64, until_s: f64) {
+        let Some(connection) = &self.connection else { return };
+        let heard = connection.recent.between(closing_s, until_s);
+        let felt: Vec<(f64, Felt)> =
+            heard.iter().map(|reading| (reading.t_s, connection.readout.felt(reading))).collect();
+        for (t_s, felt) in felt {
+            self.recognise(t_s, &felt);
+        }
     }
 
     fn tare(&mut self) {
@@ -405,7 +453,8 @@ impl Desk {
             let text = format!("nothing is recorded yet: {}", connection.stream.status().state.sentence());
             return self.outlets.tell(Notice::Warning(text));
         }
-        let from_s = from_s.unwrap_or_else(|| connection.stream.now_s());
+        let now_s = connection.stream.now_s();
+        let from_s = from_s.unwrap_or(now_s - BEFORE_S);
         let status = connection.stream.status();
         let adds = request.adds;
         let path = self.path.clone();
@@ -414,10 +463,11 @@ impl Desk {
             Err(cause) => return self.outlets.tell(Notice::Failed(cause)),
         };
         let Some(connection) = &self.connection else { return };
-        match Running::begin(store, request, &self.scene, &status, &connection.recent, from_s) {
+        match Running::begin(store, request, &self.scene, &status, &connection.recent, [from_s, now_s]) {
             Ok(running) => {
                 self.another_stretch(running.closing_s.unwrap_or(running.began_s));
                 self.running = Some(running);
+                self.begun += 1;
                 let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
                 if !adds || decided {
                     self.start_over();
@@ -458,9 +508,18 @@ impl Desk {
                 listener.end_grasp();
             }
         }
+        // What was felt before belongs to a guess that adds to it; such a guess says nothing of this trial alone.
+        let alone = !discarded && !running.request().adds;
+        let guess = self.listener.as_ref().filter(|_| alone && running.closing_s.is_some()).and_then(Listener::guess);
+        let guess = guess.zip(self.model.clone());
         let path = self.path.clone();
-        let finished = open(&mut self.store, &path)
-            .and_then(|store| running.finish(store, &status, discarded).map_err(|error| error.to_string()));
+        let finished = open(&mut self.store, &path).and_then(|store| {
+            let ended = running.finish(store, &status, discarded).map_err(|error| error.to_string())?;
+            if let Some((pmf, model)) = guess {
+                store.set_guess(ended.id, &model, &pmf).map_err(|error| error.to_string())?;
+            }
+            Ok(ended)
+        });
         match finished {
             Ok(ended) => {
                 if !discarded {

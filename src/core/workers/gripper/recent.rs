@@ -6,9 +6,9 @@ use crate::wire::Heard;
 use std::collections::VecDeque;
 
 /// Length of what is remembered (s).
-const REMEMBERED_S: f64 = 1.2;
-/// Events that are remembered at most: 1.2 s at 1 kHz, bytes and readings.
-const MOST: usize = 4000;
+const REMEMBERED_S: f64 = 2.0;
+/// Events that are remembered at most: 2 s at 1 kHz, bytes and readings.
+const MOST: usize = 6000;
 
 /// The newest events, oldest first.
 #[derive(Debug, Default)]
@@ -41,8 +41,13 @@ impl Recent {
 
     /// Readings of the last so many seconds.
     pub(super) fn last(&self, seconds: f64) -> Vec<Reading> {
-        let from_s = self.readings().last().map_or(0.0, |last| last.t_s) - seconds;
-        self.readings().filter(|reading| reading.t_s > from_s).cloned().collect()
+        let now_s = self.readings().last().map_or(0.0, |last| last.t_s);
+        self.between(now_s - seconds, f64::INFINITY)
+    }
+
+    /// Readings after one time and before another (s).
+    pub(super) fn between(&self, from_s: f64, to_s: f64) -> Vec<Reading> {
+        self.readings().filter(|reading| reading.t_s > from_s && reading.t_s < to_s).cloned().collect()
     }
 
     fn readings(&self) -> impl Iterator<Item = &Reading> {
@@ -82,7 +87,7 @@ mod tests {
             let reading = Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None };
             recent.push(&LinkEvent::Heard(Heard::Reading(reading)));
         }
-        assert!(recent.events.len() < 1400, "{}", recent.events.len());
+        assert!(recent.events.len() < 2300, "{}", recent.events.len());
         let since = recent.since(99.5055);
         assert!(matches!(&since[0], LinkEvent::Captured(piece) if (piece.arrived_s() - 99.5).abs() < 1e-9));
         assert!(matches!(&since[1], LinkEvent::Heard(Heard::Reading(reading)) if (reading.t_s - 99.506).abs() < 1e-9));

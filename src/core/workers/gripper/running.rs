@@ -3,14 +3,15 @@
 use super::messages::{EndedTrial, LEAD_S, TrialPart, TrialRequest, TrialView};
 use super::recent::Recent;
 use crate::gripper::{Phase, Programme};
+use crate::labelling::cadence_line;
 use crate::recording::{BoardRecorder, BoardTrialPlan, Store, StoreError};
 use crate::rig::serial::{Conductor, Control, LinkEvent, LinkStatus};
 use crate::scene::Scene;
 use crate::trial::PhaseMark;
-use crate::wire::{Cadence, Heard};
+use crate::wire::Heard;
 
 /// What came before the button was pressed and belongs to the trial (s).
-const BEFORE_S: f64 = 0.3;
+pub(super) const BEFORE_S: f64 = 0.3;
 /// What is recorded when the programme is done (s).
 const SETTLE_S: f64 = 0.4;
 /// Length that is reserved for a trial of unknown length (s).
@@ -34,14 +35,14 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// Begins to record, with what came just before `from_s`.
+    /// Begins to record what was heard from `from_s` on. The control box of a conducted trial begins a while after `now_s`.
     pub(super) fn begin(
         store: &mut Store,
         request: TrialRequest,
         scene: &Scene,
         status: &LinkStatus,
         recent: &Recent,
-        from_s: f64,
+        [from_s, now_s]: [f64; 2],
     ) -> Result<Self, StoreError> {
         let tick_s = 1.0 / f64::from(scene.timing.actuation_hz.max(1));
         let programme = scene.programme.clone();
@@ -52,7 +53,7 @@ impl Running {
             scene: scene.to_toml(),
             seconds: Some(if conducted { length_s } else { FREE_S }),
         };
-        let before = recent.since(from_s - BEFORE_S);
+        let before = recent.since(from_s);
         let first = before.iter().find_map(|event| match event {
             LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
             LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
@@ -60,8 +61,8 @@ impl Running {
         let began_s = first.unwrap_or(from_s);
         let mut recorder = BoardRecorder::begin(store, &plan, status, began_s)?;
         before.into_iter().for_each(|event| recorder.take(event));
-        let closing_s = conducted.then_some(from_s + LEAD_S);
-        let conductor = Conductor::new(request.control, 1.0 / tick_s, from_s + LEAD_S);
+        let closing_s = conducted.then_some(now_s + LEAD_S);
+        let conductor = Conductor::new(request.control, 1.0 / tick_s, now_s + LEAD_S);
         Ok(Self {
             request,
             recorder,
@@ -135,7 +136,7 @@ impl Running {
     ) -> Result<EndedTrial, StoreError> {
         let recorded = self.recorder.finish(store, status, self.notes)?;
         if discarded {
-            store.delete(&[recorded.id])?;
+            store.discard_trial(recorded.id)?;
         }
         let cadence = cadence_line(&recorded.about.cadence);
         Ok(EndedTrial { id: recorded.id, request: self.request, discarded, warnings: recorded.warnings, cadence })
@@ -189,10 +190,4 @@ impl Running {
             samples: self.recorder.samples(),
         }
     }
-}
-
-/// How well a board kept time, in a line.
-fn cadence_line(cadence: &Cadence) -> String {
-    let Cadence { rate_hz, jitter_p95_ms, lost, bad_lines, .. } = cadence;
-    format!("{rate_hz:.1} Hz, jitter {jitter_p95_ms:.1} ms, {lost} lost, {bad_lines} bad lines")
 }

@@ -1,0 +1,148 @@
+//! A thread behind a panel: it sleeps until something is wished for, does one thing after the other, and publishes how it
+//! stands. What is under way can be given up.
+
+use super::latest::Latest;
+use super::messages::Wake;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::JoinHandle;
+
+/// A handle on the thread: wishes `W` in, the newest state of affairs `V` out. Dropping it gives up what is under way and
+/// ends the thread.
+#[derive(Debug)]
+pub struct Desk<W, V> {
+    /// Absent once the thread is being ended.
+    wishes: Option<Sender<(W, Arc<AtomicBool>)>>,
+    /// Set to give up everything that was wished for with it.
+    stop: Arc<AtomicBool>,
+    view: Arc<Latest<V>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Where the thread says how it stands.
+pub(super) struct Outlet<V> {
+    view: Arc<Latest<V>>,
+    wake: Wake,
+}
+
+impl<V> Outlet<V> {
+    pub(super) fn publish(&self, view: V) {
+        self.view.publish(Arc::new(view));
+        (self.wake)();
+    }
+}
+
+impl<W: Send + 'static, V: Send + Sync + 'static> Desk<W, V> {
+    /// Starts the thread. `work` is called for each wish, in order; it looks at the flag as often as it can, and ends early
+    /// once that is set.
+    pub(super) fn spawn(
+        name: &str,
+        wake: Wake,
+        mut work: impl FnMut(W, &AtomicBool, &Outlet<V>) + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let (wishes, inbox) = channel::<(W, Arc<AtomicBool>)>();
+        let view = Arc::new(Latest::default());
+        let outlet = Outlet { view: Arc::clone(&view), wake };
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
+            while let Ok((wish, stop)) = inbox.recv() {
+                work(wish, &stop, &outlet);
+            }
+        })?;
+        Ok(Self { wishes: Some(wishes), stop: Arc::default(), view, thread: Some(thread) })
+    }
+}
+
+impl<W, V> Desk<W, V> {
+    /// Asks for something; it is done after what was asked for before.
+    pub fn ask(&self, wish: W) {
+        if let Some(wishes) = &self.wishes {
+            // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
+            let _heard = wishes.send((wish, Arc::clone(&self.stop)));
+        }
+    }
+
+    /// Gives up everything that was asked for.
+    pub fn give_up(&mut self) {
+        std::mem::take(&mut self.stop).store(true, Ordering::Relaxed);
+    }
+
+    /// The newest state of affairs; nothing before anything was asked for.
+    pub fn view(&self) -> Option<Arc<V>> {
+        self.view.get()
+    }
+}
+
+impl<W, V> Drop for Desk<W, V> {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.wishes = None;
+        if let Some(thread) = self.thread.take() {
+            let _ended = thread.join();
+        }
+    }
+}
+
+/// Waiting for a desk in tests.
+#[cfg(test)]
+pub(super) mod watch {
+    use super::*;
+    use std::sync::mpsc::Receiver;
+    use std::time::Duration;
+
+    /// A `wake` and where it is heard.
+    pub(crate) fn waker() -> (Wake, Receiver<()>) {
+        let (told, woken) = channel();
+        let wake: Wake = Arc::new(move || {
+            // The test may have stopped listening.
+            let _heard = told.send(());
+        });
+        (wake, woken)
+    }
+
+    /// Waits until the desk stands as wanted.
+    pub(crate) fn until<W, V>(desk: &Desk<W, V>, woken: &Receiver<()>, wanted: impl Fn(&V) -> bool) -> Arc<V> {
+        loop {
+            if let Some(view) = desk.view().filter(|view| wanted(view)) {
+                return view;
+            }
+            woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::watch::{until, waker};
+    use super::*;
+
+    /// Counts up to a number, or until it is given up; then says how far it came.
+    fn counter() -> (Desk<u64, u64>, std::sync::mpsc::Receiver<()>) {
+        let (wake, woken) = waker();
+        let desk = Desk::spawn("count", wake, |most: u64, stop, outlet| {
+            let reached = (0..most).take_while(|_| !stop.load(Ordering::Relaxed)).count();
+            outlet.publish(reached as u64);
+        });
+        (desk.expect("starts"), woken)
+    }
+
+    #[test]
+    fn wishes_are_granted_in_order_and_given_up_together() {
+        let (mut desk, woken) = counter();
+        assert_eq!(desk.view(), None);
+        desk.ask(7);
+        until(&desk, &woken, |n| *n == 7);
+        desk.ask(u64::MAX);
+        desk.ask(u64::MAX);
+        desk.give_up();
+        desk.ask(5);
+        until(&desk, &woken, |n| *n == 5);
+    }
+
+    #[test]
+    fn a_handle_that_goes_takes_its_work_with_it() {
+        let (desk, _woken) = counter();
+        desk.ask(u64::MAX);
+        drop(desk);
+    }
+}
