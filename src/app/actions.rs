@@ -1,13 +1,15 @@
 //! What panels ask for. Nothing in a panel changes anything: it pushes an action, and the workbench applies it.
 
+use super::gripper_tools::ToolWish;
+use super::labelling::ShownTrials;
 use super::modes::Mode;
 use super::panels::Source;
-use super::gripper_tools::ToolWish;
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
+use palpate_core::recording::TrialId;
 use palpate_core::rig::serial::Control;
 use palpate_core::scene::Scene;
-use palpate_core::workers::{Command, GripperWish};
+use palpate_core::workers::{Command, GripperWish, LabelWish};
 use std::path::PathBuf;
 
 /// A wish of the user's.
@@ -29,10 +31,12 @@ pub enum Action {
     MeasureEffects,
     /// Tell the real gripper's thread something.
     Gripper(GripperWish),
-    /// Begin a trial of the real gripper, or once more the one that goes on.
-    BeginTrial,
-    /// Give up the trial that goes on, or throw the last one away.
-    DiscardTrial,
+    /// Something at the desk where trials are recorded and labelled.
+    Desk(DeskAction),
+    /// Connect the real gripper, or give its port back.
+    ToggleGripper,
+    /// Something about labels, plan or journal.
+    Label(LabelWish),
     /// Stop everything: vent the fingers, and close what is open over the window.
     Stop,
     /// Who moves the fingers of the real gripper.
@@ -67,6 +71,37 @@ pub enum Action {
     ResetLayout,
     /// Something to tell the user.
     Tell(Message),
+}
+
+/// What is done at the desk where trials of the real gripper are recorded and labelled.
+#[derive(Clone, Debug)]
+pub enum DeskAction {
+    /// Record a grasp; one that goes on, or has no label yet, is given up for it.
+    Record,
+    /// Give up the trial that goes on, or throw away the one that the card asks about.
+    Discard,
+    /// Say what the trial is of that the card asks about: the object that is chosen.
+    Give,
+    /// Choose the object at this place of the list.
+    Choose(usize),
+    /// Find objects by a part of their names.
+    Search(String),
+    /// Put the cursor into the field that finds objects.
+    FocusSearch,
+    /// Ask about this trial; without one about the newest that has no label.
+    Select(Option<TrialId>),
+    /// Ask about the trial so many places further in the list.
+    Step(isize),
+    /// Which trials the list shows.
+    Show(ShownTrials),
+    /// The note of a trial, while it is being written.
+    WriteNote(TrialId, String),
+    /// The tags of a trial, while they are being written.
+    WriteTags(TrialId, String),
+    /// The label of the trial that the card asks about is a guess, or is not.
+    ToggleUnsure,
+    /// Hide what the model says until the label is given, or do not.
+    ToggleBlind,
 }
 
 /// A message to the user.

@@ -2,6 +2,8 @@
 
 mod trial;
 
+pub(super) use trial::instruction;
+
 use super::actions::Action;
 use super::icons::{self, Icon};
 use super::modes::{self, Mode};

@@ -1,12 +1,12 @@
 //! Keys: one list, from which both the behaviour and the sheet of keys are made. Off while a text field has focus.
 
-use super::actions::Action;
+use super::actions::{Action, DeskAction};
 use super::bars::SPEEDS;
 use super::modes::Mode;
 use super::panels::PanelContext;
 use egui::{Key, KeyboardShortcut, Modifiers};
 use palpate_core::drawing::{Camera, StandardView};
-use palpate_core::workers::{Command, GripperWish};
+use palpate_core::workers::{Command, GripperWish, LabelWish};
 
 /// A key, what it does, and how.
 pub(super) struct Binding {
@@ -36,17 +36,63 @@ const fn key(
     Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, only: None, act }
 }
 
+/// Ctrl and Shift.
+const UNDONE: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };
+
+/// A key of the mode Label.
+const fn label(
+    modifiers: Modifiers,
+    at: Key,
+    does: &'static str,
+    act: fn(&PanelContext<'_>) -> Option<Action>,
+) -> Binding {
+    key(modifiers, at, does, act).only_in(Mode::Label)
+}
+
+/// A key of the mode Label that another line of the sheet speaks of.
+const fn hidden(at: Key, act: fn(&PanelContext<'_>) -> Option<Action>) -> Binding {
+    label(Modifiers::NONE, at, "", act)
+}
+
 /// All keys. Those with more modifiers come first, so that they win.
-pub(super) const ALL: [Binding; 26] = [
+pub(super) const ALL: [Binding; 46] = [
     key(Modifiers::COMMAND, Key::Num1, "mode Demo", |_| Some(Action::SetMode(Mode::Demo))),
     key(Modifiers::COMMAND, Key::Num3, "mode Label", |_| Some(Action::SetMode(Mode::Label))),
-    key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or begin it anew", |_| Some(Action::BeginTrial)),
+    key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or begin it anew", |_| {
+        Some(Action::Desk(DeskAction::Record))
+    }),
     key(Modifiers::NONE, Key::Q, "end the trial, and keep it", |c| {
         c.gripper?.trial.as_ref()?;
         Some(Action::Gripper(GripperWish::End))
     }),
-    key(Modifiers::NONE, Key::D, "discard the trial", |_| Some(Action::DiscardTrial)),
+    key(Modifiers::NONE, Key::D, "discard the trial", |_| Some(Action::Desk(DeskAction::Discard))),
     key(Modifiers::NONE, Key::T, "tare the real gripper's sensors", |_| Some(Action::Gripper(GripperWish::Tare))),
+    key(Modifiers::COMMAND, Key::G, "connect the real gripper, or give its port back", |_| Some(Action::ToggleGripper)),
+    label(Modifiers::NONE, Key::N, "give the label, go on with the next", |_| Some(Action::Desk(DeskAction::Give))),
+    label(Modifiers::NONE, Key::Enter, "give the label", |_| Some(Action::Desk(DeskAction::Give))),
+    label(Modifiers::NONE, Key::U, "the label is unsure", |_| Some(Action::Desk(DeskAction::ToggleUnsure))),
+    label(Modifiers::NONE, Key::B, "blind: the model's guess stays hidden until the label is given", |_| {
+        Some(Action::Desk(DeskAction::ToggleBlind))
+    }),
+    label(Modifiers::NONE, Key::Slash, "find an object", |_| Some(Action::Desk(DeskAction::FocusSearch))),
+    label(Modifiers::NONE, Key::Num1, "choose the first object; 2 to 9 the others", |_| {
+        Some(Action::Desk(DeskAction::Choose(0)))
+    }),
+    hidden(Key::Num2, |_| Some(Action::Desk(DeskAction::Choose(1)))),
+    hidden(Key::Num3, |_| Some(Action::Desk(DeskAction::Choose(2)))),
+    hidden(Key::Num4, |_| Some(Action::Desk(DeskAction::Choose(3)))),
+    hidden(Key::Num5, |_| Some(Action::Desk(DeskAction::Choose(4)))),
+    hidden(Key::Num6, |_| Some(Action::Desk(DeskAction::Choose(5)))),
+    hidden(Key::Num7, |_| Some(Action::Desk(DeskAction::Choose(6)))),
+    hidden(Key::Num8, |_| Some(Action::Desk(DeskAction::Choose(7)))),
+    hidden(Key::Num9, |_| Some(Action::Desk(DeskAction::Choose(8)))),
+    label(Modifiers::NONE, Key::ArrowUp, "the trial above", |_| Some(Action::Desk(DeskAction::Step(-1)))),
+    label(Modifiers::NONE, Key::ArrowDown, "the trial below", |_| Some(Action::Desk(DeskAction::Step(1)))),
+    label(Modifiers::NONE, Key::Home, "the newest trial without a label", |_| {
+        Some(Action::Desk(DeskAction::Select(None)))
+    }),
+    key(UNDONE, Key::Z, "make it again", |_| Some(Action::Label(LabelWish::Redo))),
+    key(Modifiers::COMMAND, Key::Z, "take the last label or discard back", |_| Some(Action::Label(LabelWish::Undo))),
     key(Modifiers::NONE, Key::Space, "play or pause", |c| {
         let playing = c.snapshot?.status.playing;
         Some(Action::Simulation(if playing { Command::Pause } else { Command::Play }))
@@ -120,7 +166,7 @@ pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut 
         |ui| {
             egui::ScrollArea::vertical().max_height(room).show(ui, |ui| {
                 egui::Grid::new("keys").num_columns(2).spacing([22.0, 4.0]).show(ui, |ui| {
-                    for binding in ALL.iter().filter(|binding| binding.counts_in(mode)) {
+                    for binding in ALL.iter().filter(|binding| binding.counts_in(mode) && !binding.does.is_empty()) {
                         ui.monospace(ctx.format_shortcut(&binding.shortcut));
                         ui.label(binding.does);
                         ui.end_row();

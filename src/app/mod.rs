@@ -11,6 +11,7 @@ mod files;
 mod gripper_tools;
 mod icons;
 mod keys;
+mod labelling;
 mod modes;
 mod panels;
 mod plots;
@@ -33,7 +34,7 @@ pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_core::recognition::shipped_model;
 use palpate_core::scene::Scene;
-use palpate_core::workers::{examine_port, explain_scene, listen_to_port};
+use palpate_core::workers::{GripperWish, examine_port, explain_scene, listen_to_port};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -44,6 +45,8 @@ pub struct WindowOptions {
     pub scene: Scene,
     /// Where trials are stored.
     pub store: PathBuf,
+    /// The port of a real gripper to connect to.
+    pub port: Option<PathBuf>,
 }
 
 /// Size of the window when it is opened for the first time, and the smallest it can be made (points).
@@ -80,7 +83,11 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),
         };
-        Ok(Box::new(Window { workbench: Workbench::new(&creation.egui_ctx, setup)? }))
+        let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
+        if let Some(port) = options.port {
+            workbench.act(&creation.egui_ctx, Action::Gripper(GripperWish::Connect(Some(port))));
+        }
+        Ok(Box::new(Window { workbench }))
     });
     eframe::run_native("palpate", native, creator).map_err(|error| surroundings.explain(&error))
 }

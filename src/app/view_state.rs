@@ -1,5 +1,6 @@
 //! How the user looks at things: remembered between runs, never written into a trial.
 
+use super::labelling::LabelDraft;
 use super::modes::Mode;
 use super::panels::Source;
 use egui_tiles::Tree;
@@ -8,6 +9,7 @@ use palpate_core::palette::Theme;
 use palpate_core::rig::serial::Control;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// Camera, theme, layout and the like.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -32,6 +34,13 @@ pub struct ViewState {
     pub source: Source,
     /// Who moves the fingers of the real gripper.
     pub control: Control,
+    /// The port that was connected to last.
+    pub port: Option<PathBuf>,
+    /// What the model says is hidden until the label is given.
+    pub blind: bool,
+    /// What the user is about to say of a trial.
+    #[serde(skip)]
+    pub draft: LabelDraft,
     /// The stretch of time that all plots show (s); `None` for the whole grasp.
     #[serde(skip)]
     pub time_window: Option<[f64; 2]>,
@@ -57,6 +66,9 @@ impl Default for ViewState {
             layouts: BTreeMap::new(),
             source: Source::default(),
             control: Control::ByHand,
+            port: None,
+            blind: true,
+            draft: LabelDraft::default(),
             time_window: None,
             keys_shown: false,
             recent: Vec::new(),

@@ -1,10 +1,11 @@
 //! The whole window's contents: it owns the simulation's handle, the view state and the traces, lets panels draw, and
 //! applies what they ask for.
 
+mod real;
+
 use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
 use super::gripper_tools::{GripperTools, GripperToolsSetup};
-use super::modes::Mode;
 use super::panels::{PanelContext, PanelKind, Source};
 use super::theme::{self, colour};
 use super::tiling::{Tiling, panel_frame};
@@ -17,16 +18,17 @@ use egui_notify::Toasts;
 use glam::Vec2;
 use palpate_core::drawing::Camera;
 use palpate_core::grasping::ObjectDeck;
-use palpate_core::gripper::Phase;
 use palpate_core::objects::{EMPTY, anchored, catalogue, thumbnail};
 use palpate_core::picture::PictureView;
 use palpate_core::recognition::Model;
+use palpate_core::recording::TrialId;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::SensorLayout;
 use palpate_core::trial::Frame as TrialFrame;
 use palpate_core::workers::{
-    Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, Listen,
-    MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, TrialPart, TrialRequest, Wake,
+    Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, LabelView,
+    LabelWish, Labeller, Listen, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
+    TrialPart, Wake, start_labeller,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -74,6 +76,11 @@ pub struct Workbench {
     effects: EffectsWorker,
     tools: GripperTools,
     gripper: GripperWorker,
+    labeller: Labeller,
+    /// What came of wishes about labels has been told up to this number.
+    labels_told: u64,
+    /// The trial of the real gripper that ended last.
+    trial_ended: Option<TrialId>,
     /// Traces of the real gripper.
     felt: Traces,
     /// The part of the trial that was seen last: the simulation closes its fingers with the real ones.
@@ -105,6 +112,7 @@ struct Shown<'a> {
     accuracy: Option<&'a MeasuredAccuracy>,
     ghost: Option<&'a GhostGrasp>,
     gripper: Option<&'a GripperView>,
+    labels: Option<&'a LabelView>,
 }
 
 /// Messages that are kept.
@@ -130,13 +138,15 @@ impl Workbench {
         let tools = GripperTools::start(setup.tools, &setup.wake)?;
         let gripper = GripperWorker::start(GripperSetup {
             scene: setup.scene.clone(),
-            store: setup.store,
+            store: setup.store.clone(),
             model: setup.model.as_ref().ok().cloned(),
             grasps: GRASPS,
             listen: setup.listen,
             wake: Arc::clone(&setup.wake),
         })
         .map_err(|e| format!("the gripper's thread could not be started: {e}"))?;
+        let labeller = start_labeller(setup.store, Arc::clone(&setup.wake))
+            .map_err(|e| format!("the thread that keeps labels could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -149,6 +159,9 @@ impl Workbench {
             effects,
             tools,
             gripper,
+            labeller,
+            labels_told: 0,
+            trial_ended: None,
             felt: Traces::default(),
             trial_part: None,
             connected: false,
@@ -215,12 +228,14 @@ impl Workbench {
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
         let mode = self.view.mode;
         let mut layout = self.view.take_layout();
-        let (accuracy, ghost, gripper) = (self.worker.accuracy(), self.ghost(), self.gripper.view());
+        let (accuracy, ghost) = (self.worker.accuracy(), self.ghost());
+        let (gripper, labels) = (self.gripper.view(), self.labeller.view());
         let shown = Shown {
             snapshot: snapshot.as_deref(),
             accuracy: accuracy.as_deref(),
             ghost: ghost.as_deref(),
             gripper: gripper.as_deref(),
+            labels: labels.as_deref(),
         };
         let context = self.panel_context(&shown);
         actions.extend(keys::pressed(&ctx, &context));
@@ -235,6 +250,7 @@ impl Workbench {
         keys::sheet(&ctx, self.view.keys_shown, self.view.mode, &mut actions);
         drop_hint(&ctx);
         self.view.layouts.insert(mode, layout);
+        self.view.draft.focus_search = false;
         for action in actions {
             self.apply(&ctx, action);
         }
@@ -250,12 +266,14 @@ impl Workbench {
         let mut actions = Vec::new();
         panel_frame(panel, self.view.theme).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            let (accuracy, gripper) = (self.worker.accuracy(), self.gripper.view());
+            let accuracy = self.worker.accuracy();
+            let (gripper, labels) = (self.gripper.view(), self.labeller.view());
             let shown = Shown {
                 snapshot: snapshot.as_deref(),
                 accuracy: accuracy.as_deref(),
                 ghost: ghost.as_deref(),
                 gripper: gripper.as_deref(),
+                labels: labels.as_deref(),
             };
             let context = self.panel_context(&shown);
             (panel.ui)(ui, &context, &mut actions);
@@ -295,7 +313,8 @@ impl Workbench {
             tools: &self.tools,
             gripper: shown.gripper,
             source,
-            blind: false,
+            labels: shown.labels,
+            blind: self.is_blind(shown),
             traces: match source {
                 Source::Simulation => &self.traces,
                 Source::Gripper => &self.felt,
@@ -316,6 +335,7 @@ impl Workbench {
             self.traces.push(&row);
         }
         self.gather_gripper();
+        self.gather_labels();
         let notices: Vec<Notice> = self.worker.notices().chain(self.gripper.notices()).collect();
         for notice in notices {
             match notice {
@@ -335,39 +355,6 @@ impl Workbench {
         }
         if self.unsent {
             self.send_scene();
-        }
-    }
-
-    /// Takes in what the real gripper has felt, and lets the simulated one close its fingers with it.
-    fn gather_gripper(&mut self) {
-        if self.gripper.take_rows_lost() {
-            self.felt.clear();
-        }
-        for row in self.gripper.rows() {
-            self.felt.push(&row);
-        }
-        let Some(gripper) = self.gripper.view() else { return };
-        if self.connected != gripper.is_connected() {
-            self.connected = gripper.is_connected();
-            self.view.source = if self.connected { Source::Gripper } else { Source::Simulation };
-        }
-        let part = gripper.trial.as_ref().map(|trial| trial.part);
-        if self.trial_part != part {
-            self.trial_part = part;
-            if part == Some(TrialPart::Phase(Phase::Close)) {
-                self.close_twin();
-            }
-        }
-    }
-
-    /// The simulated fingers do what the real ones do, so that one lies over the other.
-    fn close_twin(&mut self) {
-        for command in
-            [Command::SetRecording(false), Command::SetGrasps(1), Command::SetSpeed(1.0), Command::Reset, Command::Play]
-        {
-            if let Err(cause) = self.worker.send(command) {
-                self.tell(Message::Warning(cause.to_string()));
-            }
         }
     }
 
@@ -425,9 +412,18 @@ impl Workbench {
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
             Action::Tool(wish) => self.tools.grant(wish),
-            Action::Gripper(wish) => self.gripper.wish(wish),
-            Action::BeginTrial => self.begin_trial(),
-            Action::DiscardTrial => self.gripper.wish(GripperWish::Discard),
+            Action::Gripper(wish) => {
+                if let GripperWish::Connect(Some(port)) = &wish {
+                    self.view.port = Some(port.clone());
+                }
+                self.gripper.wish(wish);
+            }
+            Action::Desk(action) => self.at_desk(action),
+            Action::ToggleGripper => self.gripper.wish(match self.connected {
+                true => GripperWish::Disconnect,
+                false => GripperWish::Connect(self.view.port.clone()),
+            }),
+            Action::Label(wish) => self.labeller.ask(wish),
             Action::Stop => {
                 self.view.keys_shown = false;
                 if self.connected {
@@ -439,7 +435,10 @@ impl Workbench {
                 self.gripper.wish(GripperWish::SetThreshold(threshold));
                 self.apply(ctx, Action::Simulation(Command::SetThreshold(threshold)));
             }
-            Action::SetMode(mode) => self.view.mode = mode,
+            Action::SetMode(mode) => {
+                self.view.mode = mode;
+                self.labeller.ask(LabelWish::Refresh);
+            }
             Action::Show(source) => self.view.source = source,
             Action::SetCamera(camera) => self.view.camera = camera,
             Action::FrameAll => {
@@ -463,11 +462,6 @@ impl Workbench {
             Action::Tell(message) => self.tell(message),
         }
         ctx.request_repaint();
-    }
-
-    fn begin_trial(&mut self) {
-        let request = TrialRequest { object: None, control: self.view.control, adds: self.view.mode == Mode::Demo };
-        self.gripper.wish(GripperWish::Begin(request));
     }
 
     fn frame_all(&mut self, snapshot: &Snapshot) {

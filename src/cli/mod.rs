@@ -44,6 +44,9 @@ struct Arguments {
     command: Option<Command>,
     /// What to begin with: a built-in object, a URDF, OBJ or STL file, or a scene file (.toml).
     object: Option<String>,
+    /// Connect the window to the real gripper: a port, a link to one, or a file of captured bytes.
+    #[arg(long, value_name = "PORT")]
+    port: Option<PathBuf>,
     /// The SQLite file that holds the trials (default: the platform's data folder).
     #[arg(long, global = true, value_name = "FILE")]
     store: Option<PathBuf>,
@@ -89,7 +92,7 @@ enum Command {
 }
 
 /// Opens the window on an object.
-fn window(object: Option<&str>, store: Option<&Path>) -> Result<(), Failure> {
+fn window(object: Option<&str>, port: Option<&Path>, store: Option<&Path>) -> Result<(), Failure> {
     let mut scene = Scene::default();
     if let Some(object) = object {
         if object.to_ascii_lowercase().ends_with(".toml") {
@@ -102,7 +105,7 @@ fn window(object: Option<&str>, store: Option<&Path>) -> Result<(), Failure> {
         scene.load_object()?;
     }
     let store = store.map_or_else(Store::default_path, Path::to_owned);
-    Ok(open_window(WindowOptions { scene, store })?)
+    Ok(open_window(WindowOptions { scene, store, port: port.map(Path::to_owned) })?)
 }
 
 /// A word that is neither a command nor an object would open a window with nothing in it.
@@ -119,6 +122,10 @@ fn refuse_typing_errors(object: &str) {
 /// Runs the program as its arguments ask.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
+    if arguments.port.is_some() && arguments.command.is_some() {
+        let text = "--port belongs to the window, or after the command";
+        Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
+    }
     if let (Some(object), Some(_)) = (&arguments.object, &arguments.command) {
         let text =
             format!("'{object}' stands before a command; name the object after it, as in palpate grasp {object}");
@@ -159,7 +166,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study)?,
         Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,
-        None => window(arguments.object.as_deref(), store)?,
+        None => window(arguments.object.as_deref(), arguments.port.as_deref(), store)?,
     }
     Ok(ExitCode::SUCCESS)
 }

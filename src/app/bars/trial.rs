@@ -1,6 +1,6 @@
 //! The lower bar while the real gripper is shown: the keys of a trial, what is to be done now, and how much of it is left.
 
-use crate::app::actions::Action;
+use crate::app::actions::{Action, DeskAction};
 use crate::app::panels::PanelContext;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
@@ -23,11 +23,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
             connected,
             record,
             "Record a grasp; while one goes on, give it up and begin anew (R)",
-            Action::BeginTrial,
+            Action::Desk(DeskAction::Record),
         );
         let end = Action::Gripper(GripperWish::End);
         button(trial.is_some(), "End  Q", "End the trial now, and keep it (Q)", end);
-        button(trial.is_some(), "Discard  D", "Give the trial up (D)", Action::DiscardTrial);
+        button(trial.is_some(), "Discard  D", "Give the trial up (D)", Action::Desk(DeskAction::Discard));
         ui.separator();
         let colours = context.view.theme.colours();
         match trial {

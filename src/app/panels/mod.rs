@@ -10,11 +10,15 @@ mod effects;
 mod force;
 mod grasp;
 mod gripper;
+mod journal;
+mod label;
 mod line_pressure;
 mod objects;
+mod plan;
 mod pressure;
 mod recognition;
 mod scene;
+mod trials;
 mod view3d;
 
 pub(super) use gripper::stop_button;
@@ -29,10 +33,10 @@ use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::Channel;
 use palpate_core::trial::Frame;
-use palpate_core::workers::{EffectsWorker, GripperView, LEAD_S, MeasuredAccuracy, Snapshot};
+use palpate_core::workers::{EffectsWorker, GripperView, LEAD_S, LabelView, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What panels may read.
 pub struct PanelContext<'a> {
@@ -48,6 +52,8 @@ pub struct PanelContext<'a> {
     pub tools: &'a GripperTools,
     /// Where the real gripper stands; absent until its thread has begun.
     pub gripper: Option<&'a GripperView>,
+    /// Labels, plan and journal; absent until the store has been looked into.
+    pub labels: Option<&'a LabelView>,
     /// Which gripper the plots and the recognition are of.
     pub source: Source,
     /// What the model says is hidden until the label is given.
@@ -182,7 +188,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 15] = [
+pub const ALL: [PanelKind; 19] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -193,6 +199,10 @@ pub const ALL: [PanelKind; 15] = [
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
     PanelKind { name: "effects", title: "Effects", ui: effects::ui },
+    PanelKind { name: "label", title: "Label", ui: label::ui },
+    PanelKind { name: "plan", title: "Plan", ui: plan::ui },
+    PanelKind { name: "trials", title: "Trials", ui: trials::ui },
+    PanelKind { name: "journal", title: "Journal", ui: journal::ui },
     PanelKind { name: "gripper", title: "Gripper", ui: gripper::ui },
     PanelKind { name: "counts", title: "Counts", ui: counts::ui },
     PanelKind { name: "console", title: "Console", ui: console::ui },

@@ -1,0 +1,293 @@
+//! The card of the object in the hand: what to take next and how, what goes on, and what the trial is of. Everything on it
+//! has a key.
+
+use super::{PanelContext, title_of, wrapped};
+use crate::app::actions::{Action, DeskAction};
+use crate::app::bars::instruction;
+use crate::app::theme::{colour, veil};
+use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
+use palpate_core::labelling::{LabelledTrial, NextTrial};
+use palpate_core::objects::catalogue;
+use palpate_core::workers::{GripperView, LabelView, LabelWish, TrialView};
+
+/// Side of the picture of an object (points).
+const PICTURE: f32 = 72.0;
+/// Objects that are listed.
+const LISTED: usize = 9;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let Some(view) = context.labels else {
+        ui.weak("Looking into the store ..");
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let going_on = context.gripper.and_then(|gripper| gripper.trial.as_ref());
+        match (going_on, context.view.draft.trial(view)) {
+            (Some(trial), _) => going_on_ui(ui, context, view, trial),
+            (None, Some(trial)) => question_ui(ui, context, view, trial, actions),
+            (None, None) => next_ui(ui, context, view, actions),
+        }
+    });
+}
+
+/// Picture, name and class of an object.
+fn object_ui(ui: &mut Ui, context: &PanelContext<'_>, name: &str, below: &str) {
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(vec2(PICTURE, PICTURE), Sense::hover());
+        picture(ui, context, name, rect);
+        ui.vertical(|ui| {
+            ui.label(RichText::new(title_of(name)).size(24.0).strong());
+            if let Some(built_in) = catalogue().iter().find(|built_in| built_in.name == name) {
+                ui.weak(built_in.class().to_string());
+            }
+            if !below.is_empty() {
+                wrapped(ui, RichText::new(below));
+            }
+        });
+    });
+}
+
+fn picture(ui: &Ui, context: &PanelContext<'_>, name: &str, place: Rect) {
+    match context.thumbnails.get(name) {
+        Some(texture) => egui::Image::new(texture).corner_radius(4.0).paint_at(ui, place),
+        None => {
+            let stroke = egui::Stroke::new(1.5, colour(context.view.theme.colours().border));
+            ui.painter().rect_stroke(place.shrink(1.0), 4.0, stroke, egui::StrokeKind::Inside);
+        }
+    }
+}
+
+/// What to put between the fingers.
+fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &mut Vec<Action>) {
+    last_ui(ui, context, view);
+    match &view.next {
+        Some(next) => {
+            ui.weak("next");
+            object_ui(ui, context, &next.object, &cue(next));
+        }
+        None => {
+            ui.heading("The plan is done");
+            wrapped(
+                ui,
+                RichText::new("Export with Ctrl+E, train in the panel Training, or want more in the panel Plan.")
+                    .weak(),
+            );
+        }
+    }
+    ui.add_space(4.0);
+    let connected = context.gripper.is_some_and(GripperView::is_connected);
+    let colours = context.view.theme.colours();
+    let fill = colour(colours.raised.mix(colours.accent, 0.35));
+    if connected {
+        let button = Button::new("Record  R").fill(fill);
+        if ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp of it (R)").clicked() {
+            actions.push(Action::Desk(DeskAction::Record));
+        }
+    } else {
+        wrapped(
+            ui,
+            RichText::new("Connect the gripper first: Ctrl+G, or the panel Gripper below.")
+                .color(ui.visuals().warn_fg_color),
+        );
+    }
+}
+
+/// How the object is to be held, in words.
+fn cue(next: &NextTrial) -> String {
+    let turn = format!("turn it by {:.0}°", next.cue.turn_deg);
+    let [along, across] = next.cue.shift_mm;
+    let part = |by: f64, positive: &str, negative: &str| match by.round() {
+        by if by > 0.0 => format!(", {by:.0} mm {positive}"),
+        by if by < 0.0 => format!(", {:.0} mm {negative}", -by),
+        _ => String::new(),
+    };
+    let shifts =
+        part(along, "towards the right finger", "towards the left finger") + &part(across, "backwards", "forwards");
+    format!("trial {} of it: {turn}{shifts}", next.number)
+}
+
+/// What goes on, large enough for whoever stands at the control box.
+fn going_on_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial: &TrialView) {
+    let accent = colour(context.view.theme.colours().accent);
+    ui.label(RichText::new(instruction(trial)).size(26.0).strong().color(accent));
+    if let Some(left_s) = trial.left_s {
+        ui.label(RichText::new(format!("{left_s:.1} s")).size(30.0).monospace());
+    }
+    ui.weak(format!("trial {}: {} readings", trial.id, trial.samples));
+    if let Some(next) = &view.next {
+        object_ui(ui, context, &next.object, &cue(next));
+    }
+}
+
+/// How the last label was received: the model's guess is shown now, and where it differs.
+fn last_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView) {
+    let last = view.trials.iter().find(|trial| !trial.discarded && trial.object.is_some());
+    let Some((trial, label)) = last.and_then(|trial| Some((trial, trial.object.as_ref()?))) else { return };
+    let colours = context.view.theme.colours();
+    let (text, ink) = match &trial.guess {
+        Some(guess) if guess.class == *label => {
+            (format!("trial {}: {label}. The model agrees, {:.0} %", trial.id, 100.0 * guess.p), colours.accent)
+        }
+        Some(guess) => {
+            let (class, p) = (&guess.class, 100.0 * guess.p);
+            (
+                format!("trial {}: {label}. The model says {class}, {p:.0} %: to be looked at again", trial.id),
+                colours.warning,
+            )
+        }
+        None => (format!("trial {}: {label}", trial.id), colours.quiet_text),
+    };
+    let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
+    frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        wrapped(ui, RichText::new(text).small().color(colour(ink)));
+        for flag in &trial.flags {
+            wrapped(
+                ui,
+                RichText::new(format!("{}: {}", flag.flag.label(), flag.remark)).small().color(colour(colours.warning)),
+            );
+        }
+    });
+}
+
+/// What was it?
+fn question_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    view: &LabelView,
+    trial: &LabelledTrial,
+    actions: &mut Vec<Action>,
+) {
+    let draft = &context.view.draft;
+    let question = match &trial.object {
+        Some(label) => format!("Trial {} is called {}. What is it?", trial.id, title_of(label)),
+        None => format!("Trial {}: what was it?", trial.id),
+    };
+    ui.label(RichText::new(question).heading().strong());
+    wrapped(ui, RichText::new(&trial.cadence).small().weak());
+    for flag in &trial.flags {
+        let text = format!("{}: {}", flag.flag.label(), flag.remark);
+        wrapped(ui, RichText::new(text).small().color(ui.visuals().warn_fg_color));
+    }
+    search_ui(ui, context, actions);
+    let (names, chosen) = (draft.objects(view), draft.chosen.unwrap_or(0));
+    for (place, name) in names.iter().take(LISTED).enumerate() {
+        let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
+        if object_row(ui, context, place, name, place == chosen, !known).clicked() {
+            actions.push(Action::Desk(DeskAction::Choose(place)));
+            actions.push(Action::Desk(DeskAction::Give));
+        }
+    }
+    if names.len() > LISTED {
+        ui.weak(format!("and {} more: type to find them (/)", names.len() - LISTED));
+    }
+    ui.horizontal_wrapped(|ui| {
+        let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
+        if ui.add(Button::new("Label  N, Enter").fill(fill)).clicked() {
+            actions.push(Action::Desk(DeskAction::Give));
+        }
+        let again = if trial.object.is_none() { "Again  R" } else { "Record  R" };
+        if ui
+            .button(again)
+            .on_hover_text("Throw this one away and record it again, where it has no label yet")
+            .clicked()
+        {
+            actions.push(Action::Desk(DeskAction::Record));
+        }
+        if ui.button("Discard  D").clicked() {
+            actions.push(Action::Desk(DeskAction::Discard));
+        }
+        let mut unsure = trial.unsure;
+        if ui.checkbox(&mut unsure, "unsure  U").changed() {
+            actions.push(Action::Label(LabelWish::Unsure(trial.id, unsure)));
+        }
+    });
+    remarks_ui(ui, context, trial, actions);
+}
+
+/// The field that finds objects.
+fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let draft = &context.view.draft;
+    let mut search = draft.search.clone();
+    let hint = "find an object, or name a new one ( / )";
+    let field = TextEdit::singleline(&mut search).hint_text(hint).desired_width(f32::INFINITY).char_limit(80);
+    let response = ui.add(field.id(egui::Id::unique("label search")));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
+    if draft.focus_search {
+        response.request_focus();
+    }
+    // The arrows choose among what was found while the cursor stays in the field.
+    let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));
+    if response.has_focus() && step != 0 {
+        let place = draft.chosen.unwrap_or(0).saturating_add_signed(step as isize).min(LISTED - 1);
+        actions.push(Action::Desk(DeskAction::Choose(place)));
+    }
+    if search != draft.search {
+        actions.push(Action::Desk(DeskAction::Search(search)));
+    } else if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
+        actions.push(Action::Desk(DeskAction::Give));
+    }
+}
+
+/// An object that can be chosen: its key, its picture, its name.
+fn object_row(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    place: usize,
+    name: &str,
+    chosen: bool,
+    new: bool,
+) -> egui::Response {
+    let colours = context.view.theme.colours();
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 26.0), Sense::click());
+    let title = if new { format!("{name} (new)") } else { title_of(name) };
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, format!("Label {title}")));
+    if chosen || response.hovered() || response.has_focus() {
+        let share = if chosen { 0.30 } else { 0.10 };
+        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
+    }
+    let builder =
+        egui::UiBuilder::new().max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(Layout::left_to_right(Align::Center));
+    let mut inside = ui.new_child(builder);
+    inside.label(RichText::new((place + 1).to_string()).monospace().color(colour(colours.quiet_text)));
+    let (thumbnail, _) = inside.allocate_exact_size(vec2(24.0, 24.0), Sense::hover());
+    picture(&inside, context, name, thumbnail);
+    inside.add(egui::Label::new(title).truncate().selectable(false));
+    response
+}
+
+/// Notes and tags.
+fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, actions: &mut Vec<Action>) {
+    let draft = &context.view.draft;
+    let own = |written: &Option<(i64, String)>, stored: String| match written {
+        Some((id, text)) if *id == trial.id => text.clone(),
+        _ => stored,
+    };
+    egui::Grid::new("remarks").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
+        let mut note = own(&draft.note, trial.note.clone());
+        let label = ui.label("Note");
+        let response =
+            ui.add(TextEdit::singleline(&mut note).desired_width(f32::INFINITY).char_limit(500)).labelled_by(label.id);
+        if response.changed() {
+            actions.push(Action::Desk(DeskAction::WriteNote(trial.id, note.clone())));
+        }
+        if response.lost_focus() && note != trial.note {
+            actions.push(Action::Label(LabelWish::Note(trial.id, note)));
+        }
+        ui.end_row();
+        let mut tags = own(&draft.tags, trial.tags.join(", "));
+        let label = ui.label("Tags");
+        let field =
+            TextEdit::singleline(&mut tags).hint_text("with commas").desired_width(f32::INFINITY).char_limit(200);
+        let response = ui.add(field).labelled_by(label.id);
+        if response.changed() {
+            actions.push(Action::Desk(DeskAction::WriteTags(trial.id, tags.clone())));
+        }
+        let list: Vec<String> =
+            tags.split(',').map(|tag| tag.trim().to_owned()).filter(|tag| !tag.is_empty()).collect();
+        if response.lost_focus() && list != trial.tags {
+            actions.push(Action::Label(LabelWish::Tags(trial.id, list)));
+        }
+        ui.end_row();
+    });
+}

@@ -1,0 +1,94 @@
+//! The plan of a labelling afternoon: how many trials of each object there are and are wanted, and which comes next.
+
+use super::{PanelContext, title_of};
+use crate::app::actions::Action;
+use crate::app::theme::{colour, veil};
+use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
+use palpate_core::labelling::{MOST_WANTED, ObjectProgress};
+use palpate_core::palette::Theme;
+use palpate_core::workers::LabelWish;
+
+/// Trials of an object that is added: as of the others (paper, section IV-B: 40 to 55).
+const WANTED: u32 = 50;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let Some(view) = context.labels else {
+        ui.weak("Looking into the store ..");
+        return;
+    };
+    let (done, wanted) = (view.progress.done(), view.progress.wanted());
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(format!("{done} of {wanted} trials")).strong());
+        if let Some(next) = &view.next {
+            ui.weak(format!("next: {}", title_of(&next.object)));
+        }
+    });
+    add_ui(ui, actions);
+    let next = view.next.as_ref().map(|next| next.object.as_str());
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 3.0;
+        for object in &view.progress.objects {
+            row_ui(ui, context.view.theme, object, next == Some(object.name.as_str()), actions);
+        }
+    });
+}
+
+/// The field for an object that is not in the plan yet.
+fn add_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
+    let id = egui::Id::unique("plan addition");
+    let mut name = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    let field =
+        TextEdit::singleline(&mut name).hint_text("add an object ..").desired_width(f32::INFINITY).char_limit(80);
+    let response = ui.add(field);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
+    if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
+        actions.push(Action::Label(LabelWish::Want(name.trim().to_owned(), WANTED)));
+        name.clear();
+    }
+    ui.data_mut(|data| data.insert_temp(id, name));
+}
+
+/// Name, a bar of what there is, and how many are wanted.
+fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, actions: &mut Vec<Action>) {
+    let colours = theme.colours();
+    let ObjectProgress { name, wanted, done, flagged } = object;
+    ui.horizontal(|ui| {
+        let size = vec2((ui.available_width() - 84.0).max(60.0), 22.0);
+        let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+        let flags = if *flagged > 0 { format!(", {flagged} with a flag") } else { String::new() };
+        let spoken = format!("{}: {done} of {wanted}{flags}", title_of(name));
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, &spoken));
+        response.on_hover_text(&spoken);
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 3.0, colour(colours.raised));
+        let share = |count: u32| (f64::from(count) / f64::from((*wanted).max(1))).min(1.0) as f32;
+        let part = |from: f32, to: f32| {
+            let x = |share: f32| rect.left() + rect.width() * share;
+            Rect::from_min_max(pos2(x(from), rect.top()), pos2(x(to), rect.bottom()))
+        };
+        let sound = share(done.saturating_sub(*flagged));
+        painter.rect_filled(part(0.0, sound), 3.0, veil(colours.accent, 0.45));
+        painter.rect_filled(part(sound, share(*done)), 3.0, veil(colours.warning, 0.45));
+        if next {
+            let stroke = egui::Stroke::new(1.5, colour(colours.accent));
+            painter.rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Inside);
+        }
+        let (font, ink) = (egui::FontId::proportional(12.5), colour(colours.text));
+        painter.text(rect.left_center() + vec2(6.0, 0.0), egui::Align2::LEFT_CENTER, title_of(name), font.clone(), ink);
+        painter.text(rect.right_center() - vec2(6.0, 0.0), egui::Align2::RIGHT_CENTER, done.to_string(), font, ink);
+        let mut new = *wanted;
+        let drag = DragValue::new(&mut new).range(0..=MOST_WANTED).speed(0.2);
+        let response = ui.add_sized([40.0, 22.0], drag).on_hover_text("How many are wanted");
+        // While it is dragged it has not been decided.
+        if new != *wanted && new > 0 && !response.dragged() {
+            actions.push(Action::Label(LabelWish::Want(name.clone(), new)));
+        }
+        let remove = ui.add_enabled(*wanted > 0, egui::Button::new("–").small());
+        remove.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Take {name} out of the plan"))
+        });
+        if remove.on_hover_text("Take it out of the plan; its trials stay").clicked() {
+            actions.push(Action::Label(LabelWish::Unplan(name.clone())));
+        }
+    });
+}

@@ -1,0 +1,132 @@
+//! Trials of the real gripper, newest first: a small picture of each, its label, what is wrong with it, and where the model
+//! sees something else.
+
+use super::{PanelContext, title_of};
+use crate::app::actions::{Action, DeskAction};
+use crate::app::labelling::ShownTrials;
+use crate::app::theme::colour;
+use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
+use palpate_core::labelling::LabelledTrial;
+use palpate_core::palette::Trace;
+use palpate_core::workers::{LabelView, LabelWish};
+
+/// Height of a row (points).
+const ROW: f32 = 38.0;
+/// Width of the small picture (points).
+const PICTURE: f32 = 74.0;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let Some(view) = context.labels else {
+        ui.weak("Looking into the store ..");
+        return;
+    };
+    let draft = &context.view.draft;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for shown in ShownTrials::ALL {
+            let text = format!("{} {}", shown.title(), shown.of(view).len());
+            if ui.selectable_label(draft.shown == shown, RichText::new(text).small()).clicked() {
+                actions.push(Action::Desk(DeskAction::Show(shown)));
+            }
+        }
+    });
+    let listed = draft.shown.of(view);
+    if listed.is_empty() {
+        let text = match draft.shown {
+            ShownTrials::Kept => "No trial of the real gripper yet: connect it, and press R.",
+            ShownTrials::Disagreeing => "No label differs from what the model saw.",
+            ShownTrials::Unlabelled | ShownTrials::Flagged | ShownTrials::Discarded => "None.",
+        };
+        ui.weak(text);
+        return;
+    }
+    let current = draft.trial(view).map(|trial| trial.id);
+    ScrollArea::vertical().auto_shrink(false).show_rows(ui, ROW, listed.len(), |ui, rows| {
+        for trial in &listed[rows] {
+            row_ui(ui, context, view, trial, current == Some(trial.id), actions);
+        }
+    });
+}
+
+fn row_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    view: &LabelView,
+    trial: &LabelledTrial,
+    current: bool,
+    actions: &mut Vec<Action>,
+) {
+    let colours = context.view.theme.colours();
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW - 3.0), Sense::click());
+    let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), title_of);
+    response.widget_info(|| {
+        egui::WidgetInfo::selected(egui::Role::Button, true, current, format!("Trial {}, {name}", trial.id))
+    });
+    if current || response.hovered() || response.has_focus() {
+        let share = if current { 0.30 } else { 0.10 };
+        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
+    }
+    let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
+    sparkline(ui, context, trial, picture);
+    let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);
+    let words = Rect::from_min_max(pos2(picture.right() + 8.0, rect.top() + 3.0), rect.max - vec2(4.0, 3.0));
+    let painter = ui.painter_at(words);
+    let ink = if trial.object.is_some() { colours.text } else { colours.warning };
+    let mark = if trial.unsure { "?" } else { "" };
+    let title = format!("{}  {name}{mark}", trial.id);
+    painter.text(words.left_top(), Align2::LEFT_TOP, title, FontId::proportional(13.0), colour(ink));
+    let blind = context.blind && trial.object.is_none();
+    let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
+        (true, ..) => ("discarded".to_owned(), colours.error),
+        (_, _, Some(found)) => (format!("model: {} {:.0} %", found.guess, 100.0 * found.p), colours.warning),
+        (_, Some(_), None) => {
+            let labels: Vec<&str> = trial.flags.iter().map(|flag| flag.flag.label()).collect();
+            (labels.join(", "), colours.warning)
+        }
+        (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),
+    };
+    painter.text(words.left_bottom(), Align2::LEFT_BOTTOM, below, FontId::proportional(11.0), colour(ink));
+    let clicked = response.clicked();
+    let about = || {
+        format!(
+            "{}\n{}{}",
+            trial.cadence,
+            trial.note,
+            trial.tags.iter().map(|tag| format!(" #{tag}")).collect::<String>()
+        )
+    };
+    response.on_hover_text(about()).context_menu(|ui| {
+        if disagrees.is_some() && ui.button("Keep its label: looked at again").clicked() {
+            actions.push(Action::Label(LabelWish::Reviewed(trial.id)));
+        }
+        if ui.button("Discard").clicked() {
+            actions.push(Action::Label(LabelWish::Discard(trial.id)));
+        }
+    });
+    if clicked {
+        actions.push(Action::Desk(DeskAction::Select(Some(trial.id))));
+    }
+}
+
+/// The counts of both fingers' pads, small.
+fn sparkline(ui: &Ui, context: &PanelContext<'_>, trial: &LabelledTrial, place: Rect) {
+    let theme = context.view.theme;
+    let painter = ui.painter_at(place);
+    painter.rect_filled(place, 2.0, colour(theme.colours().raised));
+    let inks: [Color32; 2] = [Trace::Pressure, Trace::PressureDistal].map(|trace| colour(trace.colour(theme)));
+    let values = &trial.sparkline;
+    let all = || values.iter().flatten().flatten().copied();
+    let (low, high) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
+    let range = (high - low).max(1.0);
+    for (finger, ink) in values.iter().zip(inks) {
+        let last = finger.len().saturating_sub(1).max(1) as f32;
+        let at = |(k, value): (usize, &Option<f32>)| {
+            let x = place.left() + place.width() * k as f32 / last;
+            value.map(|value| pos2(x, place.bottom() - 2.0 - (place.height() - 4.0) * (value - low) / range))
+        };
+        let points: Vec<Option<egui::Pos2>> = finger.iter().enumerate().map(at).collect();
+        for piece in points.split(Option::is_none) {
+            painter.line(piece.iter().copied().flatten().collect(), Stroke::new(1.2, ink));
+        }
+    }
+}

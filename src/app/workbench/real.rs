@@ -1,0 +1,147 @@
+//! What the workbench does for the real gripper: it takes in what was felt, lets the simulated fingers close with the real
+//! ones, and grants what is asked for at the desk where trials are recorded and labelled.
+
+use super::{Shown, Workbench};
+use crate::app::actions::{DeskAction, Message};
+use crate::app::modes::Mode;
+use crate::app::panels::Source;
+use palpate_core::gripper::Phase;
+use palpate_core::labelling::LabelledTrial;
+use palpate_core::workers::{Command, GripperWish, LabelWish, TrialPart, TrialRequest};
+
+impl Workbench {
+    /// Grants what is asked for at the desk.
+    pub(super) fn at_desk(&mut self, action: DeskAction) {
+        let draft = &mut self.view.draft;
+        match action {
+            DeskAction::Record => self.begin_trial(),
+            DeskAction::Discard => self.discard_trial(),
+            DeskAction::Give => self.give_label(),
+            DeskAction::Choose(place) => draft.chosen = Some(place),
+            DeskAction::Search(search) => (draft.search, draft.chosen) = (search, None),
+            DeskAction::FocusSearch => draft.focus_search = true,
+            DeskAction::Select(id) => {
+                draft.done();
+                draft.selected = id;
+            }
+            DeskAction::Step(by) => {
+                if let Some(labels) = self.labeller.view() {
+                    draft.step(&labels, by);
+                }
+            }
+            DeskAction::Show(shown) => draft.shown = shown,
+            DeskAction::WriteNote(id, text) => draft.note = Some((id, text)),
+            DeskAction::WriteTags(id, text) => draft.tags = Some((id, text)),
+            DeskAction::ToggleUnsure => {
+                if let Some(trial) = self.asked_about() {
+                    self.labeller.ask(LabelWish::Unsure(trial.id, !trial.unsure));
+                }
+            }
+            DeskAction::ToggleBlind => {
+                self.view.blind = !self.view.blind;
+                let state = if self.view.blind { "hidden until the label is given" } else { "shown" };
+                self.tell(Message::Info(format!("what the model says is {state}")));
+            }
+        }
+    }
+
+    /// What the model says is hidden while a trial goes on, and until it has a label.
+    pub(super) fn is_blind(&self, shown: &Shown<'_>) -> bool {
+        let going_on = shown.gripper.is_some_and(|gripper| gripper.trial.is_some());
+        let open = shown.labels.is_some_and(|labels| labels.unlabelled().is_some());
+        self.view.mode == Mode::Label && self.view.blind && (going_on || open)
+    }
+
+    /// Takes in what the real gripper has felt, and lets the simulated one close its fingers with it.
+    pub(super) fn gather_gripper(&mut self) {
+        if self.gripper.take_rows_lost() {
+            self.felt.clear();
+        }
+        for row in self.gripper.rows() {
+            self.felt.push(&row);
+        }
+        let Some(gripper) = self.gripper.view() else { return };
+        if self.connected != gripper.is_connected() {
+            self.connected = gripper.is_connected();
+            self.view.source = if self.connected { Source::Gripper } else { Source::Simulation };
+        }
+        let ended = gripper.ended.as_ref().map(|ended| ended.id);
+        if self.trial_ended != ended {
+            self.trial_ended = ended;
+            self.view.draft.done();
+            self.labeller.ask(LabelWish::Refresh);
+        }
+        let part = gripper.trial.as_ref().map(|trial| trial.part);
+        if self.trial_part != part {
+            self.trial_part = part;
+            if part == Some(TrialPart::Phase(Phase::Close)) {
+                self.close_twin();
+            }
+        }
+    }
+
+    /// Tells what came of wishes about labels.
+    pub(super) fn gather_labels(&mut self) {
+        let Some(labels) = self.labeller.view() else { return };
+        let before = self.labels_told;
+        for (number, told) in labels.told.iter().filter(|(number, _)| *number > before) {
+            self.labels_told = *number;
+            self.tell(match told {
+                Ok(text) => Message::Info(text.clone()),
+                Err(cause) => Message::Error(cause.clone()),
+            });
+        }
+    }
+
+    /// The simulated fingers do what the real ones do, so that one lies over the other.
+    fn close_twin(&mut self) {
+        for command in
+            [Command::SetRecording(false), Command::SetGrasps(1), Command::SetSpeed(1.0), Command::Reset, Command::Play]
+        {
+            if let Err(cause) = self.worker.send(command) {
+                self.tell(Message::Warning(cause.to_string()));
+            }
+        }
+    }
+
+    /// The trial that the card asks about.
+    fn asked_about(&self) -> Option<LabelledTrial> {
+        self.view.draft.trial(self.labeller.view()?.as_ref()).cloned()
+    }
+
+    /// Records a grasp. One that goes on, or has no label yet, is given up for it: it is recorded again.
+    fn begin_trial(&mut self) {
+        let going_on = self.gripper.view().is_some_and(|gripper| gripper.trial.is_some());
+        if going_on {
+            self.gripper.wish(GripperWish::Discard);
+        } else if let Some(trial) = self.asked_about().filter(|trial| trial.object.is_none() && self.connected) {
+            self.labeller.ask(LabelWish::Discard(trial.id));
+        }
+        self.view.draft.done();
+        let request = TrialRequest { object: None, control: self.view.control, adds: self.view.mode == Mode::Demo };
+        self.gripper.wish(GripperWish::Begin(request));
+    }
+
+    /// Gives up the trial that goes on, or throws away the one that the card asks about.
+    fn discard_trial(&mut self) {
+        if self.gripper.view().is_some_and(|gripper| gripper.trial.is_some()) {
+            self.gripper.wish(GripperWish::Discard);
+        } else if let Some(trial) = self.asked_about() {
+            self.labeller.ask(LabelWish::Discard(trial.id));
+            self.view.draft.done();
+        }
+    }
+
+    /// The trial that the card asks about is of the object that is chosen.
+    fn give_label(&mut self) {
+        let Some(labels) = self.labeller.view() else { return };
+        if let (Some(trial), Some(label)) = (self.view.draft.trial(&labels), self.view.draft.label(&labels)) {
+            self.labeller.ask(LabelWish::Label(trial.id, label));
+            // Somebody has looked at it again.
+            if labels.disagreements.iter().any(|found| found.id == trial.id) {
+                self.labeller.ask(LabelWish::Reviewed(trial.id));
+            }
+            self.view.draft.done();
+        }
+    }
+}
