@@ -1,8 +1,8 @@
 //! What panels ask for. Nothing in a panel changes anything: it pushes an action, and the workbench applies it.
 
+use super::gripper_tools::ToolWish;
 use super::modes::Mode;
 use super::panels::Source;
-use super::gripper_tools::ToolWish;
 use palpate_core::drawing::Camera;
 use palpate_core::palette::Theme;
 use palpate_core::rig::serial::Control;
@@ -25,6 +25,8 @@ pub enum Action {
     PickFile,
     /// Write the scene into a file.
     SaveScene,
+    /// Write another scene into a file.
+    SaveSceneAs(Box<Scene>),
     /// Measure what the effects of the scene cost and change.
     MeasureEffects,
     /// Tell the real gripper's thread something.
@@ -86,7 +88,7 @@ pub(super) enum Answer {
     /// Open this file.
     Open(PathBuf),
     /// Write the scene here.
-    SaveScene(PathBuf),
+    SaveScene(PathBuf, Box<Scene>),
     /// Write the picture here.
     SavePicture(PathBuf),
     /// Tell the user.

@@ -7,6 +7,7 @@ mod counts;
 mod curvature;
 mod doctor;
 mod effects;
+mod fit;
 mod force;
 mod grasp;
 mod gripper;
@@ -31,8 +32,8 @@ use palpate_core::sensing::Channel;
 use palpate_core::trial::Frame;
 use palpate_core::workers::{EffectsWorker, GripperView, LEAD_S, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What panels may read.
 pub struct PanelContext<'a> {
@@ -182,7 +183,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 15] = [
+pub const ALL: [PanelKind; 16] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -198,6 +199,7 @@ pub const ALL: [PanelKind; 15] = [
     PanelKind { name: "console", title: "Console", ui: console::ui },
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
     PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
+    PanelKind { name: "fit", title: "Fit", ui: fit::ui },
 ];
 
 /// A panel by its name.
@@ -208,6 +210,19 @@ pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
 /// Text that breaks its lines.
 fn wrapped(ui: &mut Ui, text: RichText) {
     ui.add(Label::new(text).wrap());
+}
+
+/// True in the first frame in which something is shown after it was not: what a panel shows from elsewhere is then looked
+/// for again.
+fn just_opened(ui: &Ui, name: &str) -> bool {
+    let id = egui::Id::unique(("shown last", name));
+    let now = ui.ctx().cumulative_frame_nr();
+    let last = ui.data_mut(|data| {
+        let last = data.get_temp::<u64>(id);
+        data.insert_temp(id, now);
+        last
+    });
+    last.is_none_or(|last| last + 1 < now)
 }
 
 /// A field for the port of the real gripper; nothing where it is left empty. What was typed is kept under `id`.

@@ -169,9 +169,9 @@ fn change_plan<E: std::fmt::Display>(
 mod tests {
     use super::super::desk::watch::{until, waker};
     use super::*;
-    use crate::recording::BoardInfo;
-    use crate::trial::{TrialInfo, Quality, Plan};
     use crate::geometry::Pose;
+    use crate::recording::BoardInfo;
+    use crate::trial::{Plan, Quality, TrialInfo};
 
     fn recorded(store: &mut Store) -> TrialId {
         let info = TrialInfo {
