@@ -27,6 +27,8 @@ pub enum Action {
     PickFile,
     /// Write the scene into a file.
     SaveScene,
+    /// Write another scene into a file.
+    SaveSceneAs(Box<Scene>),
     /// Measure what the effects of the scene cost and change.
     MeasureEffects,
     /// Tell the real gripper's thread something.
@@ -121,7 +123,7 @@ pub(super) enum Answer {
     /// Open this file.
     Open(PathBuf),
     /// Write the scene here.
-    SaveScene(PathBuf),
+    SaveScene(PathBuf, Box<Scene>),
     /// Write the picture here.
     SavePicture(PathBuf),
     /// Tell the user.

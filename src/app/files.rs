@@ -2,16 +2,17 @@
 //! channel. Where a desktop has no dialog there is a field to paste a path into, and files can be dropped.
 
 use super::actions::{Answer, Message};
+use palpate_core::scene::Scene;
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 
 /// What a file is asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Ask {
     /// An object to open.
     Object,
-    /// Where to write the scene.
-    SaveScene,
+    /// Where to write a scene.
+    SaveScene(Box<Scene>),
     /// Where to write a picture.
     SavePicture,
 }
@@ -41,9 +42,9 @@ fn run(what: Ask) -> Option<Answer> {
             let path = path.add_filter("URDF, OBJ, STL, scene", &["urdf", "obj", "stl", "xml", "toml"]);
             path.pick_file().map(Answer::Open)
         }
-        Ask::SaveScene => {
+        Ask::SaveScene(scene) => {
             let dialog = dialog.set_title("Save the scene").set_file_name("scene.toml").add_filter("TOML", &["toml"]);
-            dialog.save_file().map(|path| Answer::SaveScene(with_extension(path, "toml")))
+            dialog.save_file().map(|path| Answer::SaveScene(with_extension(path, "toml"), scene))
         }
         Ask::SavePicture => {
             let dialog = dialog.set_title("Save a picture").set_file_name("palpate.png").add_filter("PNG", &["png"]);

@@ -1,12 +1,15 @@
 //! The threads that help with the real gripper, each behind a panel of its own.
 
-use palpate_core::workers::{Examine, ExamineRequest, Examiner, Wake};
+use palpate_core::workers::{Examine, ExamineRequest, Examiner, FitTrials, FitWish, Fitter, Wake};
+use std::path::Path;
 use std::sync::Arc;
 
 /// What they start from.
 pub struct GripperToolsSetup {
     /// Looks at the gripper's port for the doctor.
     pub examine: Examine,
+    /// Fits the finger to recorded trials.
+    pub fit: FitTrials,
 }
 
 /// What can be asked of them.
@@ -16,22 +19,32 @@ pub enum ToolWish {
     Examine(ExamineRequest),
     /// End that, with what was seen so far.
     StopExamining,
+    /// Fit the finger to recorded trials, or list them.
+    Fit(FitWish),
+    /// Give the fit up.
+    StopFitting,
 }
 
 /// Their handles.
 pub struct GripperTools {
     /// Finds out what is wrong between board and computer.
     pub examiner: Examiner,
+    /// Lays the simulated finger over the real one.
+    pub fitter: Fitter,
 }
 
 impl GripperTools {
-    /// Starts the threads. The error is a text for the user.
-    pub(super) fn start(setup: GripperToolsSetup, wake: &Wake) -> Result<Self, String> {
+    /// Starts the threads; trials come from the store at `store`. The error is a text for the user.
+    pub(super) fn start(setup: GripperToolsSetup, store: &Path, wake: &Wake) -> Result<Self, String> {
         let failed = |what: &str| {
             let what = what.to_owned();
             move |error: std::io::Error| format!("{what} could not be started: {error}")
         };
-        Ok(Self { examiner: Examiner::start(setup.examine, Arc::clone(wake)).map_err(failed("the doctor"))? })
+        let wake = || Arc::clone(wake);
+        Ok(Self {
+            examiner: Examiner::start(setup.examine, wake()).map_err(failed("the doctor"))?,
+            fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(failed("the fit"))?,
+        })
     }
 
     /// Passes a wish on.
@@ -39,6 +52,8 @@ impl GripperTools {
         match wish {
             ToolWish::Examine(request) => self.examiner.ask(request),
             ToolWish::StopExamining => self.examiner.give_up(),
+            ToolWish::Fit(wish) => self.fitter.ask(wish),
+            ToolWish::StopFitting => self.fitter.give_up(),
         }
     }
 }

@@ -34,7 +34,7 @@ pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_core::recognition::shipped_model;
 use palpate_core::scene::Scene;
-use palpate_core::workers::{GripperWish, examine_port, explain_scene, listen_to_port};
+use palpate_core::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -78,7 +78,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
             explain: Arc::new(explain_scene),
             listen: Arc::new(listen_to_port),
-            tools: GripperToolsSetup { examine: Arc::new(examine_port) },
+            tools: GripperToolsSetup { examine: Arc::new(examine_port), fit: Arc::new(fit_trials) },
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

@@ -135,7 +135,7 @@ impl Workbench {
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
         let effects = EffectsWorker::start(setup.explain, Arc::clone(&setup.wake))
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
-        let tools = GripperTools::start(setup.tools, &setup.wake)?;
+        let tools = GripperTools::start(setup.tools, &setup.store, &setup.wake)?;
         let gripper = GripperWorker::start(GripperSetup {
             scene: setup.scene.clone(),
             store: setup.store.clone(),
@@ -408,7 +408,8 @@ impl Workbench {
                 self.apply(ctx, Action::Simulation(Command::Play));
             }
             Action::PickFile => self.ask(Ask::Object),
-            Action::SaveScene => self.ask(Ask::SaveScene),
+            Action::SaveScene => self.ask(Ask::SaveScene(Box::new(self.scene.clone()))),
+            Action::SaveSceneAs(scene) => self.ask(Ask::SaveScene(scene)),
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
             Action::Tool(wish) => self.tools.grant(wish),
@@ -478,7 +479,7 @@ impl Workbench {
     fn take_answer(&mut self, ctx: &egui::Context, answer: Answer) {
         match answer {
             Answer::Open(path) => self.open(&path.to_string_lossy()),
-            Answer::SaveScene(path) => self.save_scene(&path),
+            Answer::SaveScene(path, scene) => self.save_scene(&path, &scene),
             Answer::SavePicture(path) => self.save_picture(path),
             Answer::Tell(message) => self.tell(message),
         }
@@ -519,8 +520,8 @@ impl Workbench {
         self.unsent = self.worker.send(Command::SetScene(Box::new(self.scene.clone()))) == Err(NotSent::Busy);
     }
 
-    fn save_scene(&mut self, path: &Path) {
-        match std::fs::write(path, self.scene.to_toml()) {
+    fn save_scene(&mut self, path: &Path, scene: &Scene) {
+        match std::fs::write(path, scene.to_toml()) {
             Ok(()) => self.tell(Message::Info(format!("scene saved as {}", path.display()))),
             Err(error) => self.tell(Message::Error(format!("cannot write {}: {error}", path.display()))),
         }

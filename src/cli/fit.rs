@@ -3,11 +3,8 @@
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json, table, warn};
-use palpate_core::objects::EMPTY;
-use palpate_core::recording::{CalibrationId, Serving, Store, TrialId};
-use palpate_core::scene::Scene;
-use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};
-use palpate_core::study::{FingerFit, Known, Observation, Trust, fit_finger};
+use palpate_core::recording::{CalibrationId, TrialId};
+use palpate_core::study::{FingerFit, Known, RecordedGrasps, fit_finger};
 use palpate_core::units::three_digits;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -37,12 +34,6 @@ pub(super) struct FitArguments {
     json: bool,
 }
 
-/// How well a strip's gain repeats once it is calibrated, as a share. Assumed: half a degree in 90.
-const STRIP_REPEATS: f64 = 0.005;
-
-/// How well a pad's gain repeats (data sheet, one deviation).
-const PAD_REPEATS: f64 = 0.02;
-
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Told {
@@ -53,9 +44,15 @@ struct Told {
 
 pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), Failure> {
     let store = open_store(store)?;
-    let mut trust = Trust::default();
-    let observations: Vec<Observation> =
-        arguments.trials.iter().map(|id| observation(arguments, &store, *id, &mut trust)).collect::<Result<_, _>>()?;
+    // Of another scene only the gripper counts.
+    let scene = arguments.scene.says_something().then(|| arguments.scene.scene(None)).transpose()?;
+    let gripper = scene.as_ref().map(|scene| &scene.gripper);
+    let mut recorded = RecordedGrasps::default();
+    for id in &arguments.trials {
+        recorded.add(&store, *id, gripper, &arguments.calibrations)?;
+    }
+    let RecordedGrasps { observations, mut trust, warnings } = recorded;
+    warnings.iter().for_each(|warning| warn(warning));
     for (given, gains) in [(arguments.strip_gain, &mut trust.strip_gain), (arguments.pad_gain, &mut trust.pad_gain)] {
         if let Some(percent) = given {
             if !(0.01..=100.0).contains(&percent) {
@@ -78,56 +75,6 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
         Some(path) => say(format!("written {}: a scene with the fitted gripper", path.display())),
         None => Ok(()),
     }
-}
-
-/// A stored trial as the fit takes it.
-fn observation(
-    arguments: &FitArguments,
-    store: &Store,
-    id: TrialId,
-    trust: &mut Trust,
-) -> Result<Observation, Failure> {
-    let info = store.load(id)?.info;
-    // What was recorded elsewhere has no scene of its own.
-    let own = if info.scene.is_empty() { Scene::default() } else { Scene::from_toml(&info.scene)? };
-    let mut scene = own.clone();
-    if arguments.scene.says_something() {
-        // Of another scene only the gripper counts: what was grasped and how is the trial's.
-        scene.gripper = arguments.scene.scene(None)?.gripper;
-    }
-    let object = if info.object == EMPTY { None } else { own.load_object()? };
-    if object.is_some() && !own.holds_object() {
-        warn(&format!("trial {id} grasps something that can move: presses against what is held in place tell more"));
-    }
-    let (signals, line) = if let Some(read) = store.board_signals(id, &arguments.calibrations)? {
-        read.derived.warnings.iter().for_each(|warning| warn(&format!("trial {id}: {warning}")));
-        trust_of(&read.serving, trust);
-        (read.derived.signals, read.line)
-    } else if let Some(signals) = store.readings(id)? {
-        (signals, Observation::line_of(&own))
-    } else {
-        (clean_signals(&own, &store.load(id)?)?, Observation::line_of(&own))
-    };
-    let line = if line.is_empty() { Observation::line_of(&own) } else { line };
-    Ok(Observation { name: format!("trial {id}"), signals, line, scene, object })
-}
-
-/// How well calibrations know the gain of their parts: what their points say, and no better than parts of these kinds repeat.
-fn trust_of(serving: &Serving, trust: &mut Trust) {
-    const HALF: f64 = 1.96;
-    for (sensor, calibration) in &serving.calibrations {
-        let (gains, usual) = match sensor.is_flex() {
-            true => (&mut trust.strip_gain, STRIP_REPEATS),
-            false => (&mut trust.pad_gain, PAD_REPEATS),
-        };
-        let told = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
-        gains[*sensor as usize % 2] = told.max(usual);
-    }
-}
-
-fn clean_signals(scene: &Scene, trial: &palpate_core::trial::Trial) -> Result<Signals, Failure> {
-    let layout = SensorLayout::named("C1+F")?;
-    Ok(Sensors::new(&layout, &scene.gripper, PressureArea::Participation)?.signals(trial))
 }
 
 fn tell(fit: &FingerFit) -> Result<(), Failure> {

@@ -6,9 +6,12 @@ use egui_kittest::{Harness, TestRenderer};
 use palpate::app::{Action, GripperToolsSetup, PanelKind, ViewState, Workbench, WorkbenchSetup};
 use palpate_core::palette::Theme;
 use palpate_core::recognition::Model;
+use palpate_core::recording::Store;
 use palpate_core::scene::Scene;
 use palpate_core::study::{Explanation, Measuring};
-use palpate_core::workers::{Command, Examine, Listen, Snapshot, examine_port, explain_scene, listen_to_port};
+use palpate_core::workers::{
+    Command, Examine, FitTrials, Listen, Snapshot, examine_port, explain_scene, fit_trials, listen_to_port,
+};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -27,13 +30,27 @@ pub(crate) struct BenchSetup {
     pub(crate) listen: Listen,
     /// Looks at its port for the doctor.
     pub(crate) examine: Examine,
+    /// Fits the finger to recorded trials.
+    pub(crate) fit: FitTrials,
+    /// Puts something into the store before the window opens it.
+    pub(crate) fill: fn(&mut Store),
 }
 
 impl Default for BenchSetup {
     fn default() -> Self {
         let model = Ok(scripted::model());
-        let (size, listen, examine) = ([1280.0, 820.0], Arc::new(listen_to_port), Arc::new(examine_port));
-        Self { object: "lemon", theme: Theme::Dark, size, panel: None, render_state: None, model, listen, examine }
+        Self {
+            object: "lemon",
+            theme: Theme::Dark,
+            size: [1280.0, 820.0],
+            panel: None,
+            render_state: None,
+            model,
+            listen: Arc::new(listen_to_port),
+            examine: Arc::new(examine_port),
+            fit: Arc::new(fit_trials),
+            fill: |_| (),
+        }
     }
 }
 
@@ -63,7 +80,8 @@ impl Bench {
         let (wake, woken) = channel();
         let mut scene = Scene::default();
         setup.object.clone_into(&mut scene.object.source);
-        let BenchSetup { theme, panel, render_state, size, model, listen, examine, .. } = setup;
+        let BenchSetup { theme, panel, render_state, size, model, listen, examine, fit, fill, .. } = setup;
+        fill(&mut Store::open(&path).unwrap());
         let draw = move |ui: &mut egui::Ui, workbench: &mut Option<Workbench>| {
             let ctx = ui.ctx().clone();
             let workbench = workbench.get_or_insert_with(|| {
@@ -75,7 +93,7 @@ impl Bench {
                     model: model.clone(),
                     explain: Arc::new(explain_steadily),
                     listen: Arc::clone(&listen),
-                    tools: GripperToolsSetup { examine: Arc::clone(&examine) },
+                    tools: GripperToolsSetup { examine: Arc::clone(&examine), fit: Arc::clone(&fit) },
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.

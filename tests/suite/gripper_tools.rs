@@ -4,17 +4,24 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use crate::panels::side_by_side;
-use egui_kittest::kittest::Queryable as _;
+use egui::Key;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::ALL_PANELS;
 use palpate_core::board::{Board, Reading};
 use palpate_core::doctor::{Observations, Traces};
+use palpate_core::gripper::Side;
 use palpate_core::palette::Theme;
+use palpate_core::recording::{BOARD_RIG, BoardInfo, Store, TrialId};
 use palpate_core::rig::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
+use palpate_core::scene::Scene;
+use palpate_core::study::{Course, Estimate, FingerFit, Known, Remainder};
 use palpate_core::wire::{Cadence, Rail};
-use palpate_core::workers::Examine;
+use palpate_core::workers::{Examine, FitTrials, FittedFinger};
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// A bench with one of the panels on it, nothing else.
 fn bench(panel: &str, theme: Theme, setup: BenchSetup) -> Bench {
@@ -77,7 +84,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
             let patient = request.port.is_some();
             goes_on(2.5);
             while patient && goes_on(2.5) {
-                std::thread::sleep(std::time::Duration::from_millis(2));
+                std::thread::sleep(Duration::from_millis(2));
             }
             look.lock().unwrap().clone()
         });
@@ -117,4 +124,124 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
     for (name, [dark, light]) in ["doctor_good", "doctor_wrong"].into_iter().zip(pairs(dark, light)) {
         compare(name, &side_by_side(&dark, &light), "the CPU renderer of the tests");
     }
+}
+
+/// Two empty closes and two grasps of the real gripper, without a reading.
+fn recorded(store: &mut Store) {
+    for object in ["empty", "bigball", "bigball", "empty"] {
+        let mut info = palpate_core::grasping::prepare(&Scene::default(), None, 0).info().clone();
+        (info.rig, info.object) = (BOARD_RIG.to_owned(), object.to_owned());
+        let id = store.begin_board(&info, &BoardInfo::default()).unwrap();
+        store.finish_board(id, &BoardInfo::default(), &[]).unwrap();
+    }
+}
+
+/// Goes to something by the tabulator key and presses it by Enter.
+fn press(bench: &mut Bench, label: &str) {
+    for _ in 0..30 {
+        let harness = &bench.harness;
+        let node = harness.query_by_label(label).unwrap_or_else(|| harness.get_by_label_contains(label));
+        if node.accesskit_node().is_focused() {
+            bench.harness.key_press(Key::Enter);
+            bench.harness.step();
+            return;
+        }
+        bench.harness.key_press(Key::Tab);
+        bench.harness.step();
+    }
+    panic!("the keyboard does not reach {label}");
+}
+
+/// A fit of made-up numbers: what the panel shows does not depend on what the solver happens to find.
+fn made_up_fit(trials: &[TrialId]) -> FittedFinger {
+    let estimate = |name: &str, unit, value: f64, share: f64, known| {
+        let (low, high) = (value * (1.0 - share), value * (1.0 + share));
+        Estimate { name: name.to_owned(), unit, value, low, high, known }
+    };
+    let estimates = vec![
+        estimate("gripper.finger.bending_stiffness", "N m²", 3.36e-3, 0.021, Known::Well),
+        estimate("gripper.finger.damping_time", "s", 0.03, 0.18, Known::Roughly),
+        estimate("gripper.actuation.filling_time", "s", 0.06, 0.7, Known::Hardly),
+        estimate("torque at 0.40 bar", "N m", 0.018, 0.03, Known::Well),
+        estimate("torque at 0.80 bar / bending stiffness", "1/m", 12.5, 0.004, Known::Well),
+    ];
+    let remainders = trials.iter().map(|id| Remainder {
+        name: format!("trial {id}"),
+        curvature_per_m: 0.21,
+        force_share: (id % 2 == 0).then_some(0.031),
+        shift_s: 0.01,
+    });
+    let course = |id: &TrialId, side: Side| {
+        let t_s: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+        let fitted =
+            t_s.iter().map(|t| (8.0 + side.index() as f64) * (1.0 - (1.2 * t).cos()) / 2.0).collect::<Vec<_>>();
+        let recorded = t_s.iter().zip(&fitted).map(|(t, own)| own + 0.3 * (9.0 * t).sin()).collect();
+        Course { name: format!("trial {id}"), side, t_s, recorded, fitted }
+    };
+    let mut scene = Scene::default();
+    scene.gripper.finger.bending_stiffness = 3.36e-3;
+    let fit = FingerFit {
+        gripper: scene.gripper.clone(),
+        estimates,
+        remainders: remainders.collect(),
+        widened: 1.4,
+        steps: 7,
+        remarks: vec![
+            "the recordings do not tell gripper.actuation.filling_time: anything from 0.018 to 0.102 s fits".to_owned(),
+        ],
+        courses: trials.iter().flat_map(|id| Side::BOTH.map(|side| course(id, side))).collect(),
+    };
+    FittedFinger { trials: trials.to_vec(), fit, scene, warnings: Vec::new() }
+}
+
+#[test]
+fn a_finger_is_fitted_and_used_without_the_mouse() {
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let fit: FitTrials = Arc::new(|_, trials, watch| {
+            (watch.progress)(3.4);
+            // A single trial is never enough for this one.
+            while trials.len() < 2 {
+                if watch.stop.load(Ordering::Relaxed) {
+                    return Err("it was stopped".to_owned());
+                }
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            Ok(made_up_fit(trials))
+        });
+        let setup = BenchSetup { size: [320.0, 860.0], fit, fill: recorded, ..BenchSetup::default() };
+        let mut bench = bench("fit", theme, setup);
+        bench.until_shown(true, "4  empty close");
+        assert!(bench.harness.get_by_label("Fit").accesskit_node().is_disabled(), "nothing is chosen");
+        press(&mut bench, "4  empty close");
+        press(&mut bench, "Fit");
+        bench.until_shown(true, "step 4 of at most 25");
+        press(&mut bench, "Stop");
+        bench.until_shown(true, "Refresh");
+        press(&mut bench, "3  bigball");
+        press(&mut bench, "Fit");
+        bench.until_shown(true, "Fitted to trials 3, 4");
+        assert!(bench.harness.query_by_label("filling time: 0.0180 to 0.102").is_some());
+        // Without the list, in which the time stands.
+        let top = bench.harness.get_by_label("Fitted to trials 3, 4").rect().top() as u32;
+        let picture = bench.harness.render().unwrap();
+        let picture = image::imageops::crop_imm(&picture, 0, top, picture.width(), picture.height() - top).to_image();
+        press(&mut bench, "Use this finger");
+        let scene = bench.until(|s| s.scene.gripper.finger.bending_stiffness == 3.36e-3).scene.clone();
+        assert_eq!(scene.object.source, "lemon", "what is grasped stays");
+        bench.until_shown(true, "This finger is in use");
+        picture
+    });
+    compare("fit_done", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
+fn trials_that_cannot_be_fitted_say_why() {
+    let setup = BenchSetup { size: [320.0, 500.0], fill: recorded, ..BenchSetup::default() };
+    let mut bench = bench("fit", Theme::Dark, setup);
+    bench.until_shown(true, "1  empty close");
+    bench.harness.get_by_label_contains("1  empty close").click();
+    bench.harness.step();
+    bench.harness.get_by_label("Fit").click();
+    bench.harness.step();
+    bench.until_shown(true, "trial 1 has no curvature of either finger");
 }

@@ -7,6 +7,7 @@ mod counts;
 mod curvature;
 mod doctor;
 mod effects;
+mod fit;
 mod force;
 mod grasp;
 mod gripper;
@@ -188,7 +189,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 19] = [
+pub const ALL: [PanelKind; 20] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -208,6 +209,7 @@ pub const ALL: [PanelKind; 19] = [
     PanelKind { name: "console", title: "Console", ui: console::ui },
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
     PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
+    PanelKind { name: "fit", title: "Fit", ui: fit::ui },
 ];
 
 /// A panel by its name.
@@ -218,6 +220,19 @@ pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
 /// Text that breaks its lines.
 fn wrapped(ui: &mut Ui, text: RichText) {
     ui.add(Label::new(text).wrap());
+}
+
+/// True in the first frame in which something is shown after it was not: what a panel shows from elsewhere is then looked
+/// for again.
+fn just_opened(ui: &Ui, name: &str) -> bool {
+    let id = egui::Id::unique(("shown last", name));
+    let now = ui.ctx().cumulative_frame_nr();
+    let last = ui.data_mut(|data| {
+        let last = data.get_temp::<u64>(id);
+        data.insert_temp(id, now);
+        last
+    });
+    last.is_none_or(|last| last + 1 < now)
 }
 
 /// A field for the port of the real gripper; nothing where it is left empty. What was typed is kept under `id`.

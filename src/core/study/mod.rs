@@ -12,7 +12,10 @@ pub mod stability;
 pub use accuracy_cost::{AccuracyCost, accuracy_cost, error_sensors};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
 pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain_effects};
-pub use finger_fit::{Estimate, FingerFit, FitError, Known, Observation, Remainder, Trust, fit_finger};
+pub use finger_fit::{
+    Course, Estimate, FingerFit, FitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
+    RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
+};
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
 pub use search::{SearchRow, search};

@@ -14,7 +14,7 @@
 //! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "examine" looks for what is wrong with it.
+//! "examine" looks for what is wrong with it; "fit" lays the simulated finger over the real one.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -24,6 +24,7 @@ mod current;
 mod desk;
 mod effects;
 mod examiner;
+mod fitter;
 mod gauge;
 mod ghost;
 mod gripper;
@@ -44,6 +45,7 @@ mod sim_tests;
 pub use desk::Desk;
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
 pub use examiner::{Examination, Examine, ExamineRequest, Examiner, ExaminerView, examine_port};
+pub use fitter::{FitTrials, FitWish, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{
     BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, EndedTrial, GripperSetup, GripperView, GripperWish,

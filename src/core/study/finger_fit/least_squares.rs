@@ -44,7 +44,7 @@ pub(super) struct Minimum {
 }
 
 /// Steps after which it ends.
-const MOST_STEPS: u32 = 25;
+pub const MOST_STEPS: u32 = 25;
 
 /// A step that changes the sum by less than this share of it is the last one.
 const SETTLED: f64 = 1e-5;

@@ -12,19 +12,28 @@
 //! closes alone, EI and torques are known as well as the mass is, and less well the stiffer the finger. A press on a
 //! calibrated pad measures a force, and so the scale itself. The intervals say how much of this was in the data.
 
+mod course;
 mod least_squares;
 mod observation;
+mod recorded;
 #[cfg(test)]
 mod tests;
 mod twin;
+mod watched;
 
+pub use course::Course;
+pub use least_squares::MOST_STEPS;
 pub use observation::Observation;
+pub use recorded::{RecordedGraspError, RecordedGrasps};
+pub use watched::FitWatch;
 
 use crate::gripper::Gripper;
 use crate::units::three_digits;
 use least_squares::{Minimum, Prior, minimise};
 use serde::Serialize;
+use std::sync::atomic::AtomicBool;
 use twin::{DAMPING, LAG, PAD_BENDING, PAD_GAIN, SHIFT, STIFFNESS, STRIP_GAIN, STRIP_OFFSET, TORQUES, Twin};
+use watched::Watched;
 
 /// How well the sensors are known: one deviation each, left and right.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,6 +108,9 @@ pub struct FingerFit {
     pub steps: u32,
     /// What should be known, in sentences.
     pub remarks: Vec<String>,
+    /// Curvature over time, recorded and fitted, of each finger of each recording.
+    #[serde(skip)]
+    pub courses: Vec<Course>,
 }
 
 /// Why there is no fit.
@@ -131,6 +143,9 @@ pub enum FitError {
         /// Its length (s).
         duration_s: f64,
     },
+    /// It was given up from outside.
+    #[error("the fit was stopped; nothing was changed")]
+    Stopped,
     /// The twin cannot be computed.
     #[error("the fit failed: {0}")]
     Failed(String),
@@ -168,6 +183,15 @@ const LEAST_CURVATURE: f64 = 2.0;
 
 /// Fits the finger to recordings; it begins at the gripper of the first one's scene.
 pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FitError> {
+    fit_finger_watched(observations, trust, &FitWatch { progress: &|_| (), stop: &AtomicBool::new(false) })
+}
+
+/// The same while somebody watches.
+pub fn fit_finger_watched(
+    observations: &[Observation],
+    trust: &Trust,
+    watch: &FitWatch<'_>,
+) -> Result<FingerFit, FitError> {
     let first = observations.first().ok_or(FitError::Nothing)?;
     observations.iter().try_for_each(usable)?;
     let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
@@ -175,13 +199,15 @@ pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerF
     let knots: Vec<f64> = (1..=count as u32).map(|k| peak * f64::from(k) / count).collect();
     let mut twin = Twin::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
-    let minimum = minimise(&mut twin, &start, &priors).map_err(FitError::Failed)?;
+    let minimum = minimise(&mut Watched::new(&mut twin, watch), &start, &priors)
+        .map_err(|cause| if watch.is_over() { FitError::Stopped } else { FitError::Failed(cause) })?;
     let gripper = twin.gripper(&first.scene.gripper, &minimum.x);
     let estimates = estimates(&minimum, &knots);
     let remainders = remainders(observations, &twin, &minimum);
     let remarks = remarks(first, &twin, &minimum, &estimates, &remainders);
+    let courses = course::courses(observations, &twin, &minimum.residuals);
     let Minimum { widened, steps, .. } = minimum;
-    Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks })
+    Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks, courses })
 }
 
 fn usable(seen: &Observation) -> Result<(), FitError> {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::board::{Board, Reading, Sensor};
 use crate::grasping::grasp;
-use crate::gripper::TorquePoint;
+use crate::gripper::{Side, TorquePoint};
 use crate::objects::ObjectModel;
 use crate::scene::Scene;
 use crate::sensing::calibration::{Calibration, Input, Kind, Point, Readout, Record, plan};
@@ -11,6 +11,8 @@ use crate::sensing::electronics::{Converter, FlexStrip, ForcePad, PadPart, Strip
 use crate::sensing::{PressureArea, SensorLayout, Sensors, Signals};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A gripper whose finger the fit does not know.
 fn hidden() -> Gripper {
@@ -136,7 +138,15 @@ fn truths() -> [f64; 7] {
 fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FitError> {
     let truth = scene(&hidden());
     let close = observed("close", clean(&truth, None), &truth, None);
-    let fit = fit_finger(&[close], &Trust::default())?;
+    let heard = Cell::new(0.0);
+    let watch = FitWatch { progress: &|steps| heard.set(steps), stop: &AtomicBool::new(false) };
+    let fit = fit_finger_watched(&[close], &Trust::default(), &watch)?;
+    assert!(heard.get() > 1.0 && heard.get() <= f64::from(fit.steps), "{} of {} steps", heard.get(), fit.steps);
+    // Both fingers over all of the recording, and as far off as is told.
+    assert_eq!(fit.courses.iter().map(|c| (c.side, c.t_s.len())).collect::<Vec<_>>(), Side::BOTH.map(|s| (s, 80)));
+    let off = fit.courses.iter().flat_map(|c| c.recorded.iter().zip(&c.fitted).map(|(a, b)| (a - b) * (a - b)));
+    let rms = (off.sum::<f64>() / 160.0).sqrt();
+    assert!((rms / fit.remainders[0].curvature_per_m - 1.0).abs() < 1e-9, "{rms} {:?}", fit.remainders);
     for (estimate, truth) in fit.estimates.iter().zip(truths()) {
         assert!((estimate.value / truth - 1.0).abs() < 0.03, "{estimate:?} instead of {truth}");
     }
@@ -174,6 +184,15 @@ fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent(
     }
     assert!(held >= all - 2, "{held} of {all} intervals hold the truth");
     Ok(())
+}
+
+#[test]
+fn a_fit_ends_when_it_is_told_to() {
+    let truth = scene(&hidden());
+    let close = observed("close", clean(&truth, None), &truth, None);
+    let stop = AtomicBool::new(false);
+    let watch = FitWatch { progress: &|steps| stop.store(steps > 0.5, Ordering::Relaxed), stop: &stop };
+    assert_eq!(fit_finger_watched(&[close], &Trust::default(), &watch), Err(FitError::Stopped));
 }
 
 #[test]

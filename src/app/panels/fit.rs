@@ -1,0 +1,245 @@
+//! Fit my finger: choose recorded trials, fit the simulated finger to them, see how well each parameter is known and how the
+//! twin lies on the recordings, and use it.
+
+use super::{PanelContext, just_opened, wrapped};
+use crate::app::actions::{Action, Message};
+use crate::app::gripper_tools::ToolWish;
+use crate::app::theme::{colour, veil};
+use egui::{Align, Button, Layout, ProgressBar, RichText, ScrollArea, Sense, Ui};
+use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
+use palpate_core::gripper::Side;
+use palpate_core::objects::EMPTY;
+use palpate_core::palette::{Theme, Trace};
+use palpate_core::recording::{TrialId, TrialRow};
+use palpate_core::scene::Scene;
+use palpate_core::study::{Course, Estimate, FingerFit, Known, MOST_STEPS, Remainder};
+use palpate_core::units::three_digits;
+use palpate_core::workers::{FitWish, FittedFinger};
+use std::collections::BTreeSet;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    if just_opened(ui, "fit") {
+        actions.push(Action::Tool(ToolWish::Fit(FitWish::List)));
+    }
+    let view = context.tools.fitter.view().unwrap_or_default();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let hint = "The simulated finger is laid over the real one: by a few empty closes, and presses against something \
+                    held in place.";
+        wrapped(ui, RichText::new(hint).weak());
+        match view.running {
+            Some(steps) => running_ui(ui, steps, actions),
+            None => match &view.trials {
+                None => wrapped(ui, RichText::new("looking for recorded trials ..").weak()),
+                Some(Ok(rows)) => choice_ui(ui, rows, actions),
+                Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            },
+        }
+        match &view.ended {
+            Some(Ok(fitted)) => fitted_ui(ui, context, fitted, actions),
+            Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            None => {}
+        }
+    });
+}
+
+/// Height of the list of trials (points).
+const LIST: f32 = 132.0;
+
+/// The trials with a box to tick each, and the button that begins.
+fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Vec<Action>) {
+    if rows.is_empty() {
+        let text = "There are no trials of the real gripper yet: record some, or run `palpate record`.";
+        wrapped(ui, RichText::new(text));
+    }
+    let id = egui::Id::unique("fit trials");
+    let mut chosen = ui.data_mut(|data| data.get_temp::<BTreeSet<TrialId>>(id)).unwrap_or_default();
+    chosen.retain(|trial| rows.iter().any(|row| row.id == *trial));
+    let height = ui.spacing().interact_size.y;
+    ScrollArea::vertical().id_salt("fit trials").max_height(LIST).auto_shrink([false, true]).show_rows(
+        ui,
+        height,
+        rows.len(),
+        |ui, shown| {
+            for row in rows.iter().skip(shown.start).take(shown.len()) {
+                let mut ticked = chosen.contains(&row.id);
+                if ui.checkbox(&mut ticked, trial_text(row)).on_hover_text("When it began is in UTC").changed() {
+                    if ticked {
+                        chosen.insert(row.id)
+                    } else {
+                        chosen.remove(&row.id)
+                    };
+                }
+            }
+        },
+    );
+    ui.horizontal_wrapped(|ui| {
+        let fit = ui.add_enabled(!chosen.is_empty(), Button::new("Fit"));
+        if fit.on_disabled_hover_text("Tick at least one trial").clicked() {
+            actions.push(Action::Tool(ToolWish::Fit(FitWish::Fit(chosen.iter().copied().collect()))));
+        }
+        if ui.button("Refresh").on_hover_text("Look for trials again").clicked() {
+            actions.push(Action::Tool(ToolWish::Fit(FitWish::List)));
+        }
+    });
+    ui.data_mut(|data| data.insert_temp(id, chosen));
+}
+
+fn trial_text(row: &TrialRow) -> String {
+    let object = if row.object == EMPTY { "empty close" } else { &row.object };
+    let began: String = row.created.replace('T', " ").chars().take(16).collect();
+    format!("{}  {object}  {began}", row.id)
+}
+
+fn running_ui(ui: &mut Ui, steps: f64, actions: &mut Vec<Action>) {
+    let text = format!("step {:.0} of at most {MOST_STEPS}", steps.floor() + 1.0);
+    ui.add(ProgressBar::new((steps / f64::from(MOST_STEPS)) as f32).text(text));
+    if ui.button("Stop").on_hover_text("Give it up; nothing is changed").clicked() {
+        actions.push(Action::Tool(ToolWish::StopFitting));
+    }
+}
+
+fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, actions: &mut Vec<Action>) {
+    let FittedFinger { trials, fit, scene, warnings } = fitted;
+    ui.add_space(6.0);
+    let names: Vec<String> = trials.iter().map(ToString::to_string).collect();
+    let plural = if names.len() == 1 { "trial" } else { "trials" };
+    wrapped(ui, RichText::new(format!("Fitted to {plural} {}", names.join(", "))).heading());
+    ui.horizontal_wrapped(|ui| {
+        let in_use = context.scene.gripper == fit.gripper;
+        let text = if in_use { "This finger is in use" } else { "Use this finger" };
+        let hint = "Simulate the gripper with it from now on";
+        if ui.add_enabled(!in_use, Button::new(text)).on_hover_text(hint).clicked() {
+            let scene = Scene { gripper: fit.gripper.clone(), ..context.scene.clone() };
+            actions.push(Action::SetScene(Box::new(scene)));
+            actions.push(Action::Tell(Message::Info("the simulated gripper has the fitted fingers".to_owned())));
+        }
+        if ui.button("Save as scene ..").on_hover_text("The first trial's scene with this gripper, as TOML").clicked() {
+            actions.push(Action::SaveSceneAs(Box::new(scene.clone())));
+        }
+    });
+    for remark in fit.remarks.iter().chain(warnings) {
+        wrapped(ui, RichText::new(remark).color(ui.visuals().warn_fg_color));
+    }
+    estimates_ui(ui, context.view.theme, &fit.estimates);
+    courses_ui(ui, context.view.theme, fit);
+}
+
+/// Least and largest share of the value at which error bars end.
+const BAR_ENDS: [f64; 2] = [0.02, 0.5];
+
+/// Every parameter with its interval, in numbers and as a bar about its value.
+fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
+    let share = |estimate: &Estimate| [estimate.low, estimate.high].map(|end| end / estimate.value.max(1e-12) - 1.0);
+    // What the data do not tell reaches beyond.
+    let told = estimates.iter().filter(|estimate| estimate.known != Known::Hardly);
+    let widest = told.flat_map(share).map(f64::abs).fold(0.0, f64::max);
+    let end = widest.clamp(BAR_ENDS[0], BAR_ENDS[1]);
+    ui.add_space(4.0);
+    let text = format!("95 % intervals; the bars end {:.0} % from the value", 100.0 * end);
+    wrapped(ui, RichText::new(text).weak());
+    ui.spacing_mut().interact_size.y = 16.0;
+    for estimate in estimates {
+        let known = match estimate.known {
+            Known::Well => theme.colours().accent,
+            Known::Roughly => theme.colours().warning,
+            Known::Hardly => theme.colours().error,
+        };
+        ui.horizontal(|ui| {
+            ui.label(name_of(estimate));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.label(format!("{} {}", three_digits(estimate.value), estimate.unit));
+            });
+        });
+        ui.horizontal(|ui| {
+            bar_ui(ui, share(estimate).map(|share| (share / end) as f32), colour(known), estimate);
+            let words = match estimate.known {
+                Known::Well => "well known",
+                Known::Roughly => "roughly known",
+                Known::Hardly => "hardly known",
+            };
+            let [low, high] = [estimate.low, estimate.high].map(three_digits);
+            ui.label(RichText::new(format!("{low} to {high}, {words}")).small().weak());
+        });
+        ui.add_space(3.0);
+    }
+}
+
+/// The last word of a scene's key in plain letters; ratios as they are.
+fn name_of(estimate: &Estimate) -> String {
+    let name = estimate.name.rsplit_once("gripper.").map_or(estimate.name.as_str(), |(_, name)| name);
+    let name = name.split_once('.').filter(|(group, _)| !group.contains(' ')).map_or(name, |(_, key)| key);
+    name.replace('_', " ").replace("/ bending stiffness", "/ stiffness")
+}
+
+/// An interval about the middle: ends in shares of half the width, cut where they go beyond.
+fn bar_ui(ui: &mut Ui, [low, high]: [f32; 2], ink: egui::Color32, estimate: &Estimate) {
+    let (rect, response) = ui.allocate_exact_size(egui::vec2(96.0, 14.0), Sense::hover());
+    let label = format!("{}: {} to {}", name_of(estimate), three_digits(estimate.low), three_digits(estimate.high));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, &label));
+    let painter = ui.painter_at(rect);
+    let x = |share: f32| rect.center().x + share.clamp(-1.0, 1.0) * (0.5 * rect.width() - 2.0);
+    painter.vline(x(0.0), rect.y_range(), egui::Stroke::new(1.0, ui.visuals().weak_text_color()));
+    painter.hline(x(low)..=x(high), rect.center().y, egui::Stroke::new(2.0, ink));
+    for end in [low, high].into_iter().filter(|end| end.abs() <= 1.0) {
+        painter.vline(x(end), rect.center().y - 4.0..=rect.center().y + 4.0, egui::Stroke::new(2.0, ink));
+    }
+    painter.circle_filled(egui::pos2(x(0.0), rect.center().y), 3.5, ink);
+}
+
+/// Recorded and fitted curvature over time, and what is left between them, recording by recording.
+fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
+    ui.add_space(6.0);
+    wrapped(ui, RichText::new("Thick: recorded; thin: fitted; the right finger is dashed.").weak());
+    for (number, left) in fit.remainders.iter().enumerate() {
+        wrapped(ui, RichText::new(remainder_text(left)));
+        let own = |course: &&Course| course.name == left.name;
+        let courses: Vec<&Course> = fit.courses.iter().filter(own).collect();
+        let recorded = veil(Trace::Curvature.colour(theme), 0.5);
+        let thin = colour(theme.colours().text);
+        plot(theme, &format!("fitted curvature {number}"), 110.0).show(ui, |plot| {
+            for course in &courses {
+                plot.line(line(course, &course.recorded, "recorded").color(recorded).width(3.5));
+                plot.line(line(course, &course.fitted, "fitted").color(thin).width(1.2));
+            }
+        });
+        wrapped(ui, RichText::new("recorded less fitted").small().weak());
+        plot(theme, &format!("residuals {number}"), 70.0).include_y(-0.1).include_y(0.1).show(ui, |plot| {
+            for course in &courses {
+                let off: Vec<f64> = course.recorded.iter().zip(&course.fitted).map(|(seen, fit)| seen - fit).collect();
+                plot.line(line(course, &off, "off").color(colour(Trace::Curvature.colour(theme))).width(1.5));
+            }
+        });
+    }
+}
+
+fn remainder_text(left: &Remainder) -> String {
+    let force = left.force_share.map_or_else(String::new, |share| format!(", force within {:.1} %", 100.0 * share));
+    format!("{}: curvature within {} 1/m{force} (rms)", left.name, three_digits(left.curvature_per_m))
+}
+
+fn line<'a>(course: &Course, values: &[f64], name: &str) -> Line<'a> {
+    let points: PlotPoints<'_> = course.t_s.iter().zip(values).map(|(t, value)| [*t, *value]).collect();
+    let style = match course.side {
+        Side::Left => LineStyle::Solid,
+        Side::Right => LineStyle::Dashed { length: 7.0 },
+    };
+    Line::new(format!("{name} {}", course.side.name()), points).style(style)
+}
+
+fn plot(theme: Theme, id: &str, height: f32) -> Plot<'static> {
+    let seconds = AxisHints::new_x()
+        .formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value))
+        .label_spacing(egui::Rangef::new(24.0, 40.0));
+    Plot::new(id.to_owned())
+        .height(height)
+        .allow_zoom(false)
+        .allow_drag(false)
+        .allow_scroll(false)
+        .show_background(false)
+        .y_axis_min_width(44.0)
+        .y_axis_label("1/m")
+        .grid_color(colour(theme.colours().border))
+        .grid_spacing(10.0..=44.0)
+        .custom_x_axes(vec![seconds])
+        .set_margin_fraction(egui::vec2(0.0, 0.12))
+}
