@@ -2,7 +2,7 @@
 //! wheel to zoom about the pointer, double click for the whole grasp.
 
 use super::actions::Action;
-use super::panels::PanelContext;
+use super::panels::{PanelContext, Source};
 use super::theme::{colour, veil};
 use super::traces::GraspTrace;
 use egui::{Color32, Ui};
@@ -102,12 +102,30 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
             width: bounds.width(),
         }
     });
+    if let Some(why) = nothing_read(context, plot) {
+        let ink = colour(theme.colours().quiet_text);
+        let room = response.response.rect.width() - 60.0;
+        let galley = ui.painter().layout(why.to_owned(), egui::FontId::proportional(13.0), ink, room.max(60.0));
+        ui.painter().galley(response.response.rect.center() - 0.5 * galley.size(), galley, ink);
+    }
     response
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, format!("{} over time", plot.id)));
     if let Some(window) = moved_window(ui, &response.response, &response.inner, [from, to], span) {
         actions.push(Action::SetTimeWindow(window));
     }
+}
+
+/// What to say where a connected gripper gives no curve to draw.
+fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
+    let trace = context.traces.current().filter(|_| context.source == Source::Gripper)?;
+    let number = |k: usize| plot.curves.iter().any(|c| (c.values)(trace, k).is_some_and(f64::is_finite));
+    let nothing = trace.t.len() > 5 && !(0..trace.t.len()).any(number);
+    nothing.then_some(if plot.id == "line pressure" {
+        "The board does not report its line pressure."
+    } else {
+        "These sensors are not calibrated: panel Calibration, in the mode Label. Raw counts are in the panel Counts there."
+    })
 }
 
 struct TimeDrag {

@@ -86,6 +86,8 @@ pub struct Workbench {
     /// The part of the trial that was seen last: the simulation closes its fingers with the real ones.
     trial_part: Option<TrialPart>,
     connected: bool,
+    /// Whether the simulation stored its trials, and how many grasps it made, before it became the gripper's twin.
+    before_twin: Option<(bool, u32)>,
     wake: Wake,
     scene: Scene,
     /// A scene that the busy worker has not taken yet.
@@ -115,6 +117,28 @@ struct Shown<'a> {
     labels: Option<&'a LabelView>,
 }
 
+/// Letters in a line of a notice.
+const TOAST_WIDTH: usize = 64;
+
+/// Breaks a text into lines of at most so many letters, between words.
+fn textwrap(text: &str, width: usize) -> String {
+    let mut folded = String::new();
+    let mut column = 0;
+    for word in text.split(' ') {
+        let letters = word.chars().count();
+        if column > 0 && column + 1 + letters > width {
+            folded.push('\n');
+            column = 0;
+        } else if column > 0 {
+            folded.push(' ');
+            column += 1;
+        }
+        folded.push_str(word);
+        column += letters;
+    }
+    folded
+}
+
 /// Messages that are kept.
 const MOST_MESSAGES: usize = 50;
 
@@ -135,7 +159,6 @@ impl Workbench {
         .map_err(|e| format!("the simulation could not be started: {e}"))?;
         let effects = EffectsWorker::start(setup.explain, Arc::clone(&setup.wake))
             .map_err(|e| format!("the measurement of effects could not be started: {e}"))?;
-        let tools = GripperTools::start(setup.tools, &setup.store, &setup.wake)?;
         let gripper = GripperWorker::start(GripperSetup {
             scene: setup.scene.clone(),
             store: setup.store.clone(),
@@ -145,6 +168,8 @@ impl Workbench {
             wake: Arc::clone(&setup.wake),
         })
         .map_err(|e| format!("the gripper's thread could not be started: {e}"))?;
+        let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
+        let tools = GripperTools::start(tools, &setup.store, &setup.wake)?;
         let labeller = start_labeller(setup.store, Arc::clone(&setup.wake))
             .map_err(|e| format!("the thread that keeps labels could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
@@ -165,6 +190,7 @@ impl Workbench {
             felt: Traces::default(),
             trial_part: None,
             connected: false,
+            before_twin: None,
             wake: setup.wake,
             scene: setup.scene,
             unsent: false,
@@ -372,20 +398,22 @@ impl Workbench {
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
         }
+        // The notices take a line as long as they are told.
+        let folded = |text: String| textwrap(&text, TOAST_WIDTH);
         // Long sentences stay until they have been read.
         let time = |text: &str| Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         match message {
             Message::Info(text) => {
                 let duration = time(&text);
-                self.toasts.info(text).duration(Some(duration)).show_progress_bar(false);
+                self.toasts.info(folded(text)).duration(Some(duration)).show_progress_bar(false);
             }
             Message::Warning(text) => {
                 let duration = time(&text);
-                self.toasts.warning(text).duration(Some(duration)).show_progress_bar(false);
+                self.toasts.warning(folded(text)).duration(Some(duration)).show_progress_bar(false);
             }
             Message::Error(text) => {
                 let duration = time(&text) * 2;
-                self.toasts.error(text).duration(Some(duration)).show_progress_bar(false);
+                self.toasts.error(folded(text)).duration(Some(duration)).show_progress_bar(false);
             }
         }
     }

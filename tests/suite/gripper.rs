@@ -12,8 +12,8 @@ use palpate_core::recording::Store;
 use palpate_core::rig::serial::Control;
 use palpate_core::scene::{Accuracy, Scene};
 use palpate_core::workers::{
-    CalibrationPlan, CalibrationWish, GripperSetup, GripperView, GripperWish, GripperWorker, Listen, Notice, TraceRow,
-    TrialPart, TrialRequest,
+    CalibrationPlan, CalibrationWish, Examine, ExamineRequest, GripperSetup, GripperView, GripperWish, GripperWorker,
+    Listen, Notice, TraceRow, TrialPart, TrialRequest,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,14 +39,23 @@ fn scene() -> Scene {
     scene
 }
 
+/// The pretended gripper, waiting to be driven.
 fn board(parts: &HiddenParts) -> Listen {
+    pretended(parts, None)
+}
+
+/// The pretended gripper, grasping by itself.
+fn moving(parts: &HiddenParts) -> Listen {
+    pretended(parts, Some(7.0))
+}
+
+fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>) -> Listen {
     let parts = parts.clone();
     Arc::new(move |port| {
         if let Some(port) = port {
             return Err(format!("there is no {}", port.display()));
         }
-        let hand =
-            HandPlan { scene: scene(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script: vec![] };
+        let hand = HandPlan { scene: scene(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s, script: vec![] };
         let setup = PretendedSetup {
             hand,
             parts: parts.clone(),
@@ -292,6 +301,52 @@ fn a_calibration_shares_the_port_or_brings_its_own() {
     desk.wish(GripperWish::Calibrate(CalibrationWish::Stop));
     let view = desk.until(|view| !running(view));
     assert!(view.is_connected(), "the live view goes on");
+}
+
+#[test]
+fn the_doctor_looks_at_the_link_that_is_held() {
+    let mut desk = Desk::on(board(&parts(1, false)));
+    let alone: Examine = Arc::new(|_, _| panic!("the port is held: it cannot be opened again"));
+    let look = desk.worker.examine(alone);
+    desk.connect();
+    let request = ExamineRequest { port: None, seconds: 0.3 };
+    let mut told = 0;
+    let seen = look(&request, &mut |_| {
+        told += 1;
+        true
+    });
+    assert!(told > 0 && seen.listened_s >= 0.3 && seen.traces.channels.len() == 4);
+    assert_eq!(seen.link.map(|link| link.board.firmware), Some(Some("1".to_owned())));
+    // One that is given up ends before its time, with what was seen so far.
+    let seen = look(&ExamineRequest { port: None, seconds: 1e6 }, &mut |_| false);
+    assert!(seen.listened_s < 1e3 && seen.traces.channels.len() == 4);
+}
+
+#[test]
+fn trials_begin_and_end_by_themselves_with_their_phases() {
+    let parts = parts(1, false);
+    let mut desk = Desk::on(moving(&parts));
+    store_calibrations(&desk.store, &parts);
+    let request = TrialRequest { object: None, control: Control::Free, adds: false };
+    desk.connect();
+    desk.wish(GripperWish::Watch(Some(request)));
+    for number in 1..=2 {
+        desk.until(|view| view.trial.is_some());
+        let ended = desk.until(|view| view.trial.is_none() && view.ended.as_ref().is_some_and(|e| e.id == number));
+        let store = desk.store();
+        let trial = store.board_trial(ended.ended.as_ref().unwrap().id).unwrap().unwrap();
+        let phases: Vec<Phase> = trial.about.phases.iter().map(|mark| mark.phase).collect();
+        assert_eq!(phases, [Phase::Close, Phase::Hold, Phase::Release], "trial {number}");
+        let rest = trial.about.phases[0].from_s - trial.readings[0].t_s;
+        assert!((0.2..1.0).contains(&rest), "{rest} s of rest");
+        assert!(trial.readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 2e-3));
+        // It was heard from its closing on, though that was found out a little later.
+        let view = ended.identification.as_ref().unwrap();
+        assert!(view.beliefs.len() == 1 && view.verdict.is_some(), "{:?}", ended.recognition_off);
+        assert!(store.guess(number).unwrap().is_some_and(|guess| guess.pmf.len() == 17));
+    }
+    desk.wish(GripperWish::Watch(None));
+    desk.until(|view| view.watching.is_none());
 }
 
 #[test]

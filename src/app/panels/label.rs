@@ -170,17 +170,6 @@ fn question_ui(
         wrapped(ui, RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
     search_ui(ui, context, actions);
-    let (names, chosen) = (draft.objects(view), draft.chosen.unwrap_or(0));
-    for (place, name) in names.iter().take(LISTED).enumerate() {
-        let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
-        if object_row(ui, context, place, name, place == chosen, !known).clicked() {
-            actions.push(Action::Desk(DeskAction::Choose(place)));
-            actions.push(Action::Desk(DeskAction::Give));
-        }
-    }
-    if names.len() > LISTED {
-        ui.weak(format!("and {} more: type to find them (/)", names.len() - LISTED));
-    }
     ui.horizontal_wrapped(|ui| {
         let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
         if ui.add(Button::new("Label  N, Enter").fill(fill)).clicked() {
@@ -202,6 +191,17 @@ fn question_ui(
             actions.push(Action::Label(LabelWish::Unsure(trial.id, unsure)));
         }
     });
+    let (names, chosen) = (draft.objects(view), draft.chosen.unwrap_or(0));
+    for (place, name) in names.iter().take(LISTED).enumerate() {
+        let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
+        if object_row(ui, context, place, name, place == chosen, !known).clicked() {
+            actions.push(Action::Desk(DeskAction::Choose(place)));
+            actions.push(Action::Desk(DeskAction::Give));
+        }
+    }
+    if names.len() > LISTED {
+        ui.weak(format!("and {} more: type to find them (/)", names.len() - LISTED));
+    }
     remarks_ui(ui, context, trial, actions);
 }
 
@@ -239,7 +239,7 @@ fn object_row(
     new: bool,
 ) -> egui::Response {
     let colours = context.view.theme.colours();
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 26.0), Sense::click());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 23.0), Sense::click());
     let title = if new { format!("{name} (new)") } else { title_of(name) };
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, format!("Label {title}")));
     if chosen || response.hovered() || response.has_focus() {
@@ -250,7 +250,7 @@ fn object_row(
         egui::UiBuilder::new().max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(Layout::left_to_right(Align::Center));
     let mut inside = ui.new_child(builder);
     inside.label(RichText::new((place + 1).to_string()).monospace().color(colour(colours.quiet_text)));
-    let (thumbnail, _) = inside.allocate_exact_size(vec2(24.0, 24.0), Sense::hover());
+    let (thumbnail, _) = inside.allocate_exact_size(vec2(21.0, 21.0), Sense::hover());
     picture(&inside, context, name, thumbnail);
     inside.add(egui::Label::new(title).truncate().selectable(false));
     response

@@ -7,6 +7,7 @@ use crate::app::modes::Mode;
 use crate::app::panels::Source;
 use palpate_core::gripper::Phase;
 use palpate_core::labelling::LabelledTrial;
+use palpate_core::objects::catalogue;
 use palpate_core::workers::{Command, GripperWish, LabelWish, TrialPart, TrialRequest};
 
 impl Workbench {
@@ -64,7 +65,9 @@ impl Workbench {
         if self.connected != gripper.is_connected() {
             self.connected = gripper.is_connected();
             self.view.source = if self.connected { Source::Gripper } else { Source::Simulation };
+            self.hand_over();
         }
+        self.show_next_object();
         let ended = gripper.ended.as_ref().map(|ended| ended.id);
         if self.trial_ended != ended {
             self.trial_ended = ended;
@@ -93,11 +96,37 @@ impl Workbench {
         }
     }
 
+    /// While a gripper is connected the simulation is its twin: it waits, closes with it, and stores nothing.
+    fn hand_over(&mut self) {
+        if self.connected {
+            let status = self.worker.snapshot().map(|snapshot| snapshot.status.clone()).unwrap_or_default();
+            self.before_twin = Some((status.recording, status.grasps));
+            self.tell_simulation([Command::SetRecording(false), Command::SetGrasps(1), Command::Reset, Command::Pause]);
+        } else if let Some((recording, grasps)) = self.before_twin.take() {
+            self.tell_simulation([Command::SetRecording(recording), Command::SetGrasps(grasps.max(1))]);
+        }
+    }
+
     /// The simulated fingers do what the real ones do, so that one lies over the other.
     fn close_twin(&mut self) {
-        for command in
-            [Command::SetRecording(false), Command::SetGrasps(1), Command::SetSpeed(1.0), Command::Reset, Command::Play]
-        {
+        self.tell_simulation([Command::SetSpeed(1.0), Command::Reset, Command::Play]);
+    }
+
+    /// At the desk the twin grasps what the plan has next, where it knows that object.
+    fn show_next_object(&mut self) {
+        if self.view.mode != Mode::Label || !self.connected || self.trial_part.is_some() {
+            return;
+        }
+        let next = self.labeller.view().and_then(|labels| labels.next.as_ref().map(|next| next.object.clone()));
+        let known = next.filter(|name| catalogue().iter().any(|built_in| built_in.name == *name));
+        if let Some(name) = known.filter(|name| *name != self.scene.object.source) {
+            self.open(&name);
+            self.tell_simulation([Command::Pause]);
+        }
+    }
+
+    fn tell_simulation<const N: usize>(&mut self, commands: [Command; N]) {
+        for command in commands {
             if let Err(cause) = self.worker.send(command) {
                 self.tell(Message::Warning(cause.to_string()));
             }

@@ -55,7 +55,7 @@ impl Listener {
         let own = self.channels();
         let known: Vec<String> = own.iter().filter(|name| channels.contains(name)).cloned().collect();
         let begun = self.identification.begin_grasp_of(&known);
-        self.begun(begun, "on the gripper as it is calibrated")
+        self.begun(begun, "on the gripper: the model reads more than is calibrated")
     }
 
     fn begun(&mut self, begun: Result<(), IdentifyError>, place: &str) -> Option<String> {

@@ -2,6 +2,7 @@
 
 use super::calibrating::{Calibrating, CalibrationPlan, CalibrationView, CalibrationWish};
 use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialRequest};
+use super::observing::Observing;
 use super::plotted::{Plotted, Row};
 use super::recent::Recent;
 use super::running::{BEFORE_S, Running};
@@ -82,6 +83,7 @@ pub(super) struct Desk {
     watching: Option<TrialRequest>,
     ended: Option<Arc<EndedTrial>>,
     calibrating: Option<Calibrating>,
+    observing: Vec<Observing>,
     calibrated: Option<Result<String, String>>,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
     stretch: (u64, f64),
@@ -110,6 +112,7 @@ impl Desk {
             watching: None,
             ended: None,
             calibrating: None,
+            observing: Vec::new(),
             calibrated: None,
             stretch: (0, 0.0),
             channels: all_channels().into(),
@@ -175,6 +178,11 @@ impl Desk {
             GripperWish::Watch(request) => self.watching = request,
             GripperWish::End => self.end(false, None),
             GripperWish::Discard => self.end(true, None),
+            GripperWish::Observe(request) if self.connection.is_some() => {
+                self.observing.push(Observing::new(request));
+            }
+            // Whoever asked learns of it by the end of the request, and looks alone.
+            GripperWish::Observe(_) => {}
             GripperWish::Calibrate(wish) => self.calibrate(&wish),
             GripperWish::Quit => {}
         }
@@ -215,6 +223,7 @@ impl Desk {
     fn disconnect(&mut self, why: &str) {
         self.end(false, Some(format!("ended early: {why}")));
         self.calibrating = None;
+        self.observing.clear();
         self.connection = None;
     }
 
@@ -250,6 +259,7 @@ impl Desk {
             self.hear(event);
         }
         self.conduct();
+        self.end_looks();
         let over = self.connection.as_ref().is_some_and(|connection| connection.stream.is_over());
         if over {
             let why = self.connection.as_ref().map(|c| c.stream.status().state.sentence()).unwrap_or_default();
@@ -259,6 +269,14 @@ impl Desk {
             self.publish();
         } else if self.published.elapsed() >= CALM {
             self.publish();
+        }
+    }
+
+    /// Hands over what the doctor has seen enough of.
+    fn end_looks(&mut self) {
+        let Some(connection) = &self.connection else { return };
+        for observing in self.observing.extract_if(.., |observing| observing.is_over()) {
+            observing.finish(connection.stream.status());
         }
     }
 
@@ -295,6 +313,7 @@ impl Desk {
         let felt = connection.readout.felt(reading);
         let commanded = self.running.as_ref().and_then(Running::line_bar);
         let line_bar = commanded.or(reading.line_bar);
+        self.observing.iter_mut().for_each(|observing| observing.add(reading));
         let rows = connection.plotted.push(reading, &felt, line_bar);
         connection.latest = Some(LatestReading { counts: reading.counts.clone(), felt, line_bar });
         self.plot(rows);

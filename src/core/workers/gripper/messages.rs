@@ -1,6 +1,7 @@
 //! What travels between the gripper's thread and a window: wishes in, views out.
 
 use super::calibrating::{CalibrationView, CalibrationWish};
+use super::observing::ObserveRequest;
 use crate::grasping::IdentificationView;
 use crate::gripper::Phase;
 use crate::recognition::Model;
@@ -47,6 +48,8 @@ pub enum GripperWish {
     End,
     /// Give up the trial that goes on: it counts as discarded.
     Discard,
+    /// Let the doctor look at the board.
+    Observe(ObserveRequest),
     /// Something about a calibration.
     Calibrate(CalibrationWish),
     /// End the thread.

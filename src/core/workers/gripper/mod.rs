@@ -12,6 +12,7 @@
 mod calibrating;
 mod desk;
 mod messages;
+mod observing;
 mod plotted;
 mod recent;
 mod running;
@@ -20,5 +21,6 @@ mod worker;
 
 pub use calibrating::{CalibrationPlan, CalibrationView, CalibrationWish, RunningCalibration};
 pub use messages::{EndedTrial, GripperView, GripperWish, LEAD_S, LatestReading, TrialPart, TrialRequest, TrialView};
+pub use observing::ObserveRequest;
 pub use stream::{BoardStream, Listen, listen_to_port};
 pub use worker::{GripperSetup, GripperWorker};

@@ -2,10 +2,11 @@
 
 use super::desk::{Desk, Outlets};
 use super::messages::{GripperView, GripperWish};
+use super::observing;
 use super::stream::Listen;
 use crate::recognition::Model;
 use crate::scene::Scene;
-use crate::workers::{Latest, Notice, TraceRow, Wake};
+use crate::workers::{Examine, Latest, Notice, TraceRow, Wake};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -79,6 +80,14 @@ impl GripperWorker {
         if let Some(wishes) = &self.wishes {
             // A thread that has died has said so; the rest of the window works.
             let _heard = wishes.send(wish);
+        }
+    }
+
+    /// What looks at the board for the doctor: at the link that is held here or, while none is, as `alone` does.
+    pub fn examine(&self, alone: Examine) -> Examine {
+        match &self.wishes {
+            Some(wishes) => observing::shared(wishes.clone(), Arc::clone(&self.view), alone),
+            None => alone,
         }
     }
 
