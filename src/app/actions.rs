@@ -51,6 +51,8 @@ pub enum Action {
     Show(Source),
     /// Doctor, fit or training.
     Tool(ToolWish),
+    /// Let the model in this file listen to the real gripper, or without one that which comes with the program.
+    UseModel(Option<PathBuf>),
     /// Look from here.
     SetCamera(Camera),
     /// Show the whole gripper.

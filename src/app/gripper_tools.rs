@@ -1,7 +1,9 @@
 //! The threads that help with the real gripper, each behind a panel of its own.
 
-use palpate_core::workers::{Examine, ExamineRequest, Examiner, FitTrials, FitWish, Fitter, Wake};
-use std::path::Path;
+use palpate_core::workers::{
+    Examine, ExamineRequest, Examiner, FitTrials, FitWish, Fitter, TrainWish, TrainedModel, Trainer, Wake,
+};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What they start from.
@@ -10,6 +12,8 @@ pub struct GripperToolsSetup {
     pub examine: Examine,
     /// Fits the finger to recorded trials.
     pub fit: FitTrials,
+    /// Folder for trained models.
+    pub models: PathBuf,
 }
 
 /// What can be asked of them.
@@ -23,6 +27,10 @@ pub enum ToolWish {
     Fit(FitWish),
     /// Give the fit up.
     StopFitting,
+    /// Train on labelled trials, look what there is, or load a model.
+    Train(TrainWish),
+    /// Give the training up.
+    StopTraining,
 }
 
 /// Their handles.
@@ -31,6 +39,10 @@ pub struct GripperTools {
     pub examiner: Examiner,
     /// Lays the simulated finger over the real one.
     pub fitter: Fitter,
+    /// Learns from what was labelled.
+    pub trainer: Trainer,
+    /// Loads of models that have been taken note of.
+    loads: u64,
 }
 
 impl GripperTools {
@@ -44,6 +56,8 @@ impl GripperTools {
         Ok(Self {
             examiner: Examiner::start(setup.examine, wake()).map_err(failed("the doctor"))?,
             fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(failed("the fit"))?,
+            trainer: Trainer::start(store.to_owned(), setup.models, wake()).map_err(failed("training"))?,
+            loads: 0,
         })
     }
 
@@ -54,6 +68,16 @@ impl GripperTools {
             ToolWish::StopExamining => self.examiner.give_up(),
             ToolWish::Fit(wish) => self.fitter.ask(wish),
             ToolWish::StopFitting => self.fitter.give_up(),
+            ToolWish::Train(wish) => self.trainer.ask(wish),
+            ToolWish::StopTraining => self.trainer.give_up(),
         }
+    }
+
+    /// The model that was loaded since the last call, or why it could not be.
+    pub(super) fn loaded(&mut self) -> Option<Result<Arc<TrainedModel>, String>> {
+        let view = self.trainer.view()?;
+        let (loads, outcome) = &view.loaded;
+        let is_new = *loads > std::mem::replace(&mut self.loads, *loads);
+        outcome.clone().filter(|_| is_new)
     }
 }

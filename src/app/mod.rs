@@ -32,7 +32,7 @@ pub use view_state::ViewState;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
-use palpate_core::recognition::shipped_model;
+use palpate_core::recognition::{models_folder, shipped_model};
 use palpate_core::scene::Scene;
 use palpate_core::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
 use std::path::PathBuf;
@@ -47,6 +47,8 @@ pub struct WindowOptions {
     pub store: PathBuf,
     /// The port of a real gripper to connect to.
     pub port: Option<PathBuf>,
+    /// The model that listens to the real gripper; the one of last time where none is named.
+    pub model: Option<PathBuf>,
 }
 
 /// Size of the window when it is opened for the first time, and the smallest it can be made (points).
@@ -69,7 +71,8 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
     };
     let creator: eframe::AppCreator<'_> = Box::new(move |creation| {
         let render_state = creation.wgpu_render_state.as_ref().ok_or("the window has no graphics device")?;
-        let view = creation.storage.and_then(|s| eframe::get_value(s, VIEW_KEY)).unwrap_or_default();
+        let mut view: ViewState = creation.storage.and_then(|s| eframe::get_value(s, VIEW_KEY)).unwrap_or_default();
+        view.gripper_model = options.model.or(view.gripper_model);
         let wake_context = creation.egui_ctx.clone();
         let setup = WorkbenchSetup {
             scene: options.scene,
@@ -78,7 +81,11 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
             model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
             explain: Arc::new(explain_scene),
             listen: Arc::new(listen_to_port),
-            tools: GripperToolsSetup { examine: Arc::new(examine_port), fit: Arc::new(fit_trials) },
+            tools: GripperToolsSetup {
+                examine: Arc::new(examine_port),
+                fit: Arc::new(fit_trials),
+                models: models_folder(),
+            },
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

@@ -41,6 +41,8 @@ pub struct ViewState {
     /// What the user is about to say of a trial.
     #[serde(skip)]
     pub draft: LabelDraft,
+    /// The model that listens to the real gripper; the one that comes with the program where none is named.
+    pub gripper_model: Option<PathBuf>,
     /// The stretch of time that all plots show (s); `None` for the whole grasp.
     #[serde(skip)]
     pub time_window: Option<[f64; 2]>,
@@ -69,6 +71,7 @@ impl Default for ViewState {
             port: None,
             blind: true,
             draft: LabelDraft::default(),
+            gripper_model: None,
             time_window: None,
             keys_shown: false,
             recent: Vec::new(),

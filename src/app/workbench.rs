@@ -5,7 +5,7 @@ mod real;
 
 use super::actions::{Action, Answer, Message};
 use super::files::{Ask, ask};
-use super::gripper_tools::{GripperTools, GripperToolsSetup};
+use super::gripper_tools::{GripperTools, GripperToolsSetup, ToolWish};
 use super::panels::{PanelContext, PanelKind, Source};
 use super::theme::{self, colour};
 use super::tiling::{Tiling, panel_frame};
@@ -28,7 +28,7 @@ use palpate_core::trial::Frame as TrialFrame;
 use palpate_core::workers::{
     Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, LabelView,
     LabelWish, Labeller, Listen, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
-    TrialPart, Wake, start_labeller,
+    TrainWish, TrainedModel, TrialPart, Wake, start_labeller,
 };
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
@@ -75,6 +75,8 @@ pub struct Workbench {
     worker: SimWorker,
     effects: EffectsWorker,
     tools: GripperTools,
+    /// The model that comes with the program.
+    shipped: Option<Arc<Model>>,
     gripper: GripperWorker,
     labeller: Labeller,
     /// What came of wishes about labels has been told up to this number.
@@ -183,6 +185,7 @@ impl Workbench {
             worker,
             effects,
             tools,
+            shipped: setup.model.as_ref().ok().cloned(),
             gripper,
             labeller,
             labels_told: 0,
@@ -210,6 +213,9 @@ impl Workbench {
             && let Err(cause) = workbench.worker.send(Command::SetGhost(true))
         {
             workbench.tell(Message::Warning(cause.to_string()));
+        }
+        if let Some(path) = workbench.view.gripper_model.clone() {
+            workbench.tools.grant(ToolWish::Train(TrainWish::Load(path)));
         }
         if let Err(cause) = setup.model {
             workbench.tell(Message::Error(format!("nothing will be recognised: {cause}")));
@@ -371,6 +377,11 @@ impl Workbench {
                 Notice::Stored(id) => self.tell(Message::Info(format!("trial {id} stored"))),
             }
         }
+        match self.tools.loaded() {
+            Some(Ok(trained)) => self.use_model(&trained),
+            Some(Err(cause)) => self.tell(Message::Error(format!("the real gripper keeps its model: {cause}"))),
+            None => {}
+        }
         let answers: Vec<Answer> = self.answers.1.try_iter().collect();
         for answer in answers {
             self.take_answer(ctx, answer);
@@ -382,6 +393,13 @@ impl Workbench {
         if self.unsent {
             self.send_scene();
         }
+    }
+
+    /// Lets a model listen to the real gripper from now on.
+    fn use_model(&mut self, trained: &TrainedModel) {
+        self.view.gripper_model = Some(trained.path.clone());
+        self.gripper.wish(GripperWish::SetModel(Some(Arc::clone(&trained.model))));
+        self.tell(Message::Info(format!("the real gripper is recognised by {}", trained.about)));
     }
 
     /// The scene before goes on, and list and settings should say so, unless something else has been asked for since.
@@ -441,6 +459,11 @@ impl Workbench {
             Action::SavePicture => self.ask(Ask::SavePicture),
             Action::MeasureEffects => self.effects.ask(&self.scene),
             Action::Tool(wish) => self.tools.grant(wish),
+            Action::UseModel(Some(path)) => self.tools.grant(ToolWish::Train(TrainWish::Load(path))),
+            Action::UseModel(None) => {
+                self.view.gripper_model = None;
+                self.gripper.wish(GripperWish::SetModel(self.shipped.clone()));
+            }
             Action::Gripper(wish) => {
                 if let GripperWish::Connect(Some(port)) = &wish {
                     self.view.port = Some(port.clone());

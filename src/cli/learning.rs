@@ -6,7 +6,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use palpate_core::recognition::{Dataset, METHODS, Method, Source, View, method};
 use palpate_core::recording::Store;
 use palpate_core::sensing::model::SensorModel;
-use std::path::PathBuf;
 
 /// Which grasps to learn from or to judge by.
 #[derive(Debug, clap::Args)]
@@ -14,6 +13,9 @@ pub(super) struct DataArguments {
     /// Only trials of this collection; the beginning of its name is enough.
     #[arg(long, value_name = "NAME")]
     pub(super) collection: Option<String>,
+    /// Only trials of this rig: sim, or serial for the real gripper.
+    #[arg(long, value_name = "NAME")]
+    pub(super) rig: Option<String>,
     /// Only these objects, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     pub(super) objects: Vec<String>,
@@ -47,8 +49,8 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        let source =
-            Source { collection: self.collection.clone(), objects: self.objects.clone(), without_empty, most_of_each };
+        let (collection, rig, objects) = (self.collection.clone(), self.rig.clone(), self.objects.clone());
+        let source = Source { collection, rig, objects, without_empty, most_of_each };
         let bar = progress_bar("reading trials")?;
         let data = source.read(store, &self.view(), &mut |done, of| {
             bar.set_length(of as u64);
@@ -80,10 +82,4 @@ pub(super) fn known_method(key: &str) -> Result<&'static Method, Failure> {
         let keys: Vec<&str> = METHODS.iter().map(|m| m.key).collect();
         format!("there is no method \"{key}\"; there are {}", keys.join(", ")).into()
     })
-}
-
-/// Where trained models are kept: beside the store.
-pub(super) fn models_folder() -> PathBuf {
-    let store = Store::default_path();
-    store.parent().map_or_else(|| PathBuf::from("models"), |folder| folder.join("models"))
 }

@@ -25,6 +25,7 @@ mod workshop;
 use crate::app::{WindowOptions, open_window};
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate_core::objects::{EMPTY, anchored, catalogue};
+use palpate_core::recognition::Model;
 use palpate_core::recording::Store;
 use palpate_core::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -47,6 +48,9 @@ struct Arguments {
     /// Connect the window to the real gripper: a port, a link to one, or a file of captured bytes.
     #[arg(long, value_name = "PORT")]
     port: Option<PathBuf>,
+    /// The model that listens to the real gripper in the window (.safetensors); remembered.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
     /// The SQLite file that holds the trials (default: the platform's data folder).
     #[arg(long, global = true, value_name = "FILE")]
     store: Option<PathBuf>,
@@ -92,7 +96,8 @@ enum Command {
 }
 
 /// Opens the window on an object.
-fn window(object: Option<&str>, port: Option<&Path>, store: Option<&Path>) -> Result<(), Failure> {
+fn window(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { object, port, model, store, .. } = arguments;
     let mut scene = Scene::default();
     if let Some(object) = object {
         if object.to_ascii_lowercase().ends_with(".toml") {
@@ -104,8 +109,13 @@ fn window(object: Option<&str>, port: Option<&Path>, store: Option<&Path>) -> Re
         // A file is tried before there is a window to complain in.
         scene.load_object()?;
     }
-    let store = store.map_or_else(Store::default_path, Path::to_owned);
-    Ok(open_window(WindowOptions { scene, store, port: port.map(Path::to_owned) })?)
+    if let Some(path) = model {
+        Model::load(path)?;
+    }
+    // The folder may be another one by the next time.
+    let model = model.as_ref().map(std::path::absolute).transpose()?;
+    let store = store.clone().unwrap_or_else(Store::default_path);
+    Ok(open_window(WindowOptions { scene, store, port: port.clone(), model })?)
 }
 
 /// A word that is neither a command nor an object would open a window with nothing in it.
@@ -122,8 +132,8 @@ fn refuse_typing_errors(object: &str) {
 /// Runs the program as its arguments ask.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
-    if arguments.port.is_some() && arguments.command.is_some() {
-        let text = "--port belongs to the window, or after the command";
+    if (arguments.port.is_some() || arguments.model.is_some()) && arguments.command.is_some() {
+        let text = "--port and --model belong to the window, or after the command";
         Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
     }
     if let (Some(object), Some(_)) = (&arguments.object, &arguments.command) {
@@ -166,7 +176,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study)?,
         Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,
-        None => window(arguments.object.as_deref(), arguments.port.as_deref(), store)?,
+        None => window(arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }

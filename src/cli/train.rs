@@ -1,10 +1,10 @@
 //! `palpate train`: fits a recogniser to stored trials and saves it.
 
 use super::Failure;
-use super::learning::{DataArguments, known_method, models_folder, progress_bar};
+use super::learning::{DataArguments, known_method, progress_bar};
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
-use palpate_core::recognition::{Dataset, FitError, Fitting, METHODS, Method, Model};
+use palpate_core::recognition::{Dataset, FitError, Fitting, METHODS, Method, Model, models_folder};
 use palpate_core::study::{SearchRow, search};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

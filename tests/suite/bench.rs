@@ -93,7 +93,11 @@ impl Bench {
                     model: model.clone(),
                     explain: Arc::new(explain_steadily),
                     listen: Arc::clone(&listen),
-                    tools: GripperToolsSetup { examine: Arc::clone(&examine), fit: Arc::clone(&fit) },
+                    tools: GripperToolsSetup {
+                        examine: Arc::clone(&examine),
+                        fit: Arc::clone(&fit),
+                        models: path.with_file_name("models"),
+                    },
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.

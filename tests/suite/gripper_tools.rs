@@ -1,4 +1,4 @@
-//! The panels that help with the real gripper: doctor, fit and training, by their labels, with a picture of each state.
+//! Two panels that help with the real gripper, doctor and fit: by their labels, with a picture of what they show.
 
 use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
@@ -23,8 +23,8 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// A bench with one of the panels on it, nothing else.
-fn bench(panel: &str, theme: Theme, setup: BenchSetup) -> Bench {
+/// A bench with one panel on it, nothing else.
+pub(crate) fn bench(panel: &str, theme: Theme, setup: BenchSetup) -> Bench {
     let panel = ALL_PANELS.iter().find(|own| own.name == panel);
     Bench::new(BenchSetup { panel, theme, ..setup }, CpuRenderer::default())
 }
@@ -137,7 +137,7 @@ fn recorded(store: &mut Store) {
 }
 
 /// Goes to something by the tabulator key and presses it by Enter.
-fn press(bench: &mut Bench, label: &str) {
+pub(crate) fn press(bench: &mut Bench, label: &str) {
     for _ in 0..30 {
         let harness = &bench.harness;
         let node = harness.query_by_label(label).unwrap_or_else(|| harness.get_by_label_contains(label));

@@ -14,7 +14,8 @@
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the pretended gripper calibrated and fitted.
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
-//! - `gripper_tools`: doctor, fit and training in the window.
+//! - `gripper_tools`: doctor and fit in the window.
+//! - `training`: training on labelled trials of the board, in the window.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -48,4 +49,5 @@ mod scripted;
 mod serial;
 mod store;
 mod streams;
+mod training;
 mod trust;

@@ -19,6 +19,7 @@ mod plan;
 mod pressure;
 mod recognition;
 mod scene;
+mod training;
 mod trials;
 mod view3d;
 
@@ -189,7 +190,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 20] = [
+pub const ALL: [PanelKind; 21] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -210,6 +211,7 @@ pub const ALL: [PanelKind; 20] = [
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
     PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
     PanelKind { name: "fit", title: "Fit", ui: fit::ui },
+    PanelKind { name: "training", title: "Training", ui: training::ui },
 ];
 
 /// A panel by its name.

@@ -19,6 +19,7 @@ mod model_file;
 pub mod network;
 mod pmf;
 mod rivals;
+mod saved;
 mod source;
 
 pub use belief::{Belief, Rejection, StopReason, StopRule};
@@ -26,6 +27,7 @@ pub use data::{Class, DataCard, Dataset, Example, Labels, Sequence};
 pub use methods::{Kind, METHODS, Method, method};
 pub use model_file::{Arrays, Model, ModelCard, ModelError, shipped_model};
 pub use pmf::Pmf;
+pub use saved::{SavedModel, models_folder, new_model_path, saved_models};
 pub use source::{DatasetError, Source, View, labels_of_catalogue, sequence_of};
 
 use std::sync::atomic::{AtomicBool, Ordering};

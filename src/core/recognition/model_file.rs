@@ -181,7 +181,7 @@ impl Model {
 }
 
 /// Where the card of a model stands: `live.safetensors` has `live.json`.
-fn card_path(path: &Path) -> PathBuf {
+pub(super) fn card_path(path: &Path) -> PathBuf {
     path.with_extension("json")
 }
 

@@ -32,6 +32,8 @@ impl Default for View {
 pub struct Source {
     /// Only trials of this collection, by its name or the beginning of it.
     pub collection: Option<String>,
+    /// Only trials of this rig: [`BOARD_RIG`] for those of the real gripper.
+    pub rig: Option<String>,
     /// Only these objects; all where the list is empty.
     pub objects: Vec<String>,
     /// Leave the empty hand out: it is never confused with anything and would flatter a table.
@@ -109,11 +111,14 @@ pub enum DatasetError {
     },
     /// Trials of the real gripper, none of which can be derived.
     #[error(
-        "none of the {left_out} trials of the real gripper can be read: `palpate calibrate list` shows which parts are calibrated"
+        "none of the {left_out} trials of the real gripper can be read: {why}; `palpate calibrate list` shows which parts are \
+         calibrated"
     )]
     NoneCalibrated {
         /// How many fit.
         left_out: usize,
+        /// What is missing of the first, in words.
+        why: String,
     },
     /// An object in the list that no trial is of.
     #[error("no trial in the store is of \"{object}\"; `palpate trials list` shows what is there")]
@@ -161,6 +166,7 @@ impl Source {
             |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
         row.state == "complete"
             && self.collection.as_ref().is_none_or(in_collection)
+            && self.rig.as_ref().is_none_or(|rig| *rig == row.rig)
             && (self.objects.is_empty() || self.objects.contains(&row.object))
             && !(self.without_empty && row.object == EMPTY)
     }
@@ -169,6 +175,9 @@ impl Source {
         let mut about = String::new();
         if let Some(collection) = &self.collection {
             about += &format!(" collection {collection}");
+        }
+        if let Some(rig) = &self.rig {
+            about += &format!(" rig {rig}");
         }
         if !self.objects.is_empty() {
             about += &format!(" the objects {}", self.objects.join(", "));
@@ -231,12 +240,15 @@ impl Source {
         let mut channels: Option<(TrialId, Vec<String>)> = None;
         let mut named = BTreeMap::new();
         let mut read = Vec::new();
-        let (mut origins, mut uncalibrated) = (BTreeSet::new(), 0);
+        let (mut origins, mut uncalibrated, mut missing) = (BTreeSet::new(), 0, String::new());
         for (k, row) in rows.iter().enumerate() {
             tell(k, rows.len());
             let (signals, origin) = match signals_of(store, row, view) {
                 // Counts of a board mean nothing without a calibration; others may have one.
-                Err(DatasetError::Uncalibrated { .. }) if rows.len() > 1 => {
+                Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
+                    if uncalibrated == 0 {
+                        missing = why;
+                    }
                     uncalibrated += 1;
                     continue;
                 }
@@ -260,7 +272,7 @@ impl Source {
             Some(Example { id, class: labels.class(&object)?, grasp: Arc::new(grasp) })
         };
         if read.is_empty() {
-            return Err(DatasetError::NoneCalibrated { left_out: uncalibrated });
+            return Err(DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing });
         }
         let examples = read.into_iter().filter_map(example).collect();
         let channels = channels.map(|(_, channels)| channels).unwrap_or_default();
@@ -335,7 +347,8 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
 fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, DatasetError> {
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
     // One that says it is of a board, and has nothing of it, has nothing at all.
-    let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1 })?;
+    let read =
+        read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "nothing was heard of its board".to_owned() })?;
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
     let channels = layout.channels(&Gripper::default()).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();

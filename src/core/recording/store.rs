@@ -229,6 +229,12 @@ impl Store {
         self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(|e| fault(&path, &e))
     }
 
+    /// The time now, UTC, as trials are dated: `2026-11-21T15:36:00.123Z`.
+    pub fn now(&self) -> Result<String, StoreError> {
+        let sql = "SELECT strftime('%Y-%m-%dT%H:%M:%fZ', 'now')";
+        self.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| fault(&self.path, &e))
+    }
+
     /// Begins a trial; frames follow with [`Store::append`].
     pub fn begin(&mut self, info: &TrialInfo) -> Result<TrialId, StoreError> {
         let path = self.path.clone();

@@ -4,6 +4,7 @@ mod accuracy_cost;
 mod comparison;
 mod effects;
 mod finger_fit;
+mod labelled_training;
 mod network_cost;
 mod physics_cost;
 mod search;
@@ -15,6 +16,10 @@ pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain
 pub use finger_fit::{
     Course, Estimate, FingerFit, FitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
     RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
+};
+pub use labelled_training::{
+    HELD_BACK, JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage,
+    labelled_classes,
 };
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};

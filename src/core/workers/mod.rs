@@ -14,7 +14,8 @@
 //! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "examine" looks for what is wrong with it; "fit" lays the simulated finger over the real one.
+//! "examine" looks for what is wrong with it; "fit" lays the simulated finger over the real one;
+//! "train" learns from what was labelled.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -41,6 +42,7 @@ mod session;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
+mod trainer;
 
 pub use desk::Desk;
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
@@ -60,3 +62,4 @@ pub use messages::{
 };
 pub use recorder::{Recorder, RecorderNotice};
 pub use sim::{SimWorker, SimWorkerSetup};
+pub use trainer::{FinishedTraining, TrainRequest, TrainWish, TrainedModel, Trainer, TrainerView};

@@ -1,0 +1,265 @@
+//! Training on what was labelled: how many trials there are of each object, the method, how the new model does on trials that
+//! were held back, and which model listens to the real gripper.
+
+use super::{PanelContext, just_opened, wrapped};
+use crate::app::actions::Action;
+use crate::app::gripper_tools::ToolWish;
+use crate::app::theme::colour;
+use egui::{Align, Align2, Button, ComboBox, FontId, Layout, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
+use palpate_core::palette::{Rgb, Theme};
+use palpate_core::recognition::metrics::Confusion;
+use palpate_core::recognition::{Labels, METHODS, method};
+use palpate_core::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
+use palpate_core::workers::{FinishedTraining, TrainRequest, TrainWish, TrainerView};
+use std::path::Path;
+
+/// What is trained where nobody chooses: quick to fit, and good with few trials.
+const USUAL_METHOD: &str = "macro-layer";
+
+/// Seed of fits and of which trials are held back: the same data give the same model.
+const SEED: u64 = 1;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    if just_opened(ui, "training") {
+        actions.push(Action::Tool(ToolWish::Train(TrainWish::Look)));
+    }
+    let view = context.tools.trainer.view().unwrap_or_default();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        match &view.running {
+            Some((request, stage)) => running_ui(ui, request, *stage, actions),
+            None => begin_ui(ui, &view, actions),
+        }
+        match &view.finished {
+            Some(Ok(finished)) => finished_ui(ui, context, finished, actions),
+            Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            None => {}
+        }
+        match &view.classes {
+            Some(Ok(classes)) => classes_ui(ui, context.view.theme, classes),
+            Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            None => wrapped(ui, RichText::new("looking for labelled trials ..").weak()),
+        }
+        models_ui(ui, context, &view, actions);
+    });
+}
+
+/// The method and the button that begins.
+fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Vec<Action>) {
+    let id = egui::Id::unique("training method");
+    let mut chosen = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_else(|| USUAL_METHOD.to_owned());
+    let title = method(&chosen).map_or("", |method| method.title);
+    ui.horizontal_wrapped(|ui| {
+        let label = ui.label("Method");
+        let combo = ComboBox::from_id_salt("training method").width(150.0).selected_text(title);
+        let shown = combo.show_ui(ui, |ui| {
+            for method in in_table_order() {
+                ui.selectable_value(&mut chosen, method.key.to_owned(), method.title).on_hover_text(method.about);
+            }
+        });
+        shown.response.labelled_by(label.id);
+        let too_little = view.too_little();
+        let ready = matches!(&view.classes, Some(Ok(_))) && too_little.is_none();
+        let train =
+            ui.add_enabled(ready, Button::new("Train")).on_hover_text("On all labelled trials of the real gripper");
+        if train.on_disabled_hover_text(too_little.unwrap_or_default()).clicked() {
+            let request = TrainRequest { method: chosen.clone(), seed: SEED, quick: false };
+            actions.push(Action::Tool(ToolWish::Train(TrainWish::Train(request))));
+        }
+    });
+    if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
+        let share = 100.0 * HELD_BACK;
+        let text = format!("{about}. {share:.0} % of each object's trials are held back to judge it by.");
+        wrapped(ui, RichText::new(text).weak());
+    }
+    if let Some(why) = view.too_little() {
+        wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
+    }
+    ui.data_mut(|data| data.insert_temp(id, chosen));
+}
+
+fn running_ui(ui: &mut Ui, request: &TrainRequest, stage: TrainingStage, actions: &mut Vec<Action>) {
+    let title = method(&request.method).map_or(request.method.as_str(), |method| method.title);
+    let (share, text) = match stage {
+        TrainingStage::Reading(done, of) => (done as f64 / of.max(1) as f64, format!("reading trials, {done} of {of}")),
+        TrainingStage::Fitting(share) => (share, format!("training {title}, {:.0} %", 100.0 * share)),
+        TrainingStage::Judging => (1.0, "judging".to_owned()),
+    };
+    ui.add(ProgressBar::new(share as f32).text(text));
+    if ui.button("Stop").on_hover_text("Give it up; nothing is saved").clicked() {
+        actions.push(Action::Tool(ToolWish::StopTraining));
+    }
+}
+
+fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTraining, actions: &mut Vec<Action>) {
+    let FinishedTraining { trained, judged } = finished;
+    let [low, high] = judged.evaluation.ci95;
+    ui.add_space(6.0);
+    let f1 = judged.evaluation.f1_macro;
+    wrapped(ui, RichText::new(format!("Macro F1 {f1:.2} ({low:.2} to {high:.2})")).heading());
+    let [learned, held_back] = judged.trials;
+    let title = method(&trained.model.card.method).map_or("", |method| method.title);
+    let text = format!("{title}, learned from {learned} trials, judged by {held_back} others; 95 % interval");
+    wrapped(ui, RichText::new(text).weak());
+    for class in &judged.too_few {
+        let text = format!("\"{}\" was left out: it has {} usable trials of {LEAST_TRIALS}", class.name, class.trials);
+        wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+    }
+    if judged.left_out > 0 {
+        let text =
+            format!("{} trials were left out: the sensors they were recorded with are not calibrated", judged.left_out);
+        wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+    }
+    confusion_ui(ui, context.view.theme, &judged.evaluation.confusion, &trained.model.card.labels);
+    use_ui(ui, context, Some(&trained.path), "Use for the real gripper", actions);
+}
+
+/// A button that lets a model listen, or that it does.
+fn use_ui(ui: &mut Ui, context: &PanelContext<'_>, path: Option<&Path>, text: &str, actions: &mut Vec<Action>) {
+    let in_use = context.view.gripper_model.as_deref() == path;
+    let button = ui.add_enabled(!in_use, Button::new(if in_use { "in use" } else { text }));
+    let name = path.map_or("the shipped model".into(), name_of);
+    let label = if in_use { format!("{name} is in use") } else { format!("Use {name}") };
+    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, !in_use, &label));
+    if button.on_hover_text("Let it listen to the real gripper").clicked() {
+        actions.push(Action::UseModel(path.map(Path::to_owned)));
+    }
+}
+
+fn name_of(path: &Path) -> std::borrow::Cow<'_, str> {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy()
+}
+
+/// How many trials there are of each object.
+fn classes_ui(ui: &mut Ui, theme: Theme, classes: &[LabelledClass]) {
+    ui.add_space(6.0);
+    let all: usize = classes.iter().map(|class| class.trials).sum();
+    wrapped(ui, RichText::new("Labelled trials").strong());
+    if classes.is_empty() {
+        wrapped(ui, RichText::new("There are none yet: record grasps of the real gripper and label them.").weak());
+        return;
+    }
+    wrapped(ui, RichText::new(format!("{all} of {} objects", classes.len())).weak());
+    let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
+    for class in classes {
+        let needs = if class.is_enough() { String::new() } else { format!(", needs {LEAST_TRIALS}") };
+        let colours = theme.colours();
+        let ink = if class.is_enough() { colours.accent } else { colours.warning };
+        ui.horizontal(|ui| {
+            ui.spacing_mut().interact_size.y = 16.0;
+            ui.add_sized(vec2(110.0, 16.0), egui::Label::new(&class.name).truncate().halign(Align::LEFT));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                let count = RichText::new(format!("{}{needs}", class.trials));
+                ui.label(if class.is_enough() { count } else { count.color(colour(colours.warning)) });
+                let width = ui.available_width().max(1.0);
+                let (rect, _) = ui.allocate_exact_size(vec2(width, 10.0), Sense::hover());
+                let filled = rect.width() * class.trials as f32 / most as f32;
+                let bar = Rect::from_min_size(rect.min, vec2(filled, rect.height()));
+                ui.painter().rect_filled(bar, 2.0, colour(ink));
+            });
+        });
+    }
+}
+
+/// Models that were saved, and the one that comes with the program.
+fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, actions: &mut Vec<Action>) {
+    ui.add_space(8.0);
+    ui.horizontal(|ui| {
+        ui.strong("Models for the real gripper");
+        if ui.button("Refresh").on_hover_text("Look for trials and models again").clicked() {
+            actions.push(Action::Tool(ToolWish::Train(TrainWish::Look)));
+        }
+    });
+    let shipped = ("The one that comes with Palpate".to_owned(), "learned from simulated grasps".to_owned(), None);
+    let saved = view.models.iter();
+    let saved = saved.map(|model| (name_of(&model.path).into_owned(), model.about.clone(), Some(model.path.as_path())));
+    // One from elsewhere, which the folder does not hold.
+    let other = context.view.gripper_model.as_deref().filter(|own| view.models.iter().all(|m| m.path != *own));
+    let other = other.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
+    for (name, about, path) in std::iter::once(shipped).chain(other).chain(saved) {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            use_ui(ui, context, path, "Use", actions);
+            ui.with_layout(Layout::top_down(Align::LEFT), |ui| {
+                ui.spacing_mut().item_spacing.y = 1.0;
+                wrapped(ui, RichText::new(name));
+                wrapped(ui, RichText::new(about).small().weak());
+            });
+        });
+        ui.add_space(3.0);
+    }
+}
+
+/// Cells of a confusion matrix: largest and least side (points).
+const CELLS: [f32; 2] = [26.0, 9.0];
+
+/// Rows are what it was, columns what it was taken for; a cell is as strong as its share of the row.
+fn confusion_ui(ui: &mut Ui, theme: Theme, confusion: &Confusion, labels: &Labels) {
+    let count = confusion.classes().max(1);
+    let colours = theme.colours();
+    let names = 96.0f32.min(0.4 * ui.available_width());
+    let cell = ((ui.available_width() - names - 8.0) / count as f32).clamp(CELLS[1], CELLS[0]);
+    let heading = if cell > 12.0 { 18.0 } else { 0.0 };
+    ui.add_space(4.0);
+    wrapped(ui, RichText::new("Rows: what it was; columns: what it was taken for, in the same order").small().weak());
+    let size = vec2(names + cell * count as f32, heading + cell * count as f32);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    let name = |class: usize| labels.classes.get(class).map_or("", |class| class.name.as_str());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, confusions(confusion, labels)));
+    let painter = ui.painter_at(rect);
+    let corner = rect.min + vec2(names, heading);
+    let ink = colour(colours.text);
+    for column in 0..if heading > 0.0 { count } else { 0 } {
+        let at = corner + vec2((column as f32 + 0.5) * cell, -0.5 * heading);
+        painter.text(at, Align2::CENTER_CENTER, column + 1, FontId::proportional(11.0), colour(colours.quiet_text));
+    }
+    for row in 0..count {
+        let trials = confusion.class(row).trials.max(1);
+        let middle = corner + vec2(-6.0, (row as f32 + 0.5) * cell);
+        let font = FontId::proportional(cell.min(12.5));
+        let text = format!("{} {}", row + 1, name(row));
+        let galley = painter.layout_no_wrap(text, font, ink);
+        painter.galley(middle - vec2(galley.size().x.min(names - 6.0), 0.5 * galley.size().y), galley, ink);
+        for column in 0..count {
+            let trials_here = confusion.count(row, Some(column));
+            let at = corner + vec2(column as f32 * cell, row as f32 * cell);
+            let place = Rect::from_min_size(at, vec2(cell, cell)).shrink(0.5);
+            let share = trials_here as f32 / trials as f32;
+            let hue = if row == column { colours.accent } else { colours.error };
+            let fill = colours.raised.mix(hue, share);
+            painter.rect_filled(place, 1.0, colour(fill));
+            if trials_here > 0 && cell > 14.0 {
+                let font = FontId::proportional(11.0);
+                painter.text(place.center(), Align2::CENTER_CENTER, trials_here, font, colour(readable(fill, theme)));
+            }
+        }
+    }
+    let told = ui.input(|input| input.pointer.hover_pos()).filter(|at| rect.contains(*at)).and_then(|at| {
+        let [column, row] = [(at.x - corner.x) / cell, (at.y - corner.y) / cell];
+        (row >= 0.0 && column >= 0.0).then(|| {
+            let (row, column) = ((row as usize).min(count - 1), (column as usize).min(count - 1));
+            let (here, all) = (confusion.count(row, Some(column)), confusion.class(row).trials);
+            format!("{} taken for {}: {here} of {all}", name(row), name(column))
+        })
+    });
+    if let Some(told) = told {
+        response.on_hover_text_at_pointer(told);
+    }
+}
+
+/// The text colour that stands out more.
+fn readable(behind: Rgb, theme: Theme) -> Rgb {
+    let colours = theme.colours();
+    let stands_out = |ink: &Rgb| (100.0 * ink.contrast(behind)) as u32;
+    [colours.text, colours.background].into_iter().max_by_key(stands_out).unwrap_or(colours.text)
+}
+
+/// What was taken for something else, in words.
+fn confusions(confusion: &Confusion, labels: &Labels) -> String {
+    let classes = &labels.classes;
+    let pairs = (0..classes.len()).flat_map(|row| (0..classes.len()).map(move |column| (row, column)));
+    let wrong = pairs.filter(|(row, column)| row != column).filter_map(|(row, column)| {
+        let count = confusion.count(row, Some(column));
+        (count > 0).then(|| format!("{} taken for {}: {count}", classes[row].name, classes[column].name))
+    });
+    let wrong: Vec<String> = wrong.collect();
+    if wrong.is_empty() { "No trial was taken for another object".to_owned() } else { wrong.join("; ") }
+}

@@ -1,0 +1,235 @@
+//! Training on labelled trials of the board: made-up readings of objects that differ in how far the fingers bend and how hard
+//! they press, through calibrations that are as made up.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::golden::compare;
+use crate::gripper_tools::{bench, press};
+use crate::panels::side_by_side;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use palpate::app::Action;
+use palpate_core::board::{Board, Reading, Sensor};
+use palpate_core::gripper::Phase;
+use palpate_core::palette::Theme;
+use palpate_core::recognition::Model;
+use palpate_core::recording::{BOARD_RIG, BoardChunk, BoardInfo, Store};
+use palpate_core::scene::Scene;
+use palpate_core::sensing::calibration::{Input, Kind, Point, Record, plan};
+use palpate_core::trial::PhaseMark;
+use palpate_core::workers::{TrainRequest, TrainWish, Trainer, TrainerView};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+/// Resistance of every part at an angle (rad) or force (N) (ohm).
+fn ohm(kind: Kind, stimulus: f64) -> f64 {
+    match kind {
+        Kind::Flex => 25e3 * (1.0 + stimulus.to_degrees() / 90.0),
+        Kind::Pad => 6.5e3 * stimulus.max(1e-4).powf(-0.9),
+    }
+}
+
+fn counts(sensor: Sensor, stimulus: f64) -> f64 {
+    Input::on(&Board::default(), sensor).counts(ohm(Kind::of(sensor), stimulus))
+}
+
+/// All four parts, calibrated and in their places.
+fn calibrate(store: &mut Store) {
+    for sensor in Sensor::ALL {
+        let kind = Kind::of(sensor);
+        let point = |stimulus| Point { stimulus, counts: counts(sensor, stimulus), spread: 1.0, readings: 50 };
+        let points = plan(kind).into_iter().map(point).collect();
+        let part = sensor.channel().to_owned();
+        let input = Input::on(&Board::default(), sensor);
+        let record = Record { part, kind, input, points, bending: None, note: String::new() };
+        store.add_calibration(&record).unwrap();
+        store.mount_part(sensor, &record.part).unwrap();
+    }
+}
+
+/// Four objects by how far the fingers bend (degrees) and press (N). Nobody can tell the tomato from the lemon.
+const OBJECTS: [(&str, f64, f64); 4] =
+    [("ball", 60.0, 1.0), ("box", 30.0, 3.0), ("lemon", 45.0, 2.0), ("tomato", 45.0, 2.0)];
+
+/// A trial: the fingers close for a second and hold for one.
+fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32) {
+    let mut info = palpate_core::grasping::prepare(&Scene::default(), None, 0).info().clone();
+    (info.rig, info.object) = (BOARD_RIG.to_owned(), object.to_owned());
+    let mark = |from_s, phase| PhaseMark { from_s, phase, line_bar: None };
+    let phases = vec![mark(0.0, Phase::Close), mark(2.0, Phase::Release)];
+    let about = BoardInfo { phases, ..BoardInfo::default() };
+    // Grasps of one object differ by a few per cent, trials of different objects not alike.
+    let spread = 1.0 + 0.05 * (f64::from(number * 7919 % 97) / 48.0 - 1.0);
+    let reading = |k: u32| {
+        let t_s = 0.02 * f64::from(k);
+        let share = spread * t_s.min(1.0);
+        let felt = |sensor: Sensor| match Kind::of(sensor) {
+            Kind::Flex => (share * degrees).to_radians(),
+            Kind::Pad => share * newton,
+        };
+        let counts = Sensor::ALL.map(|sensor| Some(counts(sensor, felt(sensor)) as f32)).to_vec();
+        Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
+    };
+    let id = store.begin_board(&info, &about).unwrap();
+    let chunk = BoardChunk { readings: (0..125).map(reading).collect(), ..BoardChunk::default() };
+    store.append_board(id, &about, &chunk).unwrap();
+    store.finish_board(id, &about, &[]).unwrap();
+}
+
+/// Fifteen trials of each of the four, three of a cube, one that nobody has labelled.
+fn labelled(store: &mut Store) {
+    calibrate(store);
+    unmounted(store);
+}
+
+/// The same by parts that nobody knows.
+fn unmounted(store: &mut Store) {
+    for number in 0..15 {
+        for (k, (object, degrees, newton)) in OBJECTS.into_iter().enumerate() {
+            trial(store, object, degrees, newton, 4 * number + k as u32);
+        }
+    }
+    (0..3).for_each(|number| trial(store, "cube", 20.0, 2.0, number));
+    trial(store, "", 20.0, 2.0, 0);
+}
+
+/// A trainer without a window.
+fn trainer(at: &Path, fill: fn(&mut Store)) -> (Trainer, Receiver<()>) {
+    let store = at.join("trials.sqlite");
+    fill(&mut Store::open(&store).unwrap());
+    let (told, woken) = channel();
+    let wake = Arc::new(move || {
+        // The test may have stopped listening.
+        let _heard = told.send(());
+    });
+    (Trainer::start(store, at.join("models"), wake).unwrap(), woken)
+}
+
+fn until(trainer: &Trainer, woken: &Receiver<()>, wanted: impl Fn(&TrainerView) -> bool) -> Arc<TrainerView> {
+    loop {
+        if let Some(view) = trainer.view().filter(|view| wanted(view)) {
+            return view;
+        }
+        woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+    }
+}
+
+fn request(method: &str) -> TrainWish {
+    TrainWish::Train(TrainRequest { method: method.to_owned(), seed: 1, quick: true })
+}
+
+#[test]
+fn what_was_labelled_is_learned_judged_kept_and_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut trainer, woken) = trainer(folder.path(), labelled);
+    trainer.ask(TrainWish::Look);
+    let view = until(&trainer, &woken, |view| view.classes.is_some());
+    let classes = view.classes.clone().unwrap().unwrap();
+    let counts: Vec<(&str, usize)> = classes.iter().map(|class| (class.name.as_str(), class.trials)).collect();
+    assert_eq!(counts, [("ball", 15), ("box", 15), ("cube", 3), ("lemon", 15), ("tomato", 15)]);
+    assert_eq!(view.too_little(), None);
+
+    // A long training is given up, and nothing comes of it.
+    let long = TrainRequest { method: "committee".to_owned(), seed: 1, quick: false };
+    trainer.ask(TrainWish::Train(long));
+    until(&trainer, &woken, |view| view.running.is_some());
+    trainer.give_up();
+    trainer.ask(request("knn"));
+    let view = until(&trainer, &woken, |view| view.running.is_none() && view.finished.is_some());
+    let finished = view.finished.clone().unwrap().unwrap();
+    let judged = &finished.judged;
+    assert_eq!((judged.trials, judged.left_out), ([48, 12], 0));
+    assert_eq!(judged.too_few.iter().map(|class| class.name.as_str()).collect::<Vec<_>>(), ["cube"]);
+    let found = |truth: usize| judged.evaluation.confusion.count(truth, Some(truth));
+    assert_eq!((found(0), found(1)), (3, 3), "what can be told apart is");
+    assert!(found(2) + found(3) < 6 && judged.evaluation.f1_macro < 1.0, "what cannot is not");
+    assert_eq!(view.models.len(), 1);
+    assert!(view.models[0].about.starts_with("KNN, 4 classes, 48 grasps, macro F1 0."), "{:?}", view.models);
+
+    // From its file it comes back with its card.
+    let path = view.models[0].path.clone();
+    trainer.ask(TrainWish::Load(path.clone()));
+    let view = until(&trainer, &woken, |view| view.loaded.0 == 1);
+    let loaded = view.loaded.1.clone().unwrap().unwrap();
+    assert_eq!((&loaded.path, &loaded.model.card), (&path, &finished.trained.model.card));
+    assert_eq!(loaded.model.card.metrics["f1_macro"], judged.evaluation.f1_macro);
+
+    // Files that are none, or listen to something else, are told.
+    let odd = folder.path().join("odd.safetensors");
+    let mut foreign = Model::clone(&loaded.model);
+    foreign.card.channels[0] = "grip".to_owned();
+    foreign.save(&odd).unwrap();
+    for (file, told) in [("gone.safetensors", "cannot read the model"), ("odd.safetensors", "it needs grip")] {
+        let before = trainer.view().unwrap().loaded.0;
+        trainer.ask(TrainWish::Load(folder.path().join(file)));
+        let view = until(&trainer, &woken, |view| view.loaded.0 > before);
+        let cause = view.loaded.1.clone().unwrap().unwrap_err();
+        assert!(cause.contains(told), "{cause}");
+    }
+}
+
+#[test]
+fn too_little_to_learn_from_is_told() {
+    let few = |store: &mut Store| (0..6).for_each(|number| trial(store, "ball", 60.0, 1.0, number));
+    for (fill, told) in [
+        (few as fn(&mut Store), "1 of the objects have 5 labelled trials or more, and two are needed"),
+        (
+            unmounted,
+            "none of the 60 trials of the real gripper can be read: it is not known which part is the left flex strip",
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (trainer, woken) = trainer(folder.path(), fill);
+        trainer.ask(request("knn"));
+        let view = until(&trainer, &woken, |view| view.running.is_none());
+        let cause = view.finished.clone().unwrap().unwrap_err();
+        assert!(cause.contains(told), "{cause}");
+        assert!(view.models.is_empty(), "nothing is saved");
+    }
+}
+
+#[test]
+fn the_window_trains_and_uses_what_it_trained() {
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let setup = BenchSetup { size: [320.0, 760.0], fill: labelled, ..BenchSetup::default() };
+        let mut bench: Bench = bench("training", theme, setup);
+        bench.until_shown(true, "63 of 5 objects");
+        assert!(bench.harness.query_by_label("3, needs 5").is_some());
+        press(&mut bench, "Method");
+        bench.harness.run_steps(3);
+        bench.harness.get_by_label("KNN").click();
+        bench.harness.run_steps(3);
+        press(&mut bench, "Train");
+        bench.until_shown(true, "Macro F1");
+        assert!(bench.harness.query_by_label_contains("judged by 12 others").is_some());
+        let confused = |text: &str| bench.harness.query_by_label_contains(text).is_some();
+        assert!(confused("lemon taken for tomato") || confused("tomato taken for lemon"));
+        // Without the list of files, in whose names the time stands.
+        let picture = bench.harness.render().unwrap();
+        let end = bench.harness.get_by_label("Models for the real gripper").rect().top() as u32;
+        let picture = image::imageops::crop_imm(&picture, 0, 0, picture.width(), end.min(picture.height())).to_image();
+        assert!(bench.harness.get_by_label("the shipped model is in use").accesskit_node().is_disabled());
+        let label = "Use knn-20";
+        bench.harness.query_all_by_label_contains(label).next().unwrap().click();
+        bench.harness.step();
+        bench.until_shown(true, "is in use");
+        while bench.workbench().view().gripper_model.is_none() {
+            bench.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let used = bench.workbench().view().gripper_model.clone().unwrap();
+        assert!(used.extension().is_some_and(|extension| extension == "safetensors"), "{used:?}");
+        assert!(bench.workbench().messages().iter().any(|text| text.contains("is recognised by KNN")));
+        bench.tell(Action::UseModel(Some("/nowhere.safetensors".into())));
+        while !bench.workbench().messages().iter().any(|text| text.contains("the real gripper keeps its model")) {
+            bench.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(bench.workbench().view().gripper_model, Some(used));
+        bench.harness.get_by_label("Use the shipped model").click();
+        bench.harness.run_steps(2);
+        assert_eq!(bench.workbench().view().gripper_model, None);
+        picture
+    });
+    compare("training_done", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
