@@ -30,6 +30,9 @@ const RATE_SHARE: f64 = 0.02;
 /// Length of the window at rest where nobody says when the closing began (s).
 const REST_S: f64 = 0.3;
 
+/// A step of the control box (bar).
+const PRESSURE_STEP_BAR: f64 = 0.05;
+
 /// What may be wrong with a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -110,13 +113,22 @@ pub fn cadence_line(cadence: &Cadence) -> String {
 }
 
 impl Observed<'_> {
-    /// Readings before the closing, and those of closing and hold. Where no phase is known, all after the first tenths of a
-    /// second.
+    /// Readings before the closing, and those of closing and hold: by the phases where they are known, else by the pressure
+    /// that the board reports; else all after the first tenths of a second.
     fn split(&self) -> (&[Reading], &[Reading]) {
         let start = |phase: Phase| self.phases.iter().find(|mark| mark.phase == phase).map(|mark| mark.from_s);
+        let pressures = || self.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?)));
+        let most = pressures().map(|(_, bar)| bar).fold(0.0, f64::max);
         let first = self.readings.first().map_or(0.0, |reading| reading.t_s);
-        let closing = start(Phase::Close).unwrap_or(first + REST_S);
-        let release = start(Phase::Release).filter(|release| *release > closing).unwrap_or(f64::INFINITY);
+        let (closing, release) = match (start(Phase::Close), pressures().find(|(_, bar)| *bar > 0.0)) {
+            (Some(closing), _) => (closing, start(Phase::Release)),
+            (None, Some((closing, _))) => {
+                let full = pressures().filter(|(_, bar)| *bar > most - PRESSURE_STEP_BAR).last();
+                (closing, full.map(|(t_s, _)| t_s.next_up()))
+            }
+            (None, None) => (first + REST_S, None),
+        };
+        let release = release.filter(|release| *release > closing).unwrap_or(f64::INFINITY);
         let from = self.readings.partition_point(|reading| reading.t_s < closing);
         let to = self.readings.partition_point(|reading| reading.t_s < release).max(from);
         (&self.readings[..from], &self.readings[from..to])
@@ -328,6 +340,27 @@ mod tests {
         let mut before = readings(900.0);
         before[..20].iter_mut().for_each(|reading| reading.counts[3] = Some(4095.0));
         assert_eq!(flags(&before, &[], &[], &good()), []);
+    }
+
+    #[test]
+    fn pressure_stands_in_for_phases_that_nobody_noted() {
+        let mut readings = readings(0.0);
+        readings.iter_mut().for_each(|r| r.line_bar = Some(if (0.5..2.5).contains(&r.t_s) { 1.0 } else { 0.0 }));
+        let (board, cadence) = (Board::default(), good());
+        let mut observed = Observed {
+            board: &board,
+            readings: &readings,
+            gaps: &[],
+            interruptions: &[],
+            cadence: &cadence,
+            phases: &[],
+            calibrations: &[],
+        };
+        let (rest, pressed) = observed.split();
+        assert_eq!((rest.len(), pressed.len()), (25, 100));
+        let phases = marks();
+        observed.phases = &phases;
+        assert_eq!(observed.split().1.len(), 100);
     }
 
     #[test]

@@ -19,6 +19,7 @@ use super::journal::{Change, JOURNAL_TABLES, JournalView, change, newest};
 use super::labels::LABEL_TABLES;
 use super::store_error::{StoreError, fault, plain};
 use crate::geometry::Pose;
+use crate::labelling::{FlagRemark, flaws};
 pub use crate::trial::TrialId;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
@@ -92,7 +93,7 @@ pub struct TrialRow {
     pub state: String,
     /// Where it came from.
     pub rig: String,
-    /// Name of the object.
+    /// Name of the object; empty where nobody has said yet what it is of.
     pub object: String,
     /// Seed of the pose.
     pub seed: u64,
@@ -106,6 +107,14 @@ pub struct TrialRow {
     pub sound: bool,
     /// How many warnings it carries.
     pub warnings: usize,
+    /// What somebody noted of it.
+    pub note: String,
+    /// Its tags.
+    pub tags: Vec<String>,
+    /// Whoever gave its label was not sure.
+    pub unsure: bool,
+    /// What is wrong with it, where it is one of the real gripper.
+    pub flags: Vec<FlagRemark>,
     /// When it was deleted, if it was.
     pub deleted: Option<String>,
 }
@@ -293,18 +302,26 @@ impl Store {
     /// All trials, oldest first; deleted ones only when asked for.
     pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
         let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, \
-                   collection, size, shape FROM trials WHERE ?1 OR deleted IS NULL ORDER BY id";
+                   collection, size, shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END
+                   FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id
+                   WHERE ?1 OR deleted IS NULL ORDER BY id";
         let rows = self.connection.prepare(sql).and_then(|mut statement| {
             statement
                 .query_map([with_deleted], |row| {
                     let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
                     let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
+                    let object: String = row.get(4)?;
+                    let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
                     Ok(TrialRow {
+                        note: row.get(13)?,
+                        tags: json_or_default(&row.get::<_, String>(14)?),
+                        unsure: row.get(15)?,
+                        flags: flaws(flags, Some(&object)),
                         id: row.get(0)?,
                         created: row.get(1)?,
                         state: row.get(2)?,
                         rig: row.get(3)?,
-                        object: row.get(4)?,
+                        object,
                         seed: row.get::<_, i64>(5)?.cast_unsigned(),
                         collection: row.get(10)?,
                         properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
