@@ -126,7 +126,7 @@ impl Observed<'_> {
         let (closing, release) = match (start(Phase::Close), pressures().find(|(_, bar)| *bar > 0.0)) {
             (Some(closing), _) => (closing, start(Phase::Release)),
             (None, Some((closing, _))) => {
-                let full = pressures().filter(|(_, bar)| *bar > most - PRESSURE_STEP_BAR).last();
+                let full = pressures().rfind(|(_, bar)| *bar > most - PRESSURE_STEP_BAR);
                 (closing, full.map(|(t_s, _)| t_s.next_up()))
             }
             (None, None) => (first + REST_S, None),
