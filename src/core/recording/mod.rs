@@ -23,6 +23,8 @@ mod points_csv;
 mod readings;
 mod store;
 mod store_error;
+#[cfg(test)]
+mod store_tests;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use board_export::write_board_csv;
