@@ -4,7 +4,7 @@
 use super::Failure;
 use super::recognise::{StageOne, load_model, named};
 use super::setup::{SceneArguments, open_store};
-use super::terminal::{file_name_of, say, say_json, warn};
+use super::terminal::{say, say_json, warn};
 use glam::Vec2;
 use palpate_core::drawing::Camera;
 use palpate_core::grasping::{GraspSummary, Identification, PoseSampler, grasp};
@@ -13,7 +13,7 @@ use palpate_core::objects::{EMPTY, ObjectModel, catalogue};
 use palpate_core::palette::Theme;
 use palpate_core::picture::{PictureView, Stage};
 use palpate_core::recognition::{StopReason, StopRule};
-use palpate_core::recording::TrialId;
+use palpate_core::recording::{TrialId, file_name_of};
 use palpate_core::scene::{Between, Scene};
 use palpate_core::trial::Trial;
 use palpate_core::units::{mm, three_digits};

@@ -11,6 +11,7 @@ mod fit;
 mod grasp;
 mod interrupt;
 mod learning;
+mod plan;
 mod recognise;
 mod record;
 mod scene;
@@ -76,7 +77,9 @@ enum Command {
     Snapshot(snapshot::SnapshotArguments),
     /// Which effects a scene calls for, why, what each costs and changes.
     Scene(scene::SceneCommandArguments),
-    /// List, show, export, delete and restore recorded trials.
+    /// How many trials of each object are wanted, how many there are, and what to take next.
+    Plan(plan::PlanArguments),
+    /// List, show, label, export, delete and restore recorded trials; undo and redo.
     Trials(trials::TrialsArguments),
     /// Calibrate a flex strip or force pad of the real gripper, and manage what is known of its parts.
     Calibrate(calibrate::CalibrateArguments),
@@ -168,6 +171,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Record(record)) => record::run(record, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
+        Some(Command::Plan(plan)) => plan::run(plan, store)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
         Some(Command::Calibrate(calibrate)) => calibrate::run(calibrate, store)?,
         Some(Command::Fit(fit)) => fit::run(fit, store)?,

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
+use palpate_core::labelling::shown_name;
 use palpate_core::recognition::{Belief, Labels, Model, Pmf, Source, Verdict, View, shipped_model};
 use palpate_core::recording::TrialId;
 use palpate_core::sensing::model::SensorModel;
@@ -31,8 +32,8 @@ pub(super) struct RecogniseArguments {
 #[derive(Serialize)]
 struct Said {
     trial: TrialId,
-    /// Its label in the store.
-    truth: String,
+    /// Its label in the store; none where nobody has said yet what it is of.
+    truth: Option<String>,
     decided: String,
     probability: f64,
     stage_one: Option<StageOne>,
@@ -114,7 +115,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         let stage_one = StageOne::of(&alone, labels);
         said.push(Said {
             trial: *id,
-            truth: data.labels.classes[0].name.clone(),
+            truth: Some(data.labels.classes[0].name.clone()).filter(|name| !name.is_empty()),
             decided: labels.classes[class].name.clone(),
             probability,
             stage_one,
@@ -135,7 +136,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             let properties = said.stage_one.as_ref().map_or_else(String::new, |s| format!("{}, {}", s.size, s.shape));
             vec![
                 said.trial.to_string(),
-                said.truth.clone(),
+                shown_name(said.truth.as_deref().unwrap_or_default()).to_owned(),
                 properties,
                 said.decided.clone(),
                 format!("{:.0} %", 100.0 * said.probability),

@@ -6,6 +6,7 @@ use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_core::grasping::record_board;
+use palpate_core::labelling::{FlagRemark, class_name, flaws, shown_name};
 use palpate_core::objects::EMPTY;
 use palpate_core::recording::{BoardRecorder, BoardTrialPlan, Recorded};
 use palpate_core::rig::serial::{
@@ -27,6 +28,9 @@ pub(super) struct RecordArguments {
     /// What is in the hand.
     #[arg(long, value_name = "NAME", default_value = EMPTY)]
     object: String,
+    /// Say later what is in the hand, with `palpate trials label`; until then no data set takes the trial.
+    #[arg(long, conflicts_with = "object")]
+    unlabelled: bool,
     /// Let the board drive the control box through the programme of the scene: P, K and V lines, as our firmware takes them.
     #[arg(long, conflicts_with = "by_hand")]
     drive: bool,
@@ -66,7 +70,8 @@ fn parse_baud(text: &str) -> Result<Baud, String> {
 #[derive(Serialize)]
 struct Told {
     trial_id: i64,
-    object: String,
+    /// Its label, unless it has none yet.
+    object: Option<String>,
     port: String,
     samples: u64,
     lost: u64,
@@ -81,6 +86,7 @@ struct Told {
     dropped: [u64; 2],
     format: Option<String>,
     channels: Vec<String>,
+    flags: Vec<FlagRemark>,
     warnings: Vec<String>,
 }
 
@@ -92,6 +98,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         Some(path) => Scene::from_file(path)?,
         None => Scene::default(),
     };
+    let object = if arguments.unlabelled { None } else { Some(class_name(&arguments.object)?) };
     let mut store = open_store(store)?;
     let stop = stop_flag()?;
     let link = SerialLink::open(&LinkOptions {
@@ -109,7 +116,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     let programme_s = f64::from(scene.programme.total_ticks()) / actuation_hz;
     let seconds = arguments.seconds.or((control != Control::Free).then_some(programme_s));
     let rig = SerialRig::begin(link, SerialPlan { control, actuation_hz, seconds }, stop)?;
-    let plan = BoardTrialPlan { object: arguments.object.clone(), scene: scene.to_toml(), seconds };
+    let plan = BoardTrialPlan { object: object.clone().unwrap_or_default(), scene: scene.to_toml(), seconds };
     // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{elapsed} {msg}")?);
     let outcome = record_board(rig, &scene.programme, &plan, &mut store, &mut |recorder, status| {
@@ -118,7 +125,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     });
     bar.finish_and_clear();
     let (recorded, status) = outcome?;
-    tell(recorded, &plan.object, &status, arguments.json)
+    tell(recorded, object, &status, arguments.json)
 }
 
 fn progress(recorder: &BoardRecorder, status: &LinkStatus) -> String {
@@ -138,11 +145,12 @@ fn progress(recorder: &BoardRecorder, status: &LinkStatus) -> String {
     )
 }
 
-fn tell(recorded: Recorded, object: &str, status: &LinkStatus, json: bool) -> Result<(), Failure> {
+fn tell(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
     let cadence = recorded.about.cadence;
     let told = Told {
         trial_id: recorded.id,
-        object: object.to_owned(),
+        flags: flaws(recorded.about.flags, object.as_deref()),
+        object,
         port: recorded.about.port,
         samples: cadence.samples,
         lost: cadence.lost,
@@ -164,7 +172,11 @@ fn tell(recorded: Recorded, object: &str, status: &LinkStatus, json: bool) -> Re
     for warning in &told.warnings {
         warn(warning);
     }
-    say(format!("trial {}      {} from {}", told.trial_id, told.object, told.port))?;
+    let object = shown_name(told.object.as_deref().unwrap_or_default());
+    say(format!("trial {}      {object} from {}", told.trial_id, told.port))?;
+    for found in &told.flags {
+        say(format!("flagged       {}: {}", found.flag.label(), found.remark))?;
+    }
     say(format!("samples       {} of {}", told.samples, told.channels.join(", ")))?;
     if let Some(detected) = &recorded.about.detected {
         say(format!("format        {}: {}", detected.format.label(), detected.why))?;

@@ -130,7 +130,16 @@ fn simulated(arguments: &SnapshotArguments, which: Which) -> Result<(Stage, Fram
 }
 
 fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> Result<(Stage, Frame, String), Failure> {
-    let trial = open_store(store)?.load(id)?;
+    let store = open_store(store)?;
+    if store.board_info(id)?.is_some() || store.readings(id)?.is_some() {
+        let text = format!(
+            "trial {id} was not simulated: where its fingers and its object were is not known, so there is nothing to draw. \
+             `palpate trials show {id}` tells of it, `palpate trials export {id} --out FILE.csv` writes its traces, `palpate \
+             recognise {id}` says what it is of"
+        );
+        return Err(text.into());
+    }
+    let trial = store.load(id)?;
     let scene = Scene::from_toml(&trial.info.scene)?;
     let object = scene.load_object()?;
     let stage = Stage::new(&scene, object.as_ref(), trial.info.world_from_gripper);

@@ -58,11 +58,6 @@ pub(super) fn is_closed_pipe(failure: &(dyn Error + 'static)) -> bool {
     failure.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
 }
 
-/// An object's name without anything that a file name should not have.
-pub(super) fn file_name_of(object: &str) -> String {
-    object.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect()
-}
-
 /// Rows of text in columns: the first left-aligned, numbers right-aligned.
 pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> Result<(), Failure> {
     let width = |column: usize| {

@@ -1,18 +1,20 @@
 //! `palpate trials`: the store from the terminal.
 
+mod labels;
+mod show;
+
 use super::Failure;
 use super::setup::open_store;
-use super::terminal::{file_name_of, say, say_json, table, warn};
-use palpate_core::board::Gap;
-use palpate_core::grasping::GraspSummary;
+use super::terminal::{say, say_json, table, warn};
+use labels::Labelling;
+use palpate_core::labelling::shown_name;
 use palpate_core::recording::{
-    BoardInfo, BoardTrial, Store, TrialId, TrialRow, contacts_path, read_trials_csv, write_board_csv,
-    write_contacts_csv, write_signals_csv, write_trial_csv,
+    Store, TrialId, TrialRow, contacts_path, export_board_trial, file_name_of, read_trials_csv, write_contacts_csv,
+    write_signals_csv, write_trial_csv,
 };
 use palpate_core::scene::Scene;
-use palpate_core::sensing::{PressureArea, SensorLayout, Sensors, Signals};
-use palpate_core::trial::{Plan, Trial};
-use serde::Serialize;
+use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
+use palpate_core::trial::Trial;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -45,11 +47,17 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// Write trials as CSV, two files each.
+    #[command(flatten)]
+    Labels(Labelling),
+    /// Write trials as CSV, two files each; or with --labelled all labelled trials of the real gripper as a data set.
     Export {
         /// Their numbers.
-        #[arg(required = true)]
+        #[arg(required_unless_present = "labelled")]
         ids: Vec<TrialId>,
+        /// All labelled trials of the real gripper into a new folder: trials.csv lists them, signals.csv is what `palpate trials
+        /// import` takes, raw/ has counts and bytes.
+        #[arg(long, conflicts_with_all = ["ids", "layout", "hull", "unsound"])]
+        labelled: bool,
         /// A folder, or for a single trial a file.
         #[arg(long, value_name = "PATH")]
         out: PathBuf,
@@ -75,7 +83,8 @@ enum What {
         #[arg(required = true, value_name = "FILE")]
         stores: Vec<PathBuf>,
     },
-    /// Mark trials as deleted; `restore` takes it back.
+    /// Mark trials as deleted: no list shows them and no data set takes them; `restore` or `undo` takes it back.
+    #[command(visible_alias = "discard")]
     Delete {
         /// Their numbers.
         #[arg(required = true)]
@@ -95,8 +104,10 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
     let mut store = open_store(store)?;
     match &arguments.what {
         What::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
-        What::Show { id, json } => show(&store, *id, *json),
-        What::Export { ids, out, layout, hull, unsound } => {
+        What::Show { id, json } => show::show(&store, *id, *json),
+        What::Labels(labelling) => labels::run(labelling, &mut store),
+        What::Export { labelled: true, out, .. } => labels::export(&store, out),
+        What::Export { ids, out, layout, hull, unsound, .. } => {
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
             export(&store, &ids, out, &SensorLayout::named(layout)?, area)
@@ -152,7 +163,7 @@ fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Resul
         .map(|row| {
             vec![
                 row.id.to_string(),
-                row.object.clone(),
+                shown_name(&row.object).to_owned(),
                 row.created.chars().take(19).collect::<String>().replace('T', " "),
                 row.rig.clone(),
                 row.samples.to_string(),
@@ -178,169 +189,21 @@ fn remark(row: &TrialRow) -> String {
     if row.warnings > 0 {
         remarks.push(format!("{} warning(s)", row.warnings));
     }
+    remarks.extend(row.flags.iter().map(|found| found.flag.label().to_owned()));
+    if row.unsure {
+        remarks.push("unsure".to_owned());
+    }
+    if !row.tags.is_empty() {
+        remarks.push(format!("[{}]", row.tags.join(", ")));
+    }
+    if !row.note.is_empty() {
+        remarks.push(format!("\"{}\"", row.note));
+    }
     remarks.join(", ")
-}
-
-/// What `trials show --json` prints.
-#[derive(Serialize)]
-struct Shown {
-    id: TrialId,
-    rig: String,
-    seed: u64,
-    version: String,
-    samples: usize,
-    #[serde(flatten)]
-    summary: GraspSummary,
-    plan: Plan,
-    scene: String,
 }
 
 fn scene_of(trial: &Trial) -> Result<Scene, Failure> {
     Ok(Scene::from_toml(&trial.info.scene)?)
-}
-
-/// What `trials show --json` prints of a trial that was recorded elsewhere.
-#[derive(Serialize)]
-struct ShownImport {
-    id: TrialId,
-    rig: String,
-    object: String,
-    collection: Option<String>,
-    samples: usize,
-    duration_s: f64,
-    channels: Vec<String>,
-}
-
-fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Result<(), Failure> {
-    let info = store.load(id)?.info;
-    let shown = ShownImport {
-        id,
-        rig: info.rig,
-        object: info.object,
-        collection: info.collection,
-        samples: signals.len(),
-        duration_s: signals.t_s.last().copied().unwrap_or(0.0) - signals.t_s.first().copied().unwrap_or(0.0),
-        channels: signals.channels,
-    };
-    if json {
-        return say_json(&shown);
-    }
-    let from = shown.collection.as_deref().unwrap_or("nowhere");
-    say(format!("trial {id}: {} (imported, collection {from})", shown.object))?;
-    say(format!("{} samples over {:.2} s", shown.samples, shown.duration_s))?;
-    say(format!("channels {}", shown.channels.join(", ")))
-}
-
-/// What `trials show --json` prints of a trial of a real gripper.
-#[derive(Serialize)]
-struct ShownBoard {
-    id: TrialId,
-    rig: String,
-    object: String,
-    version: String,
-    samples: usize,
-    duration_s: f64,
-    #[serde(flatten)]
-    about: BoardInfo,
-    gaps: Vec<Gap>,
-    warnings: Vec<String>,
-}
-
-fn show_board(store: &Store, id: TrialId, trial: BoardTrial, json: bool) -> Result<(), Failure> {
-    let info = store.load(id)?.info;
-    let shown = ShownBoard {
-        id,
-        rig: info.rig,
-        object: info.object,
-        version: info.version,
-        samples: trial.readings.len(),
-        duration_s: trial.readings.last().map_or(0.0, |last| last.t_s - trial.about.began_s),
-        about: trial.about,
-        gaps: trial.gaps,
-        warnings: info.warnings,
-    };
-    if json {
-        return say_json(&shown);
-    }
-    for warning in &shown.warnings {
-        warn(warning);
-    }
-    say(format!("trial {id}: {} (real gripper on {})", shown.object, shown.about.port))?;
-    say(format!("{} samples over {:.2} s, recorded by Palpate {}", shown.samples, shown.duration_s, shown.version))?;
-    say(format!("channels {}", shown.about.board.channels.join(", ")))?;
-    if let Some(detected) = &shown.about.detected {
-        say(format!("format {}: {}", detected.format.label(), detected.why))?;
-    }
-    let cadence = &shown.about.cadence;
-    say(format!(
-        "{:.2} Hz, jitter {:.2} ms, {} lost, {} bad lines, {} reconnects",
-        cadence.rate_hz, cadence.jitter_p95_ms, cadence.lost, cadence.bad_lines, shown.about.reconnects
-    ))?;
-    for gap in &shown.gaps {
-        let since = |t: f64| t - shown.about.began_s;
-        let lost = gap.lost.map_or_else(|| "an unknown number of".to_owned(), |lost| lost.to_string());
-        say(format!("gap {:.2} s to {:.2} s, {lost} readings: {}", since(gap.from_s), since(gap.to_s), gap.cause))?;
-    }
-    Ok(())
-}
-
-fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
-    if let Some(trial) = store.board_trial(id)? {
-        return show_board(store, id, trial, json);
-    }
-    if let Some(signals) = store.readings(id)? {
-        return show_import(store, id, signals, json);
-    }
-    show_simulated(store, id, json)
-}
-
-fn show_simulated(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
-    let trial = store.load(id)?;
-    let summary = GraspSummary::new(&trial, &scene_of(&trial)?);
-    let shown = Shown {
-        id,
-        rig: trial.info.rig,
-        seed: trial.info.seed,
-        version: trial.info.version,
-        samples: trial.frames.len(),
-        summary,
-        plan: trial.info.plan,
-        scene: trial.info.scene,
-    };
-    if json {
-        return say_json(&shown);
-    }
-    for warning in &shown.summary.warnings {
-        warn(warning);
-    }
-    say(format!("trial {id}: {} ({}, seed {})", shown.summary.object, shown.rig, shown.seed))?;
-    say(format!("{} samples, recorded by Palpate {}", shown.samples, shown.version))?;
-    match shown.summary.contact_onset_s {
-        Some(onset) => say(format!("first contact at {onset:.3} s"))?,
-        None => say("no contact")?,
-    }
-    if let Some(hold) = &shown.summary.hold {
-        let [left, right] = hold.force_n;
-        say(format!("hold force {left:.3} N left, {right:.3} N right"))?;
-        let [left, right] = hold.curvature_per_m;
-        say(format!("curvature {left:.2} 1/m left, {right:.2} 1/m right"))?;
-        let [left, right] = hold.pressure_pa.map(|p| p * 1e-3);
-        say(format!("pressure {left:.2} kPa left, {right:.2} kPa right"))?;
-    }
-    for effect in &shown.plan.effects {
-        let state = if effect.on { "on" } else { "off" };
-        say(format!("effect {} {state} ({}): {}", effect.name, effect.setting, effect.reason))?;
-    }
-    let quality = &shown.summary.quality;
-    say(format!("{} steps, {:.2} Newton iterations each", quality.steps, quality.newton_mean))?;
-    say(format!(
-        "static residual at hold {:.1e}, friction residual {:.1e}",
-        quality.static_residual, quality.friction_residual
-    ))?;
-    if !quality.is_sound() {
-        say("not sound: no data set takes it")?;
-    }
-    say("its scene is in `palpate trials show --json`")
 }
 
 /// Those of the trials that may be learned from: a CSV file says nothing of the others' flaws.
@@ -376,11 +239,9 @@ fn export(
         let path = if as_file {
             out.to_owned()
         } else {
-            out.join(format!("trial_{id}_{}.csv", file_name_of(&trial.info.object)))
+            out.join(format!("trial_{id}_{}.csv", file_name_of(shown_name(&trial.info.object))))
         };
-        if let Some(board) = store.board_trial(*id)? {
-            write_board_csv(&path, &board)?;
-            std::fs::write(path.with_extension("bytes"), store.board_bytes(*id)?.unwrap_or_default())?;
+        if export_board_trial(store, *id, &path)? {
             say(path.display())?;
             continue;
         }

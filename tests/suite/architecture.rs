@@ -37,6 +37,8 @@ const TEST_FILES: &[&str] = &[
     "wire/decoder_tests.rs",
     "recording/board_tests.rs",
     "recording/journal_tests.rs",
+    "recording/store_tests.rs",
+    "labelling/segmentation_tests.rs",
     "rig/serial/link_tests.rs",
     "pretended/tests.rs",
     "study/finger_fit/tests.rs",

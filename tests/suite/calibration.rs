@@ -25,7 +25,13 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 /// What a board prints while a script is done on the bench, read as a host reads it.
-fn readings(parts: &HiddenParts, scene: &Scene, script: &str, seconds: f64, seed: u64) -> (Board, Vec<Reading>) {
+pub(crate) fn readings(
+    parts: &HiddenParts,
+    scene: &Scene,
+    script: &str,
+    seconds: f64,
+    seed: u64,
+) -> (Board, Vec<Reading>) {
     let script = parse_script(script).unwrap();
     let hand = HandPlan { scene: scene.clone(), objects: vec![EMPTY.to_owned()], seed, grasp_every_s: None, script };
     let setup = PretendedSetup {
@@ -161,7 +167,7 @@ fn a_resistor_that_is_not_what_the_board_says_is_told() {
 }
 
 /// The twin's scene, and the one with the hidden finger.
-fn scenes() -> [Scene; 2] {
+pub(crate) fn scenes() -> [Scene; 2] {
     let mut known = Scene::default();
     // What is pressed against stands where the scene says.
     (known.pose.shift, known.pose.yaw_deg) = ([0.0; 3], 0.0);
@@ -304,7 +310,7 @@ fn a_captured_stream_is_calibrated_hands_free() {
 }
 
 /// Stores readings as `palpate record` does.
-fn stored(
+pub(crate) fn stored(
     store: &mut Store,
     board: &Board,
     readings: Vec<Reading>,

@@ -11,6 +11,7 @@
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
+//! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the pretended gripper calibrated and fitted.
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
@@ -37,6 +38,7 @@ mod fuzz;
 mod golden;
 mod gripper;
 mod gripper_tools;
+mod labelling;
 mod learning;
 mod panels;
 mod peers;

@@ -21,6 +21,9 @@ use serde::{Deserialize, Serialize};
 const IN_A_ROW: usize = 3;
 /// How far beyond its noise at rest a pad without a calibration must rise, in deviations.
 const DEVIATIONS: f64 = 6.0;
+/// A pad on a bent finger may feel up to 0.3 N without any touch; where its calibration does not know of that, a touch is
+/// more (N).
+const BENT_FORCE: f64 = 0.4;
 /// Share of the pressed time at an end of the range that is worth a flag.
 const SATURATED_SHARE: f64 = 0.02;
 /// A shorter time without readings is no interruption (s), or fewer than three missing readings.
@@ -29,6 +32,9 @@ const LEAST_GAP_S: f64 = 0.1;
 const RATE_SHARE: f64 = 0.02;
 /// Length of the window at rest where nobody says when the closing began (s).
 const REST_S: f64 = 0.3;
+
+/// A step of the control box (bar).
+const PRESSURE_STEP_BAR: f64 = 0.05;
 
 /// What may be wrong with a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -110,13 +116,22 @@ pub fn cadence_line(cadence: &Cadence) -> String {
 }
 
 impl Observed<'_> {
-    /// Readings before the closing, and those of closing and hold. Where no phase is known, all after the first tenths of a
-    /// second.
+    /// Readings before the closing, and those of closing and hold: by the phases where they are known, else by the pressure
+    /// that the board reports; else all after the first tenths of a second.
     fn split(&self) -> (&[Reading], &[Reading]) {
         let start = |phase: Phase| self.phases.iter().find(|mark| mark.phase == phase).map(|mark| mark.from_s);
+        let pressures = || self.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?)));
+        let most = pressures().map(|(_, bar)| bar).fold(0.0, f64::max);
         let first = self.readings.first().map_or(0.0, |reading| reading.t_s);
-        let closing = start(Phase::Close).unwrap_or(first + REST_S);
-        let release = start(Phase::Release).filter(|release| *release > closing).unwrap_or(f64::INFINITY);
+        let (closing, release) = match (start(Phase::Close), pressures().find(|(_, bar)| *bar > 0.0)) {
+            (Some(closing), _) => (closing, start(Phase::Release)),
+            (None, Some((closing, _))) => {
+                let full = pressures().rfind(|(_, bar)| *bar > most - PRESSURE_STEP_BAR);
+                (closing, full.map(|(t_s, _)| t_s.next_up()))
+            }
+            (None, None) => (first + REST_S, None),
+        };
+        let release = release.filter(|release| *release > closing).unwrap_or(f64::INFINITY);
         let from = self.readings.partition_point(|reading| reading.t_s < closing);
         let to = self.readings.partition_point(|reading| reading.t_s < release).max(from);
         (&self.readings[..from], &self.readings[from..to])
@@ -140,19 +155,20 @@ impl Observed<'_> {
     /// How far a pad rose: in newtons where it is calibrated, else in counts.
     fn rise(&self, pad: Sensor, rest: &[Reading], pressed: &[Reading]) -> Option<PadRise> {
         let column = self.board.channel_of(pad)?;
-        if self.calibrations.iter().any(|(sensor, _)| *sensor == pad) {
+        if let Some((_, calibration)) = self.calibrations.iter().find(|(sensor, _)| *sensor == pad) {
             let readout = Readout::new(self.board, self.calibrations).ok()?;
             let readout = readout.clone().with_zero(readout.zero_from(rest));
             let side = usize::from(pad == Sensor::PadRight);
             let rise = lasting_peak(pressed.iter().map(|reading| readout.felt(reading).force[side]));
-            return Some(PadRise { pad, rise: rise?, least: PadPart::LEAST_FORCE, unit: "N" });
+            let least = if calibration.record.bending.is_some() { PadPart::LEAST_FORCE } else { BENT_FORCE };
+            return Some(PadRise { pad, rise: rise?, least, unit: "N" });
         }
         let counts = |reading: &Reading| reading.counts.get(column).copied().flatten().map(f64::from);
         let (middle, deviation) = middle_and_deviation(rest.iter().filter_map(counts).collect())?;
         let peak = lasting_peak(pressed.iter().map(counts))?;
-        let nominal = PadPart::NOMINAL_SIEMENS * PadPart::LEAST_FORCE.powf(PadPart::NOMINAL_EXPONENT);
+        let nominal = PadPart::NOMINAL_SIEMENS * BENT_FORCE.powf(PadPart::NOMINAL_EXPONENT);
         let least = Input::on(self.board, pad).counts(1.0 / nominal);
-        Some(PadRise { pad, rise: peak - middle, least: (DEVIATIONS * deviation).max(0.5 * least), unit: "counts" })
+        Some(PadRise { pad, rise: peak - middle, least: (DEVIATIONS * deviation).max(least), unit: "counts" })
     }
 
     fn saturated(&self) -> Option<String> {
@@ -297,13 +313,13 @@ mod tests {
 
     #[test]
     fn a_good_trial_has_no_flags() {
-        assert_eq!(flags(&readings(900.0), &[], &[], &good()), []);
+        assert_eq!(flags(&readings(1500.0), &[], &[], &good()), []);
         assert_eq!(cadence_line(&good()), "50.00 Hz, jitter 0.4 ms, 0 lost");
     }
 
     #[test]
     fn a_hand_that_missed_is_flagged_and_an_empty_one_may() {
-        for missed in [readings(0.0), readings(100.0), {
+        for missed in [readings(0.0), readings(600.0), {
             // One reading alone is a knock.
             let mut knocked = readings(0.0);
             knocked[80].counts[2] = Some(3000.0);
@@ -322,23 +338,44 @@ mod tests {
         let found = flags(&readings(4095.0), &[], &[], &good());
         assert_eq!((found.len(), found[0].flag), (1, Flag::Saturated));
         assert!(found[0].remark.contains("left pad") && found[0].remark.contains("75 %"), "{found:?}");
-        let mut strip = readings(900.0);
+        let mut strip = readings(1500.0);
         strip.iter_mut().for_each(|reading| reading.counts[1] = Some(4095.0));
         assert!(flags(&strip, &[], &[], &good())[0].remark.contains("right flex strip"));
-        let mut before = readings(900.0);
+        let mut before = readings(1500.0);
         before[..20].iter_mut().for_each(|reading| reading.counts[3] = Some(4095.0));
         assert_eq!(flags(&before, &[], &[], &good()), []);
     }
 
     #[test]
+    fn pressure_stands_in_for_phases_that_nobody_noted() {
+        let mut readings = readings(0.0);
+        readings.iter_mut().for_each(|r| r.line_bar = Some(if (0.5..2.5).contains(&r.t_s) { 1.0 } else { 0.0 }));
+        let (board, cadence) = (Board::default(), good());
+        let mut observed = Observed {
+            board: &board,
+            readings: &readings,
+            gaps: &[],
+            interruptions: &[],
+            cadence: &cadence,
+            phases: &[],
+            calibrations: &[],
+        };
+        let (rest, pressed) = observed.split();
+        assert_eq!((rest.len(), pressed.len()), (25, 100));
+        let phases = marks();
+        observed.phases = &phases;
+        assert_eq!(observed.split().1.len(), 100);
+    }
+
+    #[test]
     fn what_is_missing_is_told_with_its_length() {
         let gap = |from_s, to_s, cause: &str| Gap { from_s, to_s, lost: Some(1), cause: cause.to_owned() };
-        assert_eq!(flags(&readings(900.0), &[gap(1.0, 1.04, "lost")], &[], &good()), []);
-        let told = flags(&readings(900.0), &[gap(1.0, 2.25, "the board was unplugged")], &[], &good());
+        assert_eq!(flags(&readings(1500.0), &[gap(1.0, 1.04, "lost")], &[], &good()), []);
+        let told = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &[], &good());
         assert_eq!(told[0].flag, Flag::Interrupted);
         assert_eq!(told[0].remark, "nothing for 1.25 s from 1.00 s on: the board was unplugged");
         let causes = ["the board was unplugged".to_owned(), "the port is gone".to_owned()];
-        let told = flags(&readings(900.0), &[gap(1.0, 2.25, "the board was unplugged")], &causes, &good());
+        let told = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &causes, &good());
         assert!(told[0].remark.ends_with("unplugged; the port is gone"), "{told:?}");
     }
 
@@ -350,11 +387,11 @@ mod tests {
             (Cadence { jitter_p95_ms: 11.0, ..good() }, "jitter 11.0 ms, above half a period, 10.0 ms"),
         ];
         for (cadence, want) in cases {
-            let told = flags(&readings(900.0), &[], &[], &cadence);
+            let told = flags(&readings(1500.0), &[], &[], &cadence);
             assert_eq!((told.len(), told[0].flag, told[0].remark.as_str()), (1, Flag::Cadence, want));
         }
         let within = Cadence { rate_hz: 49.2, jitter_p95_ms: 9.9, ..good() };
-        assert_eq!(flags(&readings(900.0), &[], &[], &within), []);
+        assert_eq!(flags(&readings(1500.0), &[], &[], &within), []);
     }
 
     #[test]

@@ -17,6 +17,8 @@ mod flags;
 mod labelled_trial;
 mod plan;
 mod segmentation;
+#[cfg(test)]
+mod segmentation_tests;
 mod thinned;
 
 pub use class_name::{ClassNameError, LONGEST_NAME, class_name, shown_name};

@@ -148,6 +148,12 @@ impl Segmenter {
         self.grasp.is_some()
     }
 
+    /// Ticks that are remembered.
+    #[cfg(test)]
+    pub(super) fn held(&self) -> usize {
+        self.ring.len()
+    }
+
     /// Takes the next reading; what has happened, in order.
     pub fn push(&mut self, reading: &Reading) -> Vec<SegmentEvent> {
         let mut events = Vec::new();

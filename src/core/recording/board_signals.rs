@@ -8,7 +8,7 @@ use crate::gripper::Phase;
 use crate::sensing::calibration::{Derived, Readout};
 
 /// A trial of a real gripper as its calibrations read it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardSignals {
     /// Its signals, with channels of layout C1+F; time counts from the beginning of the trial (s).
     pub derived: Derived,

@@ -15,6 +15,7 @@ mod disk;
 mod journal;
 #[cfg(test)]
 mod journal_tests;
+mod labelled_export;
 mod labelled_trials;
 mod labels;
 mod merge;
@@ -22,6 +23,8 @@ mod points_csv;
 mod readings;
 mod store;
 mod store_error;
+#[cfg(test)]
+mod store_tests;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use board_export::write_board_csv;
@@ -32,6 +35,7 @@ pub use calibrations::{CalibrationId, Serving, StoredCalibration};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use journal::{Change, JournalEntry};
+pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};
 pub use merge::Merged;
 pub use points_csv::{PointsError, read_points_csv};
 pub use store::{Store, TrialId, TrialRow};

@@ -19,6 +19,7 @@ use super::journal::{Change, JOURNAL_TABLES, JournalView, change, newest};
 use super::labels::LABEL_TABLES;
 use super::store_error::{StoreError, fault, plain};
 use crate::geometry::Pose;
+use crate::labelling::{FlagRemark, flaws};
 pub use crate::trial::TrialId;
 use crate::trial::{Frame, Quality, Trial, TrialInfo};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
@@ -28,7 +29,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// "Palp" in ASCII, in the header of the SQLite file.
-const APPLICATION_ID: i32 = 0x5061_6c70;
+pub(super) const APPLICATION_ID: i32 = 0x5061_6c70;
 /// Version of the tables below. A store from a newer program is refused, an older one is brought up to date.
 pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
 /// How long to wait for another program that is writing.
@@ -55,7 +56,7 @@ const MIGRATIONS: [&str; 8] = [
     JOURNAL_TABLES,
 ];
 
-const TABLES: &str = "
+pub(super) const TABLES: &str = "
     CREATE TABLE trials (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
@@ -92,7 +93,7 @@ pub struct TrialRow {
     pub state: String,
     /// Where it came from.
     pub rig: String,
-    /// Name of the object.
+    /// Name of the object; empty where nobody has said yet what it is of.
     pub object: String,
     /// Seed of the pose.
     pub seed: u64,
@@ -106,6 +107,14 @@ pub struct TrialRow {
     pub sound: bool,
     /// How many warnings it carries.
     pub warnings: usize,
+    /// What somebody noted of it.
+    pub note: String,
+    /// Its tags.
+    pub tags: Vec<String>,
+    /// Whoever gave its label was not sure.
+    pub unsure: bool,
+    /// What is wrong with it, where it is one of the real gripper.
+    pub flags: Vec<FlagRemark>,
     /// When it was deleted, if it was.
     pub deleted: Option<String>,
 }
@@ -299,18 +308,26 @@ impl Store {
     /// All trials, oldest first; deleted ones only when asked for.
     pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
         let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, \
-                   collection, size, shape FROM trials WHERE ?1 OR deleted IS NULL ORDER BY id";
+                   collection, size, shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END
+                   FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id
+                   WHERE ?1 OR deleted IS NULL ORDER BY id";
         let rows = self.connection.prepare(sql).and_then(|mut statement| {
             statement
                 .query_map([with_deleted], |row| {
                     let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
                     let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
+                    let object: String = row.get(4)?;
+                    let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
                     Ok(TrialRow {
+                        note: row.get(13)?,
+                        tags: json_or_default(&row.get::<_, String>(14)?),
+                        unsure: row.get(15)?,
+                        flags: flaws(flags, Some(&object)),
                         id: row.get(0)?,
                         created: row.get(1)?,
                         state: row.get(2)?,
                         rig: row.get(3)?,
-                        object: row.get(4)?,
+                        object,
                         seed: row.get::<_, i64>(5)?.cast_unsigned(),
                         collection: row.get(10)?,
                         properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
@@ -505,135 +522,4 @@ fn on_network_file_system(path: &Path) -> bool {
         // The deepest mount point that holds the file; of equals the last one mounted.
         .max_by_key(|(point, _)| point.len())
         .is_some_and(|(_, kind)| NETWORK.contains(&kind))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Primitive;
-    use crate::grasping::grasp;
-    use crate::objects::ObjectModel;
-    use crate::scene::Scene;
-
-    fn trial(seed: u64) -> Trial {
-        let mut scene = Scene::default();
-        scene.timing.duration_s = 1.2;
-        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
-        grasp(&scene, Some(&ball), seed)
-    }
-
-    fn folder() -> tempfile::TempDir {
-        tempfile::tempdir().expect("a temporary folder")
-    }
-
-    #[test]
-    fn a_trial_survives_storing() -> Result<(), StoreError> {
-        let folder = folder();
-        let mut store = Store::open(&folder.path().join("new/trials.sqlite"))?;
-        let trial = trial(u64::MAX);
-        let id = store.insert(&trial)?;
-        assert!(store.load(id)? == trial);
-        let rows = store.list(false)?;
-        assert_eq!((rows.len(), rows[0].samples, rows[0].state.as_str()), (1, 90, "complete"));
-        Ok(())
-    }
-
-    #[test]
-    fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
-        let folder = folder();
-        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
-        let trial = trial(1);
-        let id = store.begin(&trial.info)?;
-        for frames in trial.frames.chunks(7) {
-            store.append(id, frames)?;
-        }
-        assert_eq!(store.list(false)?[0].state, "recording");
-        store.finish(id, &trial.info.quality, &trial.info.warnings)?;
-        assert!(store.load(id)? == trial);
-        Ok(())
-    }
-
-    #[test]
-    fn two_programs_share_a_store() -> Result<(), StoreError> {
-        let folder = folder();
-        let path = folder.path().join("trials.sqlite");
-        let mut first = Store::open(&path)?;
-        let mut second = Store::open(&path)?;
-        let trial = trial(2);
-        std::thread::scope(|scope| {
-            for store in [&mut first, &mut second] {
-                scope.spawn(|| {
-                    for _ in 0..20 {
-                        store.insert(&trial).expect("waits for its turn");
-                    }
-                });
-            }
-        });
-        assert_eq!(first.list(false)?.len(), 40);
-        assert!(second.load(40)? == trial);
-        Ok(())
-    }
-
-    #[test]
-    fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
-        let folder = folder();
-        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
-        let (a, b) = (store.insert(&trial(3))?, store.insert(&trial(4))?);
-        assert!(matches!(store.delete(&[a, 99]), Err(StoreError::NoTrial { id: 99, .. })));
-        assert_eq!(store.list(false)?.len(), 2, "all or none");
-        store.delete(&[a])?;
-        assert_eq!(store.list(false)?.len(), 1);
-        let message = store.load(a).expect_err("deleted").to_string();
-        assert!(message.contains("restore"), "{message}");
-        store.restore(&[a])?;
-        assert_eq!(store.load(a)?.info.seed, 3);
-        store.delete(&[b])?;
-        assert_eq!(store.purge()?, 1);
-        assert_eq!(store.list(true)?.len(), 1);
-        Ok(())
-    }
-
-    #[test]
-    fn a_store_of_version_1_is_brought_up_to_date() -> Result<(), Box<dyn std::error::Error>> {
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("old.sqlite");
-        let old = Connection::open(&path)?;
-        old.execute_batch(TABLES)?;
-        old.pragma_update(None, "application_id", APPLICATION_ID)?;
-        old.pragma_update(None, "user_version", 1)?;
-        old.execute_batch(
-            "INSERT INTO trials (state, rig, object, seed, scene, world_from_gripper, quality, warnings, version)
-             VALUES ('complete', 'sim', 'ball', 3, '', '{\"position\":[0,0,0],\"rotation\":[0,0,0,1]}', '{}', '[]', '0')",
-        )?;
-        drop(old);
-        let store = Store::open(&path)?;
-        let trial = store.load(1)?;
-        assert_eq!((trial.info.seed, trial.info.collection), (3, None));
-        assert_eq!(Store::open(&path)?.list(false)?.len(), 1, "and stays so");
-        Ok(())
-    }
-
-    #[test]
-    fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::error::Error>> {
-        let folder = folder();
-        let text = folder.path().join("notes.txt");
-        std::fs::write(&text, "no database at all, but long enough to be looked at as one would be".repeat(20))?;
-        assert!(matches!(Store::open(&text), Err(StoreError::Foreign { .. })));
-
-        let other = folder.path().join("other.sqlite");
-        Connection::open(&other)?.execute_batch("CREATE TABLE mine (x)")?;
-        assert!(matches!(Store::open(&other), Err(StoreError::Foreign { .. })));
-
-        let newer = folder.path().join("newer.sqlite");
-        Store::open(&newer)?;
-        Connection::open(&newer)?.pragma_update(None, "user_version", 99)?;
-        assert!(matches!(Store::open(&newer), Err(StoreError::Newer { found: 99, .. })));
-
-        let damaged = folder.path().join("damaged.sqlite");
-        let id = Store::open(&damaged)?.insert(&trial(5))?;
-        Connection::open(&damaged)?.execute("UPDATE chunks SET frames = x'00' WHERE number = 1", [])?;
-        let error = Store::open(&damaged)?.load(id).expect_err("damaged");
-        assert!(matches!(error, StoreError::Damaged { chunk: 1, .. }));
-        Ok(())
-    }
 }

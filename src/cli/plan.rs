@@ -1,0 +1,95 @@
+//! `palpate plan`: how many trials of each object are wanted, how many there are, and what to take next.
+
+use super::Failure;
+use super::setup::open_store;
+use super::terminal::{say, say_json, table};
+use palpate_core::labelling::{NextTrial, ObjectProgress, Progress};
+use palpate_core::recording::Store;
+use serde::Serialize;
+use std::path::Path;
+
+/// Arguments of `palpate plan`.
+#[derive(Debug, clap::Args)]
+pub(super) struct PlanArguments {
+    #[command(subcommand)]
+    what: Option<What>,
+    /// Print JSON instead of a table.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// How far the plan is, and what to take next; also without a word after `plan`.
+    Show,
+    /// Set how many trials of an object are wanted; one that is not in the plan is added.
+    Set {
+        /// The object, as it will stand in the label.
+        name: String,
+        /// How many trials, 1 to 1000; the paper took 40 to 55 of each.
+        wanted: u32,
+    },
+    /// Take an object out of the plan; its trials stay.
+    Remove {
+        /// The object.
+        name: String,
+    },
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Told {
+    done: u32,
+    wanted: u32,
+    unlabelled: usize,
+    objects: Vec<ObjectProgress>,
+    next: Option<NextTrial>,
+}
+
+pub(super) fn run(arguments: &PlanArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let mut store = open_store(store)?;
+    let mut plan = store.label_plan()?;
+    match arguments.what.as_ref().unwrap_or(&What::Show) {
+        What::Show => {}
+        What::Set { name, wanted } => plan.set(name, *wanted)?,
+        What::Remove { name } => plan.remove(name)?,
+    }
+    store.set_label_plan(&plan)?;
+    show(&store, arguments.json)
+}
+
+fn show(store: &Store, json: bool) -> Result<(), Failure> {
+    let rows = store.labelled_trials()?;
+    let progress = store.label_plan()?.progress(&rows);
+    let last = rows.iter().rev().find(|row| row.counts()).and_then(|row| row.object.as_deref());
+    let next = progress.next(last);
+    let unlabelled = rows.iter().filter(|row| row.complete && !row.discarded && row.object.is_none()).count();
+    let (done, wanted) = (progress.done(), progress.wanted());
+    if json {
+        return say_json(&Told { done, wanted, unlabelled, objects: progress.objects, next });
+    }
+    table(&["object", "done", "wanted", "flagged"], &cells(&progress))?;
+    say(format!("{done} of {wanted} trials"))?;
+    if unlabelled > 0 {
+        say(format!("{unlabelled} trial(s) without a label: `palpate trials label ID NAME`"))?;
+    }
+    match next {
+        Some(next) => {
+            let [opening, across] = next.cue.shift_mm;
+            say(format!(
+                "next: {} (trial {}), turned by {:.0} degrees, shifted by {opening:.0} mm to the right and {across:.0} mm across",
+                next.object, next.number, next.cue.turn_deg
+            ))
+        }
+        None => say("the plan is done"),
+    }
+}
+
+fn cells(progress: &Progress) -> Vec<Vec<String>> {
+    let row = |object: &ObjectProgress| {
+        let ObjectProgress { name, wanted, done, flagged } = object;
+        let wanted = if *wanted == 0 { "not planned".to_owned() } else { wanted.to_string() };
+        vec![name.clone(), done.to_string(), wanted, flagged.to_string()]
+    };
+    progress.objects.iter().map(row).collect()
+}
