@@ -7,11 +7,11 @@ use super::columns::Columns;
 use super::fields::{Format, Parsed, parse};
 use super::hello;
 use super::lines::{Line, LineSplitter};
-use super::rails::{Rail, RailWatch};
+use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch};
 use super::shape::{Candidate, Judged, Role, Shapes};
 use super::tail::{ConsoleLine, Tail, Verdict};
 use super::teleplot::Assembler;
-use crate::board::{Board, Gap, Reading};
+use crate::board::{Board, Gap, Reading, Sensor};
 
 /// What was heard, in its order.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +65,9 @@ struct Reader {
     /// The newest reading's time (s).
     last_s: Option<f64>,
 }
+
+/// Beside a resistor up to this (ohm) a strip, which has 17.5 kOhm or more (data sheet), is above a quarter of the range.
+const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
 
 /// Largest counter that is believed: beyond it whole numbers are not told apart.
 const LARGEST_COUNTER: f64 = 9.0e15;
@@ -129,9 +132,10 @@ impl Decoder {
         self.reader.rails.at()
     }
 
-    /// True where the counts look like those of a converter with 10 bits, and the board has not said otherwise.
+    /// True where the counts look like those of a converter with 10 bits, though it is taken for one with 12, or said to be
+    /// one: a sketch may say so and forget `analogReadResolution`.
     pub fn looks_10_bit(&self) -> bool {
-        self.reader.hello.is_none() && self.reader.rails.looks_10_bit()
+        self.reader.looks_10_bit()
     }
 }
 
@@ -143,6 +147,20 @@ impl Reader {
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
         board.channels.clone_from(&self.channels);
         board
+    }
+
+    fn looks_10_bit(&self) -> bool {
+        let Some(said) = self.hello.as_ref().filter(|_| self.rails.looks_10_bit()) else {
+            return self.rails.looks_10_bit();
+        };
+        // Against the board's word only strips speak: they are never near zero.
+        let board = self.board();
+        let is_told_by = |sensor: Sensor| {
+            let place = board.channel_of(sensor).filter(|_| sensor.is_flex());
+            let ohm = |place: usize| board.divider_ohm.get(place).copied().unwrap_or(0.0);
+            place.is_some_and(|place| self.rails.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
+        };
+        said.full_scale >= FULL_12_BIT && Sensor::ALL.into_iter().any(is_told_by)
     }
 
     fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
@@ -267,7 +285,8 @@ impl Reader {
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
-        let full_scale = self.hello.as_ref().map(|board| board.full_scale);
+        let said = self.hello.as_ref().map_or(FULL_12_BIT, |board| board.full_scale);
+        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { said };
         self.rails.add(&counts, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;
         heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));

@@ -134,6 +134,23 @@ fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
 }
 
 #[test]
+fn ten_bits_are_seen_whatever_the_board_says_unless_it_has_reasons() {
+    let looks = |hello: &str, count: u32, pad: u32| {
+        let sample = |i: u32| format!("t_us:{},flexL:{},flexR:{count},fsrL:{pad},fsrR:0", 20_000 * i, count + i % 3);
+        let lines: Vec<String> = std::iter::once(hello.to_owned()).chain((0..300).map(sample)).collect();
+        let (decoder, _) = hear_lines(&lines);
+        (decoder.looks_10_bit(), decoder.rails()[0])
+    };
+    assert_eq!(looks("# no hello", 350, 0), (true, None));
+    assert_eq!(looks(HELLO, 350, 0), (true, None), "a strip is above a quarter of the range");
+    assert_eq!(looks(HELLO, 1021, 0), (true, Some(Rail::High)), "and this one is open");
+    assert_eq!(looks(HELLO, 1400, 900), (false, None));
+    assert_eq!(looks(&HELLO.replace("47000", "100000"), 800, 0), (false, None), "beside 100 kOhm it may be lower");
+    assert_eq!(looks(HELLO, 0, 900), (false, Some(Rail::Low)), "a pad may be anywhere");
+    assert_eq!(looks(&HELLO.replace("adc=12", "adc=10"), 350, 0), (false, None), "it says so");
+}
+
+#[test]
 fn another_sketch_is_believed_after_two_of_its_lines() {
     let lines: Vec<String> =
         (0..20).map(|i| if i < 10 { format!("{i},1,2,3") } else { format!("grip:{i} bend:2") }).collect();
