@@ -111,6 +111,39 @@ fn lost_lines_and_bad_lines_are_gaps_and_nothing_is_invented() {
     assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (292, 8, 3));
 }
 
+/// A line with its checksum.
+fn signed(line: &str, mark: &str) -> String {
+    format!("{line}{mark}{}", checksum::checksum(line.as_bytes()))
+}
+
+#[test]
+fn a_digit_that_is_lost_is_a_bad_line_where_lines_have_checksums() {
+    let sound: Vec<String> = (0..600).map(|i| signed(&firmware_line(i), ",ck:")).collect();
+    let hello = signed(&HELLO.replace("fw=1", "fw=2"), " ck=");
+    for first in [hello, "# heard too late for the hello".to_owned()] {
+        let mut lines = sound.clone();
+        // Every byte of a line in turn, each from a line of its own; the last of them is cut before its checksum.
+        let damaged: Vec<usize> = (100..600).step_by(5).collect();
+        for (at, line) in damaged.iter().enumerate() {
+            let end = lines[*line].find(",ck").unwrap_or_default();
+            let lost = at % (lines[*line].len() - 1);
+            lines[*line].remove(lost);
+            if at + 1 == damaged.len() {
+                lines[*line] = sound[*line][..end].to_owned();
+            }
+        }
+        let (decoder, heard) = hear_lines(&std::iter::once(first).chain(lines).collect::<Vec<_>>());
+        let cadence = decoder.cadence();
+        assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (500, 100, 100));
+        for reading in readings(&heard) {
+            let i = reading.seq.unwrap_or_default();
+            let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
+            assert_eq!((&reading.counts[..], i % 5 == 0 && i >= 100), (&wanted[..], false), "{i}");
+        }
+        assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL", "fsrR"], "the checksum is none");
+    }
+}
+
 #[test]
 fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
     let mut decoder = Decoder::default();
