@@ -90,6 +90,8 @@ impl Decoder {
         self.reader.teleplot = Assembler::default();
         self.reader.shapes.give_up();
         self.reader.clock.interrupt();
+        // Another sketch may be on the board when it comes back; it need not say hello.
+        self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
     }
 

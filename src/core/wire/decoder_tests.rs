@@ -145,6 +145,18 @@ fn a_digit_that_is_lost_is_a_bad_line_where_lines_have_checksums() {
 }
 
 #[test]
+fn a_board_that_comes_back_with_another_sketch_needs_no_checksums() {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    let hello = signed("# tactile-gripper fw=2 adc=12 ch=flexL", " ck=");
+    decoder.push(format!("{hello}\nflexL:1\nflexL:2\n").as_bytes(), 0.0, &mut heard);
+    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (0, 2), "they lack what was said of them");
+    decoder.interrupt("unplugged");
+    decoder.push(b"\nflexL:1\nflexL:2\n", 1.0, &mut heard);
+    assert_eq!(readings(&heard).len(), 2);
+}
+
+#[test]
 fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
     let mut decoder = Decoder::default();
     let mut heard = Vec::new();

@@ -52,8 +52,10 @@ impl FuzzStream {
             1..=9 => 0.0,
             _ => 0.02,
         };
-        if self.below(400) == 0 {
-            self.format = self.below(7);
+        if self.below(80) == 0 {
+            self.format = (self.format + 1) % 7;
+            // Another sketch says hello; without a checksum it has none in its lines.
+            out.extend_from_slice(b"# tactile-gripper fw=1\n");
         }
         for _ in 0..=self.below(3) {
             self.line(out);
@@ -174,7 +176,7 @@ mod tests {
         let mut bytes = Vec::new();
         for seed in 0..20 {
             let (mut stream, mut listener) = (FuzzStream::new(seed), FuzzListener::default());
-            for _ in 0..400 {
+            for _ in 0..1000 {
                 let arrived_s = stream.next(&mut bytes);
                 listener.push(&bytes, arrived_s)?;
             }
