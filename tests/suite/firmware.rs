@@ -2,6 +2,7 @@
 //! through the board that `palpate emulate` pretends to be: both print the same bytes.
 
 use palpate_core::pretended::{BoardSetup, FirmwareBoard};
+use palpate_core::wire::{Decoder, Heard};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use std::fmt::Write as _;
@@ -136,7 +137,7 @@ fn samples_are_due_every_20_ms_and_do_not_drift_across_the_wrap_of_the_clock() {
     let lines = printed(&told);
     assert_eq!(
         lines[0],
-        "# tactile-gripper fw=1 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700"
+        "# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700 ck=55195"
     );
     assert_eq!(lines.len(), 1 + 165, "3.3 s hold 165 periods");
     for (k, line) in lines[1..].iter().enumerate() {
@@ -156,6 +157,33 @@ fn each_channel_is_the_average_of_eight_conversions_after_one_that_is_thrown_awa
 }
 
 #[test]
+fn the_parser_reads_what_it_prints_and_takes_no_line_that_lost_a_digit() {
+    let told = in_c(&setup(20_000, 8, 20), 7, &polls(7, 20_000, 400));
+    let lines = printed(&told);
+    let hear = |lost: &dyn Fn(usize) -> Option<usize>| {
+        let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+        for (k, line) in lines.iter().enumerate() {
+            let mut bytes = format!("{line}\n").into_bytes();
+            if let Some(at) = lost(k) {
+                bytes.remove(at % line.len());
+            }
+            decoder.push(&bytes, 0.02 * k as f64, &mut heard);
+        }
+        let counts = heard.iter().filter_map(|heard| match heard {
+            Heard::Reading(reading) => Some((reading.seq, reading.counts.clone())),
+            Heard::Gap(_) | Heard::Board(_) | Heard::Said(_) => None,
+        });
+        (counts.collect::<Vec<_>>(), decoder.cadence())
+    };
+    let (whole, cadence) = hear(&|_| None);
+    assert_eq!((whole.len(), cadence.bad_lines, whole[0].1.len()), (400, 0, 8));
+    // Every third line loses a byte, each another one.
+    let (kept, cadence) = hear(&|k| (k > 0 && k % 3 == 0).then_some(k / 3));
+    assert_eq!((cadence.bad_lines, cadence.lost, kept.len()), (133, 133, 400 - 133));
+    assert!(kept.iter().all(|reading| whole.contains(reading)));
+}
+
+#[test]
 fn a_sample_that_is_missed_is_counted_and_the_next_is_on_time() {
     let told = in_c(&setup(20_000, 2, 0), 0, &[0, 20_000, 95_000, 100_000, 120_500].map(Happening::Poll));
     let pairs: Vec<[f64; 2]> =
@@ -171,7 +199,7 @@ fn pressure_comes_in_steps_up_to_the_maximum_and_rubbish_is_refused() {
     let told = in_c(&setup(20_000, 4, 20), 0, &happenings);
     let not_understood = "# refused reason=not-understood";
     let hello = printed(&told)[0];
-    assert!(hello.ends_with(" p_max=1.00"), "{hello}");
+    assert!(hello.contains(" p_max=1.00 ck="), "{hello}");
     let want = [
         hello,
         "# ok p=0.55",

@@ -117,7 +117,7 @@ const fn case(faults: &'static str, missing: [usize; 2], cause: &'static str) ->
 }
 
 /// Everything is recorded through these; or what is missing is known to be.
-const CASES: [Case; 11] = [
+const CASES: [Case; 12] = [
     case("", [0, 0], ""),
     case("burst=0.3@0.8/0.7", [0, 0], ""),
     case("clock=200@0", [0, 0], ""),
@@ -127,6 +127,7 @@ const CASES: [Case; 11] = [
     case("loss=0.3@0.8/0.7", [2, 30], ""),
     case("garbage@0.8/0.7", [30, 45], ""),
     case("partial=0.3@0.8/0.7", [2, 40], ""),
+    case("byte=0.6@0.8/0.7", [10, 40], ""),
     case("silent@0.8/0.7", [30, 40], ""),
     Case { reconnects: 1, ..case("vanish@0.8/0.7", [30, 110], "unplugged") },
 ];

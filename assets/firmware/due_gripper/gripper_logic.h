@@ -4,14 +4,16 @@
  * Every period it reads each channel: one conversion thrown away, for the multiplexer to settle behind a high-impedance
  * divider, then eight that are averaged. It prints
  *
- *     t_us:20000,seq:1,flexL:512.1,flexR:498.0,fsrL:30.4,fsrR:28.0,p_bar:0.55
+ *     t_us:20000,seq:1,flexL:512.1,flexR:498.0,fsrL:30.4,fsrR:28.0,p_bar:0.55,ck:14493
+ *
+ * where ck is the CRC-16 of what stands before it, so that a digit that is lost on the way is noticed.
  *
  * It obeys lines from the host:
  *
  *     P 0.55   line pressure, bar, in steps of 0.05      ->  # ok p=0.55
  *     V        vent                                      ->  # ok p=0.00
  *     K        still here; at least every 500 ms         ->  # ok p=0.55
- *     ?        who are you                               ->  # tactile-gripper fw=1 ...
+ *     ?        who are you                               ->  # tactile-gripper fw=2 ...
  *
  * and answers anything else with "# refused reason=...". Pressure that is on goes off when no line that it understood
  * came for a second: "# vent reason=watchdog".
@@ -24,7 +26,7 @@
 #include <stdint.h>
 #include <stddef.h>
 
-#define GRIPPER_FIRMWARE 1
+#define GRIPPER_FIRMWARE 2             /* from 2 on, lines end in a checksum */
 #define GRIPPER_MOST_CHANNELS 8
 #define GRIPPER_OVERSAMPLE 8         /* conversions that are averaged */
 #define GRIPPER_WATCHDOG_US 1000000u /* pressure goes off after this long without a line */
@@ -59,14 +61,18 @@ typedef struct {
   char line[GRIPPER_LONGEST_HEARD];
 } GripperState;
 
+#define GRIPPER_LINE_END 11 /* bytes kept free for ",ck:65535" and what ends a line */
+
 /* A line for the host that is being written; what does not fit is left out, but never its end. */
 typedef struct {
-  char text[192];
+  char text[256];
   size_t length;
+  uint8_t cut; /* something did not fit */
 } GripperText;
 
 static void gripper_put(GripperText *out, const char *text) {
-  while (*text && out->length + 1 < sizeof out->text) out->text[out->length++] = *text++;
+  while (*text && out->length + GRIPPER_LINE_END < sizeof out->text) out->text[out->length++] = *text++;
+  if (*text) out->cut = 1;
 }
 
 static void gripper_put_number(GripperText *out, uint32_t number) {
@@ -88,26 +94,53 @@ static void gripper_put_bar(GripperText *out, uint8_t steps) {
   gripper_put(out, decimals);
 }
 
+/* CRC-16, CCITT polynomial 0x1021 from 0xffff, of what was written so far. */
+static uint16_t gripper_checksum(const GripperText *out) {
+  uint16_t sum = 0xffff;
+  size_t i;
+  uint8_t bit;
+  for (i = 0; i < out->length; i++) {
+    sum ^= (uint16_t)((uint16_t)(uint8_t)out->text[i] << 8);
+    for (bit = 0; bit < 8; bit++) sum = (uint16_t)(sum & 0x8000 ? sum << 1 ^ 0x1021 : sum << 1);
+  }
+  return sum;
+}
+
+/* Ends a line with its checksum; one that did not fit goes without, so that the host refuses it. */
+static void gripper_sign(GripperText *out, const char *key) {
+  char digits[6];
+  uint8_t at = sizeof digits - 1;
+  uint16_t sum = gripper_checksum(out);
+  if (out->cut) return;
+  digits[at] = 0;
+  do {
+    digits[--at] = (char)('0' + sum % 10);
+    sum = (uint16_t)(sum / 10);
+  } while (sum);
+  while (*key) out->text[out->length++] = *key++;
+  while (digits[at]) out->text[out->length++] = digits[at++];
+}
+
 static void gripper_send(const GripperPins *pins, GripperText *out) {
   out->text[out->length++] = '\n';
   pins->print(out->text, out->length);
 }
 
 static void gripper_say(const GripperPins *pins, const char *text) {
-  GripperText out = {{0}, 0};
+  GripperText out = {{0}, 0, 0};
   gripper_put(&out, text);
   gripper_send(pins, &out);
 }
 
 static void gripper_say_ok(const GripperState *state, const GripperPins *pins) {
-  GripperText out = {{0}, 0};
+  GripperText out = {{0}, 0, 0};
   gripper_put(&out, "# ok p=");
   gripper_put_bar(&out, state->steps);
   gripper_send(pins, &out);
 }
 
 static void gripper_say_hello(const GripperSetup *setup, const GripperPins *pins) {
-  GripperText out = {{0}, 0};
+  GripperText out = {{0}, 0, 0};
   uint8_t channel;
   gripper_put(&out, "# tactile-gripper fw=");
   gripper_put_number(&out, GRIPPER_FIRMWARE);
@@ -127,6 +160,7 @@ static void gripper_say_hello(const GripperSetup *setup, const GripperPins *pins
     gripper_put(&out, " p_max=");
     gripper_put_bar(&out, setup->most_steps);
   }
+  gripper_sign(&out, " ck=");
   gripper_send(pins, &out);
 }
 
@@ -176,7 +210,7 @@ static uint8_t gripper_press(GripperState *state, const GripperSetup *setup, con
   } else if (centibar % GRIPPER_STEP_CENTIBAR) {
     gripper_say(pins, "# refused reason=not-a-step step=0.05");
   } else if (centibar / GRIPPER_STEP_CENTIBAR > setup->most_steps) {
-    GripperText out = {{0}, 0};
+    GripperText out = {{0}, 0, 0};
     gripper_put(&out, "# refused reason=above-maximum max=");
     gripper_put_bar(&out, setup->most_steps);
     gripper_send(pins, &out);
@@ -244,7 +278,7 @@ static uint32_t gripper_tenths(const GripperPins *pins, uint8_t channel) {
 
 static void gripper_sample(const GripperState *state, const GripperSetup *setup, const GripperPins *pins,
                            uint32_t now_us) {
-  GripperText out = {{0}, 0};
+  GripperText out = {{0}, 0, 0};
   uint8_t channel;
   gripper_put(&out, "t_us:");
   gripper_put_number(&out, now_us);
@@ -263,6 +297,7 @@ static void gripper_sample(const GripperState *state, const GripperSetup *setup,
     gripper_put(&out, ",p_bar:");
     gripper_put_bar(&out, state->steps);
   }
+  gripper_sign(&out, ",ck:");
   gripper_send(pins, &out);
 }
 

@@ -8,7 +8,7 @@ use palpate_core::board::{Board, Reading, Sensor};
 use palpate_core::gripper::Side;
 use palpate_core::recording::Store;
 use palpate_core::rig::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
-use palpate_core::sensing::calibration::{BendingZero, Kind, Procedure, Readout, Record};
+use palpate_core::sensing::calibration::{BendingZero, Kind, Procedure, Readout, Record, Unsettled};
 use palpate_core::wire::Heard;
 use std::collections::VecDeque;
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
@@ -192,7 +192,7 @@ impl Bench {
             while let Some(reading) = self.pending.pop_front() {
                 procedure.feed(&reading);
                 if auto && procedure.has_changed() && procedure.settled().is_ok() {
-                    return self.take(procedure, planned);
+                    return Ok(self.take(procedure, planned)?);
                 }
             }
             self.show(procedure);
@@ -208,9 +208,12 @@ impl Bench {
                 None => {}
                 Some(Wish::Take(number)) => {
                     let stimulus = number.map_or(planned, |number| kind.stimulus(number));
-                    match procedure.settled() {
-                        Ok(_) => return self.take(procedure, stimulus),
-                        Err(why) => warn(&format!("not taken: {why}")),
+                    match self.take(procedure, stimulus) {
+                        Ok(()) => return Ok(()),
+                        Err(why) => {
+                            self.clear_line();
+                            warn(&format!("{} is not taken: {why}", kind.told(stimulus)));
+                        }
                     }
                 }
                 Some(Wish::Skip) => {
@@ -232,7 +235,7 @@ impl Bench {
         }
     }
 
-    fn take(&self, procedure: &mut Procedure, stimulus: f64) -> Result<(), Failure> {
+    fn take(&self, procedure: &mut Procedure, stimulus: f64) -> Result<(), Unsettled> {
         let point = procedure.take(stimulus)?;
         self.clear_line();
         let at = procedure.record().kind.told(stimulus);

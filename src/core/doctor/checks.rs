@@ -21,12 +21,6 @@ const LOST_SHARE: f64 = 1e-3;
 /// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
 const IDLE_COUNTS: f64 = 20.0;
 
-/// Largest counts that speak for a converter of ten bits; with fewer nothing is connected.
-const TEN_BITS: std::ops::RangeInclusive<f64> = 128.0..=1023.0;
-
-/// What noise may take from a channel at the upper end, as a share of the range: 4 of 4095.
-const NOISE_AT_THE_END: f64 = 1e-3;
-
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
@@ -271,9 +265,8 @@ fn firmware(seen: &Observations) -> Told {
 fn bits(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         let full = link.board.full_scale;
-        let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
-        // Whatever the board says: a strip at rest is above a quarter of the range.
-        if link.looks_10_bit || full >= 4095 && TEN_BITS.contains(&most) {
+        if link.looks_10_bit {
+            let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
             return Told::wrong(format!("no count was above {most:.0}; the converter is said to go to {full}"))
                 .because(
                     "analogRead gives 10 bits until it is told otherwise",
@@ -306,18 +299,15 @@ fn rail(link: &LinkStatus, channel: usize) -> Option<Rail> {
     link.rails.get(channel).copied().flatten()
 }
 
-/// Whether a channel stands at the upper end: lately, or all the time within what noise takes from it.
-fn is_high(seen: &Observations, link: &LinkStatus, channel: usize) -> bool {
-    let full = f64::from(link.board.full_scale);
-    let always = |trace: &Trace| trace.numbers > 0 && trace.least >= full * (1.0 - NOISE_AT_THE_END);
-    rail(link, channel) == Some(Rail::High) || seen.traces.channels.get(channel).is_some_and(always)
+fn is_high(link: &LinkStatus, channel: usize) -> bool {
+    rail(link, channel) == Some(Rail::High)
 }
 
 fn saturation(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         // A strip at the upper end has come off, which is another check's.
         let high = named(link, |channel, sensor| {
-            is_high(seen, link, channel) && !sensor.is_some_and(Sensor::is_flex)
+            is_high(link, channel) && !sensor.is_some_and(Sensor::is_flex)
         });
         if high.is_empty() {
             return Told::good("none");
@@ -334,7 +324,7 @@ fn open_circuit(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         let trace = |channel: usize| seen.traces.channels.get(channel).cloned().unwrap_or_default();
         let without = named(link, |channel, _| trace(channel).without > trace(channel).numbers);
-        let off = named(link, |channel, sensor| sensor.is_some_and(Sensor::is_flex) && is_high(seen, link, channel));
+        let off = named(link, |channel, sensor| sensor.is_some_and(Sensor::is_flex) && is_high(link, channel));
         let shorted = named(link, |channel, sensor| {
             sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Rail::Low)
         });
@@ -374,7 +364,7 @@ fn crosstalk(seen: &Observations) -> Told {
         let scale = f64::from(link.board.full_scale) / 4095.0;
         let pads = (1..link.board.channels.len()).filter(|channel| {
             // A channel at the rail says nothing of its neighbour, nor does its neighbour.
-            let railed = |channel: usize| is_high(seen, link, channel);
+            let railed = |channel: usize| is_high(link, channel);
             sensor(&link.board, *channel).is_some_and(|sensor| !sensor.is_flex())
                 && !railed(*channel)
                 && !railed(channel - 1)

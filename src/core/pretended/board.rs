@@ -1,10 +1,11 @@
 //! The board's side of the line: what `assets/firmware/due_gripper/gripper_logic.h` does, statement by statement. A test
 //! compiles that header and compares what both print, byte by byte.
 
+use crate::wire::checksum;
 use std::fmt::Write as _;
 
 /// Version that the hello line gives.
-const FIRMWARE: u32 = 1;
+const FIRMWARE: u32 = 2;
 
 /// Conversions that are averaged, after one that is thrown away.
 pub const OVERSAMPLE: u32 = 8;
@@ -139,7 +140,7 @@ impl FirmwareBoard {
             out.push_str(",p_bar:");
             put_bar(out, u32::from(self.steps));
         }
-        out.push('\n');
+        sign(out, ",ck:");
     }
 
     fn obey(&mut self, line: &[u8], out: &mut String) -> Heard {
@@ -200,7 +201,7 @@ impl FirmwareBoard {
             out.push_str(" p_max=");
             put_bar(out, u32::from(*most_steps));
         }
-        out.push('\n');
+        sign(out, " ck=");
     }
 }
 
@@ -218,6 +219,13 @@ enum Heard {
 /// Writing into a string does not fail.
 fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
     let _never = out.write_fmt(text);
+}
+
+/// Ends the last line of a text with its checksum.
+pub(super) fn sign(out: &mut String, key: &str) {
+    let begins = out.rfind('\n').map_or(0, |end| end + 1);
+    let sum = checksum(&out.as_bytes()[begins..]);
+    put(out, format_args!("{key}{sum}\n"));
 }
 
 fn put_bar(out: &mut String, steps: u32) {

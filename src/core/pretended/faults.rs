@@ -26,6 +26,8 @@ pub enum FaultKind {
     Loss,
     /// Lines are cut somewhere.
     Partial,
+    /// Lines lose a byte somewhere.
+    Byte,
     /// Random bytes stand in for lines.
     Garbage,
     /// The board sends at another rate than the host reads.
@@ -53,7 +55,7 @@ const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, w
     Row { kind, name, value, duration_s, words }
 }
 
-const TABLE: [Row; 15] = [
+const TABLE: [Row; 16] = [
     row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE keeps its reading"),
     row(FaultKind::Rail, "rail", 0.0, FOR_EVER, "channel VALUE is at the upper rail"),
     row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE has come off"),
@@ -64,6 +66,7 @@ const TABLE: [Row; 15] = [
     row(FaultKind::Reset, "reset", 0.0, 1.0, "the board restarts"),
     row(FaultKind::Loss, "loss", 0.1, 1.0, "a share VALUE of the lines is lost"),
     row(FaultKind::Partial, "partial", 0.5, 1.0, "a share VALUE of the lines is cut"),
+    row(FaultKind::Byte, "byte", 0.5, 1.0, "a share VALUE of the lines loses a byte"),
     row(FaultKind::Garbage, "garbage", 0.0, 0.5, "random bytes instead of lines"),
     row(FaultKind::Baud, "baud", 2.0, 2.0, "the board sends VALUE times faster than the host reads"),
     row(FaultKind::Burst, "burst", 0.25, 2.0, "lines are held back and come every VALUE s"),

@@ -2,7 +2,7 @@
 //! clock of its own: told how late it is and what the host said, it gives bytes. The same seed, the same times and the
 //! same words of the host give the same bytes.
 
-use super::board::{BoardSetup, FirmwareBoard};
+use super::board::{BoardSetup, FirmwareBoard, sign};
 use super::faults::{Fault, FaultKind};
 use super::hand::{Began, Hand, HandPlan};
 use super::parts::{HiddenParts, Sensors, Stimulus};
@@ -342,6 +342,9 @@ impl PretendedGripper {
         if self.fault(FaultKind::Partial).is_some_and(|fault| chance < fault.value) {
             sent.truncate(where_cut);
         }
+        if self.fault(FaultKind::Byte).is_some_and(|fault| chance < fault.value) {
+            sent.remove(where_cut);
+        }
         if self.fault(FaultKind::Garbage).is_some() {
             sent = line.bytes().map(|_| self.garbage.within(0.0, 256.0) as u8).collect();
         }
@@ -351,17 +354,19 @@ impl PretendedGripper {
         }
     }
 
-    /// A line in which a channel has no number.
+    /// A line in which a channel has no number: what a board prints for it, which the checksum covers.
     fn without_number(&self, line: &str, channel: usize) -> String {
-        let Some(name) = self.board_setup.channels.get(channel) else { return line.to_owned() };
+        let name = self.board_setup.channels.get(channel);
+        let Some((name, body)) = name.zip(line.rsplit_once(",ck:").map(|(body, _)| body)) else {
+            return line.to_owned();
+        };
         let field = |field: &str| match field.split_once(':') {
-            Some((key, number)) if key == name => {
-                let end = if number.ends_with('\n') { "\n" } else { "" };
-                format!("{key}:nan{end}")
-            }
+            Some((key, _)) if key == name => format!("{key}:nan"),
             _ => field.to_owned(),
         };
-        line.split(',').map(field).collect::<Vec<_>>().join(",")
+        let mut line = body.split(',').map(field).collect::<Vec<_>>().join(",");
+        sign(&mut line, ",ck:");
+        line
     }
 
     /// Lets go what a burst holds back, when its time has come.

@@ -45,7 +45,7 @@ fn samples(text: &str) -> Vec<&str> {
 fn it_says_hello_and_prints_fifty_samples_a_second_at_exact_times() {
     let told = text(setup("", ""), 2.0);
     assert!(
-        told.starts_with("# tactile-gripper fw=1 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,"),
+        told.starts_with("# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,"),
         "{told}"
     );
     let lines = samples(&told);
@@ -146,6 +146,8 @@ fn every_fault_does_what_it_says() {
     assert!(lines("garbage@1/1").matches('\u{fffd}').count() > 500);
     let cut = lines("partial=1@1/1");
     assert!(cut.lines().count() < 110 && cut.lines().any(|line| line.matches("t_us").count() > 1));
+    let short = lines("byte=1@1/1");
+    assert_eq!(clean.len() - short.len(), 50, "a byte of each");
     assert_ne!(lines("baud@1/1"), clean);
     assert_eq!(lines("burst=0.3@1/1"), clean, "late, but all there");
 }
@@ -165,7 +167,7 @@ fn a_thousand_samples_a_second_on_eight_channels() {
     let told = text(setup, 1.0);
     let lines = samples(&told);
     assert_eq!(lines.len(), 1001);
-    assert!(lines.iter().all(|line| line.split(',').count() == 11 && number(line, "aux4").is_some()));
+    assert!(lines.iter().all(|line| line.split(',').count() == 12 && number(line, "aux4").is_some()));
 }
 
 #[test]

@@ -2,16 +2,17 @@
 //! counted and told as a gap, and nothing is put in its place.
 
 use super::cadence::{Cadence, Meter};
+use super::checksum;
 use super::clock::{Counters, Stamp, StreamClock, TimeSource};
 use super::columns::Columns;
 use super::fields::{Format, Parsed, parse};
-use super::hello;
+use super::hello::{self, Hello};
 use super::lines::{Line, LineSplitter};
-use super::rails::{Rail, RailWatch};
+use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch};
 use super::shape::{Candidate, Judged, Role, Shapes};
 use super::tail::{ConsoleLine, Tail, Verdict};
 use super::teleplot::Assembler;
-use crate::board::{Board, Gap, Reading};
+use crate::board::{Board, Gap, Reading, Sensor};
 
 /// What was heard, in its order.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +53,7 @@ struct Reader {
     /// Names of the channels, in the order of the counts.
     channels: Vec<String>,
     /// What the board said of itself.
-    hello: Option<Board>,
+    hello: Option<Hello>,
     teleplot: Assembler,
     clock: StreamClock,
     meter: Meter,
@@ -65,6 +66,9 @@ struct Reader {
     /// The newest reading's time (s).
     last_s: Option<f64>,
 }
+
+/// Beside a resistor up to this (ohm) a strip, which has 17.5 kOhm or more (data sheet), is above a quarter of the range.
+const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
 
 /// Largest counter that is believed: beyond it whole numbers are not told apart.
 const LARGEST_COUNTER: f64 = 9.0e15;
@@ -86,6 +90,8 @@ impl Decoder {
         self.reader.teleplot = Assembler::default();
         self.reader.shapes.give_up();
         self.reader.clock.interrupt();
+        // Another sketch may be on the board when it comes back; it need not say hello.
+        self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
     }
 
@@ -129,20 +135,40 @@ impl Decoder {
         self.reader.rails.at()
     }
 
-    /// True where the counts look like those of a converter with 10 bits, and the board has not said otherwise.
+    /// True where the counts look like those of a converter with 10 bits, though it is taken for one with 12, or said to be
+    /// one: a sketch may say so and forget `analogReadResolution`.
     pub fn looks_10_bit(&self) -> bool {
-        self.reader.hello.is_none() && self.reader.rails.looks_10_bit()
+        self.reader.looks_10_bit()
     }
 }
 
 impl Reader {
     fn board(&self) -> Board {
-        let mut board = self.hello.clone().unwrap_or_default();
+        let mut board = self.said().cloned().unwrap_or_default();
         let place = |name: &String| board.channels.iter().position(|known| known.eq_ignore_ascii_case(name));
         let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
         board.channels.clone_from(&self.channels);
         board
+    }
+
+    /// What the board said of itself.
+    fn said(&self) -> Option<&Board> {
+        self.hello.as_ref().map(|hello| &hello.board)
+    }
+
+    fn looks_10_bit(&self) -> bool {
+        let Some(said) = self.said().filter(|_| self.rails.looks_10_bit()) else {
+            return self.rails.looks_10_bit();
+        };
+        // Against the board's word only strips speak: they are never near zero.
+        let board = self.board();
+        let is_told_by = |sensor: Sensor| {
+            let place = board.channel_of(sensor).filter(|_| sensor.is_flex());
+            let ohm = |place: usize| board.divider_ohm.get(place).copied().unwrap_or(0.0);
+            place.is_some_and(|place| self.rails.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
+        };
+        said.full_scale >= FULL_12_BIT && Sensor::ALL.into_iter().any(is_told_by)
     }
 
     fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
@@ -161,13 +187,15 @@ impl Reader {
     }
 
     fn line(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
-        if let Some(remark) = line.strip_prefix(b"#") {
-            return self.remark(remark, line, arrived_s, heard);
+        if line.starts_with(b"#") {
+            return self.remark(line, arrived_s, heard);
         }
-        let (format, fields) = match parse(line) {
+        let (format, fields) = match self.check(line).and_then(|()| parse(line)) {
             Err(why) => return self.bad(line, why, arrived_s),
             Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
-            Ok(Parsed::Columns(values)) => (Format::Csv, self.columns.name(values, self.hello.as_ref())),
+            Ok(Parsed::Columns(values)) => {
+                (Format::Csv, self.columns.name(values, self.hello.as_ref().map(|hello| &hello.board)))
+            }
             Ok(Parsed::Named(Format::Teleplot, fields)) => {
                 self.tail.add(line, arrived_s, Verdict::Read);
                 match self.teleplot.push(fields) {
@@ -195,19 +223,26 @@ impl Reader {
         }
     }
 
-    fn remark(&mut self, remark: &[u8], line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
-        let Ok(text) = std::str::from_utf8(remark) else {
-            return self.bad(line, "it holds bytes that are no text", arrived_s);
+    /// Refuses a line of numbers whose checksum is wrong, or missing though the board said that there is one.
+    fn check(&self, line: &[u8]) -> Result<(), &'static str> {
+        let has_one = checksum::ends_in_one(line, ':')?;
+        let wanted = self.hello.as_ref().is_some_and(|hello| hello.checked);
+        if wanted && !has_one { Err("its checksum is missing") } else { Ok(()) }
+    }
+
+    fn remark(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let text = std::str::from_utf8(line).map_err(|_not_text| "it holds bytes that are no text");
+        let (text, hello) = match text.and_then(|text| Ok((text, hello::parse(text)?))) {
+            Ok(said) => said,
+            Err(why) => return self.bad(line, why, arrived_s),
         };
         self.tail.add(line, arrived_s, Verdict::Said);
-        if let Some(board) = hello::parse(text)
-            && self.hello.as_ref() != Some(&board)
-        {
-            self.hello = Some(board);
+        if hello.is_some() && self.hello != hello {
+            self.hello = hello;
             self.name_columns(heard);
             heard.push(Heard::Board(self.board()));
         }
-        heard.push(Heard::Said(text.trim().to_owned()));
+        heard.push(Heard::Said(text.strip_prefix('#').unwrap_or(text).trim().to_owned()));
     }
 
     fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
@@ -221,7 +256,8 @@ impl Reader {
         if self.shapes.format != Some(Format::Csv) {
             return;
         }
-        let names = self.columns.names(self.shapes.names().len(), self.hello.as_ref());
+        let said = self.hello.as_ref().map(|hello| &hello.board);
+        let names = self.columns.names(self.shapes.names().len(), said);
         let before = self.shapes.roles(&mut self.channels).to_vec();
         if !self.shapes.rename(&names) {
             return;
@@ -252,7 +288,7 @@ impl Reader {
                 Role::Millis if counters.time.is_none() => counters.time = counter.map(|count| (count, 1e-3)),
                 Role::Sequence => counters.seq = counter,
                 Role::LineBar => line_bar = *value,
-                Role::Millis | Role::Ignored => {}
+                Role::Millis | Role::Checksum | Role::Ignored => {}
             }
             whole &= counter.is_some() || !matches!(role, Role::Micros | Role::Millis | Role::Sequence);
         }
@@ -267,7 +303,8 @@ impl Reader {
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
-        let full_scale = self.hello.as_ref().map(|board| board.full_scale);
+        let said = self.said().map_or(FULL_12_BIT, |board| board.full_scale);
+        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { said };
         self.rails.add(&counts, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;
         heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));

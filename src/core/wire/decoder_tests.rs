@@ -111,6 +111,51 @@ fn lost_lines_and_bad_lines_are_gaps_and_nothing_is_invented() {
     assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (292, 8, 3));
 }
 
+/// A line with its checksum.
+fn signed(line: &str, mark: &str) -> String {
+    format!("{line}{mark}{}", checksum::checksum(line.as_bytes()))
+}
+
+#[test]
+fn a_digit_that_is_lost_is_a_bad_line_where_lines_have_checksums() {
+    let sound: Vec<String> = (0..600).map(|i| signed(&firmware_line(i), ",ck:")).collect();
+    let hello = signed(&HELLO.replace("fw=1", "fw=2"), " ck=");
+    for first in [hello, "# heard too late for the hello".to_owned()] {
+        let mut lines = sound.clone();
+        // Every byte of a line in turn, each from a line of its own; the last of them is cut before its checksum.
+        let damaged: Vec<usize> = (100..600).step_by(5).collect();
+        for (at, line) in damaged.iter().enumerate() {
+            let end = lines[*line].find(",ck").unwrap_or_default();
+            let lost = at % (lines[*line].len() - 1);
+            lines[*line].remove(lost);
+            if at + 1 == damaged.len() {
+                lines[*line] = sound[*line][..end].to_owned();
+            }
+        }
+        let (decoder, heard) = hear_lines(&std::iter::once(first).chain(lines).collect::<Vec<_>>());
+        let cadence = decoder.cadence();
+        assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (500, 100, 100));
+        for reading in readings(&heard) {
+            let i = reading.seq.unwrap_or_default();
+            let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
+            assert_eq!((&reading.counts[..], i % 5 == 0 && i >= 100), (&wanted[..], false), "{i}");
+        }
+        assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL", "fsrR"], "the checksum is none");
+    }
+}
+
+#[test]
+fn a_board_that_comes_back_with_another_sketch_needs_no_checksums() {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    let hello = signed("# tactile-gripper fw=2 adc=12 ch=flexL", " ck=");
+    decoder.push(format!("{hello}\nflexL:1\nflexL:2\n").as_bytes(), 0.0, &mut heard);
+    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (0, 2), "they lack what was said of them");
+    decoder.interrupt("unplugged");
+    decoder.push(b"\nflexL:1\nflexL:2\n", 1.0, &mut heard);
+    assert_eq!(readings(&heard).len(), 2);
+}
+
 #[test]
 fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
     let mut decoder = Decoder::default();
@@ -131,6 +176,23 @@ fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
     assert_eq!(gaps.len(), 1);
     assert!(gaps[0].cause.starts_with("the cable was pulled") && gaps[0].to_s - gaps[0].from_s > 2.9, "{gaps:?}");
     assert_eq!(readings(&heard).len(), 150);
+}
+
+#[test]
+fn ten_bits_are_seen_whatever_the_board_says_unless_it_has_reasons() {
+    let looks = |hello: &str, count: u32, pad: u32| {
+        let sample = |i: u32| format!("t_us:{},flexL:{},flexR:{count},fsrL:{pad},fsrR:0", 20_000 * i, count + i % 3);
+        let lines: Vec<String> = std::iter::once(hello.to_owned()).chain((0..300).map(sample)).collect();
+        let (decoder, _) = hear_lines(&lines);
+        (decoder.looks_10_bit(), decoder.rails()[0])
+    };
+    assert_eq!(looks("# no hello", 350, 0), (true, None));
+    assert_eq!(looks(HELLO, 350, 0), (true, None), "a strip is above a quarter of the range");
+    assert_eq!(looks(HELLO, 1021, 0), (true, Some(Rail::High)), "and this one is open");
+    assert_eq!(looks(HELLO, 1400, 900), (false, None));
+    assert_eq!(looks(&HELLO.replace("47000", "100000"), 800, 0), (false, None), "beside 100 kOhm it may be lower");
+    assert_eq!(looks(HELLO, 0, 900), (false, Some(Rail::Low)), "a pad may be anywhere");
+    assert_eq!(looks(&HELLO.replace("adc=12", "adc=10"), 350, 0), (false, None), "it says so");
 }
 
 #[test]

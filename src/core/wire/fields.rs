@@ -1,7 +1,8 @@
 //! One line to named numbers, in each format that boards speak:
 //!
 //! ```text
-//! plotter   flexL:512,flexR:498 fsrL:30     names and numbers; commas, spaces, tabs or semicolons between (Arduino)
+//! plotter   flexL:512,flexR:498 fsrL:30     names and numbers; commas, spaces, tabs or semicolons between (Arduino);
+//!                                           the last may be a checksum, `ck:23641`
 //! CSV       512,498,30                      numbers, with or without a line of names at any time
 //! Teleplot  >flexL:1627551892437:512§ADC|g  one number to a line, its time in ms
 //! JSON      {"flexL":512,"flexR":498}       one flat object to a line

@@ -1,6 +1,7 @@
 //! Streams that no board should send, without end, and what must hold whatever they are. The same seed gives the same
 //! stream. A test hears a second of it; `palpate workshop --fuzz-wire SECONDS` goes on for as long as one likes.
 
+use super::checksum::checksum;
 use super::decoder::{Decoder, Heard};
 
 /// What is never exceeded: channels of a board.
@@ -51,8 +52,10 @@ impl FuzzStream {
             1..=9 => 0.0,
             _ => 0.02,
         };
-        if self.below(400) == 0 {
-            self.format = self.below(6);
+        if self.below(80) == 0 {
+            self.format = (self.format + 1) % 7;
+            // Another sketch says hello; without a checksum it has none in its lines.
+            out.extend_from_slice(b"# tactile-gripper fw=1\n");
         }
         for _ in 0..=self.below(3) {
             self.line(out);
@@ -75,6 +78,10 @@ impl FuzzStream {
             2 => (0..self.below(3000)).for_each(|_| out.push(self.draw() as u8)),
             3 => out.extend(std::iter::repeat_n(b"0:,{>-"[self.below(6) as usize], 2000)),
             4 => out.retain(|byte| *byte != b'\n'),
+            5 if !out.is_empty() => {
+                let at = self.below(out.len() as u64) as usize;
+                out.remove(at);
+            }
             _ => {}
         }
         self.now_s
@@ -92,6 +99,15 @@ impl FuzzStream {
             2 => format!(">flexL:{}:{a}§V|g\n>x{}:{b}", n * 20, self.below(200)),
             3 => format!("{{\"flexL\":{a},\"flexR\":\"{b}\",\"seq\":{n},\"deep\":[[{{}}]]}}"),
             4 => format!("name{}:{a} other{}:{b}", self.below(1000), self.below(3)),
+            5 => {
+                let says = self.below(40) == 0;
+                let (body, key) = match says {
+                    true => (format!("# tactile-gripper fw=2 adc=12 ch=flexL,b rm={b},{a}"), " ck="),
+                    false => (format!("t_us:{us},seq:{n},flexL:{a}.5,flexR:{b}"), ",ck:"),
+                };
+                let sum = checksum(body.as_bytes());
+                format!("{body}{key}{sum}")
+            }
             _ => format!("# tactile-gripper adc={b} ch={a},b rm={b},2\nch{a};other{}", self.below(9)),
         };
         out.extend_from_slice(line.as_bytes());
@@ -160,7 +176,7 @@ mod tests {
         let mut bytes = Vec::new();
         for seed in 0..20 {
             let (mut stream, mut listener) = (FuzzStream::new(seed), FuzzListener::default());
-            for _ in 0..400 {
+            for _ in 0..1000 {
                 let arrived_s = stream.next(&mut bytes);
                 listener.push(&bytes, arrived_s)?;
             }

@@ -2,14 +2,15 @@
 //! go in, and memory is bounded whatever they are.
 //!
 //! ```text
-//! bytes -> lines -> fields -> shape -> clock -> readings, gaps, remarks
-//!         (lines)  (fields)  (shape)  (clock, delay_line, counters)
+//! bytes -> lines -> checksum -> fields -> shape -> clock -> readings, gaps, remarks
+//!         (lines)  (checksum)  (fields)  (shape)  (clock, delay_line, counters)
 //! ```
 //!
 //! Not read: binary frames (COBS). Text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
 
 mod cadence;
 mod capture;
+mod checksum;
 mod clock;
 mod columns;
 mod counters;
@@ -28,6 +29,7 @@ mod teleplot;
 
 pub use cadence::Cadence;
 pub use capture::{CaptureReader, Captured, MAGIC as CAPTURE_MAGIC};
+pub use checksum::checksum;
 pub use clock::TimeSource;
 pub use decoder::{Decoder, Detected, Heard};
 pub use fields::Format;

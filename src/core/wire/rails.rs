@@ -12,13 +12,16 @@ pub enum Rail {
 
 /// A channel is told once it has stood at an end for this long (s).
 const TOLD_AFTER_S: f64 = 0.5;
-/// Counts within this of an end are at it: what is open picks up noise, and the mean of several conversions that are cut off
-/// at the end falls short of it.
-const NEAR: f32 = 3.0;
+/// Counts within this share of the range of an end are at it: 8 of 4096, 2 of 1024. What is open or shorted picks up noise,
+/// half of which the end cuts off. With a deviation of 2 counts of 12 bits, and no average taken, one reading in a thousand
+/// is 6 counts away, one in 300 000 more than 8; the mean of eight conversions is never more than 3 away. With 10 bits,
+/// the same noise goes 2 counts far, or half a count. A sound pad under its largest load (49 N) is 100 counts away beside 4.7 kOhm,
+/// and 48 beside 10.
+const NEAR: f32 = 1.0 / 512.0;
 /// Full scale of the Due as our firmware sets it up.
-const FULL_12_BIT: u32 = 4095;
+pub(super) const FULL_12_BIT: u32 = 4095;
 /// Full scale of `analogRead` when nobody asked for more.
-const FULL_10_BIT: f32 = 1023.0;
+pub(super) const FULL_10_BIT: u32 = 1023;
 /// How long counts are watched before their largest says something of the converter (s): a close and a release.
 const WATCHED_S: f64 = 5.0;
 /// With less than this nothing is connected, and nothing can be said.
@@ -27,28 +30,34 @@ const ANYTHING: f32 = 128.0;
 /// Watches the counts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RailWatch {
-    channels: Vec<Option<(Rail, f64)>>,
+    channels: Vec<Channel>,
     now_s: f64,
     since_s: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Channel {
+    /// The end at which it stands, and since when (s).
+    at: Option<(Rail, f64)>,
     largest: f32,
 }
 
 impl RailWatch {
-    /// Takes in counts; the full scale where the board has said it.
-    pub(super) fn add(&mut self, counts: &[Option<f32>], t_s: f64, full_scale: Option<u32>) {
-        self.channels.resize(counts.len(), None);
+    /// Takes in counts of a converter with this full scale.
+    pub(super) fn add(&mut self, counts: &[Option<f32>], t_s: f64, full_scale: u32) {
+        self.channels.resize(counts.len(), Channel::default());
         self.now_s = t_s;
         self.since_s.get_or_insert(t_s);
-        let ten_bit = full_scale.is_none() && self.looks_10_bit();
-        let full = if ten_bit { FULL_10_BIT } else { full_scale.unwrap_or(FULL_12_BIT) as f32 };
+        let full = full_scale as f32;
+        let near = NEAR * (full + 1.0);
         for (channel, count) in self.channels.iter_mut().zip(counts) {
-            self.largest = self.largest.max(count.unwrap_or(0.0));
+            channel.largest = channel.largest.max(count.unwrap_or(0.0));
             let rail = match count {
-                Some(count) if *count >= full - NEAR => Some(Rail::High),
-                Some(count) if *count <= NEAR => Some(Rail::Low),
+                Some(count) if *count >= full - near => Some(Rail::High),
+                Some(count) if *count <= near => Some(Rail::Low),
                 _ => None,
             };
-            *channel = rail.map(|rail| match *channel {
+            channel.at = rail.map(|rail| match channel.at {
                 Some((before, since)) if before == rail => (rail, since),
                 _ => (rail, t_s),
             });
@@ -58,41 +67,87 @@ impl RailWatch {
     /// The end at which each channel has stood for long.
     pub(super) fn at(&self) -> Vec<Option<Rail>> {
         let told = |(rail, since): (Rail, f64)| (self.now_s - since > TOLD_AFTER_S).then_some(rail);
-        self.channels.iter().map(|channel| channel.and_then(told)).collect()
+        self.channels.iter().map(|channel| channel.at.and_then(told)).collect()
     }
 
     /// True where nothing was ever above what 10 bits can say.
     pub(super) fn looks_10_bit(&self) -> bool {
         let watched = self.since_s.is_some_and(|since| self.now_s - since >= WATCHED_S);
-        watched && (ANYTHING..=FULL_10_BIT).contains(&self.largest)
+        let largest = self.channels.iter().map(|channel| channel.largest).fold(0.0, f32::max);
+        watched && (ANYTHING..=FULL_10_BIT as f32).contains(&largest)
+    }
+
+    /// True where something is connected to a channel.
+    pub(super) fn is_connected(&self, channel: usize) -> bool {
+        self.channels.get(channel).is_some_and(|channel| channel.largest >= ANYTHING)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensing::electronics::Converter;
+    use crate::sensing::model::Stream;
 
     #[test]
     fn an_end_is_told_after_half_a_second() {
         let mut watch = RailWatch::default();
         for i in 0..100u32 {
             let t = 0.02 * f64::from(i);
-            watch.add(&[Some(4095.0), Some(2000.0), None, Some(0.0)], t, Some(4095));
+            watch.add(&[Some(4095.0), Some(2000.0), None, Some(0.0)], t, FULL_12_BIT);
             let told = watch.at();
             assert_eq!(told[0], (t > 0.5).then_some(Rail::High), "{t}");
             assert_eq!((told[1], told[2]), (None, None));
             assert_eq!(told[3], (t > 0.5).then_some(Rail::Low), "{t}");
         }
-        watch.add(&[Some(4000.0), None, None, None], 3.0, Some(4095));
+        watch.add(&[Some(4000.0), None, None, None], 3.0, FULL_12_BIT);
         assert_eq!(watch.at(), [None; 4]);
+    }
+
+    /// Readings of shares of the supply at 50 Hz for ten seconds, and how often each end is told of each.
+    fn told(levels: f64, average: u32, shares: [f64; 3]) -> [[u32; 2]; 3] {
+        let converter = Converter { levels, ..Converter::DUE };
+        let mut noise = Stream::new(1, "rails", "noise");
+        let mut watch = RailWatch::default();
+        let mut times = [[0; 2]; 3];
+        for i in 0..500u32 {
+            let counts = shares.map(|share| {
+                let deviation = 2.0 * levels / Converter::DUE.levels;
+                let sum: f64 = (0..average).map(|_| converter.counts(share, deviation * noise.normal())).sum();
+                Some((sum / f64::from(average)) as f32)
+            });
+            watch.add(&counts, 0.02 * f64::from(i), levels as u32 - 1);
+            for (times, told) in times.iter_mut().zip(watch.at()) {
+                times[0] += u32::from(told == Some(Rail::Low));
+                times[1] += u32::from(told == Some(Rail::High));
+            }
+        }
+        times
+    }
+
+    #[test]
+    fn noise_hides_no_open_circuit_and_makes_none_of_a_sound_channel() {
+        // A pad under its largest load beside 10 kOhm: 49 N, 1.04 times 49 / 6 mS.
+        let ratio = 10.0 * 1.04 * 49.0 / 6.0;
+        let pressed = ratio / (1.0 + ratio);
+        for levels in [4096.0, 1024.0] {
+            for average in [1, 8] {
+                let [shorted, open, sound] = told(levels, average, [0.0, 1.0, pressed]);
+                // All but the first half second, and never the other end.
+                assert!(shorted[0] > 470 && shorted[1] == 0, "{levels} {average} {shorted:?}");
+                assert!(open[1] > 470 && open[0] == 0, "{levels} {average} {open:?}");
+                assert_eq!(sound, [0, 0], "{levels} {average}");
+            }
+        }
     }
 
     #[test]
     fn ten_bits_are_suspected_from_the_largest_count() {
         let largest = |count: f32, seconds: f64| {
             let mut watch = RailWatch::default();
-            watch.add(&[Some(count)], 0.0, None);
-            watch.add(&[Some(10.0)], seconds, None);
+            watch.add(&[Some(count)], 0.0, FULL_12_BIT);
+            watch.add(&[Some(10.0)], seconds, FULL_12_BIT);
+            assert_eq!((watch.is_connected(0), watch.is_connected(1)), (count >= 128.0, false));
             watch.looks_10_bit()
         };
         assert!(largest(668.0, 6.0));

@@ -2,6 +2,7 @@
 //! taken when it has the fields of the lines before. Other fields are believed when two lines in a row have them; a part
 //! of the known ones looks like a line that was cut, and is believed only when it goes on like that.
 
+use super::checksum::KEY;
 use super::fields::{Fields, Format, MAX_FIELDS};
 
 /// Fields of one line.
@@ -25,6 +26,8 @@ pub(super) enum Role {
     Sequence,
     /// Line pressure (bar).
     LineBar,
+    /// The checksum, which has been looked at.
+    Checksum,
     /// Nowhere: there are too many channels.
     Ignored,
 }
@@ -38,6 +41,7 @@ impl Role {
             () if is("ms") || is("t_ms") || is("millis") => Some(Self::Millis),
             () if is("seq") => Some(Self::Sequence),
             () if is("p_bar") => Some(Self::LineBar),
+            () if is(KEY) => Some(Self::Checksum),
             () => None,
         }
     }

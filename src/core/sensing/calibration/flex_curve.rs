@@ -72,8 +72,8 @@ impl FlexCurve {
         rises(&distinct, input)?;
         let weighted = |p: &Point| WeightedPoint { x: p.stimulus, y: input.ohm(p.counts), weight: 1.0 };
         let line = StraightLine::through(&points.iter().map(weighted).collect::<Vec<_>>());
-        // The points differ in angle, or else they would have been refused as too close.
-        let line = line.expect("a line through points that differ");
+        // The points differ in angle, or else they would have been refused as too close: its numbers left the range.
+        let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
         let residuals = points.iter().map(|p| (input.ohm(p.counts) - line.at(p.stimulus)) / line.slope).collect();
         let curve = Self { flat_ohm: line.intercept, ohm_per_rad: line.slope, residuals, line };
         curve.is_such_a_part(input)?;

@@ -83,8 +83,8 @@ impl PadCurve {
             WeightedPoint { x: p.stimulus.ln(), y: conductance(p).ln(), weight }
         };
         let line = StraightLine::through(&felt.iter().map(weighted).collect::<Vec<_>>());
-        // Five different weights are five different logarithms.
-        let line = line.expect("a line through points that differ");
+        // Five different weights are five different logarithms: its numbers left the range.
+        let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
         let silent = points.iter().filter(|p| !conducts(p)).map(|p| p.stimulus).fold(0.0, f64::max);
         let lightest = distinct[0].stimulus;
         let threshold = PadPart::LEAST_FORCE.max(silent.min(lightest)).min(lightest);

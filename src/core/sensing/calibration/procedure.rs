@@ -86,6 +86,8 @@ pub struct Procedure {
     window: VecDeque<(f64, f64)>,
     /// Readings since the last point that had no number.
     silent: usize,
+    /// Why the last point that was asked for was not taken.
+    refusal: Option<Unsettled>,
 }
 
 impl Procedure {
@@ -106,6 +108,7 @@ impl Procedure {
             settling: Settling::default(),
             window: VecDeque::new(),
             silent: 0,
+            refusal: None,
         })
     }
 
@@ -217,22 +220,31 @@ impl Procedure {
     }
 
     /// Takes the settled reading as that of an angle (rad) or force (N); readings for the next point begin anew. What
-    /// was next in the plan is done with it.
+    /// was next in the plan is done with it. A reading that has not settled is refused, and nothing changes.
     pub fn take(&mut self, stimulus: f64) -> Result<Point, Unsettled> {
-        let point = Point { stimulus, ..self.settled()? };
+        let settled = self.settled();
+        self.refusal = settled.err();
+        let point = Point { stimulus, ..settled? };
         self.record.points.push(point);
         self.left.pop_front();
         self.window.clear();
         Ok(point)
     }
 
+    /// Why the point that was asked for last was not taken; none once another one was taken, left out or taken back.
+    pub fn last_refusal(&self) -> Option<Unsettled> {
+        self.refusal
+    }
+
     /// Leaves out what was next in the plan.
     pub fn skip(&mut self) {
+        self.refusal = None;
         self.left.pop_front();
     }
 
     /// Takes the last point back and puts it next in the plan.
     pub fn undo(&mut self) -> Option<Point> {
+        self.refusal = None;
         let point = self.record.points.pop()?;
         self.left.push_front(point.stimulus);
         self.window.clear();
@@ -308,8 +320,12 @@ mod tests {
         let creeping = |t: f64| (500.0 - 100.0 * (-t / 0.4).exp()) as f32;
         feed(&mut procedure, 10.0, 1.2, creeping);
         assert!(matches!(procedure.settled(), Err(Unsettled::Moving { by }) if by > 5.0), "{:?}", procedure.settled());
+        // Asked for too early, it says so until something else is done.
+        let refused = procedure.take(1.0);
+        assert!(refused.is_err() && procedure.last_refusal() == refused.err() && procedure.record().points.is_empty());
         feed(&mut procedure, 20.0, 3.5, creeping);
         assert!(procedure.settled().is_ok_and(|point| (point.counts - 500.0).abs() < 0.5));
+        assert!(procedure.take(1.0).is_ok() && procedure.last_refusal().is_none());
         // Noise of four counts is no movement.
         feed(&mut procedure, 30.0, 2.0, |t| {
             700.0 + if ((t * 50.0).round() as u32).is_multiple_of(2) { 4.0 } else { -4.0 }
