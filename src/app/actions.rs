@@ -106,6 +106,14 @@ pub enum DeskAction {
     ToggleUnsure,
     /// Hide what the model says until the label is given, or do not.
     ToggleBlind,
+    /// The next way in which the fingers may be moved.
+    NextControl,
+    /// Trials begin and end by themselves, or do not.
+    ToggleWatch,
+    /// Write all labelled trials into a new folder beside the store.
+    Export,
+    /// Train on all labelled trials.
+    Train,
 }
 
 /// A message to the user.

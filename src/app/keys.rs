@@ -55,7 +55,7 @@ const fn hidden(at: Key, act: fn(&PanelContext<'_>) -> Option<Action>) -> Bindin
 }
 
 /// All keys. Those with more modifiers come first, so that they win.
-pub(super) const ALL: [Binding; 46] = [
+pub(super) const ALL: [Binding; 50] = [
     key(Modifiers::COMMAND, Key::Num1, "mode Demo", |_| Some(Action::SetMode(Mode::Demo))),
     key(Modifiers::COMMAND, Key::Num3, "mode Label", |_| Some(Action::SetMode(Mode::Label))),
     key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or begin it anew", |_| {
@@ -74,6 +74,14 @@ pub(super) const ALL: [Binding; 46] = [
     label(Modifiers::NONE, Key::B, "blind: the model's guess stays hidden until the label is given", |_| {
         Some(Action::Desk(DeskAction::ToggleBlind))
     }),
+    label(Modifiers::NONE, Key::M, "who moves the fingers: you, the board, or nobody says", |_| {
+        Some(Action::Desk(DeskAction::NextControl))
+    }),
+    label(Modifiers::NONE, Key::W, "trials begin and end by themselves", |_| {
+        Some(Action::Desk(DeskAction::ToggleWatch))
+    }),
+    label(Modifiers::COMMAND, Key::E, "export all labelled trials", |_| Some(Action::Desk(DeskAction::Export))),
+    label(Modifiers::COMMAND, Key::T, "train on all labelled trials", |_| Some(Action::Desk(DeskAction::Train))),
     label(Modifiers::NONE, Key::Slash, "find an object", |_| Some(Action::Desk(DeskAction::FocusSearch))),
     label(Modifiers::NONE, Key::Num1, "choose the first object; 2 to 9 the others", |_| {
         Some(Action::Desk(DeskAction::Choose(0)))

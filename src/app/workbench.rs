@@ -79,6 +79,7 @@ pub struct Workbench {
     shipped: Option<Arc<Model>>,
     gripper: GripperWorker,
     labeller: Labeller,
+    store: PathBuf,
     /// What came of wishes about labels has been told up to this number.
     labels_told: u64,
     /// The trial of the real gripper that ended last.
@@ -172,7 +173,7 @@ impl Workbench {
         .map_err(|e| format!("the gripper's thread could not be started: {e}"))?;
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let tools = GripperTools::start(tools, &setup.store, &setup.wake)?;
-        let labeller = start_labeller(setup.store, Arc::clone(&setup.wake))
+        let labeller = start_labeller(setup.store.clone(), Arc::clone(&setup.wake))
             .map_err(|e| format!("the thread that keeps labels could not be started: {e}"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
@@ -188,6 +189,7 @@ impl Workbench {
             shipped: setup.model.as_ref().ok().cloned(),
             gripper,
             labeller,
+            store: setup.store,
             labels_told: 0,
             trial_ended: None,
             felt: Traces::default(),

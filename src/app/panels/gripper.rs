@@ -214,26 +214,31 @@ fn drift_badge(ui: &mut Ui, theme: Theme, drift: &Drift) {
     frame.show(ui, |ui| ui.label(RichText::new(text).small().color(colour(ink)))).response.on_hover_text(about);
 }
 
+/// Who moves the fingers, in words.
+pub(in crate::app) fn control_title(control: Control) -> &'static str {
+    match control {
+        Control::ByHand => "by hand, as told",
+        Control::Driven => "by the board",
+        Control::Free => "as they like",
+    }
+}
+
 /// Who moves the fingers, and trials that begin by themselves.
 fn control_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, actions: &mut Vec<Action>) {
-    ui.label("Control box");
+    ui.label("The fingers are moved  (M)");
     let mut control = context.view.control;
-    for (kind, text, about) in [
-        (Control::ByHand, "by hand, as told", "You turn the pressure up and down when the trial's phases say so"),
-        (
-            Control::Driven,
-            "driven by the board",
-            "The board passes on the pressures of the programme, as our firmware does",
-        ),
-        (Control::Free, "free", "Nobody says when: a trial lasts until Q, and its phases are not known"),
+    for (kind, about) in [
+        (Control::ByHand, "You turn the pressure up and down when the trial's phases say so"),
+        (Control::Driven, "The board passes on the pressures of the programme, as our firmware does"),
+        (Control::Free, "Nobody says when: a trial lasts until Q, and its phases are not known"),
     ] {
-        if ui.radio_value(&mut control, kind, text).on_hover_text(about).changed() {
+        if ui.radio_value(&mut control, kind, control_title(kind)).on_hover_text(about).changed() {
             actions.push(Action::SetControl(control));
         }
     }
     let mut watching = gripper.watching.is_some();
     let about = "A trial begins when the pressure rises or the fingers move, and ends when they are back at rest";
-    if ui.checkbox(&mut watching, "Trials begin and end by themselves").on_hover_text(about).changed() {
+    if ui.checkbox(&mut watching, "Trials begin and end by themselves  (W)").on_hover_text(about).changed() {
         let request = TrialRequest { object: None, control: Control::Free, adds: false };
         actions.push(Action::Gripper(GripperWish::Watch(watching.then_some(request))));
     }

@@ -23,7 +23,8 @@ mod training;
 mod trials;
 mod view3d;
 
-pub(super) use gripper::stop_button;
+pub(super) use gripper::{control_title, stop_button};
+pub(super) use training::USUAL_METHOD;
 
 use super::actions::Action;
 use super::gripper_tools::GripperTools;

@@ -14,7 +14,7 @@ use palpate_core::workers::{FinishedTraining, TrainRequest, TrainWish, TrainerVi
 use std::path::Path;
 
 /// What is trained where nobody chooses: quick to fit, and good with few trials.
-const USUAL_METHOD: &str = "macro-layer";
+pub(in crate::app) const USUAL_METHOD: &str = "macro-layer";
 
 /// Seed of fits and of which trials are held back: the same data give the same model.
 const SEED: u64 = 1;

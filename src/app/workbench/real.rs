@@ -3,12 +3,15 @@
 
 use super::{Shown, Workbench};
 use crate::app::actions::{DeskAction, Message};
+use crate::app::gripper_tools::ToolWish;
 use crate::app::modes::Mode;
-use crate::app::panels::Source;
+use crate::app::panels::{Source, USUAL_METHOD, control_title};
 use palpate_core::gripper::Phase;
 use palpate_core::labelling::LabelledTrial;
 use palpate_core::objects::catalogue;
-use palpate_core::workers::{Command, GripperWish, LabelWish, TrialPart, TrialRequest};
+use palpate_core::rig::serial::Control;
+use palpate_core::workers::{Command, GripperWish, LabelWish, TrainRequest, TrainWish, TrialPart, TrialRequest};
+use std::path::{Path, PathBuf};
 
 impl Workbench {
     /// Grants what is asked for at the desk.
@@ -37,6 +40,27 @@ impl Workbench {
                 if let Some(trial) = self.asked_about() {
                     self.labeller.ask(LabelWish::Unsure(trial.id, !trial.unsure));
                 }
+            }
+            DeskAction::NextControl => {
+                let controls = [Control::ByHand, Control::Driven, Control::Free];
+                let now = controls.iter().position(|control| *control == self.view.control).unwrap_or(0);
+                self.view.control = controls[(now + 1) % controls.len()];
+                self.tell(Message::Info(format!("the fingers are moved {}", control_title(self.view.control))));
+            }
+            DeskAction::ToggleWatch => {
+                let watching = self.gripper.view().is_some_and(|gripper| gripper.watching.is_some());
+                let request = TrialRequest { object: None, control: Control::Free, adds: false };
+                self.gripper.wish(GripperWish::Watch((!watching).then_some(request)));
+                let state = if watching { "when R is pressed" } else { "by themselves, when the fingers move" };
+                self.tell(Message::Info(format!("trials begin {state}")));
+            }
+            DeskAction::Export => self.labeller.ask(LabelWish::Export(self.new_export())),
+            DeskAction::Train => {
+                let request = TrainRequest { method: USUAL_METHOD.to_owned(), seed: 1, quick: false };
+                self.tools.grant(ToolWish::Train(TrainWish::Train(request)));
+                self.tell(Message::Info(
+                    "training on the labelled trials: the panel Training shows how far it is".to_owned(),
+                ));
             }
             DeskAction::ToggleBlind => {
                 self.view.blind = !self.view.blind;
@@ -131,6 +155,14 @@ impl Workbench {
                 self.tell(Message::Warning(cause.to_string()));
             }
         }
+    }
+
+    /// A folder beside the store that does not exist yet: export, export-2, export-3 ..
+    fn new_export(&self) -> PathBuf {
+        let beside = self.store.parent().unwrap_or(Path::new(""));
+        let name = |k: u32| if k == 1 { "export".to_owned() } else { format!("export-{k}") };
+        let free = (1..=u32::MAX).map(|k| beside.join(name(k))).find(|folder| !folder.exists());
+        free.unwrap_or_else(|| beside.join("export"))
     }
 
     /// The trial that the card asks about.

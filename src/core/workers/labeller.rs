@@ -4,9 +4,9 @@
 use super::desk::{Desk, Outlet};
 use super::messages::Wake;
 use crate::labelling::{Disagreement, LabelledTrial, NextTrial, Progress, disagreements};
-use crate::recording::{JournalEntry, Store, StoreError, TrialId};
+use crate::recording::{Exported, JournalEntry, Store, StoreError, TrialId, export_labelled};
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What can be asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,8 @@ pub enum LabelWish {
     Want(String, u32),
     /// An object leaves the plan; its trials stay.
     Unplan(String),
+    /// Write all labelled trials into a folder that does not exist or is empty.
+    Export(PathBuf),
 }
 
 /// What there is.
@@ -136,6 +138,7 @@ impl Clerk {
             LabelWish::Redo => store.redo().map(|entry| Some(taken("made again", entry, "nothing to make again"))),
             LabelWish::Want(name, wanted) => return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err),
             LabelWish::Unplan(name) => return change_plan(store, |plan| plan.remove(name)).err().map(Err),
+            LabelWish::Export(folder) => return Some(exported(store, folder)),
         };
         done.map_err(|error| error.to_string()).transpose()
     }
@@ -154,6 +157,16 @@ impl Clerk {
         };
         read(store).map_err(|error| error.to_string())
     }
+}
+
+fn exported(store: &Store, folder: &Path) -> Result<String, String> {
+    let exported = export_labelled(store, folder).map_err(|error| error.to_string())?;
+    let Exported { folder, trials, derived, left_out } = exported;
+    let missing = match left_out.first() {
+        Some((id, why)) => format!("; {} without signals, such as trial {id}: {why}", left_out.len()),
+        None => String::new(),
+    };
+    Ok(format!("{trials} labelled trials exported into {}, {derived} with signals{missing}", folder.display()))
 }
 
 fn change_plan<E: std::fmt::Display>(
