@@ -1,6 +1,7 @@
 //! Labelling without the mouse: which trial the keys are about, which label is chosen, and what a key comes to. Nothing is
 //! drawn here.
 
+use super::panels::title_of;
 use palpate_core::labelling::LabelledTrial;
 use palpate_core::recording::TrialId;
 use palpate_core::workers::LabelView;
@@ -85,12 +86,14 @@ impl LabelDraft {
         let planned = view.progress.objects.iter().map(|object| object.name.clone());
         let mut names: Vec<String> = Vec::new();
         for name in label.into_iter().chain(next).chain(planned).chain(["empty".to_owned()]) {
-            if name.to_lowercase().contains(&wanted) && !names.contains(&name) {
+            let fits = name.to_lowercase().contains(&wanted) || title_of(&name).to_lowercase().contains(&wanted);
+            if fits && !names.contains(&name) {
                 names.push(name);
             }
         }
         // A name that was typed whole comes first.
-        names.sort_by_key(|name| name.to_lowercase() != wanted || wanted.is_empty());
+        let whole = |name: &str| name.to_lowercase() == wanted || title_of(name).to_lowercase() == wanted;
+        names.sort_by_key(|name| wanted.is_empty() || !whole(name));
         if names.is_empty() && !wanted.is_empty() {
             names.push(self.search.trim().to_owned());
         }
@@ -144,6 +147,10 @@ mod tests {
         assert_eq!(draft.label(&view), view.next.as_ref().map(|next| next.object.clone()));
         draft.search = "BALL".to_owned();
         assert_eq!(draft.objects(&view), ["ball", "bigball"]);
+        // By what people call it, too.
+        draft.search = "stop".to_owned();
+        assert_eq!(draft.objects(&view), ["button"]);
+        draft.search = "ball".to_owned();
         draft.chosen = Some(1);
         assert_eq!(draft.label(&view).as_deref(), Some("bigball"));
         draft.search = " garlic ".to_owned();

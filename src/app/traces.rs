@@ -55,6 +55,8 @@ impl GraspTrace {
 #[derive(Clone, Debug, Default)]
 pub struct Traces {
     grasps: VecDeque<GraspTrace>,
+    /// The last grasp is shown rather than what has been watched since.
+    held: bool,
 }
 
 impl Traces {
@@ -96,15 +98,25 @@ impl Traces {
         self.grasps.clear();
     }
 
-    /// The current grasp.
+    /// Whether the last grasp stays in sight, while what comes after it is only watched.
+    pub fn hold_grasp(&mut self, held: bool) {
+        self.held = held;
+    }
+
+    /// The current grasp, or what is watched.
     pub fn current(&self) -> Option<&GraspTrace> {
-        self.grasps.back()
+        self.place().and_then(|place| self.grasps.get(place))
+    }
+
+    fn place(&self) -> Option<usize> {
+        let grasp = self.grasps.iter().rposition(|trace| !trace.rolling).filter(|_| self.held);
+        grasp.or(self.grasps.len().checked_sub(1))
     }
 
     /// The grasps before it, oldest first; none beside what belongs to no grasp.
     pub fn earlier(&self) -> impl Iterator<Item = &GraspTrace> {
         let rolling = self.current().is_some_and(|current| current.rolling);
-        let many = if rolling { 0 } else { self.grasps.len().saturating_sub(1) };
+        let many = if rolling { 0 } else { self.place().unwrap_or(0) };
         self.grasps.iter().take(many)
     }
 }
@@ -152,5 +164,14 @@ mod tests {
         let trace = traces.current().unwrap();
         assert!(trace.t.len() <= 1700 && trace.channels[0].len() == trace.t.len());
         assert_eq!(trace.gaps(), [[1000.0, 1002.5]]);
+        // A grasp stays in sight where that is wanted.
+        for (grasp, rolling) in [(2, false), (3, true)] {
+            let row =
+                TraceRow { grasp, rolling, t: 0.0, line_bar: 0.0, values: Box::new([1.0]), errors: Box::default() };
+            traces.push(&row);
+        }
+        assert_eq!(traces.current().map(|trace| trace.grasp), Some(3));
+        traces.hold_grasp(true);
+        assert_eq!(traces.current().map(|trace| trace.grasp), Some(2));
     }
 }

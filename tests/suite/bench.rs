@@ -12,6 +12,7 @@ use palpate_core::study::{Explanation, Measuring};
 use palpate_core::workers::{
     Command, Examine, FitTrials, Listen, Snapshot, examine_port, explain_scene, fit_trials, listen_to_port,
 };
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -66,11 +67,14 @@ fn explain_steadily(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explana
     Ok(explain_scene(scene, how)?.map(steady))
 }
 
+/// Wakes after which something that was waited for will not come any more.
+const MOST_WAKES: u32 = 20_000;
+
 /// The workbench and the harness that drives it.
 pub(crate) struct Bench {
     pub(crate) harness: Harness<'static, Option<Workbench>>,
     woken: Receiver<()>,
-    _store: tempfile::TempDir,
+    store: tempfile::TempDir,
 }
 
 impl Bench {
@@ -117,7 +121,7 @@ impl Bench {
             }
         };
         let harness = Harness::builder().with_size(size).renderer(renderer).build_ui_state(draw, None);
-        let mut bench = Self { harness, woken, _store: store };
+        let mut bench = Self { harness, woken, store };
         bench.until(|snapshot| snapshot.status.loading.is_none());
         bench
     }
@@ -154,10 +158,47 @@ impl Bench {
 
     /// Draws until something is on the screen, or is there no more.
     pub(crate) fn until_shown(&mut self, shown: bool, text: &str) {
-        while self.harness.query_by_label_contains(text).is_some() != shown {
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("something goes on");
-            self.harness.step();
+        for _ in 0..MOST_WAKES {
+            if self.harness.query_all_by_label_contains(text).next().is_some() == shown {
+                return;
+            }
+            self.wait();
         }
+        panic!("\"{text}\" is {}there; said: {:?}", if shown { "not " } else { "" }, self.workbench().messages());
+    }
+
+    /// Draws until the user has been told something.
+    pub(crate) fn until_told(&mut self, text: &str) {
+        for _ in 0..MOST_WAKES {
+            if self.workbench().messages().iter().any(|message| message.contains(text)) {
+                return;
+            }
+            self.wait();
+        }
+        panic!("\"{text}\" was never said: {:?}", self.workbench().messages());
+    }
+
+    /// Waits until something has happened, and draws.
+    pub(crate) fn wait(&mut self) {
+        self.woken.recv_timeout(Duration::from_secs(60)).expect("something goes on");
+        self.harness.step();
+    }
+
+    /// The store, opened beside the window.
+    pub(crate) fn store(&self) -> Store {
+        Store::open(&self.store_folder().join("trials.sqlite")).unwrap()
+    }
+
+    pub(crate) fn store_folder(&self) -> &Path {
+        self.store.path()
+    }
+
+    /// What the plan has next.
+    pub(crate) fn next_object(&self) -> String {
+        let store = self.store();
+        let trials = store.labelled_trials().unwrap();
+        let last = trials.iter().rev().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
+        store.label_plan().unwrap().progress(&trials).next(last).unwrap().object
     }
 
     /// Runs the grasp up to `t` seconds and leaves it standing there.

@@ -40,7 +40,7 @@ fn scene() -> Scene {
 }
 
 /// The pretended gripper, waiting to be driven.
-fn board(parts: &HiddenParts) -> Listen {
+pub(crate) fn board(parts: &HiddenParts) -> Listen {
     pretended(parts, None)
 }
 

@@ -17,6 +17,7 @@
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
 //! - `gripper_tools`: doctor and fit in the window.
 //! - `training`: training on labelled trials of the board, in the window.
+//! - `desk`: a labelling afternoon in the window, by keys alone.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -31,6 +32,7 @@ mod bench;
 mod calibration;
 mod command_line;
 mod cpu_renderer;
+mod desk;
 mod determinism;
 mod files;
 mod firmware;

@@ -92,6 +92,9 @@ impl Workbench {
             self.hand_over();
         }
         self.show_next_object();
+        // What is to be labelled stays in sight until it is.
+        let asked = self.view.draft.selected.is_none() && self.asked_about().is_some();
+        self.felt.hold_grasp(self.view.mode == Mode::Label && gripper.trial.is_none() && asked);
         let ended = gripper.ended.as_ref().map(|ended| ended.id);
         if self.trial_ended != ended {
             self.trial_ended = ended;

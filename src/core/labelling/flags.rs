@@ -246,7 +246,7 @@ impl PadRise {
     fn told(&self) -> String {
         let digits = if self.unit == "N" { 2 } else { 0 };
         let Self { pad, rise, least, unit } = self;
-        format!("{rise:.digits$} {unit} on the {}, a touch is {least:.digits$}", pad.label())
+        format!("{rise:.digits$} {unit} on the {}, a touch is {least:.digits$} {unit}", pad.label())
     }
 }
 

@@ -149,6 +149,11 @@ impl BoardRecorder {
         }
     }
 
+    /// Something cut the grasp short, though the board was heard all the time.
+    pub fn interrupt(&mut self, cause: &str) {
+        self.interrupted.push(cause.to_owned());
+    }
+
     /// The control box does something else from now on.
     pub fn mark(&mut self, mark: PhaseMark) {
         self.about.phases.push(mark);

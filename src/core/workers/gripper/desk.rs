@@ -378,7 +378,10 @@ impl Desk {
             )),
             Ok(()) => self.outlets.tell(Notice::Warning("told to vent".to_owned())),
         }
-        self.end(false, Some("vented by the user".to_owned()));
+        if let Some(running) = &mut self.running {
+            running.interrupt("vented by the user");
+        }
+        self.end(false, None);
     }
 
     /// Tells the board what is due, and ends a trial whose programme is done.

@@ -79,10 +79,14 @@ impl Running {
 
     /// Takes in what the link has heard.
     pub(super) fn take(&mut self, event: LinkEvent) {
-        if let LinkEvent::Heard(Heard::Said(text)) = &event
-            && (text.starts_with("refused") || text.starts_with("vent"))
-        {
-            self.note(format!("the board said: {text}"));
+        match &event {
+            LinkEvent::Heard(Heard::Said(text)) if text.starts_with("refused") => {
+                self.note(format!("the board said: {text}"));
+            }
+            LinkEvent::Heard(Heard::Said(text)) if text.starts_with("vent") => {
+                self.recorder.interrupt(&format!("the board vented by itself ({text})"));
+            }
+            LinkEvent::Heard(_) | LinkEvent::Captured(_) => {}
         }
         self.recorder.take(event);
     }
@@ -108,6 +112,11 @@ impl Running {
         self.line_bar = mark.line_bar;
         self.recorder.mark(mark);
         new.then_some(phase)
+    }
+
+    /// Something cuts it short.
+    pub(super) fn interrupt(&mut self, cause: &str) {
+        self.recorder.interrupt(cause);
     }
 
     /// Something that should be known of it.

@@ -1,0 +1,171 @@
+//! A labelling afternoon at the desk, by keys alone: record, label, record again, discard, take back, find, export. The
+//! gripper is the pretended one, on a clock that runs as fast as it can.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::calibration::{calibrated, parts};
+use crate::cpu_renderer::CpuRenderer;
+use crate::gripper::board;
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
+use palpate::app::{Action, Mode};
+use palpate_core::recording::Store;
+use palpate_core::rig::serial::Control;
+use palpate_core::workers::GripperWish;
+
+fn desk() -> Bench {
+    let fill = |store: &mut Store| {
+        for (sensor, calibration) in calibrated(&parts(1, false), 1).1 {
+            store.add_calibration(&calibration.record).unwrap();
+            store.mount_part(sensor, &calibration.record.part).unwrap();
+        }
+    };
+    let setup = BenchSetup { fill, listen: board(&parts(1, false)), size: [1400.0, 1000.0], ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.tell(Action::SetMode(Mode::Label));
+    bench.until_shown(true, "0 of 800 trials");
+    bench
+}
+
+impl Bench {
+    fn press(&mut self, key: Key) {
+        self.press_with(Modifiers::NONE, key);
+    }
+
+    fn press_with(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        // Once for the key, once for what it has changed.
+        self.harness.step();
+        self.harness.step();
+    }
+
+    fn type_text(&mut self, text: &str) {
+        self.harness.event(egui::Event::Text(text.to_owned()));
+        self.harness.step();
+        self.harness.step();
+    }
+
+    fn record(&mut self) {
+        self.press(Key::R);
+        self.until_shown(true, "Time in the trial");
+        self.until_shown(false, "Time in the trial");
+        self.until_shown(true, "what was it?");
+    }
+
+    fn labels(&self) -> Vec<(i64, Option<String>, bool)> {
+        let trials = self.store().labelled_trials().unwrap();
+        trials.into_iter().map(|trial| (trial.id, trial.object, trial.discarded)).collect()
+    }
+
+    /// Waits until the labels in the store are these.
+    fn until_labelled(&mut self, wanted: &[(i64, Option<&str>, bool)]) {
+        let wanted: Vec<(i64, Option<String>, bool)> =
+            wanted.iter().map(|(id, label, gone)| (*id, label.map(str::to_owned), *gone)).collect();
+        for _ in 0..MOST_LOOKS {
+            if self.labels() == wanted {
+                return;
+            }
+            self.wait();
+        }
+        panic!("{:?} instead of {wanted:?}; {:?}", self.labels(), self.workbench().messages());
+    }
+}
+
+/// Looks after which something that was waited for will not come any more.
+const MOST_LOOKS: u32 = 3000;
+
+#[test]
+fn an_afternoon_by_keys_alone() {
+    let mut desk = desk();
+    desk.press_with(Modifiers::COMMAND, Key::G);
+    desk.until_shown(true, "Stop and vent");
+    desk.press(Key::M);
+    assert_eq!(desk.workbench().view().control, Control::Driven);
+    // What the plan has next is proposed: Enter takes it.
+    let next = desk.next_object();
+    desk.record();
+    // What the model says stays hidden until then.
+    assert!(desk.harness.query_by_label_contains("The model").is_none());
+    desk.press(Key::Enter);
+    desk.until_labelled(&[(1, Some(&next), false)]);
+    desk.until_shown(true, "1 of 800 trials");
+    desk.until_shown(true, "The model says lemon");
+    // The next one is not the same again; it is recorded twice, because the first went wrong.
+    assert_ne!(desk.next_object(), next);
+    desk.record();
+    desk.record();
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, None, false)]);
+    // Typing finds an object; Enter gives the label.
+    desk.press(Key::Slash);
+    desk.type_text("stop");
+    desk.press(Key::Enter);
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false)]);
+    desk.until_shown(true, "2 of 800 trials");
+    // The first is called something new after all: the arrows pick it.
+    desk.press(Key::ArrowDown);
+    desk.press(Key::ArrowDown);
+    desk.until_shown(true, "Trial 1 is called");
+    desk.press(Key::Slash);
+    desk.type_text("garlic");
+    desk.press(Key::Enter);
+    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false)]);
+    // Taken back, and made again.
+    desk.press_with(Modifiers::COMMAND, Key::Z);
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false)]);
+    desk.press_with(Modifiers { shift: true, ..Modifiers::COMMAND }, Key::Z);
+    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false)]);
+    // Thrown away while it goes on, and out of the list.
+    desk.press(Key::R);
+    desk.until_shown(true, "Time in the trial");
+    desk.press(Key::D);
+    desk.until_shown(false, "Time in the trial");
+    desk.press(Key::ArrowDown);
+    desk.until_shown(true, "Trial 3 is called");
+    desk.press(Key::D);
+    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), true), (4, None, true)]);
+    desk.press_with(Modifiers::COMMAND, Key::Z);
+    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
+    desk.press_with(Modifiers::COMMAND, Key::E);
+    desk.until_told("2 labelled trials exported");
+    assert!(desk.store_folder().join("export").join("trials.csv").is_file());
+    desk.press_with(Modifiers::COMMAND, Key::E);
+    desk.until_told("export-2");
+    // Too few to learn from: that is said, and what is missing.
+    desk.press_with(Modifiers::COMMAND, Key::T);
+    desk.until_told("training on the labelled trials");
+}
+
+#[test]
+fn stop_works_while_something_is_typed() {
+    let mut desk = desk();
+    desk.tell(Action::Gripper(GripperWish::Connect(None)));
+    desk.until_shown(true, "Stop and vent");
+    desk.press(Key::M);
+    desk.record();
+    desk.press(Key::Slash);
+    desk.type_text("r");
+    // A letter in the field begins no trial.
+    assert!(desk.harness.query_by_label_contains("Time in the trial").is_none());
+    desk.press(Key::Escape);
+    desk.until_told("told to vent");
+    let field = desk.harness.get_by_role_and_label(Role::SearchInput, "Find an object");
+    assert_eq!(field.value().as_deref(), Some("r"));
+}
+
+#[test]
+fn blind_hides_the_models_guess_until_the_label_is_given() {
+    let mut desk = desk();
+    desk.tell(Action::Gripper(GripperWish::Connect(None)));
+    desk.until_shown(true, "Stop and vent");
+    desk.press(Key::M);
+    desk.record();
+    desk.harness.get_by_label("Recognition").click();
+    desk.harness.step();
+    desk.until_shown(true, "is hidden until you have said what it is");
+    desk.press(Key::B);
+    desk.until_shown(false, "is hidden until you have said what it is");
+    desk.press(Key::B);
+    desk.until_shown(true, "is hidden until you have said what it is");
+    desk.press(Key::N);
+    desk.until_shown(false, "is hidden until you have said what it is");
+}
