@@ -216,7 +216,8 @@ impl Workbench {
         {
             workbench.tell(Message::Warning(cause.to_string()));
         }
-        if let Some(path) = workbench.view.gripper_model.clone() {
+        // It is remembered again once it is loaded.
+        if let Some(path) = workbench.view.gripper_model.take() {
             workbench.tools.grant(ToolWish::Train(TrainWish::Load(path)));
         }
         if let Err(cause) = setup.model {

@@ -194,7 +194,7 @@ fn the_window_trains_and_uses_what_it_trained() {
         let setup = BenchSetup { size: [320.0, 760.0], fill: labelled, ..BenchSetup::default() };
         let mut bench: Bench = bench("training", theme, setup);
         bench.until_shown(true, "63 of 5 objects");
-        assert!(bench.harness.query_by_label("3, needs 5").is_some());
+        assert!(bench.harness.query_by_label("cube: 3, needs 5").is_some());
         press(&mut bench, "Method");
         bench.harness.run_steps(3);
         bench.harness.get_by_label("KNN").click();
@@ -206,7 +206,7 @@ fn the_window_trains_and_uses_what_it_trained() {
         assert!(confused("lemon taken for tomato") || confused("tomato taken for lemon"));
         // Without the list of files, in whose names the time stands.
         let picture = bench.harness.render().unwrap();
-        let end = bench.harness.get_by_label("Models for the real gripper").rect().top() as u32;
+        let end = bench.harness.get_by_label("Models for the real gripper").rect().top() as u32 - 8;
         let picture = image::imageops::crop_imm(&picture, 0, 0, picture.width(), end.min(picture.height())).to_image();
         assert!(bench.harness.get_by_label("the shipped model is in use").accesskit_node().is_disabled());
         let label = "Use knn-20";

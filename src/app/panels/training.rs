@@ -5,7 +5,7 @@ use super::{PanelContext, just_opened, wrapped};
 use crate::app::actions::Action;
 use crate::app::gripper_tools::ToolWish;
 use crate::app::theme::colour;
-use egui::{Align, Align2, Button, ComboBox, FontId, Layout, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{Align2, Button, ComboBox, FontId, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_core::palette::{Rgb, Theme};
 use palpate_core::recognition::metrics::Confusion;
 use palpate_core::recognition::{Labels, METHODS, method};
@@ -50,7 +50,7 @@ fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Vec<Action>) {
     let title = method(&chosen).map_or("", |method| method.title);
     ui.horizontal_wrapped(|ui| {
         let label = ui.label("Method");
-        let combo = ComboBox::from_id_salt("training method").width(150.0).selected_text(title);
+        let combo = ComboBox::from_id_salt("training method").width(150.0).height(520.0).selected_text(title);
         let shown = combo.show_ui(ui, |ui| {
             for method in in_table_order() {
                 ui.selectable_value(&mut chosen, method.key.to_owned(), method.title).on_hover_text(method.about);
@@ -140,25 +140,36 @@ fn classes_ui(ui: &mut Ui, theme: Theme, classes: &[LabelledClass]) {
     }
     wrapped(ui, RichText::new(format!("{all} of {} objects", classes.len())).weak());
     let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
+    ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {
-        let needs = if class.is_enough() { String::new() } else { format!(", needs {LEAST_TRIALS}") };
-        let colours = theme.colours();
-        let ink = if class.is_enough() { colours.accent } else { colours.warning };
-        ui.horizontal(|ui| {
-            ui.spacing_mut().interact_size.y = 16.0;
-            ui.add_sized(vec2(110.0, 16.0), egui::Label::new(&class.name).truncate().halign(Align::LEFT));
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let count = RichText::new(format!("{}{needs}", class.trials));
-                ui.label(if class.is_enough() { count } else { count.color(colour(colours.warning)) });
-                let width = ui.available_width().max(1.0);
-                let (rect, _) = ui.allocate_exact_size(vec2(width, 10.0), Sense::hover());
-                let filled = rect.width() * class.trials as f32 / most as f32;
-                let bar = Rect::from_min_size(rect.min, vec2(filled, rect.height()));
-                ui.painter().rect_filled(bar, 2.0, colour(ink));
-            });
-        });
+        class_ui(ui, theme, class, class.trials as f32 / most as f32);
     }
 }
+
+/// Name, bar and number of an object's trials.
+fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
+    let colours = theme.colours();
+    let (number, bar, ink) = match class.is_enough() {
+        true => (class.trials.to_string(), colours.accent, colours.text),
+        false => (format!("{}, needs {LEAST_TRIALS}", class.trials), colours.warning, colours.warning),
+    };
+    // Some room for the scroll bar.
+    let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - 10.0).max(120.0), 18.0), Sense::hover());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, format!("{}: {number}", class.name)));
+    let painter = ui.painter_at(rect);
+    let font = FontId::proportional(13.0);
+    let [names, numbers] = [0.36, 0.26].map(|share: f32| share * rect.width());
+    let name = painter.with_clip_rect(rect.with_max_x(rect.left() + names - 4.0));
+    name.text(rect.left_center(), Align2::LEFT_CENTER, &class.name, font.clone(), colour(colours.text));
+    painter.text(rect.right_center(), Align2::RIGHT_CENTER, &number, font, colour(ink));
+    let room = rect.with_min_x(rect.left() + names).with_max_x(rect.right() - numbers).shrink2(vec2(0.0, 4.0));
+    let filled = room.with_max_x(room.left() + share * room.width());
+    painter.rect_filled(filled, 2.0, colour(bar));
+    response.on_hover_text(&class.name);
+}
+
+/// Room for the button beside a model, and for the scroll bar (points).
+const BUTTON: f32 = 72.0;
 
 /// Models that were saved, and the one that comes with the program.
 fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, actions: &mut Vec<Action>) {
@@ -176,13 +187,15 @@ fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, action
     let other = context.view.gripper_model.as_deref().filter(|own| view.models.iter().all(|m| m.path != *own));
     let other = other.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
     for (name, about, path) in std::iter::once(shipped).chain(other).chain(saved) {
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            use_ui(ui, context, path, "Use", actions);
-            ui.with_layout(Layout::top_down(Align::LEFT), |ui| {
+        ui.horizontal(|ui| {
+            let width = (ui.available_width() - BUTTON).max(80.0);
+            ui.vertical(|ui| {
+                ui.set_width(width);
                 ui.spacing_mut().item_spacing.y = 1.0;
                 wrapped(ui, RichText::new(name));
                 wrapped(ui, RichText::new(about).small().weak());
             });
+            use_ui(ui, context, path, "Use", actions);
         });
         ui.add_space(3.0);
     }
