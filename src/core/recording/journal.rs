@@ -381,11 +381,14 @@ fn undoable(transaction: &Transaction<'_>, seen: i64, writer: &str) -> rusqlite:
 fn last_of<'a>(all: &'a [Done], way: Way, given_up: &BTreeSet<i64>) -> Option<&'a Done> {
     let (mut back, mut forth): (Vec<&Done>, Vec<&Done>) = (Vec::new(), Vec::new());
     for done in all {
-        let undoes = |other: &&Done| done.undoes.as_ref() == Some(&other.uid);
-        if let Some(at) = back.iter().position(undoes) {
+        let undone = |stack: &[&Done]| {
+            let uid = done.undoes.as_ref()?;
+            stack.iter().rposition(|other| other.uid == *uid)
+        };
+        if let Some(at) = undone(&back) {
             back.remove(at);
             forth.extend(done.mine.then_some(done));
-        } else if let Some(at) = forth.iter().position(undoes) {
+        } else if let Some(at) = undone(&forth) {
             forth.remove(at);
             back.extend(done.mine.then_some(done));
         } else if done.mine {

@@ -12,7 +12,7 @@ use super::journal::{Change, LabelState, append, change, state_of};
 use super::store::{Store, TrialId, json};
 use super::store_error::{StoreError, fault};
 use crate::labelling::{Guess, LabelPlan, class_name};
-use rusqlite::{OptionalExtension, params};
+use rusqlite::{Connection, OptionalExtension, params};
 
 /// The tables above, but for the journal.
 pub(super) const LABEL_TABLES: &str = "
@@ -123,28 +123,19 @@ impl Store {
 
     /// How many trials of each object are wanted.
     pub fn label_plan(&self) -> Result<LabelPlan, StoreError> {
-        let found: Option<String> = self
-            .connection
-            .query_row("SELECT plan FROM label_plan", [], |row| row.get(0))
-            .optional()
-            .map_err(|e| fault(self.path(), &e))?;
-        // One that cannot be read is worth less than a plan that works.
-        let readable = |text: String| {
-            let plan = serde_json::from_str(&text);
-            plan.inspect_err(|error| tracing::warn!("the plan in the store cannot be read: {error}")).ok()
-        };
-        Ok(found.and_then(readable).unwrap_or_default())
+        plan_in(&self.connection).map_err(|e| fault(self.path(), &e))
     }
 
     /// Sets how many trials of each object are wanted.
     pub fn set_label_plan(&mut self, plan: &LabelPlan) -> Result<(), StoreError> {
-        let (from, to) = (self.label_plan()?, plan.checked()?);
-        if from == to {
-            return Ok(());
-        }
+        let to = plan.checked()?;
         let (path, writer) = (self.path().to_owned(), self.journal.writer.clone());
         let fault = |e: rusqlite::Error| fault(&path, &e);
         let transaction = self.write()?;
+        let from = plan_in(&transaction).map_err(fault)?;
+        if from == to {
+            return Ok(());
+        }
         let sql = "INSERT INTO label_plan (only, plan) VALUES (1, ?1) ON CONFLICT (only) DO UPDATE SET plan = ?1";
         transaction.execute(sql, params![json(&to)]).map_err(fault)?;
         append(&transaction, &writer, None, &Change::Plan { from, to }, None).map_err(fault)?;
@@ -170,6 +161,17 @@ impl Store {
         change(&transaction, &writer, id, &wanted, None).map_err(fault)?;
         transaction.commit().map_err(fault)
     }
+}
+
+/// The plan of a store; the usual one where it has none, or one that cannot be read.
+fn plan_in(connection: &Connection) -> rusqlite::Result<LabelPlan> {
+    let sql = "SELECT plan FROM label_plan";
+    let found: Option<String> = connection.query_row(sql, [], |row| row.get(0)).optional()?;
+    let readable = |text: String| {
+        let plan = serde_json::from_str(&text);
+        plan.inspect_err(|error| tracing::warn!("the plan in the store cannot be read: {error}")).ok()
+    };
+    Ok(found.and_then(readable).unwrap_or_default())
 }
 
 /// A change that changes nothing.
