@@ -2,6 +2,7 @@
 
 mod guided;
 mod shelf;
+mod zero;
 
 use super::Failure;
 use super::setup::open_store;

@@ -309,6 +309,46 @@ fn a_captured_stream_is_calibrated_hands_free() {
     refused(at, &missing, &["over before all points were taken"]);
 }
 
+#[test]
+fn a_tare_is_taken_kept_and_shown_beside_the_drift_of_trials() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let parts = parts(7, false);
+    let (board, calibrations) = calibrated(&parts, 7);
+    refused(at, &["calibrate", "tare", "--port", "rest.bytes"], &["calibrated"]);
+    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    for (sensor, calibration) in &calibrations {
+        store.add_calibration(&calibration.record).unwrap();
+        store.mount_part(*sensor, &calibration.record.part).unwrap();
+    }
+    // The left strip has slipped by 4 degrees, the right one by 17: too little to press on a pad.
+    let scene = Scene::default();
+    let (_, rest) = readings(&parts, &scene, "angleL=4 angleR=17 hold=9", 4.0, 3);
+    let rest: Vec<Reading> = rest.into_iter().filter(|reading| reading.t_s > 1.0).collect();
+    let lines: Vec<String> = rest
+        .iter()
+        .map(|reading| {
+            let counts: Vec<String> = reading.counts.iter().map(|count| count.unwrap().to_string()).collect();
+            format!("{},{}\n", (reading.t_s * 1e3).round(), counts.join(","))
+        })
+        .collect();
+    std::fs::write(at.join("rest.bytes"), format!("\nms,flexL,flexR,fsrL,fsrR\n{}", lines.concat())).unwrap();
+    let taken = json(at, &["calibrate", "tare", "--port", "rest.bytes", "--json"]);
+    let levels: Vec<&str> = taken["drift"].as_array().unwrap().iter().map(|d| d["level"].as_str().unwrap()).collect();
+    assert_eq!(levels, ["moved", "too-far", "steady", "steady"], "{taken}");
+    let offsets = store.tare().unwrap().unwrap().zero.offsets;
+    assert!((offsets[0].unwrap().to_degrees() - 4.0).abs() < 0.5 && offsets[1].is_none(), "{offsets:?}");
+    let said = run(at, &["calibrate", "tare", "--port", "rest.bytes", "--seconds", "0.5"]);
+    assert!(said.out.contains("corrected from now on") && said.out.contains("slipped"), "{said:?}");
+    assert!(said.out.contains("\"flexL\" version 2"), "{said:?}");
+    stored(&mut store, &board, rest, &scene, EMPTY, 2.0);
+    let told = json(at, &["calibrate", "drift", "--json"]);
+    assert_eq!((&told[0]["trial"], &told[0]["drift"][1]["level"]), (&1.into(), &"too-far".into()), "{told}");
+    let text = run(at, &["calibrate", "drift", "1"]);
+    assert!(text.out.contains("moved") && text.out.contains("tare 2"), "{text:?}");
+    refused(at, &["calibrate", "drift", "9"], &["no trial 9", "trials list"]);
+}
+
 /// Stores readings as `palpate record` does.
 pub(crate) fn stored(
     store: &mut Store,

@@ -12,7 +12,7 @@ use palpate_core::sensing::calibration::{BendingZero, Kind, Procedure, Readout, 
 use palpate_core::wire::Heard;
 use std::collections::VecDeque;
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
@@ -65,7 +65,7 @@ pub(super) fn record(
     store: &Store,
 ) -> Result<Record, Failure> {
     let live = &arguments.live;
-    let mut bench = Bench::open(live)?;
+    let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
     let board = bench.board()?;
     let mut procedure = Procedure::new(&board, sensor, part, arguments.resistor).ok_or_else(|| {
         let (wanted, has) = (sensor.channel(), board.channels.join(", "));
@@ -92,13 +92,30 @@ pub(super) fn record(
     Ok(procedure.record().clone())
 }
 
+/// The board, and what it sends for some seconds.
+pub(super) fn watch(port: Option<&Path>, seconds: f64) -> Result<(Board, Vec<Reading>), Failure> {
+    let mut bench = Bench::open(port, true)?;
+    bench.board()?;
+    let mut readings: Vec<Reading> = Vec::new();
+    let start = Instant::now();
+    while readings.last().zip(readings.first()).is_none_or(|(last, first)| last.t_s - first.t_s < seconds) {
+        if start.elapsed().as_secs_f64() > seconds + PATIENCE_S {
+            return Err(format!("the board fell silent. {}", bench.state.sentence()).into());
+        }
+        bench.listen()?;
+        readings.extend(bench.pending.drain(..));
+    }
+    Ok((bench.link.status().board, readings))
+}
+
 impl Bench {
-    fn open(live: &LiveArguments) -> Result<Self, Failure> {
-        let captured = live.port.as_ref().is_some_and(|path| path.is_file());
-        let replay_speed = if captured && live.auto { f64::INFINITY } else { 1.0 };
-        let link = SerialLink::open(&LinkOptions { path: live.port.clone(), replay_speed, ..LinkOptions::default() })?;
+    fn open(port: Option<&Path>, hands_free: bool) -> Result<Self, Failure> {
+        let captured = port.is_some_and(Path::is_file);
+        let replay_speed = if captured && hands_free { f64::INFINITY } else { 1.0 };
+        let path = port.map(Path::to_owned);
+        let link = SerialLink::open(&LinkOptions { path, replay_speed, ..LinkOptions::default() })?;
         let (told, keys) = channel();
-        if !live.auto {
+        if !hands_free {
             // Ends with the program: a read of the keyboard cannot be interrupted.
             std::thread::Builder::new().name("keys".to_owned()).spawn(move || {
                 for line in std::io::stdin().lock().lines().map_while(Result::ok) {

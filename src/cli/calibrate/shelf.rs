@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
-use super::{parse_sensor, tell};
+use super::{parse_sensor, tell, zero};
 use palpate_core::board::Sensor;
 use palpate_core::recording::{CalibrationId, Store, StoredCalibration};
 use palpate_core::sensing::calibration::Calibration;
@@ -50,6 +50,10 @@ pub(super) enum What {
         /// Name of the part.
         part: String,
     },
+    /// Take the zero of all sensors now, with the hand open and left alone; it serves until a part is calibrated anew.
+    Tare(zero::TareArguments),
+    /// How far the zeros of stored trials have moved from their calibrations.
+    Drift(zero::DriftArguments),
     /// Let a calibration serve no trial any more, unless it is asked for; the one before it serves again.
     Withdraw {
         /// Its number.
@@ -69,6 +73,8 @@ pub(super) fn run(what: &What, store: &mut Store) -> Result<(), Failure> {
         What::Export { ids, out } => export(store, ids, out),
         What::Import { files } => files.iter().try_for_each(|file| import(store, file)),
         What::Mount { sensor, part } => mount(store, *sensor, part.trim()),
+        What::Tare(arguments) => zero::tare(arguments, store),
+        What::Drift(arguments) => zero::drift(arguments, store),
         What::Withdraw { id } => {
             store.withdraw_calibration(*id, true)?;
             say(format!("calibration {id} serves no more; `palpate calibrate restore {id}` takes that back"))

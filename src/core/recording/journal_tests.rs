@@ -234,7 +234,7 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
     let store = store_with(&path, &["lemon"])?;
     // What version 6 did not have is taken away again.
     store.connection.execute_batch(
-        "DROP TABLE journal; DROP TABLE guesses; DROP TABLE label_plan;
+        "DROP TABLE journal; DROP TABLE tares; DROP TABLE guesses; DROP TABLE label_plan;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';

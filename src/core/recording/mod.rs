@@ -25,6 +25,7 @@ mod store;
 mod store_error;
 #[cfg(test)]
 mod store_tests;
+mod tares;
 
 pub use blob::{BlobError, decode_frames, encode_frames};
 pub use board_export::write_board_csv;
@@ -40,3 +41,4 @@ pub use merge::Merged;
 pub use points_csv::{PointsError, read_points_csv};
 pub use store::{Store, TrialId, TrialRow};
 pub use store_error::StoreError;
+pub use tares::{PartTare, StoredTare};

@@ -6,6 +6,7 @@
 //! chunks   its frames, about a second each, as described in `blob`
 //! readings channels of an imported trial, which has no frames
 //! calibrations, mountings, parts: what is known of the real gripper's sensors; see `calibrations`
+//! tares    what those showed at rest; see `tares`
 //! board_*  what the board of a real gripper sent; see `board_trials`
 //! guesses, label_plan, journal: labels and who changed what; see `labels` and `journal`
 //! ```
@@ -18,6 +19,7 @@ use super::calibrations::CALIBRATION_TABLES;
 use super::journal::{Change, JOURNAL_TABLES, JournalView, change, newest};
 use super::labels::LABEL_TABLES;
 use super::store_error::{StoreError, fault, plain};
+use super::tares::TARE_TABLES;
 use crate::geometry::Pose;
 use crate::labelling::{FlagRemark, flaws};
 pub use crate::trial::TrialId;
@@ -38,7 +40,7 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 8] = [
+const MIGRATIONS: [&str; 9] = [
     TABLES,
     "ALTER TABLE trials ADD COLUMN collection TEXT;
      CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
@@ -54,6 +56,7 @@ const MIGRATIONS: [&str; 8] = [
     CALIBRATION_TABLES,
     LABEL_TABLES,
     JOURNAL_TABLES,
+    TARE_TABLES,
 ];
 
 pub(super) const TABLES: &str = "

@@ -37,4 +37,4 @@ pub use procedure::{Procedure, Settling, Unsettled, plan};
 pub use readout::{Derived, Felt, Readout, all_channels};
 pub use record::{Calibration, Curve, Record};
 pub use straight_line::StraightLine;
-pub use zero::{Drift, DriftLevel, Zero};
+pub use zero::{Drift, DriftLevel, Unrest, Zero};

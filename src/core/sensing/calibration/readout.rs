@@ -3,7 +3,7 @@
 use super::input::{Input, Rail, stated_resistor};
 use super::pad_curve::ACTIVE_AREA;
 use super::record::{Calibration, Curve};
-use super::zero::{Drift, DriftLevel, Zero};
+use super::zero::{Drift, DriftLevel, Unrest, Zero};
 use super::{Fault, Kind};
 use crate::board::{Board, Reading, Sensor};
 use crate::gripper::Side;
@@ -139,6 +139,28 @@ impl Readout {
             *offset = (raw.len() >= LEAST_READINGS).then(|| raw[raw.len() / 2]);
         }
         zero
+    }
+
+    /// The zero of readings taken while the hand is open and left alone: a tare. Sensors whose zero is so far away that it is
+    /// no drift are left out, as [`Readout::with_zero`] does; [`Readout::drift`] of [`Readout::zero_from`] tells of them.
+    pub fn tare(&self, readings: &[Reading]) -> Result<Zero, Unrest> {
+        if readings.len() < 2 * LEAST_READINGS {
+            return Err(Unrest::TooFew { have: readings.len() });
+        }
+        let bar = readings.iter().filter_map(|reading| reading.line_bar).fold(0.0, f64::max);
+        if bar > 0.0 {
+            return Err(Unrest::Pressed { bar });
+        }
+        let (earlier, later) = readings.split_at(readings.len() / 2);
+        let [earlier, later] = [earlier, later].map(|half| self.drift(&self.zero_from(half)));
+        let moves = |before: &&Drift| {
+            let after = later.iter().find(|after| after.sensor == before.sensor);
+            after.is_some_and(|after| Drift::of(after.sensor, after.moved - before.moved).level != DriftLevel::Steady)
+        };
+        if let Some(Drift { sensor, .. }) = earlier.iter().find(moves) {
+            return Err(Unrest::Moving { sensor: *sensor });
+        }
+        Ok(self.clone().with_zero(self.zero_from(readings)).zero)
     }
 
     /// How far a zero is from that of the calibrations.

@@ -231,3 +231,25 @@ fn a_record_survives_a_file_and_is_fitted_anew() {
     let record: Record = serde_json::from_str(&text).unwrap();
     assert_eq!(Calibration::fit(record).unwrap(), calibration);
 }
+
+#[test]
+fn a_tare_wants_an_open_hand_at_rest() {
+    let mut parts = Parts::new(1);
+    let readout = parts.readout();
+    let mut rest = |degrees: &dyn Fn(f64) -> [f64; 2]| -> Vec<Reading> {
+        (0..50).map(|k| 0.02 * f64::from(k)).map(|t| parts.read(t, degrees(t), [0.0; 2])).collect()
+    };
+    let steady = rest(&|_| [5.0, -0.2]);
+    let zero = readout.tare(&steady).unwrap();
+    assert!((zero.offsets[0].unwrap().to_degrees() - 5.0).abs() < 0.5 && zero.offsets[3].is_some(), "{zero:?}");
+    let levels: Vec<&str> = readout.drift(&zero).iter().map(Drift::badge).collect();
+    assert_eq!(levels, ["moved", "steady", "steady", "steady"]);
+    // Subtracted, it is straight.
+    let felt = readout.clone().with_zero(zero).felt(&steady[7]);
+    assert!(felt.angle[0].unwrap().to_degrees().abs() < 1.0, "{felt:?}");
+    assert_eq!(readout.tare(&rest(&|_| [30.0, 0.0])).unwrap().offsets[0], None, "a bent finger is no drift");
+    assert_eq!(readout.tare(&rest(&|t| [6.0 * t, 0.0])), Err(Unrest::Moving { sensor: Sensor::FlexLeft }));
+    assert_eq!(readout.tare(&steady[..5]), Err(Unrest::TooFew { have: 5 }));
+    let pressed = Reading { line_bar: Some(0.5), ..steady[0].clone() };
+    assert_eq!(readout.tare(&[&steady[..], &[pressed]].concat()), Err(Unrest::Pressed { bar: 0.5 }));
+}

@@ -17,6 +17,29 @@ pub struct Zero {
     pub offsets: [Option<f64>; 4],
 }
 
+/// Why readings give no tare.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Unrest {
+    /// Too few readings.
+    #[error("only {have} readings came: is the board sending?")]
+    TooFew {
+        /// How many.
+        have: usize,
+    },
+    /// Pressure is on.
+    #[error("{bar:.2} bar is on: vent, let the fingers come to rest, and try again")]
+    Pressed {
+        /// The line pressure (bar).
+        bar: f64,
+    },
+    /// A sensor moves.
+    #[error("the {place} moves: leave the fingers alone until they have come to rest, and try again", place = .sensor.label())]
+    Moving {
+        /// Which.
+        sensor: Sensor,
+    },
+}
+
 /// How far a zero has moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -59,6 +82,15 @@ impl Drift {
             _ => DriftLevel::TooFar,
         };
         Self { sensor, moved, level }
+    }
+
+    /// The level in a word, as a badge.
+    pub fn badge(&self) -> &'static str {
+        match self.level {
+            DriftLevel::Steady => "steady",
+            DriftLevel::Moved => "moved",
+            DriftLevel::TooFar => "too far",
+        }
     }
 
     /// How far, with its unit: `+1.3°`, `0.2 N`.

@@ -1,0 +1,143 @@
+//! Where zero is: `palpate calibrate tare` takes it now, `palpate calibrate drift` shows how it has wandered.
+
+use super::super::Failure;
+use super::super::terminal::{say, say_json, table, warn};
+use super::guided;
+use palpate_core::board::Sensor;
+use palpate_core::recording::{BOARD_RIG, Store, StoredTare, TrialId};
+use palpate_core::sensing::calibration::{Drift, DriftLevel, Readout};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `palpate calibrate tare`.
+#[derive(Debug, clap::Args)]
+pub(super) struct TareArguments {
+    /// The port of the board, or a file of captured bytes; the only likely port where it is left out.
+    #[arg(long, value_name = "PORT|FILE")]
+    port: Option<PathBuf>,
+    /// For how long the hand is watched at rest (s).
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds)]
+    seconds: f64,
+    /// Show where zero is, and store nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate calibrate drift`.
+#[derive(Debug, clap::Args)]
+pub(super) struct DriftArguments {
+    /// Numbers of trials of the real gripper; all of them where there are none.
+    trials: Vec<TrialId>,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| (0.3..=60.0).contains(s));
+    seconds.ok_or_else(|| "write a number of seconds from 0.3 to 60".to_owned())
+}
+
+/// What `tare --json` prints.
+#[derive(Serialize)]
+struct Taken {
+    drift: Vec<Drift>,
+    /// Absent where nothing was stored.
+    stored: Option<StoredTare>,
+    warnings: Vec<String>,
+}
+
+pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), Failure> {
+    let serving = store.serving(None, &[])?;
+    if serving.calibrations.is_empty() {
+        let why = serving.warnings.first().cloned().unwrap_or_default();
+        return Err(format!("no part that sits in the gripper is calibrated, so that there is no zero: {why}").into());
+    }
+    let (board, readings) = guided::watch(arguments.port.as_deref(), arguments.seconds)?;
+    let readout = Readout::new(&board, &serving.calibrations)?;
+    let drift = readout.drift(&readout.zero_from(&readings));
+    let zero = readout.tare(&readings)?;
+    let stored = if arguments.dry_run { None } else { Some(store.add_tare(&zero)?) };
+    let warnings = [readout.warnings(), &serving.warnings].concat();
+    if arguments.json {
+        return say_json(&Taken { drift, stored, warnings });
+    }
+    let rows: Vec<Vec<String>> = drift
+        .iter()
+        .map(|drift| vec![drift.sensor.label().to_owned(), drift.told(), drift.badge().to_owned(), to_do(drift)])
+        .collect();
+    table(&["at rest", "moved", "", ""], &rows)?;
+    warnings.iter().for_each(|warning| warn(warning));
+    match stored {
+        None => say("not stored"),
+        Some(stored) => {
+            let versions = stored.parts.iter().map(|part| format!("\"{}\" version {}", part.part, part.version));
+            let versions: Vec<String> = versions.collect();
+            say(format!("stored as the zero of {}, until they are calibrated anew", versions.join(", ")))
+        }
+    }
+}
+
+/// What to do about a zero that has moved.
+fn to_do(drift: &Drift) -> String {
+    let what = match (drift.level, drift.sensor.is_flex()) {
+        (DriftLevel::Steady, _) => "nothing to do",
+        (DriftLevel::Moved, _) => "corrected from now on; calibrate again if it goes on moving",
+        (DriftLevel::TooFar, true) => "not corrected: straighten the finger, or look whether the strip has slipped",
+        (DriftLevel::TooFar, false) => "not corrected: free the pad, or look whether it is pinched",
+    };
+    what.to_owned()
+}
+
+/// What `drift --json` prints of each trial.
+#[derive(Serialize)]
+struct Row {
+    trial: TrialId,
+    created: String,
+    object: String,
+    drift: Vec<Drift>,
+}
+
+pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Failure> {
+    let rows: Vec<Row> = store
+        .list(false)?
+        .into_iter()
+        .filter(|row| row.rig == BOARD_RIG && (arguments.trials.is_empty() || arguments.trials.contains(&row.id)))
+        .map(|row| -> Result<Row, Failure> {
+            let read = store.board_signals(row.id, &[])?;
+            let drift = read.map_or_else(Vec::new, |read| read.derived.drift);
+            Ok(Row { trial: row.id, created: row.created, object: row.object, drift })
+        })
+        .collect::<Result<_, _>>()?;
+    if let Some(id) = arguments.trials.iter().find(|id| rows.iter().all(|row| row.trial != **id)) {
+        return Err(format!("there is no trial {id} of the real gripper: `palpate trials list` shows them").into());
+    }
+    if arguments.json {
+        return say_json(&rows);
+    }
+    if rows.is_empty() {
+        return say("no trials of the real gripper yet: `palpate record` makes one");
+    }
+    let cells: Vec<Vec<String>> = rows
+        .iter()
+        .map(|row| {
+            let of = |sensor: Sensor| row.drift.iter().find(|drift| drift.sensor == sensor);
+            let cell = |sensor| of(sensor).map_or_else(|| "–".to_owned(), |d| format!("{} {}", d.told(), d.badge()));
+            let date = row.created.chars().take(19).collect::<String>().replace('T', " ");
+            let start = [row.trial.to_string(), date, row.object.clone()];
+            start.into_iter().chain(Sensor::ALL.map(cell)).collect()
+        })
+        .collect();
+    let names = Sensor::ALL.map(Sensor::channel);
+    table(&["trial", "recorded (UTC)", "object", names[0], names[1], names[2], names[3]], &cells)?;
+    if let Some(tare) = store.tare()? {
+        for part in &tare.parts {
+            let date = part.taken.chars().take(19).collect::<String>().replace('T', " ");
+            say(format!("\"{}\", the {}: tare {} of {date} serves", part.part, part.sensor.label(), part.version))?;
+        }
+    }
+    Ok(())
+}
