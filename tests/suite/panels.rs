@@ -8,12 +8,13 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, Action};
+use palpate::app::{ALL_PANELS, Action, Mode};
 use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::palette::Theme;
 use palpate_core::scene::{Accuracy, Effect, Setting};
 use palpate_core::units::three_digits;
 use palpate_core::workers::{Command, MeasuredAccuracy};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 fn bench(setup: BenchSetup) -> Bench {
@@ -254,7 +255,14 @@ fn theme_keys_and_layout_answer() {
     bench.harness.key_press(Key::Escape);
     bench.harness.run_steps(2);
     assert!(bench.harness.query_by_label("pull at the object").is_none());
-    for panel in &ALL_PANELS {
-        assert!(bench.harness.query_all_by_label(panel.title).next().is_some(), "no tab \"{}\"", panel.title);
-    }
+    let tabs = |bench: &Bench| -> BTreeSet<&str> {
+        let has_tab = |title: &&str| bench.harness.query_all_by_label(title).next().is_some();
+        ALL_PANELS.iter().map(|panel| panel.title).filter(has_tab).collect()
+    };
+    let mut seen = tabs(&bench);
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
+    bench.harness.run_steps(2);
+    assert_eq!(bench.workbench().view().mode, Mode::Label);
+    seen.extend(tabs(&bench));
+    assert_eq!(seen.len(), ALL_PANELS.len(), "tabs only of {seen:?}");
 }
