@@ -374,6 +374,7 @@ impl Workbench {
         let notices: Vec<Notice> = self.worker.notices().chain(self.gripper.notices()).collect();
         for notice in notices {
             match notice {
+                Notice::Told(text) => self.tell(Message::Info(text)),
                 Notice::Warning(text) => self.tell(Message::Warning(text)),
                 Notice::Failed(text) => self.tell(Message::Error(text)),
                 Notice::SceneRefused(refusal) => self.take_refusal(*refusal),

@@ -48,6 +48,8 @@ pub enum Command {
 /// What the simulation tells besides pictures and traces.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
+    /// Something that was asked for is done.
+    Told(String),
     /// Something about the grasp that the user should know.
     Warning(String),
     /// Something failed; the sentence says what, and what to try.

@@ -231,7 +231,15 @@ impl Desk {
     fn read_calibrations(&mut self) {
         let Some(connection) = &self.connection else { return };
         let board = connection.board.clone();
-        let read = self.store().and_then(|store| store.serving(None, &[]).map_err(|error| error.to_string()));
+        let read = self.store().and_then(|store| {
+            let tare = store.tare().map_err(|error| error.to_string())?;
+            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
+            Ok((serving, tare.map(|tare| tare.zero)))
+        });
+        let (read, zero) = match read {
+            Ok((serving, zero)) => (Ok(serving), zero),
+            Err(cause) => (Err(cause), None),
+        };
         let (readout, remarks) = match read {
             Ok(serving) => match Readout::new(&board, &serving.calibrations) {
                 Ok(readout) => {
@@ -248,6 +256,9 @@ impl Desk {
             connection.readout = readout;
             connection.remarks = remarks;
             connection.drift.clear();
+            if let Some(zero) = zero {
+                connection.set_zero(zero);
+            }
         }
     }
 
@@ -459,6 +470,17 @@ impl Desk {
             .collect();
         for text in far {
             self.outlets.tell(Notice::Warning(text));
+        }
+        let path = self.path.clone();
+        let stored =
+            open(&mut self.store, &path).and_then(|store| store.add_tare(&zero).map_err(|error| error.to_string()));
+        match stored {
+            Ok(_) => {
+                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()))
+            }
+            Err(cause) => {
+                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")))
+            }
         }
     }
 
