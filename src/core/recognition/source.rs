@@ -342,8 +342,7 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
 }
 
-/// What a real gripper felt, by the calibrations of its parts, in the channels of the layout, from the beginning of the
-/// closing, where it is known, to the end of the hold: what is heard while a grasp goes on, and what is simulated.
+/// What a real gripper felt, by the calibrations of its parts, in the channels of the layout.
 fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, DatasetError> {
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
     // One that says it is of a board, and has nothing of it, has nothing at all.
@@ -352,15 +351,10 @@ fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, Dat
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
     let channels = layout.channels(&Gripper::default()).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
-    let signals = read.derived.signals.chosen(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
+    read.grasp(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
         id,
         layout: layout.full_name(),
         why: read.derived.warnings.join("; "),
-    })?;
-    let until = signals.until(read.release_s.unwrap_or(f64::INFINITY));
-    Ok(match read.closing_s {
-        Some(closing_s) => until.since(closing_s),
-        None => until,
     })
 }
 

@@ -5,6 +5,7 @@ use super::calibrations::{CalibrationId, Serving};
 use super::store::{Store, TrialId};
 use super::store_error::StoreError;
 use crate::gripper::Phase;
+use crate::sensing::Signals;
 use crate::sensing::calibration::{Derived, Readout};
 
 /// A trial of a real gripper as its calibrations read it.
@@ -21,6 +22,18 @@ pub struct BoardSignals {
     pub closing_s: Option<f64>,
     /// When the release began (s), where it is known.
     pub release_s: Option<f64>,
+}
+
+impl BoardSignals {
+    /// What recognisers learn and files exchange: some channels from the beginning of the closing, where it is known, to the
+    /// end of the hold: what is heard while a grasp goes on, and what is simulated. None where a channel could not be derived.
+    pub fn grasp(&self, channels: &[String]) -> Option<Signals> {
+        let until = self.derived.signals.chosen(channels)?.until(self.release_s.unwrap_or(f64::INFINITY));
+        Some(match self.closing_s {
+            Some(closing_s) => until.since(closing_s),
+            None => until,
+        })
+    }
 }
 
 impl Store {

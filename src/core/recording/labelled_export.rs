@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! trials.csv               a row to a trial: label, note, tags, flags, guess, calibrations, cadence
-//! signals.csv              trial, label, size, shape, t_s, channels of layout C1+F up to the release: as `trials import` takes it
+//! signals.csv              trial, label, size, shape, t_s, channels of layout C1+F, closing and hold: as `trials import` takes it
 //! raw/trial_7_lemon.csv    counts as they came, a row to a reading
 //! raw/trial_7_lemon.bytes  the bytes, which can be heard again as if they came from a port
 //! ```
@@ -123,7 +123,7 @@ fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec
         let read = store.board_signals(row.id, &[])?.unwrap_or_default();
         list_out.write_record(list_row(row, &read.serving.ids, &name)).map_err(|e| cannot(&list, &e))?;
         let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
-        match read.derived.signals.chosen(&wanted).map(|all| all.until(read.release_s.unwrap_or(f64::INFINITY))) {
+        match read.grasp(&wanted) {
             Some(chosen) => write_signals(&mut signals_out, row, label, &chosen).map_err(|e| cannot(&signals, &e))?,
             None => left_out.push((row.id, read.derived.warnings.join("; "))),
         }
