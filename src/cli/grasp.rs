@@ -7,7 +7,6 @@ use palpate_core::grasping::{ErrorNorms, GraspSummary, error_band, grasp, jitter
 use palpate_core::recording::{TrialId, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
-use palpate_core::study::error_sensors;
 use palpate_core::units::{mm, three_digits};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -81,8 +80,9 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     let start = cpu_time::ThreadTime::now();
     let trial = grasp(&scene, object.as_ref(), seed);
     let cpu_ms = start.elapsed().as_secs_f64() * 1e3;
-    let error_band = error_sensors(&scene)
-        .filter(|_| arguments.error_band)
+    let error_band = arguments
+        .error_band
+        .then(|| Sensors::whole_fingers(&scene.gripper))
         .map(|sensors| error_band(&trial, &scene, object.as_ref(), &sensors).norms(&trial, &sensors));
     let trial_id = if arguments.no_store { None } else { Some(open_store(store)?.insert(&trial)?) };
     if let Some(path) = &arguments.out {

@@ -223,8 +223,9 @@ impl PretendedGripper {
         let mut said = String::new();
         let clock_us = self.clock_us(self.now_s) as u32;
         for &byte in bytes {
+            let was_bar = self.board.line_bar();
             if self.board.hear(byte, clock_us, &mut said) {
-                self.hand.take_over();
+                self.hand.take_over(self.now_s, was_bar);
             }
         }
         self.send(&said);

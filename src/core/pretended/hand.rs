@@ -8,8 +8,8 @@ use crate::gripper::{Phase, Programme};
 use crate::objects::{EMPTY, ObjectError, ObjectModel};
 use crate::rig::{Event, Rig, SimRig};
 use crate::scene::Scene;
+use crate::sensing::Sensors;
 use crate::sensing::electronics::StripPart;
-use crate::sensing::{PressureArea, SensorLayout, Sensors};
 use crate::trial::Frame;
 use std::collections::VecDeque;
 
@@ -18,6 +18,9 @@ const LONGEST_GRASP_S: f64 = 86_400.0;
 
 /// How long fingers are left alone after a programme has ended (s).
 const SETTLE_S: f64 = 0.5;
+
+/// How often fingers that a host drives look at the pressure (1/s): a control box obeys at once, and a host may set any moment.
+const DRIVEN_HZ: u32 = 300;
 
 /// A host that vents for so long has let go: what it presses next is another grasp (s).
 const LET_GO_S: f64 = 0.5;
@@ -151,9 +154,12 @@ impl Hand {
         }
     }
 
-    /// A host has set a pressure: whatever was going on by itself is over.
-    pub(super) fn take_over(&mut self) {
-        if !self.driven {
+    /// A host has set a pressure at a time (s), instead of the one there was (bar): whatever was going on by itself is over.
+    pub(super) fn take_over(&mut self, t: f64, was_bar: f64) {
+        if self.driven {
+            // So far the old pressure was on.
+            self.at(t, was_bar);
+        } else {
             (self.driven, self.doing) = (true, Doing::Rest);
             self.script.clear();
         }
@@ -270,9 +276,10 @@ impl LiveGrasp {
         let ends_s = start_s + programme.as_ref().map_or(LONGEST_GRASP_S, lasts);
         let mut endless = scene.clone();
         endless.timing.duration_s = LONGEST_GRASP_S;
-        let layout = SensorLayout::named("C1+F").unwrap_or_else(|_| unreachable!("C1 is in the catalogue"));
-        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation)
-            .unwrap_or_else(|_| unreachable!("whole fingers suit any gripper"));
+        if programme.is_none() {
+            (endless.timing.sample_hz, endless.timing.actuation_hz) = (DRIVEN_HZ, DRIVEN_HZ);
+        }
+        let sensors = Sensors::whole_fingers(&scene.gripper);
         let rig = SimRig::new(&endless, object).0;
         Self { rig, sensors, start_s, ends_s, programme, line_bar: 0.0, frames: Default::default(), failed: None }
     }
@@ -354,7 +361,7 @@ mod tests {
     #[test]
     fn a_host_bends_the_fingers_as_far_as_the_pressure_says() {
         let mut hand = Hand::new(plan()).expect("nothing to load");
-        hand.take_over();
+        hand.take_over(0.0, 0.0);
         assert_eq!(hand.at(0.02, 0.0), Stimulus::default());
         // 0.5 bar are 0.03 N m on joints of 0.42 N m/rad and 10 mm: 7.14 1/m, less what gravity does.
         let bent = run(&mut hand, 0.02, 1.5, 0.5);
@@ -365,6 +372,20 @@ mod tests {
         assert!((0..50).all(|k| hand.at(3.1 + 0.02 * f64::from(k), 0.5).kappa[0].is_finite()));
         let began = hand.take_began();
         assert_eq!(began.len(), 2, "a new grasp after it has let go: {began:?}");
+    }
+
+    #[test]
+    fn a_pressure_is_obeyed_when_it_is_set_and_not_at_some_tick() {
+        // The same step, a tenth of a tick of the programme apart: the bend follows by as much.
+        let after = |late_s: f64| {
+            let mut hand = Hand::new(plan()).expect("nothing to load");
+            hand.take_over(0.0, 0.0);
+            run(&mut hand, 0.0, 1.0, 0.3);
+            hand.take_over(1.0 + late_s, 0.3);
+            hand.at(1.06, 0.6).kappa[0]
+        };
+        let bends = [0.0, 0.01, 0.02, 0.03].map(after);
+        assert!(bends.windows(2).all(|pair| pair[0] > pair[1] + 0.05), "{bends:?}");
     }
 
     #[test]

@@ -176,6 +176,12 @@ pub enum LayoutError {
     },
 }
 
+/// The channels of layout C1+F, which are the same on any gripper.
+pub fn whole_fingers() -> Vec<Channel> {
+    let pair = |quantity| Side::BOTH.map(|side| Channel { quantity, side, span: Span::WHOLE });
+    [Quantity::Curvature, Quantity::Pressure, Quantity::Force].map(pair).concat()
+}
+
 impl SensorLayout {
     /// A layout by its name: `C1` .. `C8`, with `+F` for force channels.
     pub fn named(name: &str) -> Result<Self, LayoutError> {
@@ -250,6 +256,12 @@ impl SensorLayout {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_fingers_are_the_layout_of_that_name() {
+        let named = SensorLayout::named("C1+F").expect("in the catalogue");
+        assert_eq!(named.channels(&Gripper::default()).expect("fits"), whole_fingers());
+    }
 
     #[test]
     fn every_layout_has_the_channels_it_promises() {

@@ -11,7 +11,9 @@ mod pressure;
 mod signals;
 
 pub use curvature::curvature;
-pub use layout::{CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, Span};
+pub use layout::{
+    CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, Span, whole_fingers,
+};
 pub use pressure::{ContactPatch, PressureArea};
 pub use signals::Signals;
 
@@ -31,6 +33,12 @@ impl Sensors {
     /// Places a layout on a gripper. Pressure is force over the participation area unless said otherwise.
     pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
         Ok(Self { channels: layout.channels(gripper)?, finger: gripper.finger.clone(), grid: gripper.taxels(), area })
+    }
+
+    /// Layout C1+F, which suits any gripper.
+    pub fn whole_fingers(gripper: &Gripper) -> Self {
+        let (finger, grid) = (gripper.finger.clone(), gripper.taxels());
+        Self { channels: whole_fingers(), finger, grid, area: PressureArea::Participation }
     }
 
     /// The channels, in the order in which [`Sensors::read`] gives values.

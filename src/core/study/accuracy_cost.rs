@@ -3,17 +3,8 @@
 use crate::grasping::{ErrorBand, ErrorNorms, prepare, prepare_companion};
 use crate::objects::ObjectModel;
 use crate::scene::Scene;
-use crate::sensing::{PressureArea, SensorLayout, Sensors};
+use crate::sensing::Sensors;
 use serde::Serialize;
-
-/// The layout whose channels errors are told for: whole fingers, with forces.
-const LAYOUT: &str = "C1+F";
-
-/// Sensors for [`ErrorNorms`]; `None` where the gripper cannot carry them.
-pub fn error_sensors(scene: &Scene) -> Option<Sensors> {
-    let layout = SensorLayout::named(LAYOUT).ok()?;
-    Sensors::new(&layout, &scene.gripper, PressureArea::Participation).ok()
-}
 
 /// What a scene's accuracy costs and leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -32,7 +23,7 @@ pub fn accuracy_cost(
     object: Option<&ObjectModel>,
     cancelled: &dyn Fn() -> bool,
 ) -> Option<AccuracyCost> {
-    let sensors = error_sensors(scene)?;
+    let sensors = Sensors::whole_fingers(&scene.gripper);
     let mut run = prepare(scene, object, 0);
     let start = cpu_time::ThreadTime::now();
     while run.next_frame().is_some() {

@@ -5,11 +5,11 @@
 //! of which the quickest of each kind count, because whatever else a machine does only adds. Differences are taken over
 //! all samples and both fingers.
 
-use super::accuracy_cost::error_sensors;
 use crate::grasping::{ErrorNorms, GraspSummary, prepare};
 use crate::objects::ObjectModel;
 use crate::physics::effects::rule_of;
 use crate::scene::{Effect, Scene, Setting};
+use crate::sensing::Sensors;
 use crate::trial::{Plan, PlannedEffect, Trial};
 use crate::units::three_digits;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
@@ -203,10 +203,10 @@ impl Felt {
 
     /// From this trial to another; the sensors of `scene` read both.
     fn change_to(&self, other: &Self, scene: &Scene) -> EffectChange {
-        let sensors = error_sensors(scene);
+        let sensors = Sensors::whole_fingers(&scene.gripper);
         let both = self.onset_s.zip(other.onset_s);
         EffectChange {
-            norms: sensors.map(|own| ErrorNorms::between(&other.trial, &self.trial, &own)).unwrap_or_default(),
+            norms: ErrorNorms::between(&other.trial, &self.trial, &sensors),
             contact_onset_s: other.onset_s,
             onset_ms: both.map(|(here, there)| (there - here) * 1e3),
         }

@@ -10,7 +10,7 @@ mod physics_cost;
 mod search;
 pub mod stability;
 
-pub use accuracy_cost::{AccuracyCost, accuracy_cost, error_sensors};
+pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
 pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain_effects};
 pub use finger_fit::{

@@ -4,11 +4,11 @@
 //! Times are those of the thread, not of the wall clock, and the median of several runs, so that a busy machine
 //! disturbs them little. Numbers to compare on one machine, not to assert in a test.
 
-use super::accuracy_cost::error_sensors;
 use crate::geometry::Primitive;
 use crate::grasping::{ErrorNorms, grasp, prepare};
 use crate::objects::{ObjectError, ObjectModel};
 use crate::scene::{Accuracy, Scene};
+use crate::sensing::Sensors;
 use crate::trial::Trial;
 use glam::DVec3;
 use serde::Serialize;
@@ -108,10 +108,8 @@ pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: 
     times.sort_by(f64::total_cmp);
     let median = times[times.len() / 2];
     let quality = last.as_ref().map(|trial| trial.info.quality.clone()).unwrap_or_default();
-    let error = last.zip(truth).and_then(|(trial, truth)| {
-        let sensors = error_sensors(&scene)?;
-        Some(ErrorNorms::between(&trial, truth, &sensors))
-    });
+    let sensors = Sensors::whole_fingers(&scene.gripper);
+    let error = last.zip(truth).map(|(trial, truth)| ErrorNorms::between(&trial, truth, &sensors));
     let steps = quality.steps.max(1) as f64;
     CostRow {
         scene: bench.name,

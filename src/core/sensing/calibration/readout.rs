@@ -8,7 +8,7 @@ use super::{Fault, Kind};
 use crate::board::{Board, Reading, Sensor};
 use crate::gripper::Side;
 use crate::sensing::electronics::StripPart;
-use crate::sensing::{Channel, Quantity, Signals, Span};
+use crate::sensing::{Channel, Quantity, Signals, whole_fingers};
 use crate::units::three_digits;
 
 /// What one reading comes to; left and right. None where a sensor is missing, not calibrated, or at an end of its range.
@@ -263,7 +263,7 @@ impl Readout {
 
     /// The channels of layout C1+F that can be read.
     pub fn channels(&self) -> Vec<Channel> {
-        all_channels().into_iter().filter(|channel| self.has(channel)).collect()
+        whole_fingers().into_iter().filter(|channel| self.has(channel)).collect()
     }
 
     /// True when the sensor that a channel needs is there.
@@ -307,12 +307,6 @@ impl Wired {
             }
         }
     }
-}
-
-/// The channels of layout C1+F on any gripper.
-pub fn all_channels() -> Vec<Channel> {
-    let pair = |quantity| Side::BOTH.map(|side| Channel { quantity, side, span: Span::WHOLE });
-    [Quantity::Curvature, Quantity::Pressure, Quantity::Force].map(pair).concat()
 }
 
 /// How many readings at the beginning were taken before the closing: until the line pressure rises, or the first 0.3 s

@@ -6,7 +6,7 @@ use crate::gripper::Gripper;
 use crate::objects::{EMPTY, ObjectError};
 use crate::recording::{CalibrationId, Serving, Store, StoreError, TrialId};
 use crate::scene::{Scene, SceneError};
-use crate::sensing::{LayoutError, PressureArea, SensorLayout, Sensors};
+use crate::sensing::Sensors;
 
 /// How well a strip's gain repeats once it is calibrated, as a share. Assumed: half a degree in 90.
 const STRIP_REPEATS: f64 = 0.005;
@@ -47,14 +47,6 @@ pub enum RecordedGraspError {
         /// What is wrong.
         cause: ObjectError,
     },
-    /// Its gripper has no such channels.
-    #[error("trial {id}: {cause}")]
-    Layout {
-        /// The trial.
-        id: TrialId,
-        /// What is wrong.
-        cause: LayoutError,
-    },
 }
 
 impl RecordedGrasps {
@@ -94,10 +86,7 @@ impl RecordedGrasps {
         } else if let Some(signals) = store.readings(id)? {
             (signals, programme.clone())
         } else {
-            let layout = SensorLayout::named("C1+F").map_err(|cause| RecordedGraspError::Layout { id, cause })?;
-            let sensors = Sensors::new(&layout, &own.gripper, PressureArea::Participation);
-            let sensors = sensors.map_err(|cause| RecordedGraspError::Layout { id, cause })?;
-            (sensors.signals(&trial), programme.clone())
+            (Sensors::whole_fingers(&own.gripper).signals(&trial), programme.clone())
         };
         let line = if line.is_empty() { programme } else { line };
         self.observations.push(Observation { name: format!("trial {id}"), signals, line, scene, object });

@@ -5,10 +5,11 @@ use super::observation::{Observation, Track};
 use crate::gripper::{Gripper, Phase, TorquePoint};
 use crate::rig::{Event, Rig, SimRig};
 use crate::scene::{Effect, Scene, Setting, Timing};
-use crate::sensing::{PressureArea, SensorLayout, Sensors, Signals};
+use crate::sensing::{Sensors, Signals};
 
-/// Rate at which the twin is commanded (Hz): commands of any control box fall on its ticks nearly enough.
-const COMMAND_HZ: u32 = 50;
+/// Rate at which the twin is commanded (Hz): commands of any control box fall on its ticks nearly enough. At 50 Hz they would be
+/// 10 ms late on average, some more than others, and the fit would make lag and damping of that.
+const COMMAND_HZ: u32 = 300;
 
 /// Rate at which it is sampled (Hz). A finger swings at some 7 Hz; straight between samples at 50 Hz would miss a twelfth of
 /// it, and the fit would make stiffness of that.
@@ -146,9 +147,7 @@ fn shown(seen: &Observation, gripper: Gripper) -> Result<Signals, String> {
     scene.timing = Timing { sample_hz: SAMPLE_HZ, actuation_hz: COMMAND_HZ, duration_s: seen.duration() + 0.1 };
     // What lags a little lags, too: `auto` would leave it out and make a corner for the fit.
     scene.effects.set(Effect::PneumaticLag, if lag { Setting::On } else { Setting::Off });
-    let sensors = SensorLayout::named("C1+F")
-        .and_then(|layout| Sensors::new(&layout, &scene.gripper, PressureArea::Participation))
-        .map_err(|e| e.to_string())?;
+    let sensors = Sensors::whole_fingers(&scene.gripper);
     let (mut rig, _) = SimRig::new(&scene, seen.object.as_ref());
     let channels = sensors.channels().iter().map(crate::sensing::Channel::name).collect();
     let mut signals = Signals { channels, ..Signals::default() };

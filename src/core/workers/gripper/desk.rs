@@ -15,7 +15,8 @@ use crate::recording::Store;
 use crate::rig::serial::{LinkEvent, PortInfo, VENT, list_ports};
 use crate::scene::Scene;
 use crate::sensing::Channel;
-use crate::sensing::calibration::{Drift, DriftLevel, Felt, Readout, Zero, all_channels};
+use crate::sensing::calibration::{Drift, DriftLevel, Felt, Readout, Zero};
+use crate::sensing::whole_fingers;
 use crate::wire::Heard;
 use crate::workers::listener::Listener;
 use crate::workers::{Latest, Notice, TraceRow, Wake};
@@ -115,7 +116,7 @@ impl Desk {
             observing: Vec::new(),
             calibrated: None,
             stretch: (0, 0.0),
-            channels: all_channels().into(),
+            channels: whole_fingers().into(),
             revision: 0,
             published: Instant::now(),
         };
