@@ -5,6 +5,7 @@ use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
 use palpate_core::labelling::class_name;
 use palpate_core::recording::{JournalEntry, Store, TrialId, export_labelled};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The commands.
@@ -107,8 +108,15 @@ fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {
 /// Writes all labelled trials.
 pub(super) fn export(store: &Store, out: &Path) -> Result<(), Failure> {
     let exported = export_labelled(store, out)?;
+    // Hundreds of trials lack the same calibration: it is said once.
+    let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (id, why) in &exported.left_out {
-        warn(&format!("trial {id} is not in signals.csv: {why}"));
+        reasons.entry(why).or_default().push(id.to_string());
+    }
+    for (why, ids) in reasons {
+        let (named, all) = (ids.iter().take(5).cloned().collect::<Vec<_>>().join(", "), ids.len());
+        let more = if all > 5 { format!(" and {} more", all - 5) } else { String::new() };
+        warn(&format!("trial {named}{more} left out of signals.csv: {why}"));
     }
     let (trials, derived) = (exported.trials, exported.derived);
     say(format!(
