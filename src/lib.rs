@@ -27,15 +27,16 @@
 //!    grasp after grasp until it is clear what is in the hand.
 //! 6. [`palpate_core::picture::Stage`], which turns a frame into a [`palpate_core::drawing::DrawList`], and
 //!    [`palpate_render::Renderer`], which draws that.
-//! 7. [`palpate_core::workers::SimWorker`], the thread in which all this happens live, and [`app::Workbench`], which
-//!    shows it.
+//! 7. [`palpate_core::workers::SimWorker`], the thread in which all this happens live,
+//!    [`palpate_core::workers::GripperWorker`], its like for the real gripper, and [`app::Workbench`], which shows both.
 //!
 //! # Where to add what
 //!
 //! | what | the one place |
 //! |---|---|
 //! | a built-in object | a function in `src/cli/workshop/sixteen.rs`; `palpate workshop` writes its folder |
-//! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`] |
+//! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`]; its place in `src/app/modes.rs` |
+//! | a mode of the window | a line and a layout in `src/app/modes.rs` |
 //! | a key | a line in `src/app/keys.rs` |
 //! | a headless command | a file in `src/cli/` and a line in its `Command` |
 //! | a setting | a field of a struct below [`palpate_core::scene::Scene`], and its range in `scene/check.rs` |

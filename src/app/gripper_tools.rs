@@ -1,7 +1,8 @@
 //! The threads that help with the real gripper, each behind a panel of its own.
 
 use palpate_core::workers::{
-    Examine, ExamineRequest, Examiner, FitTrials, FitWish, Fitter, TrainWish, TrainedModel, Trainer, Wake,
+    Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish,
+    TrainedModel, Trainer, Wake,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,6 +44,16 @@ pub struct GripperTools {
     pub trainer: Trainer,
     /// Loads of models that have been taken note of.
     loads: u64,
+    /// A training that was asked for without looking at its panel.
+    awaited: Option<Awaited>,
+}
+
+/// A training whose end somebody waits for.
+struct Awaited {
+    /// How the one before it ended.
+    before: Option<Result<Arc<FinishedTraining>, String>>,
+    /// It has been seen going on.
+    begun: bool,
 }
 
 impl GripperTools {
@@ -58,6 +69,7 @@ impl GripperTools {
             fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(failed("the fit"))?,
             trainer: Trainer::start(store.to_owned(), setup.models, wake()).map_err(failed("training"))?,
             loads: 0,
+            awaited: None,
         })
     }
 
@@ -71,6 +83,29 @@ impl GripperTools {
             ToolWish::Train(wish) => self.trainer.ask(wish),
             ToolWish::StopTraining => self.trainer.give_up(),
         }
+    }
+
+    /// Trains, and remembers that somebody waits for it.
+    pub(super) fn train_and_tell(&mut self, request: TrainRequest) {
+        let before = self.trainer.view().and_then(|view| view.finished.clone());
+        self.awaited = Some(Awaited { before, begun: false });
+        self.trainer.ask(TrainWish::Train(request));
+    }
+
+    /// How the training ended that somebody waits for, once it has.
+    pub(super) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, String>> {
+        let awaited = self.awaited.as_mut()?;
+        let view = self.trainer.view()?;
+        awaited.begun |= view.running.is_some();
+        let same = match (&view.finished, &awaited.before) {
+            (Some(Ok(now)), Some(Ok(before))) => Arc::ptr_eq(now, before),
+            (Some(Err(now)), Some(Err(before))) => now == before,
+            (now, before) => now.is_none() && before.is_none(),
+        };
+        let ended = view.running.is_none() && (awaited.begun || !same);
+        let outcome = view.finished.clone().filter(|_| ended)?;
+        self.awaited = None;
+        Some(outcome)
     }
 
     /// The model that was loaded since the last call, or why it could not be.

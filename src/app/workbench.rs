@@ -371,6 +371,7 @@ impl Workbench {
         }
         self.gather_gripper();
         self.gather_labels();
+        self.gather_training();
         let notices: Vec<Notice> = self.worker.notices().chain(self.gripper.notices()).collect();
         for notice in notices {
             match notice {

@@ -3,14 +3,13 @@
 
 use super::{Shown, Workbench};
 use crate::app::actions::{DeskAction, Message};
-use crate::app::gripper_tools::ToolWish;
 use crate::app::modes::Mode;
 use crate::app::panels::{Source, USUAL_METHOD, control_title};
 use palpate_core::gripper::Phase;
 use palpate_core::labelling::LabelledTrial;
 use palpate_core::objects::catalogue;
 use palpate_core::rig::serial::Control;
-use palpate_core::workers::{Command, GripperWish, LabelWish, TrainRequest, TrainWish, TrialPart, TrialRequest};
+use palpate_core::workers::{Command, GripperWish, LabelWish, TrainRequest, TrialPart, TrialRequest};
 use std::path::{Path, PathBuf};
 
 impl Workbench {
@@ -57,7 +56,7 @@ impl Workbench {
             DeskAction::Export => self.labeller.ask(LabelWish::Export(self.new_export())),
             DeskAction::Train => {
                 let request = TrainRequest { method: USUAL_METHOD.to_owned(), seed: 1, quick: false };
-                self.tools.grant(ToolWish::Train(TrainWish::Train(request)));
+                self.tools.train_and_tell(request);
                 self.tell(Message::Info(
                     "training on the labelled trials: the panel Training shows how far it is".to_owned(),
                 ));
@@ -107,6 +106,19 @@ impl Workbench {
             if part == Some(TrialPart::Phase(Phase::Close)) {
                 self.close_twin();
             }
+        }
+    }
+
+    /// A model that was trained by key listens to the gripper at once.
+    pub(super) fn gather_training(&mut self) {
+        match self.tools.trained() {
+            Some(Ok(finished)) => {
+                let f1 = finished.judged.evaluation.f1_macro;
+                self.tell(Message::Info(format!("trained: macro F1 {f1:.2} on the trials held back")));
+                self.use_model(&finished.trained);
+            }
+            Some(Err(cause)) => self.tell(Message::Error(format!("nothing was trained: {cause}"))),
+            None => {}
         }
     }
 
