@@ -316,7 +316,7 @@ fn the_doctor_looks_at_the_link_that_is_held() {
         true
     });
     assert!(told > 0 && seen.listened_s >= 0.3 && seen.traces.channels.len() == 4);
-    assert_eq!(seen.link.map(|link| link.board.firmware), Some(Some("1".to_owned())));
+    assert!(seen.link.is_some_and(|link| link.board.firmware.is_some()), "it has said who it is");
     // One that is given up ends before its time, with what was seen so far.
     let seen = look(&ExamineRequest { port: None, seconds: 1e6 }, &mut |_| false);
     assert!(seen.listened_s < 1e3 && seen.traces.channels.len() == 4);
