@@ -92,6 +92,8 @@ pub enum DeskAction {
     Search(String),
     /// Put the cursor into the field that finds objects.
     FocusSearch,
+    /// The cursor is there.
+    SearchFocused,
     /// Ask about this trial; without one about the newest that has no label.
     Select(Option<TrialId>),
     /// Ask about the trial so many places further in the list.

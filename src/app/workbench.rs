@@ -211,6 +211,7 @@ impl Workbench {
             seen: None,
             deck: ObjectDeck::new(DECK_SEED),
         };
+        workbench.labeller.ask(LabelWish::Refresh);
         if workbench.view.ghost
             && let Err(cause) = workbench.worker.send(Command::SetGhost(true))
         {
@@ -285,7 +286,6 @@ impl Workbench {
         keys::sheet(&ctx, self.view.keys_shown, self.view.mode, &mut actions);
         drop_hint(&ctx);
         self.view.layouts.insert(mode, layout);
-        self.view.draft.focus_search = false;
         for action in actions {
             self.apply(&ctx, action);
         }

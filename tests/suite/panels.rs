@@ -32,8 +32,12 @@ fn every_panel_in_both_themes() {
             let size = [300.0, 240.0];
             let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), ..BenchSetup::default() });
             bench.advance_to(2.6);
-            if panel.name == "effects" {
-                bench.until_effects_are_measured();
+            match panel.name {
+                "effects" => bench.until_effects_are_measured(),
+                "plan" => bench.until_shown(true, "0 of 800 trials"),
+                "trials" => bench.until_shown(true, "No trial of the real gripper yet"),
+                "label" => bench.until_shown(true, "Connect the gripper first"),
+                _ => {}
             }
             bench.harness.render().unwrap()
         });

@@ -215,6 +215,7 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>)
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
     if draft.focus_search {
         response.request_focus();
+        actions.push(Action::Desk(DeskAction::SearchFocused));
     }
     // The arrows choose among what was found while the cursor stays in the field.
     let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));

@@ -33,6 +33,7 @@ use super::view_state::ViewState;
 use egui::{Label, RichText, TextEdit, Ui};
 use palpate_core::grasping::IdentificationView;
 use palpate_core::objects::{EMPTY, catalogue};
+use palpate_core::rig::serial::Control;
 use palpate_core::scene::Scene;
 use palpate_core::sensing::Channel;
 use palpate_core::trial::Frame;
@@ -144,9 +145,15 @@ impl<'a> PanelContext<'a> {
 
     /// When the hold begins and ends in what the plots show (s), where that is known.
     pub(super) fn hold(&self) -> Option<[f64; 2]> {
-        let rolling = self.traces.current().is_none_or(|trace| trace.rolling);
-        if self.source == Source::Gripper && rolling {
-            return None;
+        if self.source == Source::Gripper {
+            // Only a conducted trial keeps to the programme.
+            let gripper = self.gripper?;
+            let ended = || gripper.ended.as_ref().map(|ended| ended.request.control);
+            let control = gripper.trial.as_ref().map(|trial| trial.request.control).or_else(ended);
+            let rolling = self.traces.current().is_none_or(|trace| trace.rolling);
+            if rolling || control.is_none_or(|control| control == Control::Free) {
+                return None;
+            }
         }
         let scene = match self.source {
             Source::Simulation => &self.snapshot?.scene,

@@ -22,7 +22,12 @@ impl Workbench {
             DeskAction::Give => self.give_label(),
             DeskAction::Choose(place) => draft.chosen = Some(place),
             DeskAction::Search(search) => (draft.search, draft.chosen) = (search, None),
-            DeskAction::FocusSearch => draft.focus_search = true,
+            DeskAction::FocusSearch => {
+                // A question that is about to be asked is answered there, too.
+                let soon = self.trial_part.is_some() || self.asked_about().is_some() || self.awaits_question();
+                self.view.draft.focus_search = soon;
+            }
+            DeskAction::SearchFocused => draft.focus_search = false,
             DeskAction::Select(id) => {
                 draft.done();
                 draft.selected = id;
@@ -178,6 +183,12 @@ impl Workbench {
         let name = |k: u32| if k == 1 { "export".to_owned() } else { format!("export-{k}") };
         let free = (1..=u32::MAX).map(|k| beside.join(name(k))).find(|folder| !folder.exists());
         free.unwrap_or_else(|| beside.join("export"))
+    }
+
+    /// A trial has ended, and the list of labels has not told of it yet.
+    fn awaits_question(&self) -> bool {
+        let Some(ended) = self.trial_ended else { return false };
+        self.labeller.view().is_none_or(|labels| labels.trial(ended).is_none_or(|trial| !trial.complete))
     }
 
     /// The trial that the card asks about.
