@@ -158,11 +158,30 @@ pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Ac
         let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
         ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
     }
+    if let Some(typed) = (mode == Mode::Label).then(|| typed_after_slash(ctx)).flatten() {
+        let focus = Action::Desk(DeskAction::FocusSearch);
+        return std::iter::once(focus).chain(typed.map(|text| Action::Desk(DeskAction::Search(text)))).collect();
+    }
     ALL.iter()
         .filter(|binding| binding.counts_in(mode))
         .filter(|binding| ctx.input_mut(|i| i.consume_shortcut(&binding.shortcut)))
         .filter_map(|binding| (binding.act)(context))
         .collect()
+}
+
+/// What was typed in this frame after the key that goes to the search field: it belongs there, and is no keys. None where
+/// that key was not pressed; nothing where it was the last.
+fn typed_after_slash(ctx: &egui::Context) -> Option<Option<String>> {
+    ctx.input_mut(|input| {
+        let slash = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Slash, pressed: true, .. });
+        let from = input.events.iter().position(slash)?;
+        let text = |event: &egui::Event| match event {
+            egui::Event::Text(text) if text != "/" => Some(text.clone()),
+            _ => None,
+        };
+        let typed: String = input.events.drain(from..).filter_map(|event| text(&event)).collect();
+        Some(Some(typed).filter(|typed| !typed.is_empty()))
+    })
 }
 
 /// The sheet of keys and of what the mouse does.

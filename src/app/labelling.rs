@@ -120,7 +120,7 @@ impl LabelDraft {
 
     /// A label has been given: back to the newest trial without one.
     pub(super) fn done(&mut self) {
-        *self = Self { shown: self.shown, ..Self::default() };
+        *self = Self { shown: self.shown, focus_search: self.focus_search, ..Self::default() };
     }
 }
 

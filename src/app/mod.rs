@@ -23,7 +23,7 @@ mod view_state;
 mod viewport;
 mod workbench;
 
-pub use actions::Action;
+pub use actions::{Action, DeskAction};
 pub use gripper_tools::{GripperTools, GripperToolsSetup, ToolWish};
 pub use modes::Mode;
 pub use panels::{ALL as ALL_PANELS, PanelContext, PanelKind, Source};

@@ -8,7 +8,7 @@ use crate::gripper::board;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{Action, Mode};
+use palpate::app::{Action, DeskAction, Mode};
 use palpate_core::recording::Store;
 use palpate_core::rig::serial::Control;
 use palpate_core::workers::GripperWish;
@@ -101,6 +101,27 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::Enter);
     desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false)]);
     desk.until_shown(true, "2 of 800 trials");
+    // What was typed so fast that it came with the key belongs into the field as well, and is no keys.
+    desk.record();
+    let key = egui::Event::Key {
+        key: Key::Slash,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::NONE,
+    };
+    desk.harness.event(key);
+    for letter in ["/", "c", "u", "b", "e"] {
+        desk.harness.event(egui::Event::Text(letter.to_owned()));
+    }
+    desk.harness.step();
+    desk.harness.step();
+    let field = desk.harness.get_by_role_and_label(Role::SearchInput, "Find an object");
+    assert_eq!(field.value().as_deref(), Some("cube"));
+    desk.press(Key::Escape);
+    desk.tell(Action::Desk(DeskAction::Search(String::new())));
+    desk.tell(Action::Desk(DeskAction::Discard));
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     // The first is called something new after all: the arrows pick it.
     desk.press(Key::ArrowDown);
     desk.press(Key::ArrowDown);
@@ -108,12 +129,12 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::Slash);
     desk.type_text("garlic");
     desk.press(Key::Enter);
-    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false)]);
+    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     // Taken back, and made again.
     desk.press_with(Modifiers::COMMAND, Key::Z);
-    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false)]);
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     desk.press_with(Modifiers { shift: true, ..Modifiers::COMMAND }, Key::Z);
-    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false)]);
+    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     // Thrown away while it goes on, and out of the list.
     desk.press(Key::R);
     desk.until_shown(true, "Time in the trial");
@@ -122,9 +143,21 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::ArrowDown);
     desk.until_shown(true, "Trial 3 is called");
     desk.press(Key::D);
-    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), true), (4, None, true)]);
+    desk.until_labelled(&[
+        (1, Some("garlic"), false),
+        (2, None, true),
+        (3, Some("button"), true),
+        (4, None, true),
+        (5, None, true),
+    ]);
     desk.press_with(Modifiers::COMMAND, Key::Z);
-    desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
+    desk.until_labelled(&[
+        (1, Some("garlic"), false),
+        (2, None, true),
+        (3, Some("button"), false),
+        (4, None, true),
+        (5, None, true),
+    ]);
     desk.press_with(Modifiers::COMMAND, Key::E);
     desk.until_told("2 labelled trials exported");
     assert!(desk.store_folder().join("export").join("trials.csv").is_file());

@@ -14,6 +14,9 @@ use palpate_core::workers::{Command, Snapshot};
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
 
+/// Change of curvature that can be seen (1/m): a quarter of a millimetre at the tip of a finger of a decimetre.
+const SEEN_PER_M: f64 = 0.05;
+
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let rect = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
@@ -135,7 +138,9 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
 /// Curvature of the real fingers (1/m), while they are shown and read.
 fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
     let felt = context.gripper?.latest.as_ref()?.felt;
-    (context.source == Source::Gripper && felt.curvature.iter().any(Option::is_some)).then_some(felt.curvature)
+    // In steps that cannot be seen, so that noise alone is not drawn again and again.
+    let curvature = felt.curvature.map(|side| side.map(|kappa| (kappa / SEEN_PER_M).round() * SEEN_PER_M));
+    (context.source == Source::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 
 /// Standard views and switches, in the upper left corner of the picture.
