@@ -25,6 +25,8 @@ pub struct GraspTrace {
 
 /// What is kept of a trace that belongs to no grasp (s), and how much more may gather before it is cut.
 const ROLLING_S: [f64; 2] = [12.0, 4.0];
+/// The same of a grasp: a recording without an end must not fill the memory.
+const GRASP_S: [f64; 2] = [120.0, 30.0];
 
 impl GraspTrace {
     /// Stretches of time without readings (s): a row without any number marks where one begins.
@@ -37,7 +39,7 @@ impl GraspTrace {
 
     /// Forgets what is long ago.
     fn cut(&mut self) {
-        let [kept, more] = ROLLING_S;
+        let [kept, more] = if self.rolling { ROLLING_S } else { GRASP_S };
         let Some(last) = self.t.last().copied() else { return };
         if self.t.first().is_some_and(|first| last - first <= kept + more) {
             return;
@@ -88,9 +90,7 @@ impl Traces {
         for (channel, error) in last.errors.iter_mut().zip(row.errors.iter()) {
             channel.push(*error);
         }
-        if last.rolling {
-            last.cut();
-        }
+        last.cut();
     }
 
     /// Forgets everything.
@@ -164,6 +164,13 @@ mod tests {
         let trace = traces.current().unwrap();
         assert!(trace.t.len() <= 1700 && trace.channels[0].len() == trace.t.len());
         assert_eq!(trace.gaps(), [[1000.0, 1002.5]]);
+        // A recording without an end is bounded as well.
+        for k in 0..100_000u32 {
+            let (t, values) = (0.01 * f64::from(k), Box::new([1.0]));
+            traces.push(&TraceRow { grasp: 9, rolling: false, t, line_bar: 0.0, values, errors: Box::default() });
+        }
+        assert!(traces.current().is_some_and(|trace| (12_000..=15_001).contains(&trace.t.len())));
+        traces.clear();
         // A grasp stays in sight where that is wanted.
         for (grasp, rolling) in [(2, false), (3, true)] {
             let row =

@@ -175,7 +175,9 @@ const TRIAL_S: f64 = 4.0;
 fn gripper_span(trace: Option<&GraspTrace>) -> [f64; 2] {
     let last = |trace: &GraspTrace| trace.t.last().copied().unwrap_or(0.0);
     match trace {
-        Some(trace) if !trace.rolling => [-LEAD_S, last(trace).max(TRIAL_S)],
+        Some(trace) if !trace.rolling => {
+            [trace.t.first().copied().unwrap_or(0.0).max(-LEAD_S), last(trace).max(TRIAL_S)]
+        }
         Some(trace) => [last(trace).max(ROLLING_S) - ROLLING_S, last(trace).max(ROLLING_S)],
         None => [0.0, ROLLING_S],
     }

@@ -477,10 +477,10 @@ impl Desk {
             open(&mut self.store, &path).and_then(|store| store.add_tare(&zero).map_err(|error| error.to_string()));
         match stored {
             Ok(_) => {
-                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()))
+                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()));
             }
             Err(cause) => {
-                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")))
+                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")));
             }
         }
     }
