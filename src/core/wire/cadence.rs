@@ -96,6 +96,13 @@ impl Meter {
         self.bin(arrived_s).bad += 1;
     }
 
+    /// What could not be read before the first reading was heard at another speed: it says nothing of the lines.
+    pub(super) fn forget_what_came_before(&mut self) {
+        if self.samples == 0 {
+            *self = Self::default();
+        }
+    }
+
     pub(super) fn gap(&mut self, lost: Option<u64>) {
         self.gaps += 1;
         self.lost = self.lost.saturating_add(lost.unwrap_or(0));

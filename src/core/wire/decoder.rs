@@ -93,6 +93,7 @@ impl Decoder {
         // Another sketch may be on the board when it comes back; it need not say hello.
         self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
+        self.reader.meter.forget_what_came_before();
     }
 
     /// What is known of the board.

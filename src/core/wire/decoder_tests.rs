@@ -218,6 +218,22 @@ fn bytes() -> impl Strategy<Value = Vec<u8>> {
     ]
 }
 
+#[test]
+fn nonsense_at_a_wrong_speed_is_not_held_against_the_lines() {
+    let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+    decoder.push(b"\xff\xfe\n\x81\x90\n\xa0\n", 0.1, &mut heard);
+    assert!(decoder.cadence().bad_lines > 0);
+    decoder.interrupt("the speed was found to be 250000 baud");
+    for k in 0..5 {
+        decoder.push(format!("flexL:{k},flexR:2\n").as_bytes(), 0.2 + 0.02 * f64::from(k), &mut heard);
+    }
+    assert_eq!((decoder.cadence().bad_lines, decoder.cadence().samples > 2), (0, true));
+    // Once something was read, what cannot be read counts.
+    decoder.push(b"\xff\n", 0.4, &mut heard);
+    decoder.interrupt("the cable was pulled");
+    assert_eq!(decoder.cadence().bad_lines, 1);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
