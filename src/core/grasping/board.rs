@@ -37,8 +37,7 @@ pub fn record_board(
             Event::Sampled(_) => {}
             Event::Finished => break,
         }
-        if recorder.is_due() {
-            recorder.flush(store)?;
+        if recorder.flush_if_due(store)? {
             tell(&recorder, &rig.link().status());
         }
     }

@@ -1,5 +1,5 @@
-//! Records what a link hears as a trial. Whoever holds the link hands over its events and calls [`BoardRecorder::flush`]
-//! when it is due, so that a kill loses at most a second.
+//! Records what a link hears as a trial. Whoever holds the link hands over its events and calls
+//! [`BoardRecorder::flush_if_due`] after each, so that a kill loses at most a second.
 
 use super::board_trials::{BOARD_RIG, BoardChunk, BoardInfo};
 use super::calibrations::Serving;
@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 
 /// What waits to be written is never older than this.
 const FLUSH_AFTER: Duration = Duration::from_millis(800);
+/// How often what waits is offered to a store that another program writes to; together as long as others wait for it.
+const MOST_OFFERS: u32 = 12;
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
 const BYTES_PER_S: f64 = 400e3;
 /// A board that was silent for longer than this before the end left a gap there (s).
@@ -31,7 +33,8 @@ pub struct BoardRecorder {
     id: TrialId,
     about: BoardInfo,
     chunk: BoardChunk,
-    flushed: Instant,
+    /// When what waits was last offered to the store, and how often that was in vain.
+    offered: (Instant, u32),
     samples: u64,
     lost: u64,
     gaps: u64,
@@ -58,7 +61,7 @@ pub struct Recorded {
 }
 
 /// What is known of a trial of a real gripper before it begins.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardTrialPlan {
     /// Name of the object; empty where nobody has said yet what it is of.
     pub object: String,
@@ -66,6 +69,24 @@ pub struct BoardTrialPlan {
     pub scene: String,
     /// How long it will take (s), where that is known.
     pub seconds: Option<f64>,
+}
+
+impl BoardTrialPlan {
+    /// What the store is told of such a trial at its beginning.
+    pub fn info(&self) -> TrialInfo {
+        TrialInfo {
+            rig: BOARD_RIG.to_owned(),
+            object: self.object.clone(),
+            seed: 0,
+            collection: None,
+            scene: self.scene.clone(),
+            world_from_gripper: Pose::IDENTITY,
+            plan: Plan::default(),
+            quality: Quality::default(),
+            warnings: Vec::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
 }
 
 impl BoardRecorder {
@@ -77,18 +98,7 @@ impl BoardRecorder {
         began_s: f64,
     ) -> Result<Self, StoreError> {
         check_space(store.path(), plan.seconds.unwrap_or(UNKNOWN_LENGTH_S) * BYTES_PER_S)?;
-        let info = TrialInfo {
-            rig: BOARD_RIG.to_owned(),
-            object: plan.object.clone(),
-            seed: 0,
-            collection: None,
-            scene: plan.scene.clone(),
-            world_from_gripper: Pose::IDENTITY,
-            plan: Plan::default(),
-            quality: Quality::default(),
-            warnings: Vec::new(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-        };
+        let info = plan.info();
         let about = BoardInfo {
             port: format!("{}, {}", status.port.path.display(), status.port.title),
             board: status.board.clone(),
@@ -100,7 +110,7 @@ impl BoardRecorder {
             id: store.begin_board(&info, &about)?,
             about,
             chunk: BoardChunk::default(),
-            flushed: Instant::now(),
+            offered: (Instant::now(), 0),
             samples: 0,
             lost: 0,
             gaps: 0,
@@ -159,16 +169,31 @@ impl BoardRecorder {
         self.about.phases.push(mark);
     }
 
-    /// True when what waits should be written.
-    pub fn is_due(&self) -> bool {
-        self.flushed.elapsed() >= FLUSH_AFTER
+    /// Writes what waits, where it is time. Whoever holds the link has fingers under pressure to look after, and does not
+    /// wait here for another program that writes: what waits is offered again later, and an error after ten seconds.
+    /// True where it was time.
+    pub fn flush_if_due(&mut self, store: &mut Store) -> Result<bool, StoreError> {
+        let due = self.offered.0.elapsed() >= FLUSH_AFTER;
+        if due {
+            self.offer(store)?;
+        }
+        Ok(due)
     }
 
-    /// Writes what waits.
+    pub(super) fn offer(&mut self, store: &mut Store) -> Result<(), StoreError> {
+        let refused = self.offered.1 + 1;
+        self.offered = (Instant::now(), refused);
+        match store.at_once(|store| self.flush(store)) {
+            Err(StoreError::Busy) if refused < MOST_OFFERS => Ok(()),
+            outcome => outcome,
+        }
+    }
+
+    /// Writes what waits, now.
     pub fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
         store.append_board(self.id, &self.about, &self.chunk)?;
         self.chunk = BoardChunk::default();
-        self.flushed = Instant::now();
+        self.offered = (Instant::now(), 0);
         Ok(())
     }
 

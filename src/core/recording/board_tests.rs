@@ -140,3 +140,31 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     assert_eq!(states, ["complete", "recording"]);
     Ok(())
 }
+
+#[test]
+fn a_store_that_another_program_writes_to_holds_nobody_up_and_loses_nothing() -> Result<(), Box<dyn std::error::Error>>
+{
+    let folder = tempfile::tempdir()?;
+    let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
+    capture(&bytes)?;
+    let mut store = Store::open(&path)?;
+    let speed = f64::INFINITY;
+    let options = LinkOptions { path: Some(bytes), replay_speed: speed, ..LinkOptions::default() };
+    let link = SerialLink::open(&options)?;
+    let plan = BoardTrialPlan { object: "lemon".to_owned(), scene: String::new(), seconds: Some(8.0) };
+    let mut recorder = BoardRecorder::begin(&mut store, &plan, &link.status(), 0.0)?;
+    let other = rusqlite::Connection::open(&path)?;
+    other.execute_batch("BEGIN IMMEDIATE")?;
+    while !link.is_over() {
+        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.take(event));
+    }
+    for _ in 0..11 {
+        recorder.offer(&mut store)?;
+    }
+    let refused = recorder.offer(&mut store);
+    assert!(matches!(refused, Err(StoreError::Busy)), "it does not go on like that for ever: {refused:?}");
+    other.execute_batch("COMMIT")?;
+    recorder.offer(&mut store)?;
+    assert_eq!(store.board_trial(recorder.id())?.map(|trial| trial.readings.len()), Some(299));
+    Ok(())
+}

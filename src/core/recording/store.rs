@@ -167,7 +167,7 @@ impl Store {
     fn prepare(&mut self) -> Result<(), StoreError> {
         let path = self.path.clone();
         let fault = |e: rusqlite::Error| fault(&path, &e);
-        self.connection.busy_timeout(PATIENCE).map_err(fault)?;
+        self.set_patience(PATIENCE)?;
         self.check_identity()?;
         // The log lives in shared memory, which network file systems do not have.
         let mode = if on_network_file_system(&self.path) {
@@ -209,6 +209,22 @@ impl Store {
                 outcome => return outcome,
             }
         }
+    }
+
+    /// How long it waits for another program that writes.
+    fn set_patience(&self, patience: Duration) -> Result<(), StoreError> {
+        self.connection.busy_timeout(patience).map_err(|e| self.fault(&e))
+    }
+
+    /// Does what can wait for later better than now: [`StoreError::Busy`] at once while another program writes.
+    pub(super) fn at_once<T>(
+        &mut self,
+        work: impl FnOnce(&mut Self) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        self.set_patience(Duration::ZERO)?;
+        let done = work(self);
+        self.set_patience(PATIENCE)?;
+        done
     }
 
     /// Refuses files of other programs and of newer versions, before anything is written.

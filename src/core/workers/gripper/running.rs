@@ -133,7 +133,7 @@ impl Running {
 
     /// Writes what waits, where it is time.
     pub(super) fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
-        if self.recorder.is_due() { self.recorder.flush(store) } else { Ok(()) }
+        self.recorder.flush_if_due(store).map(|_due| ())
     }
 
     /// Ends it, and keeps it or gives it up.
