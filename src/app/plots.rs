@@ -164,6 +164,21 @@ fn moved_window(
     None
 }
 
+/// A plot of what does not move: no mouse, its axes as wide as those of the others.
+pub(super) fn still(id: &str, height: f32, y_label: &str, below: AxisHints<'static>, air_beside: f32) -> Plot<'static> {
+    Plot::new(id.to_owned())
+        .height(height)
+        .allow_zoom(false)
+        .allow_drag(false)
+        .allow_scroll(false)
+        .show_background(false)
+        .y_axis_min_width(44.0)
+        .y_axis_label(y_label.to_owned())
+        .grid_spacing(10.0..=44.0)
+        .custom_x_axes(vec![below.label_spacing(egui::Rangef::new(24.0, 40.0))])
+        .set_margin_fraction(egui::vec2(air_beside, 0.12))
+}
+
 /// A number at an axis, without trailing zeros.
 fn plain(value: f64) -> String {
     let text = three_digits(value);

@@ -112,12 +112,12 @@ pub struct Workbench {
 }
 
 /// The newest of what other threads have published.
-struct Shown<'a> {
-    snapshot: Option<&'a Snapshot>,
-    accuracy: Option<&'a MeasuredAccuracy>,
-    ghost: Option<&'a GhostGrasp>,
-    gripper: Option<&'a GripperView>,
-    labels: Option<&'a LabelView>,
+struct Shown {
+    snapshot: Option<Arc<Snapshot>>,
+    accuracy: Option<Arc<MeasuredAccuracy>>,
+    ghost: Option<Arc<GhostGrasp>>,
+    gripper: Option<Arc<GripperView>>,
+    labels: Option<Arc<LabelView>>,
 }
 
 /// Letters in a line of a notice.
@@ -256,23 +256,14 @@ impl Workbench {
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
-        let snapshot = self.worker.snapshot();
-        if let Some(snapshot) = snapshot.as_deref() {
+        let shown = self.shown();
+        if let Some(snapshot) = shown.snapshot.as_deref() {
             self.take_note_of_object(snapshot);
         }
         let mut actions = Vec::new();
         // The tree of panels is changed while it is drawn, so it is taken out for that time.
         let mode = self.view.mode;
         let mut layout = self.view.take_layout();
-        let (accuracy, ghost) = (self.worker.accuracy(), self.ghost());
-        let (gripper, labels) = (self.gripper.view(), self.labeller.view());
-        let shown = Shown {
-            snapshot: snapshot.as_deref(),
-            accuracy: accuracy.as_deref(),
-            ghost: ghost.as_deref(),
-            gripper: gripper.as_deref(),
-            labels: labels.as_deref(),
-        };
         let context = self.panel_context(&shown);
         actions.extend(keys::pressed(&ctx, &context));
         let colours = self.view.theme.colours();
@@ -296,25 +287,26 @@ impl Workbench {
     pub fn panel_ui(&mut self, ui: &mut Ui, panel: &PanelKind) {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
-        let snapshot = self.worker.snapshot();
-        let ghost = self.ghost();
+        let shown = self.shown();
         let mut actions = Vec::new();
         panel_frame(panel, self.view.theme).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            let accuracy = self.worker.accuracy();
-            let (gripper, labels) = (self.gripper.view(), self.labeller.view());
-            let shown = Shown {
-                snapshot: snapshot.as_deref(),
-                accuracy: accuracy.as_deref(),
-                ghost: ghost.as_deref(),
-                gripper: gripper.as_deref(),
-                labels: labels.as_deref(),
-            };
             let context = self.panel_context(&shown);
             (panel.ui)(ui, &context, &mut actions);
         });
         for action in actions {
             self.apply(&ctx, action);
+        }
+    }
+
+    /// The newest of everything, for one frame.
+    fn shown(&self) -> Shown {
+        Shown {
+            snapshot: self.worker.snapshot(),
+            accuracy: self.worker.accuracy(),
+            ghost: self.ghost(),
+            gripper: self.gripper.view(),
+            labels: self.labeller.view(),
         }
     }
 
@@ -338,17 +330,17 @@ impl Workbench {
         self.seen = Some(source.clone());
     }
 
-    fn panel_context<'a>(&'a self, shown: &Shown<'a>) -> PanelContext<'a> {
+    fn panel_context<'a>(&'a self, shown: &'a Shown) -> PanelContext<'a> {
         let source = self.view.source;
         PanelContext {
-            snapshot: shown.snapshot,
-            accuracy: shown.accuracy,
+            snapshot: shown.snapshot.as_deref(),
+            accuracy: shown.accuracy.as_deref(),
             scene: &self.scene,
             effects: &self.effects,
             tools: &self.tools,
-            gripper: shown.gripper,
+            gripper: shown.gripper.as_deref(),
             source,
-            labels: shown.labels,
+            labels: shown.labels.as_deref(),
             blind: self.is_blind(shown),
             traces: match source {
                 Source::Simulation => &self.traces,
@@ -357,7 +349,7 @@ impl Workbench {
             view: &self.view,
             thumbnails: &self.thumbnails,
             driver: self.driver.as_deref(),
-            ghost: ghost_of(shown.snapshot, shown.ghost),
+            ghost: ghost_of(shown.snapshot.as_deref(), shown.ghost.as_deref()),
         }
     }
 

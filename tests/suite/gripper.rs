@@ -33,6 +33,11 @@ struct Desk {
 /// Views after which something that was waited for will not come any more.
 const MOST_VIEWS: u32 = 3000;
 
+/// A look at the pretended gripper takes this long in truth.
+const FAST: Duration = Duration::from_micros(100);
+/// A look when its time is the time of the clock.
+const TRUE_TO_TIME: Duration = Duration::from_millis(10);
+
 fn scene() -> Scene {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
@@ -41,15 +46,15 @@ fn scene() -> Scene {
 
 /// The pretended gripper, waiting to be driven.
 pub(crate) fn board(parts: &HiddenParts) -> Listen {
-    pretended(parts, None)
+    pretended(parts, None, FAST)
 }
 
 /// The pretended gripper, grasping by itself.
 fn moving(parts: &HiddenParts) -> Listen {
-    pretended(parts, Some(7.0))
+    pretended(parts, Some(7.0), FAST)
 }
 
-fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>) -> Listen {
+fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration) -> Listen {
     let parts = parts.clone();
     Arc::new(move |port| {
         if let Some(port) = port {
@@ -66,7 +71,7 @@ fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>) -> Listen {
             faults: vec![],
             seed: 1,
         };
-        Ok(Box::new(Pretended::new(setup, Duration::from_micros(100))))
+        Ok(Box::new(Pretended::new(setup, look)))
     })
 }
 
@@ -116,10 +121,14 @@ impl Desk {
     }
 
     fn until_said(&mut self, text: &str) {
-        while !self.notices.iter().any(|notice| format!("{notice:?}").contains(text)) {
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+        for _ in 0..MOST_VIEWS {
             self.notices.extend(self.worker.notices());
+            if self.notices.iter().any(|notice| format!("{notice:?}").contains(text)) {
+                return;
+            }
+            self.woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
         }
+        panic!("never said: {text}; {:?}", self.notices)
     }
 
     fn connect(&mut self) {
@@ -189,6 +198,26 @@ fn stop_vents_ends_the_trial_and_says_so() {
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     let released = |mark: &palpate_core::trial::PhaseMark| mark.phase == Phase::Release;
     assert!(!desk.store().board_info(ended.id).unwrap().unwrap().phases.iter().any(released));
+}
+
+#[test]
+fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
+    // What waits is written about once a second of the clock, which must come before the trial's end.
+    let mut desk = Desk::on(pretended(&parts(1, false), None, TRUE_TO_TIME));
+    desk.connect();
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
+    let pressed = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
+    // Another program throws it away for good: nothing more can be written of it.
+    let id = pressed.trial.as_ref().unwrap().id;
+    let mut store = desk.store();
+    store.discard_trial(id).unwrap();
+    store.purge().unwrap();
+    desk.until_said("the trial was broken off");
+    let view = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
+    // It was told to, and did not wait until it missed us.
+    assert!(!view.console.iter().any(|line| line.text.contains("watchdog")), "{:?}", view.console);
+    assert!(view.trial.is_none() && view.is_connected());
+    desk.trial(Control::Driven, false);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use super::{PanelContext, wrapped};
 use crate::app::actions::Action;
+use crate::app::plots::still;
 use crate::app::theme::colour;
 use egui::{Button, Color32, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
@@ -181,16 +182,5 @@ fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, accent: Col
 }
 
 fn plot(id: &str, height: f32, axis: &str, stimulus: &str) -> Plot<'static> {
-    let below = AxisHints::new_x().label(stimulus.to_owned()).label_spacing(egui::Rangef::new(24.0, 40.0));
-    Plot::new(id.to_owned())
-        .height(height)
-        .allow_zoom(false)
-        .allow_drag(false)
-        .allow_scroll(false)
-        .show_background(false)
-        .y_axis_min_width(44.0)
-        .y_axis_label(axis.to_owned())
-        .grid_spacing(10.0..=44.0)
-        .custom_x_axes(vec![below])
-        .set_margin_fraction(egui::vec2(0.06, 0.12))
+    still(id, height, axis, AxisHints::new_x().label(stimulus.to_owned()), 0.06)
 }

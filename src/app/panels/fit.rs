@@ -4,6 +4,7 @@
 use super::{PanelContext, just_opened, wrapped};
 use crate::app::actions::{Action, Message};
 use crate::app::gripper_tools::ToolWish;
+use crate::app::plots::still;
 use crate::app::theme::{colour, veil};
 use egui::{Align, Button, Layout, ProgressBar, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
@@ -229,19 +230,6 @@ fn line<'a>(course: &Course, values: &[f64], name: &str) -> Line<'a> {
 }
 
 fn plot(theme: Theme, id: &str, height: f32) -> Plot<'static> {
-    let seconds = AxisHints::new_x()
-        .formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value))
-        .label_spacing(egui::Rangef::new(24.0, 40.0));
-    Plot::new(id.to_owned())
-        .height(height)
-        .allow_zoom(false)
-        .allow_drag(false)
-        .allow_scroll(false)
-        .show_background(false)
-        .y_axis_min_width(44.0)
-        .y_axis_label("1/m")
-        .grid_color(colour(theme.colours().border))
-        .grid_spacing(10.0..=44.0)
-        .custom_x_axes(vec![seconds])
-        .set_margin_fraction(egui::vec2(0.0, 0.12))
+    let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value));
+    still(id, height, "1/m", seconds, 0.0).grid_color(colour(theme.colours().border))
 }

@@ -75,9 +75,9 @@ impl Workbench {
     }
 
     /// What the model says is hidden while a trial goes on, and until it has a label.
-    pub(super) fn is_blind(&self, shown: &Shown<'_>) -> bool {
-        let going_on = shown.gripper.is_some_and(|gripper| gripper.trial.is_some());
-        let open = shown.labels.is_some_and(|labels| labels.unlabelled().is_some());
+    pub(super) fn is_blind(&self, shown: &Shown) -> bool {
+        let going_on = shown.gripper.as_ref().is_some_and(|gripper| gripper.trial.is_some());
+        let open = shown.labels.as_ref().is_some_and(|labels| labels.unlabelled().is_some());
         self.view.mode == Mode::Label && self.view.blind && (going_on || open)
     }
 

@@ -66,7 +66,7 @@ pub(super) fn run(what: &Labelling, store: &mut Store) -> Result<(), Failure> {
             None => say("there is nothing to take back"),
         },
         Labelling::Redo => match store.redo()? {
-            Some(entry) => say(format!("no longer taken back: {}", entry.sentence())),
+            Some(entry) => say(format!("no longer taken back: {}", entry.restored())),
             None => say("nothing was taken back since the last change"),
         },
         Labelling::Journal { last, json } => journal(&store.journal(*last)?, *json),

@@ -291,13 +291,13 @@ fn insert(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::board::{Board, Reading};
     use crate::sensing::calibration::{Input, Point, Readout};
 
     /// A strip's record with some resistance flat, twice that at a right angle.
-    fn strip(part: &str, flat_ohm: f64) -> Record {
+    pub(crate) fn strip(part: &str, flat_ohm: f64) -> Record {
         let input = Input::on(&Board::default(), Sensor::FlexLeft);
         let point = |degrees: f64| Point {
             stimulus: degrees.to_radians(),

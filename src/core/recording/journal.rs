@@ -177,6 +177,13 @@ impl JournalEntry {
         let undoes = self.undoes.map_or_else(String::new, |number| format!(" (takes back {number})"));
         format!("{trial}{}{undoes}", self.change.sentence())
     }
+
+    /// What it took back, in words, for an entry that takes another back.
+    pub fn restored(&self) -> String {
+        let again =
+            Self { change: self.change.inverse().unwrap_or_else(|| self.change.clone()), undoes: None, ..self.clone() };
+        again.sentence()
+    }
 }
 
 /// Names this run of the program among those that write to a store.

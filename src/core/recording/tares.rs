@@ -89,21 +89,8 @@ impl Store {
 
 #[cfg(test)]
 mod tests {
+    use super::super::calibrations::tests::strip;
     use super::*;
-    use crate::board::Board;
-    use crate::sensing::calibration::{Input, Kind, Point, Record};
-
-    fn strip(part: &str, flat_ohm: f64) -> Record {
-        let input = Input::on(&Board::default(), Sensor::FlexLeft);
-        let point = |degrees: f64| Point {
-            stimulus: degrees.to_radians(),
-            counts: input.counts(flat_ohm * (1.0 + degrees / 90.0)),
-            spread: 1.0,
-            readings: 50,
-        };
-        let points = [0.0, 45.0, 90.0].map(point).to_vec();
-        Record { part: part.to_owned(), kind: Kind::Flex, input, points, bending: None, note: String::new() }
-    }
 
     #[test]
     fn a_tare_serves_its_part_until_a_newer_calibration() -> Result<(), Box<dyn std::error::Error>> {

@@ -119,10 +119,9 @@ impl Clerk {
             Ok(store) => store,
             Err(cause) => return Some(Err(cause)),
         };
-        let taken = |what: &str, entry: Option<JournalEntry>, none: &str| match entry {
-            Some(entry) => format!("{what}: {}", entry.sentence()),
-            None => none.to_owned(),
-        };
+        let undone = |entry: JournalEntry| format!("taken back: {}", entry.sentence());
+        let redone = |entry: JournalEntry| format!("made again: {}", entry.restored());
+        let told = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
         let done: Result<Option<String>, StoreError> = match wish {
             LabelWish::Refresh => Ok(None),
             LabelWish::Label(id, object) => store.label_trial(*id, object).map(|()| None),
@@ -134,8 +133,8 @@ impl Clerk {
             LabelWish::Tags(id, tags) => store.set_tags(*id, tags).map(|()| None),
             LabelWish::Unsure(id, unsure) => store.set_unsure(*id, *unsure).map(|()| None),
             LabelWish::Reviewed(id) => store.mark_reviewed(*id).map(|()| None),
-            LabelWish::Undo => store.undo().map(|entry| Some(taken("taken back", entry, "nothing to take back"))),
-            LabelWish::Redo => store.redo().map(|entry| Some(taken("made again", entry, "nothing to make again"))),
+            LabelWish::Undo => store.undo().map(|entry| told(entry.map(undone), "nothing to take back")),
+            LabelWish::Redo => store.redo().map(|entry| told(entry.map(redone), "nothing to make again")),
             LabelWish::Want(name, wanted) => return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err),
             LabelWish::Unplan(name) => return change_plan(store, |plan| plan.remove(name)).err().map(Err),
             LabelWish::Export(folder) => return Some(exported(store, folder)),
@@ -182,23 +181,10 @@ fn change_plan<E: std::fmt::Display>(
 mod tests {
     use super::super::desk::watch::{until, waker};
     use super::*;
-    use crate::geometry::Pose;
-    use crate::recording::BoardInfo;
-    use crate::trial::{Plan, Quality, TrialInfo};
+    use crate::recording::{BoardInfo, BoardTrialPlan};
 
     fn recorded(store: &mut Store) -> TrialId {
-        let info = TrialInfo {
-            rig: crate::recording::BOARD_RIG.to_owned(),
-            object: String::new(),
-            seed: 0,
-            collection: None,
-            scene: String::new(),
-            world_from_gripper: Pose::IDENTITY,
-            plan: Plan::default(),
-            quality: Quality::default(),
-            warnings: Vec::new(),
-            version: String::new(),
-        };
+        let info = BoardTrialPlan::default().info();
         let id = store.begin_board(&info, &BoardInfo::default()).expect("begins");
         store.finish_board(id, &BoardInfo::default(), &[]).expect("ends");
         id
@@ -219,12 +205,21 @@ mod tests {
         desk.ask(LabelWish::Label(ids[1], next.clone()));
         let labelled = until(&desk, &woken, |view| view.progress.done() == 1);
         assert_eq!(labelled.unlabelled().map(|trial| trial.id), Some(ids[0]));
-        assert_ne!(labelled.next.as_ref().map(|n| n.object.clone()), Some(next), "never twice in a row");
+        assert_ne!(labelled.next.as_ref().map(|n| n.object.clone()), Some(next.clone()), "never twice in a row");
         desk.ask(LabelWish::Discard(ids[0]));
         until(&desk, &woken, |view| view.unlabelled().is_none());
         for _ in 0..2 {
             desk.ask(LabelWish::Undo);
         }
+        desk.ask(LabelWish::Redo);
+        until(&desk, &woken, |view| {
+            view.told.iter().any(|(_, told)| {
+                told.as_ref().is_ok_and(|text| {
+                    text.starts_with("made again: ") && text.ends_with(&format!("label unlabelled -> {next}"))
+                })
+            })
+        });
+        desk.ask(LabelWish::Undo);
         let back = until(&desk, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
         assert!(back.told.iter().any(|(_, told)| told.as_ref().is_ok_and(|text| text.starts_with("taken back: "))));
         desk.ask(LabelWish::Want("mug".to_owned(), 3));

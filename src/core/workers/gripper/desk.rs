@@ -1,21 +1,24 @@
 //! The gripper's thread: it owns the link, hands what it hears to everybody who wants it, and does what it is told.
 
-use super::calibrating::{Calibrating, CalibrationPlan, CalibrationView, CalibrationWish};
+mod recognising;
+mod sensors;
+mod trials;
+
+use super::calibrating::{Calibrating, CalibrationView};
 use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialRequest};
 use super::observing::Observing;
 use super::plotted::{Plotted, Row};
 use super::recent::Recent;
-use super::running::{BEFORE_S, Running};
+use super::running::Running;
 use super::stream::{BoardStream, Listen};
 use super::worker::GripperSetup;
 use crate::board::{Board, Reading};
-use crate::gripper::Phase;
-use crate::labelling::{SegmentEvent, Segmenter};
+use crate::labelling::Segmenter;
 use crate::recording::Store;
-use crate::rig::serial::{LinkEvent, PortInfo, VENT, list_ports};
+use crate::rig::serial::{LinkEvent, PortInfo, list_ports};
 use crate::scene::Scene;
 use crate::sensing::Channel;
-use crate::sensing::calibration::{Drift, DriftLevel, Felt, Readout, Zero};
+use crate::sensing::calibration::{Drift, Readout};
 use crate::sensing::whole_fingers;
 use crate::wire::Heard;
 use crate::workers::listener::Listener;
@@ -30,8 +33,6 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_millis(10);
 /// Views are published no more often than this.
 const CALM: Duration = Duration::from_millis(33);
-/// Readings before the closing from which the zeros are taken (s).
-const REST_S: f64 = 0.6;
 
 /// Where results go.
 pub(super) struct Outlets {
@@ -189,8 +190,6 @@ impl Desk {
         }
     }
 
-    // The link.
-
     fn connect(&mut self, port: Option<&Path>) {
         self.refused = None;
         match (self.listen)(port) {
@@ -226,41 +225,6 @@ impl Desk {
         self.calibrating = None;
         self.observing.clear();
         self.connection = None;
-    }
-
-    /// Reads the board through the newest calibrations of its parts.
-    fn read_calibrations(&mut self) {
-        let Some(connection) = &self.connection else { return };
-        let board = connection.board.clone();
-        let read = self.store().and_then(|store| {
-            let tare = store.tare().map_err(|error| error.to_string())?;
-            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
-            Ok((serving, tare.map(|tare| tare.zero)))
-        });
-        let (read, zero) = match read {
-            Ok((serving, zero)) => (Ok(serving), zero),
-            Err(cause) => (Err(cause), None),
-        };
-        let (readout, remarks) = match read {
-            Ok(serving) => match Readout::new(&board, &serving.calibrations) {
-                Ok(readout) => {
-                    let remarks = serving.warnings.into_iter().chain(readout.warnings().iter().cloned()).collect();
-                    (readout, remarks)
-                }
-                Err(fault) => (Readout::default(), vec![fault.to_string()]),
-            },
-            Err(cause) => (Readout::default(), vec![cause]),
-        };
-        if let Some(connection) = &mut self.connection {
-            connection.plotted = Plotted::new(self.channels.to_vec(), board.channels.len());
-            connection.segmenter.set_board(&board);
-            connection.readout = readout;
-            connection.remarks = remarks;
-            connection.drift.clear();
-            if let Some(zero) = zero {
-                connection.set_zero(zero);
-            }
-        }
     }
 
     /// Takes in what the link has heard, and does what is due.
@@ -338,27 +302,6 @@ impl Desk {
         }
     }
 
-    /// Begins and ends trials by what the fingers do, where that is wanted.
-    fn watch(&mut self, reading: &Reading) {
-        let Some(connection) = &mut self.connection else { return };
-        let events = connection.segmenter.push(reading);
-        let Some(request) = self.watching.clone() else { return };
-        // A trial that was asked for goes its own way.
-        if self.running.as_ref().is_some_and(|running| *running.request() != request) {
-            return;
-        }
-        for event in events {
-            match event {
-                SegmentEvent::Began { from_s } => self.begin(request.clone(), Some(from_s)),
-                SegmentEvent::Phase(mark) => {
-                    let phase = self.running.as_mut().and_then(|running| running.mark(mark));
-                    phase.into_iter().for_each(|phase| self.begin_phase(phase, reading.t_s));
-                }
-                SegmentEvent::Ended { .. } => self.end(false, None),
-            }
-        }
-    }
-
     fn plot(&self, rows: Vec<Row>) {
         let (grasp, from_s) = self.stretch;
         let rolling = self.running.is_none();
@@ -374,294 +317,6 @@ impl Desk {
         let rows = self.connection.as_mut().map(|connection| connection.plotted.flush()).unwrap_or_default();
         self.plot(rows);
         self.stretch = (self.stretch.0 + 1, from_s);
-    }
-
-    // The control box.
-
-    fn vent(&mut self) {
-        let Some(connection) = &mut self.connection else {
-            return self.outlets.tell(Notice::Warning("no board is connected: vent at the control box".to_owned()));
-        };
-        let sent = connection.stream.send(VENT);
-        match sent {
-            Err(error) => self.outlets.tell(Notice::Failed(format!("{error}: vent at the control box"))),
-            Ok(()) if connection.board.firmware.is_none() => self.outlets.tell(Notice::Warning(
-                "told to vent, but this board has not said that it drives a control box: vent by hand".to_owned(),
-            )),
-            Ok(()) => self.outlets.tell(Notice::Warning("told to vent".to_owned())),
-        }
-        if let Some(running) = &mut self.running {
-            running.interrupt("vented by the user");
-        }
-        self.end(false, None);
-    }
-
-    /// Tells the board what is due, and ends a trial whose programme is done.
-    fn conduct(&mut self) {
-        let (Some(connection), Some(running)) = (&mut self.connection, &mut self.running) else { return };
-        let now_s = connection.stream.now_s();
-        let (line, phase) = running.conduct(now_s);
-        if let Some(line) = line
-            && let Err(error) = connection.stream.send(&line)
-        {
-            running.note(format!("{line}: {error}"));
-        }
-        let over = running.is_over(now_s);
-        if let Some(phase) = phase {
-            self.begin_phase(phase, f64::INFINITY);
-        }
-        self.write();
-        if over {
-            self.end(false, None);
-        }
-    }
-
-    /// What was heard before `until_s` has been passed over.
-    fn begin_phase(&mut self, phase: Phase, until_s: f64) {
-        match phase {
-            Phase::Close => {
-                let closing_s = self.running.as_ref().and_then(|running| running.closing_s).unwrap_or(f64::INFINITY);
-                self.zero_from_rest(closing_s);
-                self.begin_recognition();
-                self.catch_up(closing_s, until_s);
-            }
-            Phase::Hold => {}
-            Phase::Release => {
-                if let Some(listener) = &mut self.listener {
-                    listener.end_grasp();
-                }
-            }
-        }
-    }
-
-    // Zeros.
-
-    /// The zeros of a trial are what the sensors show just before its closing.
-    fn zero_from_rest(&mut self, closing_s: f64) {
-        let Some(connection) = &mut self.connection else { return };
-        let zero = connection.readout.zero_from(&connection.recent.between(closing_s - REST_S, closing_s));
-        connection.set_zero(zero);
-    }
-
-    /// Recognises what was heard since the closing began, where that was found out later.
-    fn catch_up(&mut self, closing_s: f64, until_s: f64) {
-        let Some(connection) = &self.connection else { return };
-        let heard = connection.recent.between(closing_s, until_s);
-        let felt: Vec<(f64, Felt)> =
-            heard.iter().map(|reading| (reading.t_s, connection.readout.felt(reading))).collect();
-        for (t_s, felt) in felt {
-            self.recognise(t_s, &felt);
-        }
-    }
-
-    fn tare(&mut self) {
-        let Some(connection) = &mut self.connection else { return };
-        let readings = connection.recent.last(REST_S);
-        let zero = connection.readout.zero_from(&readings);
-        if zero == Zero::default() {
-            let text = "nothing was tared: no calibrated sensor has been read yet";
-            return self.outlets.tell(Notice::Warning(text.to_owned()));
-        }
-        connection.set_zero(zero);
-        let far: Vec<String> = connection
-            .drift
-            .iter()
-            .filter(|drift| drift.level == DriftLevel::TooFar)
-            .filter_map(Drift::remark)
-            .collect();
-        for text in far {
-            self.outlets.tell(Notice::Warning(text));
-        }
-        let path = self.path.clone();
-        let stored =
-            open(&mut self.store, &path).and_then(|store| store.add_tare(&zero).map_err(|error| error.to_string()));
-        match stored {
-            Ok(_) => {
-                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()));
-            }
-            Err(cause) => {
-                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")));
-            }
-        }
-    }
-
-    // Trials.
-
-    /// Begins a trial; one that goes on ends before it.
-    fn begin(&mut self, request: TrialRequest, from_s: Option<f64>) {
-        self.end(false, None);
-        let Some(connection) = &self.connection else {
-            let text = "no board is connected: connect the gripper first";
-            return self.outlets.tell(Notice::Warning(text.to_owned()));
-        };
-        if connection.latest.is_none() {
-            let text = format!("nothing is recorded yet: {}", connection.stream.status().state.sentence());
-            return self.outlets.tell(Notice::Warning(text));
-        }
-        let now_s = connection.stream.now_s();
-        let from_s = from_s.unwrap_or(now_s - BEFORE_S);
-        let status = connection.stream.status();
-        let adds = request.adds;
-        let path = self.path.clone();
-        let store = match open(&mut self.store, &path) {
-            Ok(store) => store,
-            Err(cause) => return self.outlets.tell(Notice::Failed(cause)),
-        };
-        let Some(connection) = &self.connection else { return };
-        match Running::begin(store, request, &self.scene, &status, &connection.recent, [from_s, now_s]) {
-            Ok(running) => {
-                self.another_stretch(running.closing_s.unwrap_or(running.began_s));
-                self.running = Some(running);
-                self.begun += 1;
-                let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
-                if !adds || decided {
-                    self.start_over();
-                }
-            }
-            Err(error) => self.outlets.tell(Notice::Failed(format!("no trial was begun: {error}"))),
-        }
-    }
-
-    /// Writes what waits of the trial; a store that fails ends it.
-    fn write(&mut self) {
-        let Some(running) = &mut self.running else { return };
-        let path = self.path.clone();
-        let written =
-            open(&mut self.store, &path).and_then(|store| running.flush(store).map_err(|error| error.to_string()));
-        if let Err(cause) = written {
-            self.running = None;
-            self.outlets.tell(Notice::Failed(format!("the trial was broken off, what was written is safe: {cause}")));
-        }
-    }
-
-    /// Ends the trial that goes on, if any.
-    fn end(&mut self, discarded: bool, note: Option<String>) {
-        let Some(mut running) = self.running.take() else { return };
-        if let Some(note) = note {
-            running.note(note);
-        }
-        let Some(connection) = &mut self.connection else { return };
-        if running.is_driven() && connection.stream.send(VENT).is_err() {
-            running
-                .note("the board could not be told to vent at the end; it vents by itself within a second".to_owned());
-        }
-        let status = connection.stream.status();
-        if let Some(listener) = &mut self.listener {
-            if discarded && !running.request().adds {
-                listener.start_over();
-            } else {
-                listener.end_grasp();
-            }
-        }
-        // What was felt before belongs to a guess that adds to it; such a guess says nothing of this trial alone.
-        let alone = !discarded && !running.request().adds;
-        let guess = self.listener.as_ref().filter(|_| alone && running.closing_s.is_some()).and_then(Listener::guess);
-        let guess = guess.zip(self.model.clone());
-        let path = self.path.clone();
-        let finished = open(&mut self.store, &path).and_then(|store| {
-            let ended = running.finish(store, &status, discarded).map_err(|error| error.to_string())?;
-            if let Some((pmf, model)) = guess {
-                store.set_guess(ended.id, &model, &pmf).map_err(|error| error.to_string())?;
-            }
-            Ok(ended)
-        });
-        match finished {
-            Ok(ended) => {
-                if !discarded {
-                    self.outlets.tell(Notice::Stored(ended.id));
-                }
-                self.ended = Some(Arc::new(ended));
-            }
-            Err(cause) => self.outlets.tell(Notice::Failed(format!("the trial could not be ended: {cause}"))),
-        }
-        self.another_stretch(0.0);
-    }
-
-    // Recognition.
-
-    fn set_model(&mut self, model: Option<Arc<crate::recognition::Model>>) {
-        self.model = model.as_ref().map(|model| model.card.method.clone());
-        self.listener = model.map(|model| Listener::new(model, self.grasps));
-    }
-
-    fn start_over(&mut self) {
-        if let Some(listener) = &mut self.listener {
-            listener.start_over();
-        }
-    }
-
-    fn begin_recognition(&mut self) {
-        let (Some(listener), Some(connection)) = (&mut self.listener, &self.connection) else { return };
-        let channels: Vec<String> = connection.readout.channels().iter().map(Channel::name).collect();
-        if let Some(warning) = listener.begin_grasp_of(&channels) {
-            self.outlets.tell(Notice::Warning(warning));
-        }
-    }
-
-    /// Lets the model hear a reading of the grasp that goes on.
-    fn recognise(&mut self, t_s: f64, felt: &Felt) {
-        let (Some(listener), Some(running)) = (&mut self.listener, &self.running) else { return };
-        let Some(t) = running.closing_s.map(|closing_s| t_s - closing_s).filter(|t| *t >= 0.0) else { return };
-        let names = listener.channels();
-        let value =
-            |name: &String| self.channels.iter().find(|channel| channel.name() == *name).and_then(|c| felt.of(c));
-        // A reading in which a sensor is at an end of its range is passed over.
-        let row: Option<Vec<f32>> = names.iter().map(|name| value(name).map(|value| value as f32)).collect();
-        if let Some(row) = row {
-            listener.push_row(t as f32, &row);
-        }
-    }
-
-    // Calibration.
-
-    fn calibrate(&mut self, wish: &CalibrationWish) {
-        match wish {
-            CalibrationWish::Begin(plan) => self.begin_calibration(plan),
-            CalibrationWish::Stop => self.end_calibration(None),
-            CalibrationWish::Keep => {
-                let path = self.path.clone();
-                let kept = match (&self.calibrating, open(&mut self.store, &path)) {
-                    (None, _) => return,
-                    (Some(calibrating), Ok(store)) => calibrating.keep(store),
-                    (Some(_), Err(cause)) => Some(Err(cause)),
-                };
-                if let Some(kept) = kept {
-                    self.end_calibration(Some(kept));
-                    self.read_calibrations();
-                }
-            }
-            CalibrationWish::Take(_) | CalibrationWish::Skip | CalibrationWish::Undo => {
-                if let Some(calibrating) = &mut self.calibrating {
-                    calibrating.grant(wish);
-                }
-            }
-        }
-    }
-
-    fn begin_calibration(&mut self, plan: &CalibrationPlan) {
-        let owns_port = self.connection.is_none();
-        if owns_port {
-            self.connect(plan.port.as_deref());
-        }
-        match (&self.connection, self.refused.take()) {
-            (None, refused) => {
-                self.calibrated = Some(Err(refused.clone().unwrap_or_else(|| "no board is connected".to_owned())));
-                self.refused = refused;
-            }
-            (Some(_), _) => self.calibrating = Some(Calibrating::new(plan.clone(), owns_port)),
-        }
-    }
-
-    fn end_calibration(&mut self, ended: Option<Result<String, String>>) {
-        let owns_port = self.calibrating.take().is_some_and(|calibrating| calibrating.owns_port);
-        self.calibrated = ended;
-        if owns_port {
-            self.disconnect("the calibration has ended");
-        }
-    }
-
-    fn store(&mut self) -> Result<&mut Store, String> {
-        open(&mut self.store, &self.path)
     }
 
     fn publish(&mut self) {
@@ -695,14 +350,6 @@ impl Desk {
             console: connection.map(|c| c.stream.console()).unwrap_or_default().into(),
         }));
         (self.outlets.wake)();
-    }
-}
-
-impl Connection {
-    /// Subtracts a zero from now on, and judges how far it is from the calibrations.
-    fn set_zero(&mut self, zero: Zero) {
-        self.drift = self.readout.drift(&zero);
-        self.readout = self.readout.clone().with_zero(zero);
     }
 }
 

@@ -1,0 +1,141 @@
+//! What the sensors mean: calibrations of the parts, those that are being made, and zeros.
+
+use super::{Connection, Desk, open};
+use crate::sensing::calibration::{Drift, DriftLevel, Readout, Zero};
+use crate::workers::Notice;
+use crate::workers::gripper::calibrating::{Calibrating, CalibrationPlan, CalibrationWish};
+use crate::workers::gripper::plotted::Plotted;
+
+/// Readings before the closing from which the zeros are taken (s).
+const REST_S: f64 = 0.6;
+
+impl Desk {
+    /// Reads the board through the newest calibrations of its parts.
+    pub(super) fn read_calibrations(&mut self) {
+        let Some(connection) = &self.connection else { return };
+        let board = connection.board.clone();
+        let read = open(&mut self.store, &self.path).and_then(|store| {
+            let tare = store.tare().map_err(|error| error.to_string())?;
+            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
+            Ok((serving, tare.map(|tare| tare.zero)))
+        });
+        let (read, zero) = match read {
+            Ok((serving, zero)) => (Ok(serving), zero),
+            Err(cause) => (Err(cause), None),
+        };
+        let (readout, remarks) = match read {
+            Ok(serving) => match Readout::new(&board, &serving.calibrations) {
+                Ok(readout) => {
+                    let remarks = serving.warnings.into_iter().chain(readout.warnings().iter().cloned()).collect();
+                    (readout, remarks)
+                }
+                Err(fault) => (Readout::default(), vec![fault.to_string()]),
+            },
+            Err(cause) => (Readout::default(), vec![cause]),
+        };
+        if let Some(connection) = &mut self.connection {
+            connection.plotted = Plotted::new(self.channels.to_vec(), board.channels.len());
+            connection.segmenter.set_board(&board);
+            connection.readout = readout;
+            connection.remarks = remarks;
+            connection.drift.clear();
+            if let Some(zero) = zero {
+                connection.set_zero(zero);
+            }
+        }
+    }
+
+    // Zeros.
+
+    /// The zeros of a trial are what the sensors show just before its closing.
+    pub(super) fn zero_from_rest(&mut self, closing_s: f64) {
+        let Some(connection) = &mut self.connection else { return };
+        let zero = connection.readout.zero_from(&connection.recent.between(closing_s - REST_S, closing_s));
+        connection.set_zero(zero);
+    }
+
+    pub(super) fn tare(&mut self) {
+        let Some(connection) = &mut self.connection else { return };
+        let readings = connection.recent.last(REST_S);
+        let zero = connection.readout.zero_from(&readings);
+        if zero == Zero::default() {
+            let text = "nothing was tared: no calibrated sensor has been read yet";
+            return self.outlets.tell(Notice::Warning(text.to_owned()));
+        }
+        connection.set_zero(zero);
+        let far: Vec<String> = connection
+            .drift
+            .iter()
+            .filter(|drift| drift.level == DriftLevel::TooFar)
+            .filter_map(Drift::remark)
+            .collect();
+        for text in far {
+            self.outlets.tell(Notice::Warning(text));
+        }
+        let stored = open(&mut self.store, &self.path)
+            .and_then(|store| store.add_tare(&zero).map_err(|error| error.to_string()));
+        match stored {
+            Ok(_) => {
+                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()));
+            }
+            Err(cause) => {
+                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")));
+            }
+        }
+    }
+
+    // Calibration.
+
+    pub(super) fn calibrate(&mut self, wish: &CalibrationWish) {
+        match wish {
+            CalibrationWish::Begin(plan) => self.begin_calibration(plan),
+            CalibrationWish::Stop => self.end_calibration(None),
+            CalibrationWish::Keep => {
+                let kept = match (&self.calibrating, open(&mut self.store, &self.path)) {
+                    (None, _) => return,
+                    (Some(calibrating), Ok(store)) => calibrating.keep(store),
+                    (Some(_), Err(cause)) => Some(Err(cause)),
+                };
+                if let Some(kept) = kept {
+                    self.end_calibration(Some(kept));
+                    self.read_calibrations();
+                }
+            }
+            CalibrationWish::Take(_) | CalibrationWish::Skip | CalibrationWish::Undo => {
+                if let Some(calibrating) = &mut self.calibrating {
+                    calibrating.grant(wish);
+                }
+            }
+        }
+    }
+
+    fn begin_calibration(&mut self, plan: &CalibrationPlan) {
+        let owns_port = self.connection.is_none();
+        if owns_port {
+            self.connect(plan.port.as_deref());
+        }
+        match (&self.connection, self.refused.take()) {
+            (None, refused) => {
+                self.calibrated = Some(Err(refused.clone().unwrap_or_else(|| "no board is connected".to_owned())));
+                self.refused = refused;
+            }
+            (Some(_), _) => self.calibrating = Some(Calibrating::new(plan.clone(), owns_port)),
+        }
+    }
+
+    pub(super) fn end_calibration(&mut self, ended: Option<Result<String, String>>) {
+        let owns_port = self.calibrating.take().is_some_and(|calibrating| calibrating.owns_port);
+        self.calibrated = ended;
+        if owns_port {
+            self.disconnect("the calibration has ended");
+        }
+    }
+}
+
+impl Connection {
+    /// Subtracts a zero from now on, and judges how far it is from the calibrations.
+    fn set_zero(&mut self, zero: Zero) {
+        self.drift = self.readout.drift(&zero);
+        self.readout = self.readout.clone().with_zero(zero);
+    }
+}
