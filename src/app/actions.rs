@@ -90,8 +90,8 @@ pub enum DeskAction {
     Choose(usize),
     /// Find objects by a part of their names.
     Search(String),
-    /// Put the cursor into the field that finds objects.
-    FocusSearch,
+    /// The cursor goes into the search field, after what was typed on its way there.
+    FocusSearch(String),
     /// The cursor is there.
     SearchFocused,
     /// Ask about this trial; without one about the newest that has no label.

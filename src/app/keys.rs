@@ -82,7 +82,9 @@ pub(super) const ALL: [Binding; 50] = [
     }),
     label(Modifiers::COMMAND, Key::E, "export all labelled trials", |_| Some(Action::Desk(DeskAction::Export))),
     label(Modifiers::COMMAND, Key::T, "train on all labelled trials", |_| Some(Action::Desk(DeskAction::Train))),
-    label(Modifiers::NONE, Key::Slash, "find an object", |_| Some(Action::Desk(DeskAction::FocusSearch))),
+    label(Modifiers::NONE, Key::Slash, "find an object", |_| {
+        Some(Action::Desk(DeskAction::FocusSearch(String::new())))
+    }),
     label(Modifiers::NONE, Key::Num1, "choose the first object; 2 to 9 the others", |_| {
         Some(Action::Desk(DeskAction::Choose(0)))
     }),
@@ -149,18 +151,17 @@ fn object_framed(context: &PanelContext<'_>) -> Option<Camera> {
 /// Actions for the keys pressed in this frame.
 pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Action> {
     if ctx.text_edit_focused() {
-        // Whoever has to stop the gripper does not look where the cursor is.
-        let stop = ctx.input(|i| i.key_pressed(Key::Escape));
-        return if stop { vec![Action::Stop] } else { Vec::new() };
+        return stop(ctx).into_iter().collect();
     }
     let mode = context.view.mode;
     if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F11)) {
         let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
         ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
     }
-    if let Some(typed) = (mode == Mode::Label).then(|| typed_after_slash(ctx)).flatten() {
-        let focus = Action::Desk(DeskAction::FocusSearch);
-        return std::iter::once(focus).chain(typed.map(|text| Action::Desk(DeskAction::Search(text)))).collect();
+    if mode == Mode::Label
+        && let Some(typed) = typed_for_search(ctx, context.view.draft.focus_search)
+    {
+        return std::iter::once(Action::Desk(DeskAction::FocusSearch(typed))).chain(stop(ctx)).collect();
     }
     ALL.iter()
         .filter(|binding| binding.counts_in(mode))
@@ -169,18 +170,33 @@ pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Ac
         .collect()
 }
 
-/// What was typed in this frame after the key that goes to the search field: it belongs there, and is no keys. None where
-/// that key was not pressed; nothing where it was the last.
-fn typed_after_slash(ctx: &egui::Context) -> Option<Option<String>> {
+/// Whoever has to stop the gripper does not look where the cursor is.
+fn stop(ctx: &egui::Context) -> Option<Action> {
+    ctx.input(|i| i.key_pressed(Key::Escape)).then_some(Action::Stop)
+}
+
+/// What was typed in this frame after the key that goes to the search field, or while the cursor is on its way there: it
+/// belongs there, and is no keys. None where nothing is for the field.
+fn typed_for_search(ctx: &egui::Context, on_its_way: bool) -> Option<String> {
     ctx.input_mut(|input| {
         let slash = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Slash, pressed: true, .. });
-        let from = input.events.iter().position(slash)?;
         let text = |event: &egui::Event| match event {
             egui::Event::Text(text) if text != "/" => Some(text.clone()),
             _ => None,
         };
-        let typed: String = input.events.drain(from..).filter_map(|event| text(&event)).collect();
-        Some(Some(typed).filter(|typed| !typed.is_empty()))
+        let pressed = input.events.iter().position(slash);
+        let from = pressed.or_else(|| on_its_way.then_some(0))?;
+        let typed: String = input.events[from..].iter().filter_map(text).collect();
+        if pressed.is_none() && typed.is_empty() {
+            return None;
+        }
+        let is_stop = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Escape, .. });
+        let mut place = 0;
+        input.events.retain(|event| {
+            place += 1;
+            place <= from || is_stop(event)
+        });
+        Some(typed)
     })
 }
 

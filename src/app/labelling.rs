@@ -118,6 +118,13 @@ impl LabelDraft {
         (self.search, self.chosen) = (String::new(), None);
     }
 
+    /// The cursor goes into the search field; what was typed on its way there stands in it already.
+    pub(super) fn type_ahead(&mut self, typed: &str) {
+        self.focus_search = true;
+        self.search.push_str(typed);
+        self.chosen = None;
+    }
+
     /// A label has been given: back to the newest trial without one.
     pub(super) fn done(&mut self) {
         *self = Self { shown: self.shown, focus_search: self.focus_search, ..Self::default() };

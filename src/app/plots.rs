@@ -58,7 +58,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
     let unit = plot.unit;
     let show_legend = ui.available_width() > 360.0 && ui.available_height() > 70.0;
     let seconds = AxisHints::new_x()
-        .formatter(|mark: GridMark, _| format!("{}\u{2009}s", plain(mark.value)))
+        .formatter(|mark: GridMark, shown| seconds_at(mark.value, shown))
         .label_spacing(egui::Rangef::new(24.0, 40.0));
     let mut widget = Plot::new(plot.id)
         .allow_zoom(false)
@@ -162,6 +162,12 @@ fn moved_window(
         return Some((!whole).then_some([start, end]));
     }
     None
+}
+
+/// A time at the axis; none so close to its end that it would be cut off there.
+fn seconds_at(value: f64, shown: &std::ops::RangeInclusive<f64>) -> String {
+    let left = (shown.end() - value) / (shown.end() - shown.start());
+    if left < 0.02 { String::new() } else { format!("{}\u{2009}s", plain(value)) }
 }
 
 /// A plot of what does not move: no mouse, its axes as wide as those of the others.

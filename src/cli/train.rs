@@ -95,6 +95,9 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     say(format!("channels    {}", trained.channels.join(", ")))?;
     say(format!("parameters  {}", trained.parameters))?;
     say(format!("cost        {:.1} s CPU", trained.train_cpu_s))?;
+    if model.card.rejection.is_none() {
+        say("unknown     never said: whatever is in the hand is named as one of these objects")?;
+    }
     say(format!("saved       {}", out.display()))
 }
 

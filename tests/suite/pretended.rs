@@ -146,8 +146,9 @@ fn survives(case: &Case) {
     assert_eq!(told["lost"], missing, "{faults}: what is missing is said: {told}, {:?}", trial.gaps);
     assert_eq!(told["reconnects"], case.reconnects, "{faults}: {told}");
     assert_eq!(told["dropped"], serde_json::json!([0, 0]), "{faults}");
-    // It goes on to the end: the last reading is no older than a burst.
-    assert!(kept[kept.len() - 1] + 25 > sent.len() && trial.readings.len() + missing > 100, "{faults}: {told}");
+    // It goes on to the end: the last reading is no older than a burst, and what a busy machine is behind by.
+    let behind = (told["delay_p95_ms"].as_f64().unwrap() * 0.05) as usize;
+    assert!(kept[kept.len() - 1] + 25 + behind > sent.len() && trial.readings.len() + missing > 100, "{faults}: {told}");
     assert_eq!(missing > 0, !trial.gaps.is_empty(), "{faults}: {:?}", trial.gaps);
     assert!(missing == 0 || trial.gaps.iter().any(|gap| gap.cause.contains(case.cause)), "{faults}: {:?}", trial.gaps);
     assert!(trial.readings.windows(2).all(|pair| pair[0].t_s < pair[1].t_s), "{faults}: time goes on");
@@ -259,7 +260,7 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
         ("nan=1@0", &[], "3", "open-circuit"),
         ("crosstalk=0.2@0", &[], "3", "crosstalk"),
         ("loss=0.2@1/30", &[], "3", "rate"),
-        ("garbage@1/1", &[], "3", "lines"),
+        ("garbage@1/1", &[], "6", "lines"),
         ("tenbit@0", &[], "6", "bits"),
         ("silent@0/60", &[], "3", "silence"),
     ];

@@ -64,6 +64,10 @@ impl Recogniser for Script {
         Some(Box::new(LiveScript { before: None, t: 0.0 }))
     }
 
+    fn has_stage_one(&self) -> bool {
+        true
+    }
+
     fn arrays(&self) -> Arrays {
         Arrays::default()
     }

@@ -23,9 +23,15 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let going_on = context.gripper.and_then(|gripper| gripper.trial.as_ref());
         match (going_on, context.view.draft.trial(view)) {
-            (Some(trial), _) => going_on_ui(ui, context, view, trial),
+            (Some(trial), _) => {
+                going_on_ui(ui, context, view, trial);
+                answer_ahead_ui(ui, context, actions);
+            }
             (None, Some(trial)) => question_ui(ui, context, view, trial, actions),
-            (None, None) => next_ui(ui, context, view, actions),
+            (None, None) => {
+                next_ui(ui, context, view, actions);
+                answer_ahead_ui(ui, context, actions);
+            }
         }
     });
 }
@@ -205,13 +211,26 @@ fn question_ui(
     remarks_ui(ui, context, trial, actions);
 }
 
+/// Whoever knows what it is before the question is asked says so: the field is there as soon as it is wanted.
+fn answer_ahead_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    let draft = &context.view.draft;
+    if draft.focus_search || !draft.search.is_empty() || ui.memory(|memory| memory.has_focus(search_id())) {
+        ui.add_space(4.0);
+        search_ui(ui, context, actions);
+    }
+}
+
+fn search_id() -> egui::Id {
+    egui::Id::unique("label search")
+}
+
 /// The field that finds objects.
 fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let draft = &context.view.draft;
     let mut search = draft.search.clone();
     let hint = "find an object, or name a new one ( / )";
     let field = TextEdit::singleline(&mut search).hint_text(hint).desired_width(f32::INFINITY).char_limit(80);
-    let response = ui.add(field.id(egui::Id::unique("label search")));
+    let response = ui.add(field.id(search_id()));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
     if draft.focus_search {
         response.request_focus();

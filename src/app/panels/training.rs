@@ -109,6 +109,10 @@ fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTrain
             format!("{} trials were left out: the sensors they were recorded with are not calibrated", judged.left_out);
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
     }
+    if trained.model.card.rejection.is_none() {
+        let text = "Whatever is in the hand, it names one of these: networks learn to say unknown from more trials.";
+        wrapped(ui, RichText::new(text).weak());
+    }
     confusion_ui(ui, context.view.theme, &judged.evaluation.confusion, &trained.model.card.labels);
     use_ui(ui, context, Some(&trained.path), "Use for the real gripper", actions);
 }

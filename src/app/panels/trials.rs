@@ -8,6 +8,7 @@ use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
 use palpate_core::labelling::LabelledTrial;
 use palpate_core::palette::Trace;
+use palpate_core::recording::TrialId;
 use palpate_core::workers::{LabelView, LabelWish};
 
 /// Height of a row (points).
@@ -41,11 +42,29 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         return;
     }
     let current = draft.trial(view).map(|trial| trial.id);
-    ScrollArea::vertical().auto_shrink(false).show_rows(ui, ROW, listed.len(), |ui, rows| {
+    let mut list = ScrollArea::vertical().auto_shrink(false);
+    if let Some(offset) = to_be_seen(ui, &listed, current) {
+        list = list.vertical_scroll_offset(offset);
+    }
+    let height = ROW - ui.spacing().item_spacing.y;
+    list.show_rows(ui, height, listed.len(), |ui, rows| {
         for trial in &listed[rows] {
             row_ui(ui, context, view, trial, current == Some(trial.id), actions);
         }
     });
+}
+
+/// Where the list must stand for a trial that was picked just now, by the arrows, to be seen in the middle.
+fn to_be_seen(ui: &Ui, listed: &[&LabelledTrial], current: Option<TrialId>) -> Option<f32> {
+    let seen = ui.scope_id().with("seen");
+    let before = ui.data(|data| data.get_temp::<Option<TrialId>>(seen)).flatten();
+    if before == current {
+        return None;
+    }
+    ui.data_mut(|data| data.insert_temp(seen, current));
+    let place = listed.iter().position(|trial| Some(trial.id) == current)?;
+    let above = 0.5 * (ui.available_height() - ROW);
+    Some((ROW * place as f32 - above).max(0.0))
 }
 
 fn row_ui(
@@ -57,7 +76,8 @@ fn row_ui(
     actions: &mut Vec<Action>,
 ) {
     let colours = context.view.theme.colours();
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW - 3.0), Sense::click());
+    let (rect, response) =
+        ui.allocate_exact_size(vec2(ui.available_width(), ROW - ui.spacing().item_spacing.y), Sense::click());
     let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), title_of);
     response.widget_info(|| {
         egui::WidgetInfo::selected(egui::Role::Button, true, current, format!("Trial {}, {name}", trial.id))

@@ -22,10 +22,11 @@ impl Workbench {
             DeskAction::Give => self.give_label(),
             DeskAction::Choose(place) => draft.chosen = Some(place),
             DeskAction::Search(search) => (draft.search, draft.chosen) = (search, None),
-            DeskAction::FocusSearch => {
-                // A question that is about to be asked is answered there, too.
-                let soon = self.trial_part.is_some() || self.asked_about().is_some() || self.awaits_question();
-                self.view.draft.focus_search = soon;
+            // A question that is about to be asked is answered there, too.
+            DeskAction::FocusSearch(typed) => {
+                if self.trial_part.is_some() || self.asked_about().is_some() || self.awaits_question() {
+                    self.view.draft.type_ahead(&typed);
+                }
             }
             DeskAction::SearchFocused => draft.focus_search = false,
             DeskAction::Select(id) => {
@@ -102,11 +103,15 @@ impl Workbench {
         let ended = gripper.ended.as_ref().map(|ended| ended.id);
         if self.trial_ended != ended {
             self.trial_ended = ended;
-            self.view.draft.done();
+            // What was typed while it went on is the answer to its question.
+            self.view.draft.selected = None;
             self.labeller.ask(LabelWish::Refresh);
         }
         let part = gripper.trial.as_ref().map(|trial| trial.part);
         if self.trial_part != part {
+            if self.trial_part.is_none() {
+                self.view.draft.done();
+            }
             self.trial_part = part;
             if part == Some(TrialPart::Phase(Phase::Close)) {
                 self.close_twin();
@@ -191,17 +196,22 @@ impl Workbench {
         self.labeller.view().is_none_or(|labels| labels.trial(ended).is_none_or(|trial| !trial.complete))
     }
 
-    /// The trial that the card asks about.
+    /// The trial that the card asks about: none while one goes on, or has ended and is not in the list yet.
     fn asked_about(&self) -> Option<LabelledTrial> {
+        if self.trial_part.is_some() || self.awaits_question() {
+            return None;
+        }
         self.view.draft.trial(self.labeller.view()?.as_ref()).cloned()
     }
 
-    /// Records a grasp. One that goes on, or has no label yet, is given up for it: it is recorded again.
+    /// Records a grasp. One that goes on is given up for it; at the labelling desk so is one that has no label yet: it is
+    /// recorded again.
     fn begin_trial(&mut self) {
+        let again = self.view.mode == Mode::Label && self.connected;
         let going_on = self.gripper.view().is_some_and(|gripper| gripper.trial.is_some());
         if going_on {
             self.gripper.wish(GripperWish::Discard);
-        } else if let Some(trial) = self.asked_about().filter(|trial| trial.object.is_none() && self.connected) {
+        } else if let Some(trial) = self.asked_about().filter(|trial| again && trial.object.is_none()) {
             self.labeller.ask(LabelWish::Discard(trial.id));
         }
         self.view.draft.done();
@@ -221,8 +231,8 @@ impl Workbench {
 
     /// The trial that the card asks about is of the object that is chosen.
     fn give_label(&mut self) {
-        let Some(labels) = self.labeller.view() else { return };
-        if let (Some(trial), Some(label)) = (self.view.draft.trial(&labels), self.view.draft.label(&labels)) {
+        let (Some(labels), Some(trial)) = (self.labeller.view(), self.asked_about()) else { return };
+        if let Some(label) = self.view.draft.label(&labels) {
             self.labeller.ask(LabelWish::Label(trial.id, label));
             // Somebody has looked at it again.
             if labels.disagreements.iter().any(|found| found.id == trial.id) {

@@ -55,6 +55,8 @@ impl std::fmt::Debug for Identification {
 pub struct IdentificationView {
     /// What can be answered.
     pub labels: Arc<Labels>,
+    /// Whether sizes and shapes are among it (stage one).
+    pub has_stage_one: bool,
     /// When it stops.
     pub rule: StopRule,
     /// The newest answer to the grasp that is going on, or to the last one; none before the first readings.
@@ -208,6 +210,7 @@ impl Identification {
     pub fn view(&self) -> IdentificationView {
         IdentificationView {
             labels: Arc::clone(&self.labels),
+            has_stage_one: self.model.recogniser.has_stage_one(),
             rule: self.rule,
             verdict: self.verdict.clone(),
             listening: !self.closed,

@@ -46,7 +46,7 @@ pub struct Properties {
 pub struct Verdict {
     /// Over [`Labels::classes`], with what was known before where it was given.
     pub pmf: Pmf,
-    /// Stage one, from this grasp alone; absent where the labels have no sizes or shapes.
+    /// Stage one, from this grasp alone; absent where the recogniser has none.
     pub properties: Option<Properties>,
 }
 
@@ -69,7 +69,12 @@ pub trait Recogniser: Send + Sync {
     /// Settings that were chosen or found while fitting, for the model's card.
     fn settings(&self) -> serde_json::Value;
 
-    /// How sure its answers must be to be taken for known objects.
+    /// Whether it says something of sizes and shapes, before it knows the object.
+    fn has_stage_one(&self) -> bool {
+        false
+    }
+
+    /// How sure its answers must be to be taken for known objects; absent where too little was seen to tell.
     fn rejection(&self) -> Option<&Rejection> {
         None
     }

@@ -72,8 +72,8 @@ impl Measures {
     }
 
     /// How many lines there are for classes, and how high each is.
-    fn lines(&self, height: f32, classes: usize, has_properties: bool) -> (usize, f32) {
-        let properties = if has_properties { 2.0 * self.properties + self.gap } else { 0.0 };
+    fn lines(&self, height: f32, classes: usize, has_stage_one: bool) -> (usize, f32) {
+        let properties = if has_stage_one { 2.0 * self.properties + self.gap } else { 0.0 };
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
         let room = height - parts - properties - 7.0 * self.gap;
         // All of them, if need be in lines as low as those of a small window.
@@ -106,8 +106,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
                     part.truth_ui(ui, truth);
                 }
                 properties::ui(ui, &part);
-                let has_properties = !view.labels.sizes.is_empty();
-                let lines = measures.lines(room.y, view.labels.classes.len(), has_properties);
+                let lines = measures.lines(room.y, view.labels.classes.len(), view.has_stage_one);
                 classes::ui(ui, &mut part, lines);
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);

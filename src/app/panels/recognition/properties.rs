@@ -16,7 +16,7 @@ const LETTERS: f32 = 11.0;
 
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     let labels = &part.view.labels;
-    if !labels.have_properties() {
+    if !part.view.has_stage_one {
         return;
     }
     // An empty hand has neither, but that is not known before the grasp is over.

@@ -69,6 +69,9 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
             None => format!("{grasp}; it is sure from {threshold} on"),
         },
         None if recognised.finished => format!("stopped before it was sure: {}", leaders(&view.labels, now)),
+        None if certain && view.beliefs.len() == 1 => {
+            format!("{}, but less sure than it is of what it knows: one more", percent(p))
+        }
         None if certain => format!("{}, but the grasps do not agree yet: one more", percent(p)),
         None => format!("one more grasp: {}", leaders(&view.labels, now)),
     }
@@ -133,6 +136,7 @@ mod tests {
     fn view(now: Option<f64>, beliefs: &[f64], decision: Option<StopReason>) -> IdentificationView {
         IdentificationView {
             labels: Arc::new(labels_of_catalogue()),
+            has_stage_one: true,
             rule: StopRule { threshold: 0.9, most_grasps: 4 },
             verdict: now.map(|p| Verdict { pmf: pmf(p), properties: None }),
             listening: false,
@@ -157,7 +161,8 @@ mod tests {
             (listening(0.61, &[]), "Lemon", "grasp 1 of at most 4; it is sure from 90 % on"),
             (listening(0.7, &[0.61]), "Lemon", "grasp 2 of at most 4; before it: lemon 61 %, tomato 35 %"),
             (view(Some(0.61), &[0.61], None), "Lemon", "one more grasp: lemon 61 %, tomato 35 %"),
-            (view(Some(0.92), &[0.92], None), "Lemon", "92 %, but the grasps do not agree yet: one more"),
+            (view(Some(0.92), &[0.92], None), "Lemon", "92 %, but less sure than it is of what it knows: one more"),
+            (view(Some(0.92), &[0.5, 0.92], None), "Lemon", "92 %, but the grasps do not agree yet: one more"),
             (view(Some(0.92), &[0.92], Some(StopReason::Sure)), "Lemon", "92 % reaches the threshold of 90 %"),
             (view(Some(0.8), &[0.8], Some(StopReason::Sure)), "Lemon", "80 % reached the threshold that was set then"),
             (view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)), "Lemon", "grasp limit of 4 reached, best guess"),

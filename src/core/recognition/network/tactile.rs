@@ -11,7 +11,7 @@
 //! Both stages run step by step: after every step stage two sees what stage one says by then. So the same network
 //! answers while the fingers close and at the end.
 
-use super::super::belief::{Rejection, agreement};
+use super::super::belief::{Rejection, StopRule, agreement};
 use super::super::data::{Dataset, Sequence};
 use super::super::model_file::{Arrays, ModelCard};
 use super::super::{FitError, Fitting, LiveRecogniser, Pmf, Properties, Recogniser, Verdict, check_enough};
@@ -31,7 +31,7 @@ pub struct TactileNetwork {
     learned: Learned,
     stage_one: Option<Calibrated>,
     stage_two: Calibrated,
-    rejection: Rejection,
+    rejection: Option<Rejection>,
 }
 
 /// What is learned besides weights.
@@ -67,6 +67,8 @@ impl NetworkCard {
 const CALIBRATION: usize = 6;
 /// Share of known objects that may be taken for unknown.
 const REJECTED_SHARE: f64 = 0.02;
+/// Grasps from which on the share is more than a part of one grasp.
+const LEAST_FOR_REJECTION: usize = (1.0 / REJECTED_SHARE) as usize - 1;
 /// Beliefs drawn to calibrate the rejection for each number of grasps.
 const DRAWN_BELIEFS: usize = 4000;
 /// Numbers of grasps for which it is calibrated.
@@ -126,7 +128,7 @@ impl TactileNetwork {
         if stage_two.shape().with_prior != learned.recipe.iterated {
             return Err("its second stage is not what its recipe says".to_owned());
         }
-        Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone().unwrap_or_default() })
+        Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone() })
     }
 
     fn reader(&self) -> LiveTactile {
@@ -386,8 +388,11 @@ impl Work<'_> {
 }
 
 /// Draws beliefs of several held-back grasps of the same object, and finds the agreement that all but a share of them
-/// reach.
-fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Rejection {
+/// reach. Among fewer grasps than [`LEAST_FOR_REJECTION`] nobody can tell where that share begins.
+fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Option<Rejection> {
+    if alone.len() < LEAST_FOR_REJECTION {
+        return None;
+    }
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0e1ec7);
     let mut of_class: Vec<Vec<&Pmf>> = Vec::new();
     for (class, pmf) in alone {
@@ -395,9 +400,8 @@ fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Rejection {
         of_class[*class].push(pmf);
     }
     of_class.retain(|pmfs| !pmfs.is_empty());
-    if of_class.is_empty() {
-        return Rejection::default();
-    }
+    // What is as sure as it takes to stop is no unknown object, however sure everything was that was seen.
+    let certain = 2.0 * StopRule::default().threshold.ln();
     let least = (1..=MOST_GRASPS)
         .map(|grasps| {
             let mut reached: Vec<f64> = (0..DRAWN_BELIEFS)
@@ -409,10 +413,10 @@ fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Rejection {
                 })
                 .collect();
             reached.sort_by(f64::total_cmp);
-            reached[(REJECTED_SHARE * DRAWN_BELIEFS as f64) as usize]
+            reached[(REJECTED_SHARE * DRAWN_BELIEFS as f64) as usize].min(certain)
         })
         .collect();
-    Rejection { share: REJECTED_SHARE, least }
+    Some(Rejection { share: REJECTED_SHARE, least })
 }
 
 impl Recogniser for TactileNetwork {
@@ -455,8 +459,12 @@ impl Recogniser for TactileNetwork {
         serde_json::to_value(&self.learned).unwrap_or_default()
     }
 
+    fn has_stage_one(&self) -> bool {
+        self.stage_one.is_some()
+    }
+
     fn rejection(&self) -> Option<&Rejection> {
-        Some(&self.rejection)
+        self.rejection.as_ref()
     }
 }
 
@@ -533,5 +541,29 @@ impl LiveRecogniser for LiveTactile {
             }
             None => self.latest.clone(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::Belief;
+    use super::*;
+
+    fn rejects(rejection: &Rejection, p: f64) -> bool {
+        let pmf = Pmf::from_weights([p, 1.0 - p, 0.0]);
+        let mut belief = Belief::default();
+        belief.add(pmf.clone(), pmf);
+        rejection.rejects(&belief)
+    }
+
+    #[test]
+    fn few_grasps_teach_nothing_of_unknown_objects() {
+        let sure = |class: usize| (class, Pmf::from_weights([0, 1, 2].map(|k| if k == class { 1.0 } else { 1e-6 })));
+        let of = |grasps: usize| -> Vec<(usize, Pmf)> { (0..grasps).map(|n| sure(n % 3)).collect() };
+        assert_eq!(calibrated_rejection(&of(LEAST_FOR_REJECTION - 1), 1), None);
+        // All that was seen was surer than a model ever is of real grasps: what it takes to stop is enough still.
+        let rejection = calibrated_rejection(&of(LEAST_FOR_REJECTION), 1).expect("enough");
+        assert!(!rejects(&rejection, 0.999) && !rejects(&rejection, 0.9));
+        assert!(rejects(&rejection, 0.5));
     }
 }
