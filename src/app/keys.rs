@@ -25,6 +25,17 @@ impl Binding {
     fn counts_in(&self, mode: Mode) -> bool {
         self.only.is_none_or(|only| only == mode)
     }
+
+    /// Shift more than is asked for is where the key is on this keyboard.
+    fn is(&self, key: Key, modifiers: Modifiers) -> bool {
+        let KeyboardShortcut { modifiers: wanted, logical_key } = self.shortcut;
+        logical_key == key && modifiers.alt == wanted.alt && modifiers.matches_logically(wanted)
+    }
+
+    /// Held down it does so again and again; others do what they do once.
+    fn repeats(&self) -> bool {
+        matches!(self.shortcut.logical_key, Key::ArrowUp | Key::ArrowDown | Key::ArrowRight | Key::Minus | Key::Equals)
+    }
 }
 
 const fn key(
@@ -55,7 +66,7 @@ const fn hidden(at: Key, act: fn(&PanelContext<'_>) -> Option<Action>) -> Bindin
 }
 
 /// All keys. Those with more modifiers come first, so that they win.
-pub(super) const ALL: [Binding; 50] = [
+pub(super) static ALL: [Binding; 50] = [
     key(Modifiers::COMMAND, Key::Num1, "mode Demo", |_| Some(Action::SetMode(Mode::Demo))),
     key(Modifiers::COMMAND, Key::Num3, "mode Label", |_| Some(Action::SetMode(Mode::Label))),
     key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or begin it anew", |_| {
@@ -163,11 +174,24 @@ pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Ac
     {
         return std::iter::once(Action::Desk(DeskAction::FocusSearch(typed))).chain(stop(ctx)).collect();
     }
-    ALL.iter()
-        .filter(|binding| binding.counts_in(mode))
-        .filter(|binding| ctx.input_mut(|i| i.consume_shortcut(&binding.shortcut)))
-        .filter_map(|binding| (binding.act)(context))
-        .collect()
+    bound(ctx, mode).into_iter().filter_map(|binding| (binding.act)(context)).collect()
+}
+
+/// What the keys of this frame are bound to, in the order in which they were pressed. Nothing else hears of them.
+fn bound(ctx: &egui::Context, mode: Mode) -> Vec<&'static Binding> {
+    let mut pressed = Vec::new();
+    ctx.input_mut(|input| {
+        input.events.retain(|event| {
+            let egui::Event::Key { key, modifiers, pressed: true, repeat, .. } = event else { return true };
+            let fits = |binding: &&Binding| binding.counts_in(mode) && binding.is(*key, *modifiers);
+            let Some(binding) = ALL.iter().find(fits) else { return true };
+            if !repeat || binding.repeats() {
+                pressed.push(binding);
+            }
+            false
+        });
+    });
+    pressed
 }
 
 /// Whoever has to stop the gripper does not look where the cursor is.
@@ -244,5 +268,32 @@ mod tests {
             let together = |b: &&Binding| a.only.is_none() || b.only.is_none() || a.only == b.only;
             assert!(ALL[k + 1..].iter().filter(together).all(|b| a.shortcut != b.shortcut), "{}", a.does);
         }
+    }
+    fn key(key: Key, modifiers: Modifiers, repeat: bool) -> egui::Event {
+        egui::Event::Key { key, physical_key: None, pressed: true, repeat, modifiers }
+    }
+
+    /// What a frame with these events does in the mode Label.
+    fn does(events: Vec<egui::Event>) -> Vec<&'static str> {
+        let ctx = egui::Context::default();
+        let mut does = Vec::new();
+        let mut drawn = ctx.run_ui(egui::RawInput { events, ..egui::RawInput::default() }, |ui| {
+            does = bound(ui.ctx(), Mode::Label).iter().map(|binding| binding.does).collect();
+        });
+        drawn.textures_delta.clear();
+        does
+    }
+
+    #[test]
+    fn keys_of_a_frame_act_in_their_order_and_once() {
+        let plain = |at: Key| key(at, Modifiers::NONE, false);
+        let choose = "choose the first object; 2 to 9 the others";
+        assert_eq!(does(vec![plain(Key::Num1), plain(Key::N)]), [choose, "give the label, go on with the next"]);
+        assert_eq!(does(vec![plain(Key::D), key(Key::D, Modifiers::NONE, true)]), ["discard the trial"]);
+        assert_eq!(does(vec![plain(Key::ArrowUp), key(Key::ArrowUp, Modifiers::NONE, true)]).len(), 2);
+        assert_eq!(does(vec![key(Key::Num1, Modifiers::ALT, false)]), ["front view"]);
+        assert_eq!(does(vec![key(Key::Slash, Modifiers::SHIFT, false)]), ["find an object"]);
+        assert_eq!(does(vec![key(Key::Z, UNDONE, false)]), ["make it again"]);
+        assert_eq!(does(vec![key(Key::Z, Modifiers::COMMAND, false)]), ["take the last label or discard back"]);
     }
 }

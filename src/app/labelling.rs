@@ -4,7 +4,7 @@
 use super::panels::title_of;
 use palpate_core::labelling::LabelledTrial;
 use palpate_core::recording::TrialId;
-use palpate_core::workers::LabelView;
+use palpate_core::workers::{LabelView, LabelWish};
 
 /// What the user is about to say.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -24,6 +24,9 @@ pub struct LabelDraft {
     /// Which trials the list shows.
     pub shown: ShownTrials,
 }
+
+/// Objects that can be chosen by a number.
+pub(super) const LISTED: usize = 9;
 
 /// Which trials the list shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,8 +80,9 @@ impl LabelDraft {
         }
     }
 
-    /// Names of objects that fit what was typed, in the order of their keys: of the plan, what comes next first. What fits
-    /// none is the name of a new object.
+    /// Names of objects that fit what was typed, in the order of their keys: of the plan, what comes next first. What is
+    /// none of their names may be that of a new object, which comes last of those with a
+    /// number.
     pub(super) fn objects(&self, view: &LabelView) -> Vec<String> {
         let wanted = self.search.trim().to_lowercase();
         let next = view.next.iter().map(|next| next.object.clone());
@@ -94,8 +98,8 @@ impl LabelDraft {
         // A name that was typed whole comes first.
         let whole = |name: &str| name.to_lowercase() == wanted || title_of(name).to_lowercase() == wanted;
         names.sort_by_key(|name| wanted.is_empty() || !whole(name));
-        if names.is_empty() && !wanted.is_empty() {
-            names.push(self.search.trim().to_owned());
+        if !wanted.is_empty() && !names.first().is_some_and(|name| whole(name)) {
+            names.insert(names.len().min(LISTED - 1), self.search.trim().to_owned());
         }
         names
     }
@@ -103,7 +107,7 @@ impl LabelDraft {
     /// The label that would be given now.
     pub(super) fn label(&self, view: &LabelView) -> Option<String> {
         let names = self.objects(view);
-        names.get(self.chosen.unwrap_or(0)).or_else(|| names.first()).cloned()
+        names.get(self.chosen.unwrap_or(0)).cloned()
     }
 
     /// Moves to the trial so many places further in the list.
@@ -125,10 +129,28 @@ impl LabelDraft {
         self.chosen = None;
     }
 
+    /// What was written of a trial and is not in the store: its note, its tags.
+    pub(super) fn unsaved(&self, view: &LabelView) -> Vec<LabelWish> {
+        let note = self
+            .note
+            .as_ref()
+            .and_then(|(id, text)| (view.trial(*id)?.note != *text).then(|| LabelWish::Note(*id, text.clone())));
+        let tags = self.tags.as_ref().and_then(|(id, text)| {
+            let tags = tags_of(text);
+            (view.trial(*id)?.tags != tags).then_some(LabelWish::Tags(*id, tags))
+        });
+        note.into_iter().chain(tags).collect()
+    }
+
     /// A label has been given: back to the newest trial without one.
     pub(super) fn done(&mut self) {
         *self = Self { shown: self.shown, focus_search: self.focus_search, ..Self::default() };
     }
+}
+
+/// Tags, as they are written with commas.
+pub(super) fn tags_of(text: &str) -> Vec<String> {
+    text.split(',').map(|tag| tag.trim().to_owned()).filter(|tag| !tag.is_empty()).collect()
 }
 
 #[cfg(test)]
@@ -156,12 +178,23 @@ mod tests {
         assert_eq!(draft.objects(&view), ["ball", "bigball"]);
         // By what people call it, too.
         draft.search = "stop".to_owned();
-        assert_eq!(draft.objects(&view), ["button"]);
+        assert_eq!(draft.objects(&view), ["button", "stop"]);
+        // A new one whose name is a part of another's, and a number that nothing stands behind.
+        draft.search = "ring".to_owned();
+        assert_eq!(draft.objects(&view), ["syringe", "ring"]);
+        draft.chosen = Some(1);
+        assert_eq!(draft.label(&view).as_deref(), Some("ring"));
+        draft.chosen = Some(7);
+        assert_eq!(draft.label(&view), None);
+        draft.chosen = None;
         draft.search = "ball".to_owned();
         draft.chosen = Some(1);
         assert_eq!(draft.label(&view).as_deref(), Some("bigball"));
-        draft.search = " garlic ".to_owned();
+        (draft.search, draft.chosen) = (" garlic ".to_owned(), None);
         assert_eq!(draft.label(&view).as_deref(), Some("garlic"));
+        draft.note = Some((4, "slipped".to_owned()));
+        draft.tags = Some((3, " ,".to_owned()));
+        assert_eq!(draft.unsaved(&view), [LabelWish::Note(4, "slipped".to_owned())]);
         draft.done();
         assert_eq!(draft, LabelDraft::default());
     }

@@ -88,6 +88,8 @@ pub struct Workbench {
     felt: Traces,
     /// The part of the trial that was seen last: the simulation closes its fingers with the real ones.
     trial_part: Option<TrialPart>,
+    /// The wish by which the last trial was begun.
+    begun_by: u64,
     connected: bool,
     /// Whether the simulation stored its trials, and how many grasps it made, before it became the gripper's twin.
     before_twin: Option<(bool, u32)>,
@@ -194,6 +196,7 @@ impl Workbench {
             trial_ended: None,
             felt: Traces::default(),
             trial_part: None,
+            begun_by: 0,
             connected: false,
             before_twin: None,
             wake: setup.wake,
@@ -468,10 +471,12 @@ impl Workbench {
                 self.gripper.wish(wish);
             }
             Action::Desk(action) => self.at_desk(action),
-            Action::ToggleGripper => self.gripper.wish(match self.connected {
-                true => GripperWish::Disconnect,
-                false => GripperWish::Connect(self.view.port.clone()),
-            }),
+            Action::ToggleGripper => {
+                self.gripper.wish(match self.connected {
+                    true => GripperWish::Disconnect,
+                    false => GripperWish::Connect(self.view.port.clone()),
+                });
+            }
             Action::Label(wish) => self.labeller.ask(wish),
             Action::Stop => {
                 self.view.keys_shown = false;

@@ -46,15 +46,15 @@ fn scene() -> Scene {
 
 /// The pretended gripper, waiting to be driven.
 pub(crate) fn board(parts: &HiddenParts) -> Listen {
-    pretended(parts, None, FAST)
+    pretended(parts, None, FAST, 30)
 }
 
 /// The pretended gripper, grasping by itself.
 fn moving(parts: &HiddenParts) -> Listen {
-    pretended(parts, Some(7.0), FAST)
+    pretended(parts, Some(7.0), FAST, 30)
 }
 
-fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration) -> Listen {
+fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, most_steps: u8) -> Listen {
     let parts = parts.clone();
     Arc::new(move |port| {
         if let Some(port) = port {
@@ -66,7 +66,7 @@ fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration) ->
             parts: parts.clone(),
             rate_hz: 50,
             channels: 4,
-            most_steps: 30,
+            most_steps,
             clock_start_us: 0,
             faults: vec![],
             seed: 1,
@@ -203,7 +203,7 @@ fn stop_vents_ends_the_trial_and_says_so() {
 #[test]
 fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
     // What waits is written about once a second of the clock, which must come before the trial's end.
-    let mut desk = Desk::on(pretended(&parts(1, false), None, TRUE_TO_TIME));
+    let mut desk = Desk::on(pretended(&parts(1, false), None, TRUE_TO_TIME, 30));
     desk.connect();
     desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
     let pressed = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
@@ -376,6 +376,58 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
     }
     desk.wish(GripperWish::Watch(None));
     desk.until(|view| view.watching.is_none());
+}
+
+#[test]
+fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
+    // Half a bar at most, where the programme goes up to one.
+    let mut desk = Desk::on(pretended(&parts(1, false), None, FAST, 10));
+    desk.connect();
+    let id = desk.trial(Control::Driven, false);
+    desk.until_said("the trial was ended, and the fingers vented: the board said: refused reason=above-maximum");
+    desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
+    let trial = desk.store().board_trial(id).unwrap().unwrap();
+    // The refused step is the last that it was told.
+    let most = trial.about.phases.iter().filter_map(|mark| mark.line_bar).fold(0.0, f64::max);
+    assert!((most - 0.55).abs() < 1e-9, "{most} bar");
+    assert!(trial.readings.iter().all(|reading| reading.line_bar <= Some(0.501)));
+    let rows = desk.rows.iter().filter(|row| row.grasp == 2);
+    assert!(rows.map(|row| row.line_bar).all(|bar| bar.is_nan() || bar < 0.501), "the board knows better");
+}
+
+#[test]
+fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
+    let mut desk = Desk::on(moving(&parts(1, false)));
+    let request = TrialRequest { object: None, control: Control::Free, adds: false };
+    desk.connect();
+    desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
+    desk.wish(GripperWish::Watch(Some(request.clone())));
+    desk.wish(GripperWish::Begin(request));
+    let id = desk.until(|view| view.trial.is_some()).trial.as_ref().unwrap().id;
+    // A whole grasp passes.
+    for pressed in [true, false] {
+        let is = |bar: Option<f64>| if pressed { bar > Some(0.5) } else { bar < Some(0.01) };
+        let view = desk.until(|view| view.latest.as_ref().is_some_and(|latest| is(latest.line_bar)));
+        assert_eq!(view.trial.as_ref().map(|trial| trial.id), Some(id));
+    }
+    desk.wish(GripperWish::End);
+    let ended = desk.until(|view| view.ended.is_some()).ended.clone().unwrap();
+    assert_eq!(ended.id, id);
+}
+
+#[test]
+fn zeros_are_taken_from_open_hands_alone() {
+    let parts = parts(1, false);
+    let mut desk = Desk::on(moving(&parts));
+    store_calibrations(&desk.store, &parts);
+    desk.connect();
+    desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
+    desk.wish(GripperWish::Tare);
+    desk.until_said("bar is on: vent");
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Free, adds: false }));
+    desk.wish(GripperWish::Tare);
+    desk.until_said("nothing was tared: a trial goes on");
+    assert!(desk.store().tare().unwrap().is_none());
 }
 
 #[test]

@@ -148,7 +148,10 @@ fn survives(case: &Case) {
     assert_eq!(told["dropped"], serde_json::json!([0, 0]), "{faults}");
     // It goes on to the end: the last reading is no older than a burst, and what a busy machine is behind by.
     let behind = (told["delay_p95_ms"].as_f64().unwrap() * 0.05) as usize;
-    assert!(kept[kept.len() - 1] + 25 + behind > sent.len() && trial.readings.len() + missing > 100, "{faults}: {told}");
+    assert!(
+        kept[kept.len() - 1] + 25 + behind > sent.len() && trial.readings.len() + missing > 100,
+        "{faults}: {told}"
+    );
     assert_eq!(missing > 0, !trial.gaps.is_empty(), "{faults}: {:?}", trial.gaps);
     assert!(missing == 0 || trial.gaps.iter().any(|gap| gap.cause.contains(case.cause)), "{faults}: {:?}", trial.gaps);
     assert!(trial.readings.windows(2).all(|pair| pair[0].t_s < pair[1].t_s), "{faults}: time goes on");

@@ -4,6 +4,7 @@
 use super::{PanelContext, title_of, wrapped};
 use crate::app::actions::{Action, DeskAction};
 use crate::app::bars::instruction;
+use crate::app::labelling::{LISTED, tags_of};
 use crate::app::theme::{colour, veil};
 use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
 use palpate_core::labelling::{LabelledTrial, NextTrial};
@@ -12,8 +13,6 @@ use palpate_core::workers::{GripperView, LabelView, LabelWish, TrialView};
 
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;
-/// Objects that are listed.
-const LISTED: usize = 9;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let Some(view) = context.labels else {
@@ -303,8 +302,7 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
         if response.changed() {
             actions.push(Action::Desk(DeskAction::WriteTags(trial.id, tags.clone())));
         }
-        let list: Vec<String> =
-            tags.split(',').map(|tag| tag.trim().to_owned()).filter(|tag| !tag.is_empty()).collect();
+        let list = tags_of(&tags);
         if response.lost_focus() && list != trial.tags {
             actions.push(Action::Label(LabelWish::Tags(trial.id, list)));
         }

@@ -20,7 +20,11 @@ impl Workbench {
             DeskAction::Record => self.begin_trial(),
             DeskAction::Discard => self.discard_trial(),
             DeskAction::Give => self.give_label(),
-            DeskAction::Choose(place) => draft.chosen = Some(place),
+            DeskAction::Choose(place) => {
+                let objects = self.labeller.view().map(|labels| draft.objects(&labels).len());
+                draft.chosen =
+                    Some(place).filter(|place| objects.is_some_and(|objects| *place < objects)).or(draft.chosen);
+            }
             DeskAction::Search(search) => (draft.search, draft.chosen) = (search, None),
             // A question that is about to be asked is answered there, too.
             DeskAction::FocusSearch(typed) => {
@@ -110,6 +114,10 @@ impl Workbench {
         let part = gripper.trial.as_ref().map(|trial| trial.part);
         if self.trial_part != part {
             if self.trial_part.is_none() {
+                // One that begins by itself asks nobody whether they are done with writing.
+                let labels = self.labeller.view();
+                let unsaved = labels.map(|labels| self.view.draft.unsaved(&labels)).unwrap_or_default();
+                unsaved.into_iter().for_each(|wish| self.labeller.ask(wish));
                 self.view.draft.done();
             }
             self.trial_part = part;
@@ -196,32 +204,43 @@ impl Workbench {
         self.labeller.view().is_none_or(|labels| labels.trial(ended).is_none_or(|trial| !trial.complete))
     }
 
-    /// The trial that the card asks about: none while one goes on, or has ended and is not in the list yet.
+    /// The trial that the card asks about: none while one goes on, or has ended and is not in the list yet, and none while
+    /// the card does not show what came of the last keys: nobody means what they cannot see.
     fn asked_about(&self) -> Option<LabelledTrial> {
-        if self.trial_part.is_some() || self.awaits_question() {
+        let shown = self.labeller.is_settled() && !self.is_beginning();
+        if self.trial_part.is_some() || self.awaits_question() || !shown {
             return None;
         }
         self.view.draft.trial(self.labeller.view()?.as_ref()).cloned()
+    }
+
+    /// A trial has been asked for and is not seen yet.
+    fn is_beginning(&self) -> bool {
+        self.gripper.view().map_or(0, |gripper| gripper.granted) < self.begun_by
+    }
+
+    /// Whether a trial goes on, or is about to.
+    fn has_trial(&self) -> bool {
+        self.is_beginning() || self.gripper.view().is_some_and(|gripper| gripper.trial.is_some())
     }
 
     /// Records a grasp. One that goes on is given up for it; at the labelling desk so is one that has no label yet: it is
     /// recorded again.
     fn begin_trial(&mut self) {
         let again = self.view.mode == Mode::Label && self.connected;
-        let going_on = self.gripper.view().is_some_and(|gripper| gripper.trial.is_some());
-        if going_on {
+        if self.has_trial() {
             self.gripper.wish(GripperWish::Discard);
         } else if let Some(trial) = self.asked_about().filter(|trial| again && trial.object.is_none()) {
             self.labeller.ask(LabelWish::Discard(trial.id));
         }
         self.view.draft.done();
         let request = TrialRequest { object: None, control: self.view.control, adds: self.view.mode == Mode::Demo };
-        self.gripper.wish(GripperWish::Begin(request));
+        self.begun_by = self.gripper.wish(GripperWish::Begin(request));
     }
 
     /// Gives up the trial that goes on, or throws away the one that the card asks about.
     fn discard_trial(&mut self) {
-        if self.gripper.view().is_some_and(|gripper| gripper.trial.is_some()) {
+        if self.has_trial() {
             self.gripper.wish(GripperWish::Discard);
         } else if let Some(trial) = self.asked_about() {
             self.labeller.ask(LabelWish::Discard(trial.id));
@@ -231,6 +250,9 @@ impl Workbench {
 
     /// The trial that the card asks about is of the object that is chosen.
     fn give_label(&mut self) {
+        if !self.labeller.is_settled() {
+            return self.tell(Message::Info("one moment: what was asked for before is not done yet".to_owned()));
+        }
         let (Some(labels), Some(trial)) = (self.labeller.view(), self.asked_about()) else { return };
         if let Some(label) = self.view.draft.label(&labels) {
             self.labeller.ask(LabelWish::Label(trial.id, label));

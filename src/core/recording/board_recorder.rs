@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 
 /// What waits to be written is never older than this.
 const FLUSH_AFTER: Duration = Duration::from_millis(800);
+/// How often the end of a trial is offered to a store that another program writes to. Each waits for ten seconds.
+const MOST_ENDS: u32 = 6;
 /// How often what waits is offered to a store that another program writes to; together as long as others wait for it.
 const MOST_OFFERS: u32 = 12;
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
@@ -197,7 +199,8 @@ impl BoardRecorder {
         Ok(())
     }
 
-    /// Ends the trial; `notes` are what its rig has to say.
+    /// Ends the trial; `notes` are what its rig has to say. Another program that writes to the store is waited for, for a
+    /// minute.
     pub fn finish(
         mut self,
         store: &mut Store,
@@ -205,7 +208,7 @@ impl BoardRecorder {
         notes: Vec<String>,
     ) -> Result<Recorded, StoreError> {
         self.close(status);
-        self.flush(store)?;
+        stubbornly(|| self.flush(store))?;
         let (before, reconnects) = &self.before;
         self.about.reconnects = status.reconnects - reconnects;
         self.about.detected.clone_from(&status.detected);
@@ -219,7 +222,7 @@ impl BoardRecorder {
         self.examine(store);
         let mut warnings = self.warnings(status);
         warnings.extend(notes);
-        store.finish_board(self.id, &self.about, &warnings)?;
+        stubbornly(|| store.finish_board(self.id, &self.about, &warnings))?;
         Ok(Recorded { id: self.id, about: self.about, warnings })
     }
 
@@ -283,5 +286,34 @@ impl BoardRecorder {
             warnings.push(format!("the board has not all of flexL, flexR, fsrL, fsrR, but {names}"));
         }
         warnings
+    }
+}
+
+/// What must not be lost is tried again while another program writes.
+fn stubbornly<T>(mut write: impl FnMut() -> Result<T, StoreError>) -> Result<T, StoreError> {
+    for _ in 1..MOST_ENDS {
+        match write() {
+            Err(StoreError::Busy) => {}
+            outcome => return outcome,
+        }
+    }
+    write()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_busy_store_is_asked_again_and_not_for_ever() {
+        let tried = |free_after: u32| {
+            let mut tries = 0;
+            let outcome = stubbornly(|| {
+                tries += 1;
+                if tries > free_after { Ok(tries) } else { Err(StoreError::Busy) }
+            });
+            (outcome.ok(), tries)
+        };
+        assert_eq!((tried(0), tried(3), tried(99)), ((Some(1), 1), (Some(4), 4), (None, 6)));
     }
 }

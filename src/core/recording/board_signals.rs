@@ -57,10 +57,43 @@ impl Store {
         let mut derived = readout.derive(&trial.readings, closing_s);
         derived.warnings.extend(serving.warnings.iter().cloned());
         let marks = trial.about.phases.iter().filter_map(|mark| Some((mark.from_s - began, mark.line_bar?)));
-        let mut line: Vec<(f64, f64)> = marks.collect();
-        if line.is_empty() {
-            line = trial.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();
-        }
+        let commanded: Vec<(f64, f64)> = marks.collect();
+        let told: Vec<(f64, f64)> =
+            trial.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();
+        let line = if is_obeyed(&commanded, &told) { commanded } else { told };
         Ok(Some(BoardSignals { derived, serving, line, closing_s, release_s }))
+    }
+}
+
+/// A pressure that is farther from the commanded one than this is another (bar): half a step of the control box.
+const HALF_STEP_BAR: f64 = 0.026;
+/// The board tells a new pressure within this time (s).
+const ANSWER_S: f64 = 0.1;
+
+/// Whether the board did what it was told, and when: commands are the better times then. Where it refused, or vented by
+/// itself, only what it tells is true.
+fn is_obeyed(commanded: &[(f64, f64)], told: &[(f64, f64)]) -> bool {
+    let other = |(t_s, bar): &&(f64, f64)| {
+        let last = commanded.iter().take_while(|(from_s, _)| from_s <= t_s).last();
+        last.is_some_and(|(from_s, asked)| t_s - from_s > ANSWER_S && (bar - asked).abs() > HALF_STEP_BAR)
+    };
+    !commanded.is_empty() && told.iter().filter(other).count() < 3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_board_refused_or_vented_is_not_what_it_was_told() {
+        let commanded = [(0.0, 0.5), (1.0, 1.0)];
+        let told = |bar_of: fn(f64) -> f64| -> Vec<(f64, f64)> {
+            (0..100).map(|k| 0.02 * f64::from(k)).map(|t_s| (t_s, bar_of(t_s))).collect()
+        };
+        assert!(is_obeyed(&commanded, &told(|t_s| if t_s < 1.04 { 0.5 } else { 1.0 })));
+        assert!(is_obeyed(&commanded, &[]), "a board that tells nothing is believed");
+        assert!(!is_obeyed(&commanded, &told(|_| 0.5)), "the second step was refused");
+        assert!(!is_obeyed(&commanded, &told(|t_s| if t_s < 1.5 { 1.0 } else { 0.0 })), "it vented");
+        assert!(!is_obeyed(&[], &told(|_| 0.5)));
     }
 }

@@ -4,7 +4,7 @@
 use super::latest::Latest;
 use super::messages::Wake;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
@@ -17,6 +17,9 @@ pub struct Desk<W, V> {
     /// Set to give up everything that was wished for with it.
     stop: Arc<AtomicBool>,
     view: Arc<Latest<V>>,
+    /// Wishes so far, and how many of them have been dealt with.
+    asked: AtomicU64,
+    done: Arc<AtomicU64>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -44,22 +47,32 @@ impl<W: Send + 'static, V: Send + Sync + 'static> Desk<W, V> {
         let (wishes, inbox) = channel::<(W, Arc<AtomicBool>)>();
         let view = Arc::new(Latest::default());
         let outlet = Outlet { view: Arc::clone(&view), wake };
+        let (asked, done) = (AtomicU64::new(0), Arc::new(AtomicU64::new(0)));
+        let dealt_with = Arc::clone(&done);
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             while let Ok((wish, stop)) = inbox.recv() {
                 work(wish, &stop, &outlet);
+                dealt_with.fetch_add(1, Ordering::Release);
+                (outlet.wake)();
             }
         })?;
-        Ok(Self { wishes: Some(wishes), stop: Arc::default(), view, thread: Some(thread) })
+        Ok(Self { wishes: Some(wishes), stop: Arc::default(), view, asked, done, thread: Some(thread) })
     }
 }
 
 impl<W, V> Desk<W, V> {
     /// Asks for something; it is done after what was asked for before.
     pub fn ask(&self, wish: W) {
+        self.asked.fetch_add(1, Ordering::Relaxed);
         if let Some(wishes) = &self.wishes {
             // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
             let _heard = wishes.send((wish, Arc::clone(&self.stop)));
         }
+    }
+
+    /// True when the view shows what came of everything that was asked for.
+    pub fn is_settled(&self) -> bool {
+        self.done.load(Ordering::Acquire) == self.asked.load(Ordering::Relaxed)
     }
 
     /// Gives up everything that was asked for.
@@ -130,6 +143,13 @@ mod tests {
     fn wishes_are_granted_in_order_and_given_up_together() {
         let (mut desk, woken) = counter();
         assert_eq!(desk.view(), None);
+        assert!(desk.is_settled());
+        desk.ask(u64::MAX);
+        assert!(!desk.is_settled());
+        desk.give_up();
+        while !desk.is_settled() {
+            woken.recv_timeout(std::time::Duration::from_secs(60)).expect("the thread is alive");
+        }
         desk.ask(7);
         until(&desk, &woken, |n| *n == 7);
         desk.ask(u64::MAX);

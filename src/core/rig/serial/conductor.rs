@@ -8,6 +8,9 @@ use crate::trial::PhaseMark;
 /// The board vents when it hears nothing for a second; this leaves it time (s).
 const KEEP_ALIVE_S: f64 = 0.4;
 
+/// Behind the clock by more than this, a programme goes on from where it was, later: the pressure takes no leap (s).
+const LATE_S: f64 = 0.25;
+
 /// The line that vents the fingers.
 pub const VENT: &str = "V";
 
@@ -28,12 +31,18 @@ impl Conductor {
         Self { control, actuation_hz, from_s, asked: None, commanded: None, sent_s: from_s }
     }
 
-    /// The actuation tick that is due and was not asked for. Ticks that were slept through are left out.
+    /// The actuation tick that is due and was not asked for. A few that were slept through are left out; after more of
+    /// them, or where the first comes late, the programme is that much later.
     pub fn tick(&mut self, now_s: f64) -> Option<u32> {
         if self.control == Control::Free || now_s < self.from_s {
             return None;
         }
-        let tick = ((now_s - self.from_s) * self.actuation_hz) as u32;
+        let next = self.asked.map_or(0, |asked| asked + 1);
+        let late_s = now_s - self.from_s - f64::from(next) / self.actuation_hz;
+        if late_s > LATE_S {
+            self.from_s += late_s;
+        }
+        let tick = ((now_s - self.from_s) * self.actuation_hz + 1e-6) as u32;
         (self.asked != Some(tick)).then(|| {
             self.asked = Some(tick);
             tick
@@ -63,6 +72,11 @@ impl Conductor {
             self.sent_s = now_s;
             "K"
         })
+    }
+
+    /// When tick 0 was or will be (s); where the programme is late, later ticks count from a later time.
+    pub fn from_s(&self) -> f64 {
+        self.from_s
     }
 
     /// Who moves the fingers.
@@ -102,6 +116,13 @@ mod tests {
         let mut by_hand = Conductor::new(Control::ByHand, 10.0, 0.0);
         let (mark, line) = by_hand.command(0.05, Phase::Close, 0.0).expect("something new");
         assert_eq!((mark.line_bar, line, by_hand.keep_alive(9.0)), (None, None, None));
+        // However late it begins, and however long it sleeps: no leap.
+        let mut late = Conductor::new(Control::Driven, 10.0, 2.0);
+        let told: Vec<(u32, f64)> =
+            [5.0, 5.1, 5.2, 8.0, 8.1].map(|now_s| (late.tick(now_s).unwrap_or(99), late.from_s())).into();
+        let ticks: Vec<u32> = told.iter().map(|(tick, _)| *tick).collect();
+        assert_eq!(ticks, [0, 1, 2, 3, 4]);
+        assert!((told[0].1 - 5.0).abs() < 1e-9 && (told[4].1 - 7.7).abs() < 1e-9, "{told:?}");
         assert_eq!(Conductor::new(Control::Free, 10.0, 0.0).tick(1.0), None);
     }
 }

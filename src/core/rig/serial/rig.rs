@@ -7,7 +7,7 @@ use super::queue::LinkEvent;
 use crate::gripper::Phase;
 use crate::rig::{Event, Rig, RigError};
 use crate::trial::{PhaseMark, Quality};
-use crate::wire::Heard;
+use crate::wire::{Captured, Heard};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,7 +69,7 @@ impl SerialRig {
         let mut first_s = None;
         let began_s = loop {
             heard.extend(link.take(PATIENCE));
-            let LinkStatus { state, port, baud, .. } = link.status();
+            let LinkStatus { state, port, baud, cadence, .. } = link.status();
             first_s = first_s.or_else(|| heard.iter().find_map(reading_time));
             if let Some(first_s) = first_s {
                 // Captured bytes keep the beginning that they were captured with.
@@ -82,7 +82,13 @@ impl SerialRig {
             }
             let nonsense = matches!(state, LinkState::Unreadable { .. }) && start.elapsed() > NONSENSE;
             if nonsense || start.elapsed() > FIRST_READING || stop.load(Ordering::Relaxed) || link.is_over() {
-                let (path, why) = (port.path.display(), state.sentence());
+                let (path, why, bad) = (port.path.display(), state.sentence(), cadence.bad_lines);
+                if baud.is_none() && link.is_over() {
+                    return Err(RigError::Board(format!(
+                        "no reading is in \"{path}\" ({bad} line(s) could not be read): it should hold bytes as a board \
+                         sent them, such as `palpate trials export --labelled` writes"
+                    )));
+                }
                 return Err(RigError::Board(format!("nothing was heard from \"{path}\": {why}")));
             }
         };
@@ -111,6 +117,15 @@ impl SerialRig {
             if !self.notes.contains(&note) {
                 self.notes.push(note);
             }
+            self.cut();
+        }
+    }
+
+    /// The fingers do not do any more what they are told: where this program drives them, it must not go on as if nothing
+    /// had happened, with a leap of pressure.
+    fn cut(&mut self) {
+        if self.plan.control == Control::Driven && !std::mem::replace(&mut self.over, true) {
+            self.notes.push("ended early, and told to vent".to_owned());
         }
     }
 
@@ -124,6 +139,10 @@ impl SerialRig {
             && (text.starts_with("refused") || text.starts_with("vent"))
         {
             self.notes.push(format!("the board said: {text}"));
+            self.cut();
+        }
+        if matches!(event, LinkEvent::Captured(Captured::Interrupted { .. })) {
+            self.cut();
         }
         Some(Event::Heard(event))
     }

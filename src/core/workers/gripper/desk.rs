@@ -91,6 +91,7 @@ pub(super) struct Desk {
     stretch: (u64, f64),
     channels: Arc<[Channel]>,
     revision: u64,
+    granted: u64,
     published: Instant,
 }
 
@@ -119,6 +120,7 @@ impl Desk {
             stretch: (0, 0.0),
             channels: whole_fingers().into(),
             revision: 0,
+            granted: 0,
             published: Instant::now(),
         };
         desk.set_model(model);
@@ -143,6 +145,8 @@ impl Desk {
             match wish {
                 Some(GripperWish::Quit) => break,
                 Some(wish) => {
+                    // The doctor asks by himself.
+                    self.granted += u64::from(!matches!(wish, GripperWish::Observe(_)));
                     self.obey(wish);
                     self.publish();
                 }
@@ -280,6 +284,7 @@ impl Desk {
             && let Some(running) = &mut self.running
         {
             running.take(event);
+            self.end_what_is_cut();
             self.write();
         }
     }
@@ -288,7 +293,8 @@ impl Desk {
         let Some(connection) = &mut self.connection else { return };
         let felt = connection.readout.felt(reading);
         let commanded = self.running.as_ref().and_then(Running::line_bar);
-        let line_bar = commanded.or(reading.line_bar);
+        // A board that tells its pressure knows better than whoever commands it.
+        let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
         let rows = connection.plotted.push(reading, &felt, line_bar);
         connection.latest = Some(LatestReading { counts: reading.counts.clone(), felt, line_bar });
@@ -332,6 +338,7 @@ impl Desk {
         let trial = self.running.as_ref().zip(connection).map(|(running, c)| running.view(c.stream.now_s()));
         self.outlets.view.publish(Arc::new(GripperView {
             revision: self.revision,
+            granted: self.granted,
             link,
             refused: self.refused.clone(),
             ports: self.ports.clone(),

@@ -130,6 +130,8 @@ pub struct EndedTrial {
 pub struct GripperView {
     /// Rises with every change.
     pub revision: u64,
+    /// Wishes that have been granted, of those that were asked for; what is shown here came after them.
+    pub granted: u64,
     /// The link; none while nothing is listened to.
     pub link: Option<LinkStatus>,
     /// Why the last port could not be opened.

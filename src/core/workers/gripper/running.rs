@@ -8,7 +8,7 @@ use crate::recording::{BoardRecorder, BoardTrialPlan, Store, StoreError};
 use crate::rig::serial::{Conductor, Control, LinkEvent, LinkStatus};
 use crate::scene::Scene;
 use crate::trial::PhaseMark;
-use crate::wire::Heard;
+use crate::wire::{Captured, Heard};
 
 /// What came before the button was pressed and belongs to the trial (s).
 pub(super) const BEFORE_S: f64 = 0.3;
@@ -32,17 +32,23 @@ pub(super) struct Running {
     /// Commanded line pressure (bar), where this program commands it.
     line_bar: Option<f64>,
     notes: Vec<String>,
+    /// It began with what the fingers did, and ends with it.
+    by_itself: bool,
+    /// Why it cannot go on.
+    cut: Option<String>,
 }
 
 impl Running {
-    /// Begins to record what was heard from `from_s` on. The control box of a conducted trial begins a while after `now_s`.
+    /// Begins to record what was heard from `from_s` on. The control box of a conducted trial begins a
+    /// while after the store has taken it.
     pub(super) fn begin(
         store: &mut Store,
         request: TrialRequest,
         scene: &Scene,
         status: &LinkStatus,
         recent: &Recent,
-        [from_s, now_s]: [f64; 2],
+        from_s: f64,
+        now_s: impl Fn() -> f64,
     ) -> Result<Self, StoreError> {
         let tick_s = 1.0 / f64::from(scene.timing.actuation_hz.max(1));
         let programme = scene.programme.clone();
@@ -61,8 +67,8 @@ impl Running {
         let began_s = first.unwrap_or(from_s);
         let mut recorder = BoardRecorder::begin(store, &plan, status, began_s)?;
         before.into_iter().for_each(|event| recorder.take(event));
-        let closing_s = conducted.then_some(now_s + LEAD_S);
-        let conductor = Conductor::new(request.control, 1.0 / tick_s, now_s + LEAD_S);
+        let closing_s = conducted.then(|| now_s() + LEAD_S);
+        let conductor = Conductor::new(request.control, 1.0 / tick_s, closing_s.unwrap_or(began_s));
         Ok(Self {
             request,
             recorder,
@@ -74,6 +80,8 @@ impl Running {
             phase: None,
             line_bar: None,
             notes: Vec::new(),
+            by_itself: false,
+            cut: None,
         })
     }
 
@@ -81,14 +89,43 @@ impl Running {
     pub(super) fn take(&mut self, event: LinkEvent) {
         match &event {
             LinkEvent::Heard(Heard::Said(text)) if text.starts_with("refused") => {
-                self.note(format!("the board said: {text}"));
+                let cause = format!("the board said: {text}");
+                self.note(cause.clone());
+                self.cut(cause);
             }
             LinkEvent::Heard(Heard::Said(text)) if text.starts_with("vent") => {
-                self.recorder.interrupt(&format!("the board vented by itself ({text})"));
+                let cause = format!("the board vented by itself ({text})");
+                self.recorder.interrupt(&cause);
+                self.cut(cause);
             }
+            LinkEvent::Captured(Captured::Interrupted { cause, .. }) => self.cut(cause.clone()),
             LinkEvent::Heard(_) | LinkEvent::Captured(_) => {}
         }
         self.recorder.take(event);
+    }
+
+    /// What the fingers do is no longer what they are told to: where this program drives them, it must not go on as if
+    /// nothing had happened, with a leap of pressure.
+    pub(super) fn cut(&mut self, cause: String) {
+        if self.is_driven() {
+            self.cut.get_or_insert(cause);
+        }
+    }
+
+    /// Why it cannot go on.
+    pub(super) fn why_cut(&self) -> Option<&str> {
+        self.cut.as_deref()
+    }
+
+    /// It began with what the fingers did.
+    pub(super) fn began_by_itself(mut self, by_itself: bool) -> Self {
+        self.by_itself = by_itself;
+        self
+    }
+
+    /// Whether it begins and ends with what the fingers do.
+    pub(super) fn is_by_itself(&self) -> bool {
+        self.by_itself
     }
 
     /// Does what is due by now: the line for the board, and the phase that begins, if any.
@@ -104,7 +141,9 @@ impl Running {
     /// Notes what the control box does; the phase, where it is a new one.
     pub(super) fn mark(&mut self, mark: PhaseMark) -> Option<Phase> {
         let phase = mark.phase;
-        let new = self.phase != Some(phase);
+        // Fingers that pause while they close go on closing: the zeros were taken before.
+        let again = phase == Phase::Close && self.phase.is_some();
+        let new = self.phase != Some(phase) && !again;
         if new && phase == Phase::Close {
             self.closing_s = Some(mark.from_s);
         }
@@ -143,9 +182,11 @@ impl Running {
         status: &LinkStatus,
         discarded: bool,
     ) -> Result<EndedTrial, StoreError> {
-        let recorded = self.recorder.finish(store, status, self.notes)?;
-        if discarded {
-            store.discard_trial(recorded.id)?;
+        let mut recorded = self.recorder.finish(store, status, self.notes)?;
+        let given_up = discarded.then(|| store.discard_trial(recorded.id));
+        let discarded = matches!(given_up, Some(Ok(())));
+        if let Some(Err(error)) = given_up {
+            recorded.warnings.push(format!("it could not be discarded: {error}"));
         }
         let cadence = cadence_line(&recorded.about.cadence);
         Ok(EndedTrial { id: recorded.id, request: self.request, discarded, warnings: recorded.warnings, cadence })
@@ -167,9 +208,7 @@ impl Running {
 
     fn programme_ends_s(&self) -> Option<f64> {
         let conducted = self.request.control != Control::Free;
-        self.closing_s
-            .filter(|_| conducted)
-            .map(|closing_s| closing_s + self.tick_s * f64::from(self.programme.total_ticks()))
+        conducted.then(|| self.conductor.from_s() + self.tick_s * f64::from(self.programme.total_ticks()))
     }
 
     pub(super) fn view(&self, now_s: f64) -> TrialView {
@@ -180,7 +219,8 @@ impl Running {
             (Some(end_s), _) if now_s >= end_s => (TrialPart::Settling, Some(end_s + SETTLE_S)),
             (Some(_), None) => (TrialPart::Ready, Some(closing_s)),
             (Some(end_s), Some(phase)) => {
-                let closed_s = closing_s + self.tick_s * f64::from(self.programme.close_ticks());
+                let began_s = self.conductor.from_s();
+                let closed_s = began_s + self.tick_s * f64::from(self.programme.close_ticks());
                 let until_s = match phase {
                     Phase::Close => closed_s,
                     Phase::Hold => closed_s + self.tick_s * f64::from(self.programme.hold_ticks),

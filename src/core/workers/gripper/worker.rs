@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::workers::{Examine, Latest, Notice, TraceRow, Wake};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
 use std::thread::JoinHandle;
 
@@ -37,6 +37,8 @@ const MOST_ROWS: usize = 9000;
 pub struct GripperWorker {
     /// Absent once the thread is being ended.
     wishes: Option<Sender<GripperWish>>,
+    /// Wishes so far.
+    asked: AtomicU64,
     view: Arc<Latest<GripperView>>,
     rows: Receiver<TraceRow>,
     rows_lost: Arc<AtomicBool>,
@@ -72,15 +74,24 @@ impl GripperWorker {
                 last_words.1();
             }
         })?;
-        Ok(Self { wishes: Some(wishes), view, rows, rows_lost, notices, thread: Some(thread) })
+        Ok(Self {
+            wishes: Some(wishes),
+            asked: AtomicU64::new(0),
+            view,
+            rows,
+            rows_lost,
+            notices,
+            thread: Some(thread),
+        })
     }
 
-    /// Asks for something.
-    pub fn wish(&self, wish: GripperWish) {
+    /// Asks for something; how many wishes that makes. [`GripperView::granted`] tells how many have been granted.
+    pub fn wish(&self, wish: GripperWish) -> u64 {
         if let Some(wishes) = &self.wishes {
             // A thread that has died has said so; the rest of the window works.
             let _heard = wishes.send(wish);
         }
+        self.asked.fetch_add(1, Ordering::Relaxed) + 1
     }
 
     /// What looks at the board for the doctor: at the link that is held here or, while none is, as `alone` does.

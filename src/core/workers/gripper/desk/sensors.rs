@@ -8,6 +8,8 @@ use crate::workers::gripper::plotted::Plotted;
 
 /// Readings before the closing from which the zeros are taken (s).
 const REST_S: f64 = 0.6;
+/// Readings older than this say nothing of now (s).
+const STALE_S: f64 = 2.0;
 
 impl Desk {
     /// Reads the board through the newest calibrations of its parts.
@@ -54,14 +56,27 @@ impl Desk {
         connection.set_zero(zero);
     }
 
+    /// Takes the zeros of now, where the hand is open and left alone.
     pub(super) fn tare(&mut self) {
-        let Some(connection) = &mut self.connection else { return };
-        let readings = connection.recent.last(REST_S);
-        let zero = connection.readout.zero_from(&readings);
-        if zero == Zero::default() {
-            let text = "nothing was tared: no calibrated sensor has been read yet";
+        if self.running.is_some() {
+            let text = "nothing was tared: a trial goes on; its zeros are taken before it closes";
             return self.outlets.tell(Notice::Warning(text.to_owned()));
         }
+        // The zero is kept for the parts that serve in the store now, so it is measured through them.
+        self.read_calibrations();
+        let Some(connection) = &mut self.connection else { return };
+        let mut readings = connection.recent.last(2.0 * REST_S);
+        // What was heard before the board fell silent says nothing of now; captured bytes keep their own time.
+        let since_s = if connection.stream.status().baud.is_some() { connection.stream.now_s() - STALE_S } else { 0.0 };
+        readings.retain(|reading| reading.t_s > since_s);
+        let zero = match connection.readout.tare(&readings) {
+            Ok(zero) if zero != Zero::default() => zero,
+            Ok(_) => {
+                let text = "nothing was tared: no calibrated sensor has been read yet";
+                return self.outlets.tell(Notice::Warning(text.to_owned()));
+            }
+            Err(unrest) => return self.outlets.tell(Notice::Warning(format!("nothing was tared: {unrest}"))),
+        };
         connection.set_zero(zero);
         let far: Vec<String> = connection
             .drift

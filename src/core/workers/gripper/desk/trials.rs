@@ -18,7 +18,7 @@ impl Desk {
         let events = connection.segmenter.push(reading);
         let Some(request) = self.watching.clone() else { return };
         // A trial that was asked for goes its own way.
-        if self.running.as_ref().is_some_and(|running| *running.request() != request) {
+        if self.running.as_ref().is_some_and(|running| !running.is_by_itself()) {
             return;
         }
         for event in events {
@@ -59,16 +59,26 @@ impl Desk {
         if let Some(line) = line
             && let Err(error) = connection.stream.send(&line)
         {
-            running.note(format!("{line}: {error}"));
+            let cause = format!("{line}: {error}");
+            running.note(cause.clone());
+            running.cut(cause);
         }
         let over = running.is_over(now_s);
         if let Some(phase) = phase {
             self.begin_phase(phase, f64::INFINITY);
         }
+        self.end_what_is_cut();
         self.write();
         if over {
             self.end(false, None);
         }
+    }
+
+    /// Ends a trial whose fingers do not do any more what they are told.
+    pub(super) fn end_what_is_cut(&mut self) {
+        let Some(cause) = self.running.as_ref().and_then(Running::why_cut) else { return };
+        self.outlets.tell(Notice::Warning(format!("the trial was ended, and the fingers vented: {cause}")));
+        self.end(false, None);
     }
 
     /// What was heard before `until_s` has been passed over.
@@ -102,16 +112,18 @@ impl Desk {
             let text = format!("nothing is recorded yet: {}", connection.stream.status().state.sentence());
             return self.outlets.tell(Notice::Warning(text));
         }
-        let now_s = connection.stream.now_s();
-        let from_s = from_s.unwrap_or(now_s - BEFORE_S);
+        let by_itself = from_s.is_some();
+        let from_s = from_s.unwrap_or(connection.stream.now_s() - BEFORE_S);
         let status = connection.stream.status();
         let adds = request.adds;
         let store = match open(&mut self.store, &self.path) {
             Ok(store) => store,
             Err(cause) => return self.outlets.tell(Notice::Failed(cause)),
         };
-        match Running::begin(store, request, &self.scene, &status, &connection.recent, [from_s, now_s]) {
+        let now_s = || connection.stream.now_s();
+        match Running::begin(store, request, &self.scene, &status, &connection.recent, from_s, now_s) {
             Ok(running) => {
+                let running = running.began_by_itself(by_itself);
                 self.another_stretch(running.closing_s.unwrap_or(running.began_s));
                 self.running = Some(running);
                 self.begun += 1;
@@ -171,13 +183,14 @@ impl Desk {
         let guess = guess.zip(self.model.clone());
         let finished = open(&mut self.store, &self.path).and_then(|store| {
             let ended = running.finish(store, &status, discarded).map_err(|error| error.to_string())?;
-            if let Some((pmf, model)) = guess {
-                store.set_guess(ended.id, &model, &pmf).map_err(|error| error.to_string())?;
-            }
-            Ok(ended)
+            let guessed = guess.map_or(Ok(()), |(pmf, model)| store.set_guess(ended.id, &model, &pmf));
+            Ok((ended, guessed))
         });
         match finished {
-            Ok(ended) => {
+            Ok((ended, guessed)) => {
+                if let Err(error) = guessed {
+                    self.outlets.tell(Notice::Warning(format!("what the model took it for was not stored: {error}")));
+                }
                 if !discarded {
                     self.outlets.tell(Notice::Stored(ended.id));
                 }
