@@ -1,10 +1,11 @@
 //! The whole window's contents: it owns the simulation's handle, the view state and the traces, lets panels draw, and
 //! applies what they ask for.
 
+mod files;
 mod real;
 
 use super::actions::{Action, Answer, Message};
-use super::files::{Ask, ask};
+use super::files::Ask;
 use super::gripper_tools::{GripperTools, GripperToolsSetup, ToolWish};
 use super::panels::{PanelContext, PanelKind, Source};
 use super::theme::{self, colour};
@@ -15,11 +16,9 @@ use super::viewport::Viewport;
 use super::{bars, keys};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_notify::Toasts;
-use glam::Vec2;
 use palpate_core::drawing::Camera;
 use palpate_core::grasping::ObjectDeck;
-use palpate_core::objects::{EMPTY, anchored, catalogue, thumbnail};
-use palpate_core::picture::PictureView;
+use palpate_core::objects::{EMPTY, catalogue, thumbnail};
 use palpate_core::recognition::Model;
 use palpate_core::recording::TrialId;
 use palpate_core::scene::Scene;
@@ -30,9 +29,9 @@ use palpate_core::workers::{
     LabelWish, Labeller, Listen, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
     TrainWish, TrainedModel, TrialPart, Wake, start_labeller,
 };
-use palpate_render::{DriverChoice, Gpu, Picture, Renderer, describe_adapter};
+use palpate_render::{Picture, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
@@ -67,8 +66,6 @@ const LIVE_LAYOUT: &str = "C1+F";
 const GRASPS: u32 = 4;
 /// Names the sequence of objects that come when any other may.
 const DECK_SEED: u64 = 1;
-/// Pixels per point of saved pictures.
-const PICTURE_SCALE: f32 = 2.0;
 
 /// Everything in the window.
 pub struct Workbench {
@@ -278,7 +275,7 @@ impl Workbench {
             layout.ui(&mut Tiling { context: &context, actions: &mut actions }, ui);
         });
         keys::sheet(&ctx, self.view.keys_shown, self.view.mode, &mut actions);
-        drop_hint(&ctx);
+        files::drop_hint(&ctx);
         self.view.layouts.insert(mode, layout);
         for action in actions {
             self.apply(&ctx, action);
@@ -524,41 +521,6 @@ impl Workbench {
         self.framed = Some(self.view.camera);
     }
 
-    fn ask(&mut self, what: Ask) {
-        let wake = Arc::clone(&self.wake);
-        ask(what, &self.answers.0, move || wake());
-    }
-
-    fn take_answer(&mut self, ctx: &egui::Context, answer: Answer) {
-        match answer {
-            Answer::Open(path) => self.open(&path.to_string_lossy()),
-            Answer::SaveScene(path, scene) => self.save_scene(&path, &scene),
-            Answer::SavePicture(path) => self.save_picture(path),
-            Answer::Tell(message) => self.tell(message),
-        }
-        ctx.request_repaint();
-    }
-
-    /// Grasps a built-in object, a file, or the scene in a scene file.
-    fn open(&mut self, source: &str) {
-        if source.to_ascii_lowercase().ends_with(".toml") {
-            match Scene::from_file(Path::new(source)) {
-                Ok(scene) => self.set_scene(scene),
-                Err(error) => self.tell(Message::Error(error.to_string())),
-            }
-            return;
-        }
-        let mut scene = self.scene.clone();
-        scene.object.source = anchored(source);
-        // Mass and size belong to the object that was there before.
-        let fresh = Scene::default().object;
-        scene.object.mass = fresh.mass;
-        scene.object.friction = fresh.friction;
-        scene.object.scale = fresh.scale;
-        scene.object.rotation_deg = fresh.rotation_deg;
-        self.set_scene(scene);
-    }
-
     fn set_scene(&mut self, scene: Scene) {
         if let Err(error) = scene.check() {
             return self.tell(Message::Error(error.to_string()));
@@ -572,63 +534,12 @@ impl Workbench {
     fn send_scene(&mut self) {
         self.unsent = self.worker.send(Command::SetScene(Box::new(self.scene.clone()))) == Err(NotSent::Busy);
     }
-
-    fn save_scene(&mut self, path: &Path, scene: &Scene) {
-        match std::fs::write(path, scene.to_toml()) {
-            Ok(()) => self.tell(Message::Info(format!("scene saved as {}", path.display()))),
-            Err(error) => self.tell(Message::Error(format!("cannot write {}: {error}", path.display()))),
-        }
-    }
-
-    /// Draws the view once more, off-screen and twice as fine, in a thread of its own.
-    fn save_picture(&mut self, path: PathBuf) {
-        let Some(snapshot) = self.worker.snapshot() else { return };
-        let size = Vec2::new(800.0, 560.0);
-        let view = PictureView {
-            camera: self.view.camera,
-            theme: self.view.theme,
-            forces: self.view.forces,
-            size,
-            badge: Some("SIMULATED".to_owned()),
-            ..PictureView::default()
-        };
-        let (answers, wake, ghost) = (self.answers.0.clone(), Arc::clone(&self.wake), self.ghost());
-        let draw = move || {
-            let drawn = draw_picture(&snapshot, ghost.as_deref(), &view, &path);
-            let message = match drawn {
-                Ok(()) => Message::Info(format!("picture saved as {}", path.display())),
-                Err(text) => Message::Error(text),
-            };
-            let _heard = answers.send(Answer::Tell(message));
-            wake();
-        };
-        if let Err(error) = std::thread::Builder::new().name("picture".to_owned()).spawn(draw) {
-            self.tell(Message::Error(format!("the picture could not be drawn: {error}")));
-        }
-    }
 }
 
 /// The ghost's sample at the time of the snapshot's, if it belongs to the same grasp.
 fn ghost_of<'a>(snapshot: Option<&Snapshot>, ghost: Option<&'a GhostGrasp>) -> Option<&'a TrialFrame> {
     let (snapshot, ghost) = (snapshot?, ghost?);
     ghost.at(snapshot.frame.t).filter(|_| ghost.grasp == snapshot.grasp)
-}
-
-fn draw_picture(
-    snapshot: &Snapshot,
-    ghost: Option<&GhostGrasp>,
-    view: &PictureView,
-    path: &Path,
-) -> Result<(), String> {
-    let gpu = Gpu::headless(DriverChoice::Any).map_err(|e| e.to_string())?;
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    let pixels = [view.size.x, view.size.y].map(|side| (side * PICTURE_SCALE) as u32);
-    let mut list = snapshot.stage.draw(&snapshot.frame, view);
-    if let Some(frame) = ghost_of(Some(snapshot), ghost) {
-        list.ghosts = snapshot.stage.ghosts(frame, view.theme);
-    }
-    let picture = Picture::draw(&gpu, &mut renderer, &list, pixels, PICTURE_SCALE).map_err(|e| e.to_string())?;
-    picture.save(path).map_err(|e| e.to_string())
 }
 
 /// Pictures of the built-in objects, as textures.
@@ -643,18 +554,4 @@ fn load_thumbnails(ctx: &egui::Context) -> BTreeMap<String, egui::TextureHandle>
         }
     }
     textures
-}
-
-/// While a file hovers over the window: what will happen when it is dropped.
-fn drop_hint(ctx: &egui::Context) {
-    if ctx.input(|i| i.raw.hovered_files.is_empty()) {
-        return;
-    }
-    let rect = ctx.content_rect();
-    let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop hint"));
-    let painter = ctx.layer_painter(layer);
-    painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(150));
-    let font = egui::FontId::proportional(22.0);
-    let text = "Drop a URDF, OBJ, STL or scene file to grasp it";
-    painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
 }

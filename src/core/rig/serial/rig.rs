@@ -190,15 +190,19 @@ impl Rig for SerialRig {
             if let Some(mark) = self.marks.pop_front() {
                 return Ok(Event::Commanded(mark));
             }
-            let now_s = self.link.now_s();
-            if let Some(tick) = self.conductor.tick(now_s).filter(|_| !self.over) {
-                return Ok(Event::ActuationDue { tick });
+            // Before the board is told anything, everything that it has said is heard: it may have vented.
+            if self.heard.is_empty() {
+                self.heard = self.link.take(Duration::ZERO).into();
             }
             if let Some(event) = self.heard.pop_front() {
                 match self.hear(event) {
                     Some(event) => return Ok(event),
                     None => return Ok(Event::Finished),
                 }
+            }
+            let now_s = self.link.now_s();
+            if let Some(tick) = self.conductor.tick(now_s).filter(|_| !self.over) {
+                return Ok(Event::ActuationDue { tick });
             }
             if self.is_over() {
                 return Ok(Event::Finished);
