@@ -7,10 +7,9 @@ use super::terminal::{say, say_json, table, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_core::grasping::record_board;
 use palpate_core::labelling::{FlagRemark, class_name, flaws, shown_name};
-use palpate_core::objects::EMPTY;
 use palpate_core::recording::{BoardRecorder, BoardTrialPlan, Recorded};
 use palpate_core::rig::serial::{
-    Baud, Control, LinkOptions, LinkState, LinkStatus, SerialLink, SerialPlan, SerialRig, list_ports,
+    Baud, CUT, Control, LinkOptions, LinkState, LinkStatus, SerialLink, SerialPlan, SerialRig, list_ports,
 };
 use palpate_core::scene::Scene;
 use serde::Serialize;
@@ -25,12 +24,10 @@ pub(super) struct RecordArguments {
     /// How long to record (s); without it until Ctrl+C, or for as long as the programme takes.
     #[arg(long, value_name = "N", value_parser = parse_seconds)]
     seconds: Option<f64>,
-    /// What is in the hand.
-    #[arg(long, value_name = "NAME", default_value = EMPTY)]
-    object: String,
-    /// Say later what is in the hand, with `palpate trials label`; until then no data set takes the trial.
-    #[arg(long, conflicts_with = "object")]
-    unlabelled: bool,
+    /// What is in the hand; "empty" for nothing. Without it `palpate trials label` says so later, and until then no data set
+    /// takes the trial.
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Let the board drive the control box through the programme of the scene: P, K and V lines, as our firmware takes them.
     #[arg(long, conflicts_with = "by_hand")]
     drive: bool,
@@ -98,7 +95,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         Some(path) => Scene::from_file(path)?,
         None => Scene::default(),
     };
-    let object = if arguments.unlabelled { None } else { Some(class_name(&arguments.object)?) };
+    let object = arguments.object.as_deref().map(class_name).transpose()?;
     let mut store = open_store(store)?;
     let stop = stop_flag()?;
     let link = SerialLink::open(&LinkOptions {
@@ -125,7 +122,13 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     });
     bar.finish_and_clear();
     let (recorded, status) = outcome?;
-    tell(recorded, object, &status, arguments.json)
+    let is_cut = recorded.warnings.iter().any(|text| text == CUT);
+    tell(recorded, object, &status, arguments.json)?;
+    if is_cut {
+        Err("the fingers did not do what they were told, so the trial ended early; it is stored".into())
+    } else {
+        Ok(())
+    }
 }
 
 fn progress(recorder: &BoardRecorder, status: &LinkStatus) -> String {

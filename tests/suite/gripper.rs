@@ -13,10 +13,11 @@ use palpate_core::rig::serial::Control;
 use palpate_core::scene::{Accuracy, Scene};
 use palpate_core::workers::{
     CalibrationPlan, CalibrationWish, Examine, ExamineRequest, GripperSetup, GripperView, GripperWish, GripperWorker,
-    Listen, Notice, TraceRow, TrialPart, TrialRequest,
+    Listen, NotOpened, Notice, TraceRow, TrialPart, TrialRequest,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -58,7 +59,7 @@ fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, mo
     let parts = parts.clone();
     Arc::new(move |port| {
         if let Some(port) = port {
-            return Err(format!("there is no {}", port.display()));
+            return Err(format!("there is no {}", port.display()).into());
         }
         let hand = HandPlan { scene: scene(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s, script: vec![] };
         let setup = PretendedSetup {
@@ -413,6 +414,24 @@ fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
     desk.wish(GripperWish::End);
     let ended = desk.until(|view| view.ended.is_some()).ended.clone().unwrap();
     assert_eq!(ended.id, id);
+}
+
+#[test]
+fn a_port_that_another_program_has_is_opened_when_that_lets_it_go() {
+    let tries = AtomicU32::new(0);
+    let free = board(&parts(1, false));
+    let mut desk = Desk::on(Arc::new(move |port| match tries.fetch_add(1, Ordering::Relaxed) {
+        0 | 1 => Err(NotOpened { text: "it is open in another program".to_owned(), may_pass: true }),
+        _ => free(port),
+    }));
+    desk.wish(GripperWish::Connect(None));
+    desk.until_said("it is open in another program; until then it is tried each second");
+    let view = desk.until(|view| view.latest.is_some());
+    assert!(view.refused.is_none() && view.is_connected());
+    // What does not pass is not tried again.
+    desk.wish(GripperWish::Connect(Some("/dev/nothing".into())));
+    let view = desk.until(|view| view.refused.is_some());
+    assert_eq!((view.refused.as_deref(), view.is_connected()), (Some("there is no /dev/nothing"), false));
 }
 
 #[test]

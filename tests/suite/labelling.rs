@@ -50,6 +50,7 @@ fn faults_of_the_pretended_gripper_are_flagged_and_a_good_grasp_is_not() {
         (lemon, "rail=3@1.5", vec!["saturated"]),
         (lemon, "silent@2/0.6", vec!["interrupted"]),
         (lemon, "loss=0.3@1/1", vec!["cadence"]),
+        (lemon, "nan=1@0", vec!["interrupted"]),
     ] {
         capture(at, "grasp.bytes", script, faults);
         let told = record(at, "grasp.bytes", &["--object", "lemon"]);
@@ -60,7 +61,7 @@ fn faults_of_the_pretended_gripper_are_flagged_and_a_good_grasp_is_not() {
     }
     // An empty hand feels nothing, and should not.
     capture(at, "grasp.bytes", "rest=0.5; close empty bar=0.6", "");
-    assert!(record(at, "grasp.bytes", &[]).is_empty());
+    assert!(record(at, "grasp.bytes", &["--object", "empty"]).is_empty());
     let list = run(at, &["trials", "list"]).out;
     let flagged = list.lines().filter(|line| line.contains("no contact")).count();
     assert_eq!(flagged, 1, "{list}");
@@ -78,7 +79,7 @@ fn an_afternoon_of_labels_from_the_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     capture(at, "grasp.bytes", "rest=0.5; grasp lemon", "");
-    record(at, "grasp.bytes", &["--unlabelled"]);
+    record(at, "grasp.bytes", &[]);
     record(at, "grasp.bytes", &["--object", "cube"]);
     let list = run(at, &["trials", "list"]).out;
     assert!(list.contains("unlabelled") && list.contains("cube"), "{list}");

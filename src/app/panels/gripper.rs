@@ -148,13 +148,11 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
         pair(ui, "firmware", firmware, false, "What the board says of itself; – where it says nothing");
         ui.end_row();
     });
-    if link.dropped != [0; 2] {
-        let [bytes, readings] = link.dropped;
-        let text = format!("this computer was too slow for {bytes} bytes and {readings} readings");
+    wrapped(ui, RichText::new(link.heard_as()).small().weak());
+    for text in link.line_remarks() {
         wrapped(ui, RichText::new(text).color(ui.visuals().error_fg_color));
     }
-    if link.looks_10_bit {
-        let text = "the counts look like those of ten bits: call analogReadResolution(12) in the sketch";
+    for text in link.wiring_remarks() {
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
     }
 }

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | no contact | no pad felt anything while the hand closed and held |
 //! | saturated | a channel was at an end of its range for more than 2 % of that time |
-//! | interrupted | the connection broke, or readings are missing for longer than 0.1 s |
+//! | interrupted | the connection broke, readings are missing for longer than 0.1 s, or a sensor is in less than half of them |
 //! | cadence | readings were lost, the rate is off by more than 2 %, the jitter is above half a period |
 
 use crate::board::{Board, Gap, Reading, Sensor};
@@ -205,7 +205,17 @@ impl Observed<'_> {
         let gaps = self.gaps.iter().filter(long).map(told);
         // What broke the connection is the cause of a gap as well, where anything came after it.
         let untold = |cause: &&String| !self.gaps.iter().any(|gap| gap.cause.contains(cause.as_str()));
-        joined(gaps.chain(self.interruptions.iter().filter(untold).cloned()))
+        let broken = self.interruptions.iter().filter(untold).cloned();
+        joined(gaps.chain(broken).chain(Sensor::ALL.into_iter().filter_map(|sensor| self.without_numbers(sensor))))
+    }
+
+    /// A sensor that most readings say nothing of: an open circuit, as far as the board can tell.
+    fn without_numbers(&self, sensor: Sensor) -> Option<String> {
+        let column = self.board.channel_of(sensor)?;
+        let is_missing = |reading: &&Reading| reading.counts.get(column).copied().flatten().is_none();
+        let (missing, all) = (self.readings.iter().filter(is_missing).count(), self.readings.len());
+        let percent = 100.0 * missing as f64 / all.max(1) as f64;
+        (percent > 50.0).then(|| format!("the {} gave no number in {percent:.0} % of the readings", sensor.label()))
     }
 
     fn bad_cadence(&self) -> Option<String> {

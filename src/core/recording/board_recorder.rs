@@ -276,10 +276,7 @@ impl BoardRecorder {
         if gaps > 0 {
             warnings.push(format!("{lost} reading(s) are missing for certain, in {gaps} gap(s)"));
         }
-        if status.looks_10_bit {
-            let text = "the counts look like those of ten bits: call analogReadResolution(12) in the sketch";
-            warnings.push(text.to_owned());
-        }
+        warnings.extend(status.wiring_remarks());
         let assumed = Board::default().channels.iter().any(|name| !self.about.board.channels.contains(name));
         if assumed && cadence.samples > 0 {
             let names = self.about.board.channels.join(", ");

@@ -247,9 +247,21 @@ impl Store {
 
 impl Serving {
     fn take_first_sound(&mut self, sensor: Sensor, part: &str, wanted: Vec<StoredCalibration>) {
-        for stored in wanted {
+        let mut wanted = wanted.into_iter();
+        while let Some(stored) = wanted.next() {
             match Calibration::fit(stored.record) {
                 Ok(calibration) => {
+                    let knew = |older: &StoredCalibration| older.record.bending.is_some();
+                    if calibration.record.bending.is_none()
+                        && let Some(older) = wanted.find(knew)
+                    {
+                        let (id, channel) = (stored.id, sensor.channel());
+                        self.warnings.push(format!(
+                            "calibration {id} (\"{part}\", version {}) does not know what bending does to it, as version {} \
+                             did: `palpate calibrate {channel} --part \"{part}\" --empty-close 5` learns it anew",
+                            stored.version, older.version
+                        ));
+                    }
                     self.calibrations.push((sensor, calibration));
                     self.ids.push(stored.id);
                     return;

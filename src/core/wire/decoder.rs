@@ -80,6 +80,7 @@ impl Decoder {
         reader.meter.bytes(bytes, arrived_s);
         splitter.push(bytes, |line| match line {
             Line::Whole(line) => reader.line(line, arrived_s, heard),
+            Line::First(line) => reader.first(line, arrived_s, heard),
             Line::TooLong => reader.bad(b"", "it does not end", arrived_s),
         });
     }
@@ -221,6 +222,19 @@ impl Reader {
                     self.meter.bad_line(arrived_s);
                 }
             }
+        }
+    }
+
+    /// A first line is most often the rest of one, and passed over. A line of names is read: a board that is reset by being
+    /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
+    fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let Ok(Parsed::Header(names)) = parse(line) else { return };
+        let usual = Board::default();
+        let is_known = |name: &String| {
+            !Role::is_channel(name) || usual.channels.iter().any(|known| known.eq_ignore_ascii_case(name))
+        };
+        if names.first().is_some_and(is_known) {
+            self.header(names, line, arrived_s, heard);
         }
     }
 

@@ -273,3 +273,19 @@ proptest! {
         prop_assert_eq!(at_once, in_pieces);
     }
 }
+
+#[test]
+fn names_that_are_the_first_line_are_read_where_they_are_whole() {
+    let after = |first: &str| {
+        let text: String = (0..20).map(|i| format!("{},{i},21{i:02},20{i:02},5,6\n", 20_000 * i)).collect();
+        let (decoder, heard) = hear([(0.0, first.as_bytes()), (0.5, text.as_bytes())]);
+        (decoder.board().channels, readings(&heard).len())
+    };
+    let (channels, read) = after("t_us,seq,flexR,flexL,fsrL,fsrR\n");
+    assert_eq!((channels.join(" ").as_str(), read), ("flexR flexL fsrL fsrR", 20));
+    // Of the first name something is missing: nobody knows what it is.
+    for cut in ["us,seq,flexR,flexL,fsrL,fsrR\n", "1,2,3,4\n", "\n"] {
+        let (channels, read) = after(cut);
+        assert!(!channels.contains(&"flexR".to_owned()) && read >= 18, "{cut}: {channels:?}, {read}");
+    }
+}

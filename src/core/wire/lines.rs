@@ -1,5 +1,5 @@
 //! Bytes to lines. A line ends with LF, CR or both. What a listener hears first is most often the end of a line; it is
-//! dropped. A line longer than [`MAX_LINE`] is no line of a board: it is passed over to its end and told as one.
+//! told as such. A line longer than [`MAX_LINE`] is no line of a board: it is passed over to its end and told as one.
 
 /// Longest line that is read (bytes): thirty-two channels with long names fit. It bounds the memory of a stream that
 /// never ends a line.
@@ -13,6 +13,8 @@ const OPENING: u8 = b'#';
 pub(super) enum Line<'a> {
     /// Its bytes.
     Whole(&'a [u8]),
+    /// The first line that was heard: its beginning may be missing.
+    First(&'a [u8]),
     /// Longer than [`MAX_LINE`].
     TooLong,
 }
@@ -57,8 +59,8 @@ impl LineSplitter {
     fn end_line(&mut self, take: &mut impl FnMut(Line<'_>)) {
         match self.state {
             State::Passing => take(Line::TooLong),
-            State::First if self.begun.first() != Some(&OPENING) => {}
             State::First | State::Inside if self.begun.is_empty() => {}
+            State::First if self.begun.first() != Some(&OPENING) => take(Line::First(&self.begun)),
             State::First | State::Inside => take(Line::Whole(&self.begun)),
         }
         self.begun.clear();
@@ -83,6 +85,7 @@ mod tests {
             splitter.push(chunk, |line| {
                 found.push(match line {
                     Line::Whole(bytes) => String::from_utf8_lossy(bytes).into_owned(),
+                    Line::First(bytes) => format!("first {}", String::from_utf8_lossy(bytes)),
                     Line::TooLong => "TOO LONG".to_owned(),
                 });
             });
@@ -91,8 +94,8 @@ mod tests {
     }
 
     #[test]
-    fn the_first_partial_line_is_dropped_and_every_kind_of_end_ends() {
-        assert_eq!(lines(&[b"12,13\n1,2\r\n3,", b"4\r5,6\n\n7"]), ["1,2", "3,4", "5,6"]);
+    fn the_first_line_is_told_as_such_and_every_kind_of_end_ends() {
+        assert_eq!(lines(&[b"12,13\n1,2\r\n3,", b"4\r5,6\n\n7"]), ["first 12,13", "1,2", "3,4", "5,6"]);
         assert_eq!(lines(&[b"# tactile-gripper fw=1\n1,2\n"]), ["# tactile-gripper fw=1", "1,2"]);
     }
 

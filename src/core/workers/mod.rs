@@ -51,8 +51,8 @@ pub use fitter::{FitTrials, FitWish, FittedFinger, Fitter, FitterView, fit_trial
 pub use ghost::GhostGrasp;
 pub use gripper::{
     BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, EndedTrial, GripperSetup, GripperView, GripperWish,
-    GripperWorker, LEAD_S, LatestReading, Listen, ObserveRequest, RunningCalibration, TrialPart, TrialRequest,
-    TrialView, listen_to_port,
+    GripperWorker, LEAD_S, LatestReading, Listen, NotOpened, ObserveRequest, RunningCalibration, TrialPart,
+    TrialRequest, TrialView, listen_to_port,
 };
 pub use labeller::{LabelView, LabelWish, Labeller, start_labeller};
 pub use latest::Latest;

@@ -14,7 +14,7 @@ use super::ports::{PortInfo, choose, describe, list_ports};
 use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
 use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
-use crate::board::Board;
+use crate::board::{Board, Sensor};
 use crate::wire::{Cadence, Captured, ConsoleLine, Decoder, Detected, Rail};
 use serde::Serialize;
 use std::io::Write;
@@ -113,6 +113,59 @@ pub struct LinkStatus {
     pub now_s: f64,
     /// Bytes, and readings, that this computer was too slow to take.
     pub dropped: [u64; 2],
+}
+
+impl LinkStatus {
+    /// What is wrong with the line, and what to try, in sentences.
+    pub fn line_remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.cadence.troubled {
+            let bad = self.cadence.bad_lines;
+            remarks.push(format!(
+                "many lines cannot be read, {bad} so far: look at them in the console; a short cable straight into the \
+                 computer helps, and no other program on the port"
+            ));
+        }
+        if let [bytes, readings] = self.dropped
+            && bytes + readings > 0
+        {
+            remarks.push(format!("this computer was too slow for {bytes} bytes and {readings} readings"));
+        }
+        remarks
+    }
+
+    /// What is wrong with the sensors' wiring as far as counts tell, in sentences.
+    pub fn wiring_remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.looks_10_bit {
+            let text = "the counts look like those of ten bits: call analogReadResolution(12) in the sketch";
+            remarks.push(text.to_owned());
+        }
+        let flex = [Sensor::FlexLeft, Sensor::FlexRight].map(|sensor| self.board.channel_of(sensor));
+        for (channel, (name, rail)) in self.board.channels.iter().zip(&self.rails).enumerate() {
+            let is_strip = flex.contains(&Some(channel));
+            remarks.extend(match (rail, is_strip) {
+                (Some(Rail::High), true) => {
+                    Some(format!("{name} is at the upper end of the range: the strip or one of its wires has come off"))
+                }
+                (Some(Rail::Low), true) => Some(format!("{name} reads nothing: the strip is shorted, or its divider not fed")),
+                (Some(Rail::High), false) => Some(format!(
+                    "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
+                     ground that is missing or too large"
+                )),
+                // A pad that nothing touches reads nothing.
+                (Some(Rail::Low), false) | (None, _) => None,
+            });
+        }
+        remarks
+    }
+
+    /// At what speed it is heard, and how its lines are read.
+    pub fn heard_as(&self) -> String {
+        let speed = self.baud.map(|baud| format!("{baud} baud"));
+        let format = self.detected.as_ref().map(|detected| detected.why.clone());
+        speed.into_iter().chain(format).collect::<Vec<String>>().join("; ")
+    }
 }
 
 /// What the threads of a link share.

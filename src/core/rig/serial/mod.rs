@@ -19,4 +19,4 @@ pub use link::{LinkOptions, LinkState, LinkStatus, SendError, SerialLink};
 pub use port_error::{MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};
 pub use queue::LinkEvent;
-pub use rig::{Control, SerialPlan, SerialRig};
+pub use rig::{CUT, Control, SerialPlan, SerialRig};

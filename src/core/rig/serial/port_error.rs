@@ -47,7 +47,7 @@ pub struct PortError {
 pub const MODEM_MANAGER_RULE: &str = "ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"";
 /// Puts that rule where udev finds it.
 pub const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
-     sudo tee /etc/udev/rules.d/77-palpate.rules && sudo udevadm control --reload";
+     sudo tee /etc/udev/rules.d/77-palpate.rules && sudo udevadm control --reload && sudo udevadm trigger";
 
 impl PortError {
     fn opening(trouble: PortTrouble, path: &Path, cause: impl Into<String>, fix: impl Into<String>) -> Self {
@@ -92,11 +92,12 @@ impl PortError {
     fn busy(path: &Path) -> Self {
         if is_running("ModemManager") {
             let fix = format!(
-                "ModemManager asks each new port whether it is a modem, for half a minute: wait and connect again, or keep \
-                 it away from boards with the udev rule {MODEM_MANAGER_RULE}"
+                "Close the Serial Monitor of the Arduino IDE and other programs that listen to it, then connect. Within half \
+                 a minute of plugging in it may be ModemManager, which asks each new port whether it is a modem: wait, or \
+                 keep it away from boards with the udev rule {MODEM_MANAGER_RULE}, and plug the board in again"
             );
             let command = Some(MODEM_MANAGER_COMMAND.to_owned());
-            let cause = "it is in use, most likely by ModemManager";
+            let cause = "it is open in another program, or ModemManager looks at it";
             return Self { command, ..Self::opening(PortTrouble::Busy, path, cause, fix) };
         }
         let fix = "Close the Serial Monitor of the Arduino IDE and other programs that listen to it, then connect";

@@ -61,6 +61,9 @@ pub struct SerialRig {
     over: bool,
 }
 
+/// What is noted of a driven trial whose fingers did not do what they were told.
+pub const CUT: &str = "ended early, and told to vent";
+
 impl SerialRig {
     /// Waits until the board speaks and the times of its readings have settled; the recording begins then.
     pub fn begin(link: SerialLink, plan: SerialPlan, stop: Arc<AtomicBool>) -> Result<Self, RigError> {
@@ -125,7 +128,7 @@ impl SerialRig {
     /// had happened, with a leap of pressure.
     fn cut(&mut self) {
         if self.plan.control == Control::Driven && !std::mem::replace(&mut self.over, true) {
-            self.notes.push("ended early, and told to vent".to_owned());
+            self.notes.push(CUT.to_owned());
         }
     }
 

@@ -10,7 +10,7 @@ use super::observing::Observing;
 use super::plotted::{Plotted, Row};
 use super::recent::Recent;
 use super::running::Running;
-use super::stream::{BoardStream, Listen};
+use super::stream::{BoardStream, Listen, NotOpened};
 use super::worker::GripperSetup;
 use crate::board::{Board, Reading};
 use crate::labelling::Segmenter;
@@ -26,11 +26,13 @@ use crate::workers::{Latest, Notice, TraceRow, Wake};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, TrySendError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError};
 use std::time::{Duration, Instant};
 
 /// How long the thread waits for readings before it looks for wishes again: also how punctual the control box is told.
 const PATIENCE: Duration = Duration::from_millis(10);
+/// How often a port is tried that another program has.
+const RETRY: Duration = Duration::from_secs(1);
 /// Views are published no more often than this.
 const CALM: Duration = Duration::from_millis(33);
 
@@ -78,6 +80,8 @@ pub(super) struct Desk {
     grasps: u32,
     ports: Vec<PortInfo>,
     refused: Option<String>,
+    /// The port that another program has, where it is to be opened as soon as that lets it go.
+    retried: Option<Option<PathBuf>>,
     connection: Option<Connection>,
     running: Option<Running>,
     /// Trials that were begun so far.
@@ -109,6 +113,7 @@ impl Desk {
             grasps,
             ports: Vec::new(),
             refused: None,
+            retried: None,
             connection: None,
             running: None,
             begun: 0,
@@ -137,6 +142,11 @@ impl Desk {
                     Err(TryRecvError::Empty) => None,
                     Err(TryRecvError::Disconnected) => break,
                 },
+                None if self.retried.is_some() => match inbox.recv_timeout(RETRY) {
+                    Ok(wish) => Some(wish),
+                    Err(RecvTimeoutError::Timeout) => None,
+                    Err(RecvTimeoutError::Disconnected) => break,
+                },
                 None => match inbox.recv() {
                     Ok(wish) => Some(wish),
                     Err(_closed) => break,
@@ -150,6 +160,7 @@ impl Desk {
                     self.obey(wish);
                     self.publish();
                 }
+                None if self.connection.is_none() => self.try_again(),
                 None => self.listen_on(),
             }
         }
@@ -196,32 +207,47 @@ impl Desk {
 
     fn connect(&mut self, port: Option<&Path>) {
         self.refused = None;
-        match (self.listen)(port) {
-            Ok(stream) => {
-                // A board that speaks our language says who it is; to others it is a line they do not know.
-                let mut stream = stream;
-                let _told = stream.send("?");
-                self.connection = Some(Connection {
-                    board: stream.status().board,
-                    stream,
-                    recent: Recent::default(),
-                    readout: Readout::default(),
-                    remarks: Vec::new(),
-                    drift: Vec::new(),
-                    latest: None,
-                    plotted: Plotted::new(Vec::new(), 0),
-                    segmenter: Segmenter::new(&Board::default()),
-                });
-                self.read_calibrations();
-                self.another_stretch(0.0);
-                self.start_over();
+        if let Err(NotOpened { mut text, may_pass }) = self.open_stream(port) {
+            if may_pass {
+                self.retried = Some(port.map(Path::to_owned));
+                text.push_str("; until then it is tried each second");
             }
-            Err(cause) => {
-                self.outlets.tell(Notice::Failed(cause.clone()));
-                self.refused = Some(cause);
-                self.ports = list_ports();
-            }
+            self.outlets.tell(Notice::Failed(text.clone()));
+            self.refused = Some(text);
+            self.ports = list_ports();
         }
+    }
+
+    /// Whether the program that had the port has let it go. That it has not is no news.
+    fn try_again(&mut self) {
+        let Some(port) = self.retried.take() else { return };
+        match self.open_stream(port.as_deref()) {
+            Ok(()) => self.refused = None,
+            Err(NotOpened { may_pass: true, .. }) => return self.retried = Some(port),
+            Err(NotOpened { text, .. }) => self.refused = Some(text),
+        }
+        self.publish();
+    }
+
+    fn open_stream(&mut self, port: Option<&Path>) -> Result<(), NotOpened> {
+        let mut stream = (self.listen)(port)?;
+        // A board that speaks our language says who it is; to others it is a line they do not know.
+        let _told = stream.send("?");
+        self.connection = Some(Connection {
+            board: stream.status().board,
+            stream,
+            recent: Recent::default(),
+            readout: Readout::default(),
+            remarks: Vec::new(),
+            drift: Vec::new(),
+            latest: None,
+            plotted: Plotted::new(Vec::new(), 0),
+            segmenter: Segmenter::new(&Board::default()),
+        });
+        self.read_calibrations();
+        self.another_stretch(0.0);
+        self.start_over();
+        Ok(())
     }
 
     fn disconnect(&mut self, why: &str) {
@@ -229,6 +255,7 @@ impl Desk {
         self.calibrating = None;
         self.observing.clear();
         self.connection = None;
+        self.retried = None;
     }
 
     /// Takes in what the link has heard, and does what is due.

@@ -22,5 +22,5 @@ mod worker;
 pub use calibrating::{CalibrationPlan, CalibrationView, CalibrationWish, RunningCalibration};
 pub use messages::{EndedTrial, GripperView, GripperWish, LEAD_S, LatestReading, TrialPart, TrialRequest, TrialView};
 pub use observing::ObserveRequest;
-pub use stream::{BoardStream, Listen, listen_to_port};
+pub use stream::{BoardStream, Listen, NotOpened, listen_to_port};
 pub use worker::{GripperSetup, GripperWorker};

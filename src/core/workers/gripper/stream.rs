@@ -1,6 +1,6 @@
 //! What is listened to: a port, a file of captured bytes, or what a test makes up.
 
-use crate::rig::serial::{LinkEvent, LinkOptions, LinkStatus, SendError, SerialLink};
+use crate::rig::serial::{LinkEvent, LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
 use crate::wire::ConsoleLine;
 use std::path::Path;
 use std::sync::Arc;
@@ -53,12 +53,29 @@ impl BoardStream for SerialLink {
     }
 }
 
+/// Why nothing can be listened to.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text}")]
+pub struct NotOpened {
+    /// Cause and fix, in a sentence.
+    pub text: String,
+    /// Another program has it, which may let it go.
+    pub may_pass: bool,
+}
+
+impl From<String> for NotOpened {
+    fn from(text: String) -> Self {
+        Self { text, may_pass: false }
+    }
+}
+
 /// Opens what is to be listened to: a port, a file of captured bytes, or the only likely port; or says why it cannot.
-pub type Listen = Arc<dyn Fn(Option<&Path>) -> Result<Box<dyn BoardStream>, String> + Send + Sync>;
+pub type Listen = Arc<dyn Fn(Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> + Send + Sync>;
 
 /// Listens to a serial port.
-pub fn listen_to_port(port: Option<&Path>) -> Result<Box<dyn BoardStream>, String> {
+pub fn listen_to_port(port: Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> {
     let options = LinkOptions { path: port.map(Path::to_owned), ..LinkOptions::default() };
-    let link = SerialLink::open(&options).map_err(|error| error.to_string())?;
+    let link = SerialLink::open(&options)
+        .map_err(|error| NotOpened { text: error.to_string(), may_pass: error.trouble == PortTrouble::Busy })?;
     Ok(Box::new(link))
 }

@@ -128,6 +128,8 @@ impl Desk {
         let owns_port = self.connection.is_none();
         if owns_port {
             self.connect(plan.port.as_deref());
+            // A calibration that could not begin is not begun behind anybody's back.
+            self.retried = None;
         }
         match (&self.connection, self.refused.take()) {
             (None, refused) => {
