@@ -88,7 +88,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
             }
             look.lock().unwrap().clone()
         });
-        let setup = BenchSetup { size: [320.0, 620.0], examine, ..BenchSetup::default() };
+        let setup = BenchSetup { size: [320.0, 820.0], examine, ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
         assert!(bench.harness.query_by_label_contains("It checks that there is a board").is_some());
         bench.harness.get_by_label("Examine").click();

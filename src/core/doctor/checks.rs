@@ -29,32 +29,72 @@ pub struct Check {
     /// What it looks for, in a few words.
     pub about: &'static str,
     look: fn(&Observations) -> Told,
+    next: Next,
+}
+
+/// What to run where a check finds something and knows no command of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Next {
+    /// Only what the finding says.
+    Nothing,
+    /// See which ports there are.
+    Ports,
+    /// Put our firmware on the board.
+    Upload,
+    /// When it is mended, look again, for longer.
+    Again,
+}
+
+impl Next {
+    fn command(self, seen: &Observations) -> Option<String> {
+        let port = seen.link.as_ref().map(|link| &link.port);
+        let path = port.map(|port| quoted(&port.path.to_string_lossy()));
+        match self {
+            Self::Nothing => None,
+            Self::Ports => Some("palpate record --list".to_owned()),
+            Self::Upload => {
+                // The two ports of a Due are two boards to the tools of Arduino.
+                let board = if port?.kind.native { "arduino_due_x" } else { "arduino_due_x_dbg" };
+                let sketch = "assets/firmware/due_gripper";
+                Some(format!("arduino-cli compile --upload --fqbn arduino:sam:{board} --port {} {sketch}", path?))
+            }
+            Self::Again => Some(format!("palpate doctor {} --seconds 20", path?)),
+        }
+    }
+}
+
+/// A path as shells take it.
+fn quoted(path: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
+    if path.chars().all(plain) { path.to_owned() } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
 impl Check {
     /// Looks.
     pub fn look(&self, seen: &Observations) -> Finding {
-        let Told { verdict, seen, cause, fix, command } = (self.look)(seen);
-        Finding { check: self.name, verdict, seen, cause, fix, command }
+        let Told { verdict, seen: told, cause, fix, command } = (self.look)(seen);
+        let worth_it = matches!(verdict, Verdict::Note | Verdict::Wrong);
+        let command = command.or_else(|| self.next.command(seen).filter(|_| worth_it));
+        Finding { check: self.name, verdict, seen: told, cause, fix, command }
     }
 }
 
 /// All of them.
 pub const CHECKS: &[Check] = &[
-    Check { name: "port", about: "there is a board", look: port },
-    Check { name: "permission", about: "you may open it", look: permission },
-    Check { name: "busy", about: "nobody else has it", look: busy },
-    Check { name: "modem-manager", about: "nobody takes it for a modem", look: modem_manager },
-    Check { name: "silence", about: "it says something", look: silence },
-    Check { name: "baud", about: "at a rate that can be read", look: baud },
-    Check { name: "lines", about: "in lines that can be read", look: lines },
-    Check { name: "firmware", about: "and says what it is", look: firmware },
-    Check { name: "bits", about: "the converter gives 12 bits", look: bits },
-    Check { name: "saturation", about: "no channel is at its upper end", look: saturation },
-    Check { name: "open-circuit", about: "every sensor is connected", look: open_circuit },
-    Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk },
-    Check { name: "rate", about: "samples come as often as they should", look: rate },
-    Check { name: "clock", about: "the board's clock can be relied on", look: clock },
+    Check { name: "port", about: "there is a board", look: port, next: Next::Ports },
+    Check { name: "permission", about: "you may open it", look: permission, next: Next::Nothing },
+    Check { name: "busy", about: "nobody else has it", look: busy, next: Next::Ports },
+    Check { name: "modem-manager", about: "nobody takes it for a modem", look: modem_manager, next: Next::Nothing },
+    Check { name: "silence", about: "it says something", look: silence, next: Next::Upload },
+    Check { name: "baud", about: "at a rate that can be read", look: baud, next: Next::Again },
+    Check { name: "lines", about: "in lines that can be read", look: lines, next: Next::Again },
+    Check { name: "firmware", about: "and says what it is", look: firmware, next: Next::Upload },
+    Check { name: "bits", about: "the converter gives 12 bits", look: bits, next: Next::Upload },
+    Check { name: "saturation", about: "no channel is at its upper end", look: saturation, next: Next::Again },
+    Check { name: "open-circuit", about: "every sensor is connected", look: open_circuit, next: Next::Again },
+    Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk, next: Next::Again },
+    Check { name: "rate", about: "samples come as often as they should", look: rate, next: Next::Again },
+    Check { name: "clock", about: "the board's clock can be relied on", look: clock, next: Next::Upload },
 ];
 
 /// A finding without its name.
