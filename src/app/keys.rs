@@ -269,6 +269,7 @@ mod tests {
             assert!(ALL[k + 1..].iter().filter(together).all(|b| a.shortcut != b.shortcut), "{}", a.does);
         }
     }
+
     fn key(key: Key, modifiers: Modifiers, repeat: bool) -> egui::Event {
         egui::Event::Key { key, physical_key: None, pressed: true, repeat, modifiers }
     }
