@@ -31,6 +31,12 @@ impl Sensor {
         }
     }
 
+    /// True for the names that boards may give its channel: case, blanks, hyphens and underscores say nothing.
+    pub fn is_called(self, name: &str) -> bool {
+        let letters = name.chars().filter(|c| !" -_".contains(*c)).map(|c| c.to_ascii_lowercase());
+        letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
+    }
+
     /// What it is called on screen.
     pub fn label(self) -> &'static str {
         match self {
@@ -80,9 +86,9 @@ impl Default for Board {
 }
 
 impl Board {
-    /// Which of its channels a sensor is read on; names are compared without regard to case.
+    /// Which of its channels a sensor is read on; see [`Sensor::is_called`].
     pub fn channel_of(&self, sensor: Sensor) -> Option<usize> {
-        self.channels.iter().position(|name| name.eq_ignore_ascii_case(sensor.channel()))
+        self.channels.iter().position(|name| sensor.is_called(name))
     }
 }
 
@@ -121,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_board_knows_its_channels_by_name_and_not_by_place() {
-        let board = Board { channels: vec!["FSRL".into(), "flexr".into(), "temperature".into()], ..Board::default() };
+        let board = Board { channels: vec!["FSRL".into(), "Flex_r".into(), "temperature".into()], ..Board::default() };
         assert_eq!(board.channel_of(Sensor::PadLeft), Some(0));
         assert_eq!(board.channel_of(Sensor::FlexRight), Some(1));
         assert_eq!(board.channel_of(Sensor::FlexLeft), None);

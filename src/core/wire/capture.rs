@@ -160,9 +160,9 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
 impl Pace {
     fn go_on(&mut self, line: &[u8]) {
         let clock = match parse(line) {
-            Ok(Parsed::Named(_, fields)) => fields.iter().find_map(|(name, value)| match name.as_str() {
-                "t_us" => value.map(|us| us * 1e-6),
-                "ms" => value.map(|ms| ms * 1e-3),
+            Ok(Parsed::Named(_, fields)) => fields.iter().find_map(|field| match field.name.as_str() {
+                "t_us" => field.value.map(|us| us * 1e-6),
+                "ms" => field.value.map(|ms| ms * 1e-3),
                 _ => None,
             }),
             _ => None,

@@ -1,7 +1,7 @@
 //! What the columns of CSV lines are called: by a line of names, whenever it comes; by the board's hello line; or by a
 //! guess that is told as one.
 
-use super::fields::Fields;
+use super::fields::{Cell, Field, Fields};
 use crate::board::{Board, Sensor};
 
 /// Names for columns.
@@ -43,8 +43,9 @@ impl Columns {
     }
 
     /// The values of a line with their names.
-    pub(super) fn name(&mut self, values: Vec<Option<f64>>, hello: Option<&Board>) -> Fields {
-        self.names(values.len(), hello).into_iter().zip(values).collect()
+    pub(super) fn name(&mut self, cells: Vec<Cell>, hello: Option<&Board>) -> Fields {
+        let names = self.names(cells.len(), hello);
+        names.into_iter().zip(cells).map(|(name, Cell { value, unit, .. })| Field { name, unit, value }).collect()
     }
 
     /// Where the names come from, in words.

@@ -5,7 +5,7 @@ use super::cadence::{Cadence, Meter};
 use super::checksum;
 use super::clock::{Counters, Stamp, StreamClock, TimeSource};
 use super::columns::Columns;
-use super::fields::{Format, Parsed, parse};
+use super::fields::{Field, Format, Parsed, parse};
 use super::hello::{self, Hello};
 use super::lines::{Line, LineSplitter};
 use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch};
@@ -229,9 +229,8 @@ impl Reader {
     /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
     fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
-        let usual = Board::default();
         let is_known = |name: &String| {
-            !Role::is_channel(name) || usual.channels.iter().any(|known| known.eq_ignore_ascii_case(name))
+            !Role::is_channel(name) || Sensor::ALL.iter().any(|sensor| sensor.is_called(name))
         };
         if names.first().is_some_and(is_known) {
             self.header(names, line, arrived_s, heard);
@@ -294,7 +293,7 @@ impl Reader {
         let mut counts = vec![None; self.channels.len()];
         let (mut counters, mut line_bar) = (Counters { unreadable: self.unreadable, ..Counters::default() }, None);
         let mut whole = true;
-        for (role, (_, value)) in roles.iter().zip(&line.fields) {
+        for (role, Field { value, .. }) in roles.iter().zip(&line.fields) {
             let counter = value.filter(|value| (0.0..LARGEST_COUNTER).contains(value));
             match role {
                 // What no f32 can hold is no count of any converter.

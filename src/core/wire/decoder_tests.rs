@@ -195,6 +195,47 @@ fn ten_bits_are_seen_whatever_the_board_says_unless_it_has_reasons() {
     assert_eq!(looks(&HELLO.replace("adc=12", "adc=10"), 350, 0), (false, None), "it says so");
 }
 
+/// A line without a checksum, as other people's sketches write them.
+fn plain_line(i: u32) -> String {
+    format!("flexL:{}mV,flexR:{},fsrL:{}", 2000 + i % 7, 2100 + i % 5, 12 + i % 3)
+}
+
+#[test]
+fn of_a_line_that_lost_its_beginning_or_its_unit_nothing_is_taken() {
+    let whole = plain_line(50);
+    // Behind the first name and its colon only a value with its unit tells.
+    for from in 1..whole.len() {
+        let mut lines: Vec<String> = (0..100).map(plain_line).collect();
+        lines[50] = whole[from..].to_owned();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{}", &whole[from..]);
+        assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL"], "{}", &whole[from..]);
+    }
+    for damaged in ["flexL:2003m,flexR:2100,fsrL:14", "flexL:2003,flexR:2100,fsrL:14", "flexL:2003mV,flexR:210o,fsrL:14"] {
+        let mut lines: Vec<String> = (0..100).map(plain_line).collect();
+        lines[50] = damaged.to_owned();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{damaged}");
+    }
+}
+
+#[test]
+fn a_word_in_place_of_a_number_costs_that_channel_alone() {
+    // The middle one is missing in every third line, the last in every fifth.
+    let word = |i: u32, every: u32, word: &str, number: u32| if i % every == 0 { word.to_owned() } else { number.to_string() };
+    let named = |i| format!("flexL:{i},flexR:{},fsrL: {}", word(i, 3, "open", 7), word(i, 5, "disconnected", 8));
+    let columns = |i| format!("{i},{},{}", word(i, 3, "err", 7), word(i, 5, "Disconnected", 8));
+    for lines in [(1..90).map(named).collect::<Vec<_>>(), (1..90).map(columns).collect()] {
+        let (decoder, heard) = hear_lines(&lines);
+        let readings = readings(&heard);
+        assert_eq!((readings.len(), decoder.cadence().bad_lines), (89, 0), "{}", lines[2]);
+        for (i, reading) in (1u8..).zip(readings) {
+            let wanted = [Some(f32::from(i)), (i % 3 != 0).then_some(7.0), (i % 5 != 0).then_some(8.0)];
+            assert_eq!(reading.counts, wanted, "{}", lines[usize::from(i) - 1]);
+        }
+    }
+}
+
 #[test]
 fn another_sketch_is_believed_after_two_of_its_lines() {
     let lines: Vec<String> =

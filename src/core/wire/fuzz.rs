@@ -53,7 +53,7 @@ impl FuzzStream {
             _ => 0.02,
         };
         if self.below(80) == 0 {
-            self.format = (self.format + 1) % 7;
+            self.format = (self.format + 1) % 9;
             // Another sketch says hello; without a checksum it has none in its lines.
             out.extend_from_slice(b"# tactile-gripper fw=1\n");
         }
@@ -92,6 +92,8 @@ impl FuzzStream {
         let (n, a) = (self.sample, self.below(4096));
         let odd = ["nan", "", "inf", "1e999", "-5", "0x1f", "99999999999999999999"][self.below(7) as usize];
         let b = if self.below(20) == 0 { odd.to_owned() } else { self.below(4096).to_string() };
+        let word = ["err", "open", "---", "5x2", "12.5N", "7 mV", "3m/s²", "flexL", "?"][self.below(9) as usize];
+        let between = [",", ", ", " ,,\t", ";", " ", "; ;"][self.below(6) as usize];
         let us = (n * 20_000) & 0xffff_ffff;
         let line = match self.format {
             0 => format!("t_us:{us},seq:{},flexL:{a},flexR:{b},p_bar:0.5", n & 0xffff),
@@ -108,6 +110,8 @@ impl FuzzStream {
                 let sum = checksum(body.as_bytes());
                 format!("{body}{key}{sum}")
             }
+            6 => format!("Reading: {n}{between}flexL:{a}N{between}1:{word}{between}_x: {b}{between}{word}"),
+            7 => format!("{a}N{between}{word}{between}{b}{between}{n}"),
             _ => format!("# tactile-gripper adc={b} ch={a},b rm={b},2\nch{a};other{}", self.below(9)),
         };
         out.extend_from_slice(line.as_bytes());

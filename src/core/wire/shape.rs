@@ -1,9 +1,10 @@
 //! Which fields a board's lines have. A board repeats itself, and that is how its lines are told from noise: a line is
 //! taken when it has the fields of the lines before. Other fields are believed when two lines in a row have them; a part
-//! of the known ones looks like a line that was cut, and is believed only when it goes on like that.
+//! of the known ones looks like a line that was cut, and is believed only when it goes on like that. A unit belongs to its
+//! field: `51k` among `512` and `513` is a damaged number, not another unit.
 
 use super::checksum::KEY;
-use super::fields::{Fields, Format, MAX_FIELDS};
+use super::fields::{Field, Fields, Format, MAX_FIELDS};
 
 /// Fields of one line.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,6 +63,8 @@ const CONFIRM_PART: u32 = 20;
 pub(super) struct Shapes {
     pub(super) format: Option<Format>,
     names: Vec<String>,
+    /// What stands behind their numbers.
+    units: Vec<String>,
     roles: Vec<Role>,
     /// The newest line with other fields, and how many such came in a row.
     waiting: Option<(Candidate, u32)>,
@@ -81,7 +84,7 @@ pub(super) enum Judged {
 impl Shapes {
     /// What to make of a line.
     pub(super) fn judge(&mut self, line: Candidate) -> Judged {
-        if self.format == Some(line.format) && has_names(&line, &self.names) {
+        if self.is_known(&line) {
             // Whoever waits is given up by the caller, who has seen this line arrive.
             return Judged::Known(line);
         }
@@ -90,7 +93,9 @@ impl Shapes {
         match self.waiting.take() {
             Some((before, count)) if before.format == line.format && same_names(&before, &line) => {
                 if count + 1 >= needed {
-                    self.names = line.fields.iter().map(|(name, _)| name.clone()).collect();
+                    self.names = line.fields.iter().map(|field| field.name.clone()).collect();
+                    let unit = |(a, b): (&Field, &Field)| if a.value.is_some() { a.unit.clone() } else { b.unit.clone() };
+                    self.units = before.fields.iter().zip(&line.fields).map(unit).collect();
                     self.format = Some(line.format);
                     self.roles.clear();
                     return Judged::Changed(Box::new([before, line]));
@@ -115,7 +120,16 @@ impl Shapes {
         if line.format == Format::Csv {
             return line.fields.len() < self.names.len();
         }
-        line.fields.iter().all(|(name, _)| self.names.contains(name))
+        line.fields.iter().all(|field| self.names.contains(&field.name))
+    }
+
+    /// Columns have no names of their own.
+    fn is_known(&self, line: &Candidate) -> bool {
+        let named = |field: &Field, name: &String| line.format == Format::Csv || field.name == *name;
+        let known = self.names.iter().zip(&self.units);
+        self.format == Some(line.format)
+            && line.fields.len() == self.names.len()
+            && line.fields.iter().zip(known).all(|(field, (name, unit))| named(field, name) && has_unit(field, unit))
     }
 
     /// Where the fields go; channels that are new are added to `channels`.
@@ -152,12 +166,12 @@ impl Shapes {
     }
 }
 
-fn has_names(line: &Candidate, names: &[String]) -> bool {
-    // Columns have no names of their own.
-    line.fields.len() == names.len()
-        && (line.format == Format::Csv || line.fields.iter().zip(names).all(|((name, _), known)| name == known))
+/// A number that is not there has no unit either.
+fn has_unit(field: &Field, unit: &str) -> bool {
+    field.value.is_none() || field.unit == unit
 }
 
 fn same_names(a: &Candidate, b: &Candidate) -> bool {
-    a.fields.len() == b.fields.len() && a.fields.iter().zip(&b.fields).all(|((a, _), (b, _))| a == b)
+    let same = |(a, b): (&Field, &Field)| a.name == b.name && (has_unit(a, &b.unit) || b.value.is_none());
+    a.fields.len() == b.fields.len() && a.fields.iter().zip(&b.fields).all(same)
 }

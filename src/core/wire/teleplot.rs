@@ -1,6 +1,6 @@
 //! Teleplot sends one number to a line; a reading is complete when a name comes again or the time moves on.
 
-use super::fields::{Fields, MAX_FIELDS};
+use super::fields::{Field, Fields, MAX_FIELDS};
 
 /// Gathers numbers into readings.
 #[derive(Clone, Debug, Default)]
@@ -12,9 +12,9 @@ pub(super) struct Assembler {
 impl Assembler {
     /// Takes in the fields of a line, a number and perhaps its time; hands over the reading that it ends.
     pub(super) fn push(&mut self, fields: Fields) -> Option<Fields> {
-        let time = fields.iter().find(|(name, _)| name == "ms").and_then(|(_, value)| *value);
+        let time = fields.iter().find(|field| field.name == "ms").and_then(|field| field.value);
         let value = fields.into_iter().next()?;
-        let known = self.gathered.iter().any(|(name, _)| *name == value.0);
+        let known = self.gathered.iter().any(|field| field.name == value.name);
         let moved = self.time.is_some() && self.time != time;
         let ended = (known || moved || self.gathered.len() >= MAX_FIELDS).then(|| self.take());
         self.time = time;
@@ -25,7 +25,7 @@ impl Assembler {
     fn take(&mut self) -> Fields {
         let mut fields = std::mem::take(&mut self.gathered);
         if let Some(time) = self.time {
-            fields.push(("ms".to_owned(), Some(time)));
+            fields.push(Field { name: "ms".to_owned(), unit: String::new(), value: Some(time) });
         }
         fields
     }
