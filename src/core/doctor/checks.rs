@@ -305,6 +305,15 @@ fn firmware(seen: &Observations) -> Told {
 fn bits(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         let full = link.board.full_scale;
+        if link.looks_10_bit && full < 4095 {
+            return Told::note(format!(
+                "no count was above {full}, so that the converter is taken for one of ten bits"
+            ))
+            .because(
+                "analogRead gives ten bits until it is told otherwise, and the board does not say how far it counts",
+                "Call analogReadResolution(12) in setup() for finer counts, and say adc=12 in a hello line",
+            );
+        }
         if link.looks_10_bit {
             let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
             return Told::wrong(format!("no count was above {most:.0}; the converter is said to go to {full}"))
@@ -315,7 +324,7 @@ fn bits(seen: &Observations) -> Told {
         }
         if full < 4095 {
             return Told::note(format!("the converter goes to {full}")).because(
-                "The board says so",
+                "The board says so, or has sent nothing beyond",
                 "A Due has 12 bits: call analogReadResolution(12), and say adc=12 in the hello line",
             );
         }

@@ -8,7 +8,7 @@ use super::columns::Columns;
 use super::fields::{Field, Format, Parsed, parse};
 use super::hello::{self, Hello};
 use super::lines::{Line, LineSplitter};
-use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch};
+use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch, Reach};
 use super::shape::{Candidate, Judged, Role, Shapes};
 use super::tail::{ConsoleLine, Tail, Verdict};
 use super::teleplot::Assembler;
@@ -58,6 +58,7 @@ struct Reader {
     clock: StreamClock,
     meter: Meter,
     rails: RailWatch,
+    reach: Reach,
     tail: Tail,
     /// Lines since the last reading that could not be read.
     unreadable: u64,
@@ -132,7 +133,7 @@ impl Decoder {
         self.reader.tail.lines()
     }
 
-    /// For each channel, the end of the converter's range at which it has stood for half a second or more.
+    /// For each channel, where it has said nothing of its sensor for half a second or more.
     pub fn rails(&self) -> Vec<Option<Rail>> {
         self.reader.rails.at()
     }
@@ -147,6 +148,7 @@ impl Decoder {
 impl Reader {
     fn board(&self) -> Board {
         let mut board = self.said().cloned().unwrap_or_default();
+        board.full_scale = self.full_scale();
         let place = |name: &String| board.channels.iter().position(|known| known.eq_ignore_ascii_case(name));
         let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
@@ -157,6 +159,15 @@ impl Reader {
     /// What the board said of itself.
     fn said(&self) -> Option<&Board> {
         self.hello.as_ref().map(|hello| &hello.board)
+    }
+
+    /// How far its converter counts: as it says, but for counts beyond that. The sketch that says nothing is taken at its
+    /// counts, of which a strip's alone are most often beyond ten bits where there are more.
+    fn full_scale(&self) -> u32 {
+        self.said().map_or(0, |board| board.full_scale).max(match self.reach.full_scale() {
+            FULL_10_BIT if self.hello.is_some() => 0,
+            reached => reached,
+        })
     }
 
     fn looks_10_bit(&self) -> bool {
@@ -229,9 +240,8 @@ impl Reader {
     /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
     fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
-        let is_known = |name: &String| {
-            !Role::is_channel(name) || Sensor::ALL.iter().any(|sensor| sensor.is_called(name))
-        };
+        let is_known =
+            |name: &String| !Role::is_channel(name) || Sensor::ALL.iter().any(|sensor| sensor.is_called(name));
         if names.first().is_some_and(is_known) {
             self.header(names, line, arrived_s, heard);
         }
@@ -314,14 +324,24 @@ impl Reader {
             self.unreadable += 1;
             return self.meter.bad_line(line.arrived_s);
         };
+        if self.reach.add(self.largest(&counts)) {
+            heard.push(Heard::Board(self.board()));
+        }
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
-        let said = self.said().map_or(FULL_12_BIT, |board| board.full_scale);
-        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { said };
+        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { self.full_scale() };
         self.rails.add(&counts, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;
         heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
+    }
+
+    /// The largest count of a gripper's sensors; what else a board sends need not come from its converter.
+    fn largest(&self, counts: &[Option<f32>]) -> f32 {
+        let is_sensor = |name: &String| Sensor::ALL.iter().any(|sensor| sensor.is_called(name));
+        let beyond = |count: &f32| *count > self.reach.full_scale() as f32;
+        let counts = self.channels.iter().zip(counts).filter_map(|(name, count)| Some((name, count.filter(beyond)?)));
+        counts.filter(|(name, _)| is_sensor(name)).map(|(_, count)| count).fold(0.0, f32::max)
     }
 
     fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<Heard>) {

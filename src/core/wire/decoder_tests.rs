@@ -211,7 +211,9 @@ fn of_a_line_that_lost_its_beginning_or_its_unit_nothing_is_taken() {
         assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{}", &whole[from..]);
         assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL"], "{}", &whole[from..]);
     }
-    for damaged in ["flexL:2003m,flexR:2100,fsrL:14", "flexL:2003,flexR:2100,fsrL:14", "flexL:2003mV,flexR:210o,fsrL:14"] {
+    for damaged in
+        ["flexL:2003m,flexR:2100,fsrL:14", "flexL:2003,flexR:2100,fsrL:14", "flexL:2003mV,flexR:210o,fsrL:14"]
+    {
         let mut lines: Vec<String> = (0..100).map(plain_line).collect();
         lines[50] = damaged.to_owned();
         let (decoder, heard) = hear_lines(&lines);
@@ -222,7 +224,8 @@ fn of_a_line_that_lost_its_beginning_or_its_unit_nothing_is_taken() {
 #[test]
 fn a_word_in_place_of_a_number_costs_that_channel_alone() {
     // The middle one is missing in every third line, the last in every fifth.
-    let word = |i: u32, every: u32, word: &str, number: u32| if i % every == 0 { word.to_owned() } else { number.to_string() };
+    let word =
+        |i: u32, every: u32, word: &str, number: u32| if i % every == 0 { word.to_owned() } else { number.to_string() };
     let named = |i| format!("flexL:{i},flexR:{},fsrL: {}", word(i, 3, "open", 7), word(i, 5, "disconnected", 8));
     let columns = |i| format!("{i},{},{}", word(i, 3, "err", 7), word(i, 5, "Disconnected", 8));
     for lines in [(1..90).map(named).collect::<Vec<_>>(), (1..90).map(columns).collect()] {
@@ -234,6 +237,25 @@ fn a_word_in_place_of_a_number_costs_that_channel_alone() {
             assert_eq!(reading.counts, wanted, "{}", lines[usize::from(i) - 1]);
         }
     }
+}
+
+#[test]
+fn the_converters_reach_is_told_by_the_counts_of_a_sketch_that_says_nothing() {
+    let full_scale = |first: &str, strip: u32| {
+        let sample = |i: u32| format!("flexL:{},flexR:{strip},fsrL:3,fsrR:0,heap:70000", strip + i % 3);
+        let lines: Vec<String> = std::iter::once(first.to_owned()).chain((0..30).map(sample)).collect();
+        let (decoder, heard) = hear_lines(&lines);
+        let told =
+            heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None });
+        assert_eq!(told, Some(decoder.board()));
+        decoder.board().full_scale
+    };
+    let remark = "# no hello";
+    assert_eq!([355, 1420, 5700, 22_700].map(|strip| full_scale(remark, strip)), [1023, 4095, 16_383, 65_535]);
+    // It is believed, but for what goes beyond.
+    assert_eq!([355, 1420, 5700].map(|strip| full_scale(HELLO, strip)), [4095, 4095, 16_383]);
+    let ten = HELLO.replace("adc=12", "adc=10");
+    assert_eq!([355, 1420].map(|strip| full_scale(&ten, strip)), [1023, 4095]);
 }
 
 #[test]

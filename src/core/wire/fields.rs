@@ -22,8 +22,8 @@ const MAX_NAME: usize = 40;
 const MAX_UNIT: usize = 8;
 /// What boards and their libraries print for a number that they do not have.
 const NOTHING: [&str; 19] = [
-    "", "nan", "-nan", "inf", "-inf", "ovf", "null", "none", "n/a", "-", "--", "---", "?", "err", "error", "open", "fail", "ol",
-    "off",
+    "", "nan", "-nan", "inf", "-inf", "ovf", "null", "none", "n/a", "-", "--", "---", "?", "err", "error", "open",
+    "fail", "ol", "off",
 ];
 
 /// How a board writes its lines.

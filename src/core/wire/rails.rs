@@ -1,6 +1,6 @@
-//! Channels that stand at an end of the converter's range, and converters that seem to have fewer bits than expected.
+//! Channels that stand at an end of the converter's range or have no numbers, and how far the converter counts.
 
-/// An end of the converter's range.
+/// Where a channel says nothing of its sensor: an end of the converter's range, or no number at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rail {
@@ -8,6 +8,8 @@ pub enum Rail {
     Low,
     /// All of them: the pin is at the reference voltage, or above.
     High,
+    /// `nan`, a word or nothing where a number should be.
+    NoNumber,
 }
 
 /// A channel is told once it has stood at an end for this long (s).
@@ -26,6 +28,41 @@ pub(super) const FULL_10_BIT: u32 = 1023;
 const WATCHED_S: f64 = 5.0;
 /// With less than this nothing is connected, and nothing can be said.
 const ANYTHING: f32 = 128.0;
+
+/// Largest counts of the converters that there are: 10, 12, 14, 16, 18, 20 and 24 bits.
+const FULL_SCALES: [u32; 7] =
+    [FULL_10_BIT, FULL_12_BIT, (1 << 14) - 1, (1 << 16) - 1, (1 << 18) - 1, (1 << 20) - 1, (1 << 24) - 1];
+/// Readings in a row that are beyond a full scale before a larger one is believed: one alone may be a damaged number.
+const BELIEVED: u32 = 3;
+
+/// How far a converter counts, by what it has sent: no less than ten bits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    full_scale: u32,
+    beyond: u32,
+}
+
+impl Default for Reach {
+    fn default() -> Self {
+        Self { full_scale: FULL_10_BIT, beyond: 0 }
+    }
+}
+
+impl Reach {
+    /// Takes in the largest count of a reading; true where it reaches farther from now on.
+    pub(super) fn add(&mut self, largest: f32) -> bool {
+        self.beyond = if largest > self.full_scale as f32 { self.beyond + 1 } else { 0 };
+        let larger = FULL_SCALES.into_iter().find(|full_scale| largest <= *full_scale as f32);
+        let Some(larger) = larger.filter(|_| self.beyond >= BELIEVED) else { return false };
+        *self = Self { full_scale: larger, beyond: 0 };
+        true
+    }
+
+    /// The full scale.
+    pub(super) fn full_scale(self) -> u32 {
+        self.full_scale
+    }
+}
 
 /// Watches the counts.
 #[derive(Clone, Debug, Default)]
@@ -55,7 +92,8 @@ impl RailWatch {
             let rail = match count {
                 Some(count) if *count >= full - near => Some(Rail::High),
                 Some(count) if *count <= near => Some(Rail::Low),
-                _ => None,
+                Some(_) => None,
+                None => Some(Rail::NoNumber),
             };
             channel.at = rail.map(|rail| match channel.at {
                 Some((before, since)) if before == rail => (rail, since),
@@ -97,10 +135,10 @@ mod tests {
             watch.add(&[Some(4095.0), Some(2000.0), None, Some(0.0)], t, FULL_12_BIT);
             let told = watch.at();
             assert_eq!(told[0], (t > 0.5).then_some(Rail::High), "{t}");
-            assert_eq!((told[1], told[2]), (None, None));
+            assert_eq!((told[1], told[2]), (None, (t > 0.5).then_some(Rail::NoNumber)));
             assert_eq!(told[3], (t > 0.5).then_some(Rail::Low), "{t}");
         }
-        watch.add(&[Some(4000.0), None, None, None], 3.0, FULL_12_BIT);
+        watch.add(&[Some(4000.0), None, Some(9.0), Some(9.0)], 3.0, FULL_12_BIT);
         assert_eq!(watch.at(), [None; 4]);
     }
 
@@ -139,6 +177,18 @@ mod tests {
                 assert_eq!(sound, [0, 0], "{levels} {average}");
             }
         }
+    }
+
+    #[test]
+    fn a_converter_reaches_as_far_as_three_readings_in_a_row() {
+        let mut reach = Reach::default();
+        assert!(!reach.add(1023.0) && !reach.add(20_002.0) && !reach.add(300.0));
+        assert_eq!(reach.full_scale(), 1023, "one number alone was damaged");
+        let steps = [1400.0, 1400.5, 1401.0, 4095.0, 9000.0, 9000.0, 9000.0, 2.0, 5e9, 5e9, 5e9].map(|count| {
+            reach.add(count);
+            reach.full_scale()
+        });
+        assert_eq!(steps, [1023, 1023, 4095, 4095, 4095, 4095, 16383, 16383, 16383, 16383, 16383]);
     }
 
     #[test]

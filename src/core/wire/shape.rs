@@ -94,7 +94,8 @@ impl Shapes {
             Some((before, count)) if before.format == line.format && same_names(&before, &line) => {
                 if count + 1 >= needed {
                     self.names = line.fields.iter().map(|field| field.name.clone()).collect();
-                    let unit = |(a, b): (&Field, &Field)| if a.value.is_some() { a.unit.clone() } else { b.unit.clone() };
+                    let unit =
+                        |(a, b): (&Field, &Field)| if a.value.is_some() { a.unit.clone() } else { b.unit.clone() };
                     self.units = before.fields.iter().zip(&line.fields).map(unit).collect();
                     self.format = Some(line.format);
                     self.roles.clear();

@@ -24,6 +24,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// Full scale of ten bits.
+const TEN_BITS: u32 = 1023;
+
 /// What to listen to, and how.
 #[derive(Clone, Debug)]
 pub struct LinkOptions {
@@ -103,7 +106,7 @@ pub struct LinkStatus {
     pub detected: Option<Detected>,
     /// How well it keeps time.
     pub cadence: Cadence,
-    /// Channels at an end of the converter's range.
+    /// Channels at an end of the converter's range, or without numbers.
     pub rails: Vec<Option<Rail>>,
     /// The counts look like those of ten bits.
     pub looks_10_bit: bool,
@@ -138,13 +141,21 @@ impl LinkStatus {
     pub fn wiring_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.looks_10_bit {
-            let text = "the counts look like those of ten bits: call analogReadResolution(12) in the sketch";
+            let text = match self.board.full_scale <= TEN_BITS {
+                true => {
+                    "the counts are those of ten bits, and taken as such: analogReadResolution(12) in the sketch gives finer ones"
+                }
+                false => {
+                    "the counts look like those of ten bits, against the board's word, so that what is derived from them is \
+                          wrong: call analogReadResolution(12) in the sketch"
+                }
+            };
             remarks.push(text.to_owned());
         }
-        let flex = [Sensor::FlexLeft, Sensor::FlexRight].map(|sensor| self.board.channel_of(sensor));
+        let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
         for (channel, (name, rail)) in self.board.channels.iter().zip(&self.rails).enumerate() {
-            let is_strip = flex.contains(&Some(channel));
-            remarks.extend(match (rail, is_strip) {
+            let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
+            remarks.extend(match (rail, sensor.is_some_and(Sensor::is_flex)) {
                 (Some(Rail::High), true) => {
                     Some(format!("{name} is at the upper end of the range: the strip or one of its wires has come off"))
                 }
@@ -153,6 +164,9 @@ impl LinkStatus {
                     "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
                      ground that is missing or too large"
                 )),
+                (Some(Rail::NoNumber), _) => sensor.map(|_| {
+                    format!("{name} has no numbers: an open circuit as the sketch sees it; look at its lines in the console")
+                }),
                 // A pad that nothing touches reads nothing.
                 (Some(Rail::Low), false) | (None, _) => None,
             });

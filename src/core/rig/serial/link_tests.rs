@@ -156,3 +156,43 @@ fn captured_bytes_are_heard_as_from_a_port() {
         .sum();
     assert_eq!(bytes as u64, std::fs::metadata(&path).expect("is there").len());
 }
+
+/// Speaks at a speed, 20 lines of 30 bytes, if the link listens at it, and else nonsense.
+fn speak_at(board: &mut TTYPort, speed: u32, from: u32) {
+    for i in from..from + 20 {
+        let right = board.baud_rate().is_ok_and(|baud| baud == speed);
+        let bytes: Vec<u8> =
+            line(i, 3).bytes().map(|byte| if right { byte } else { byte.rotate_left(3) | 0x80 }).collect();
+        let _unheard = board.write_all(&bytes);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_board_that_goes_on_at_another_speed_is_found_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("due");
+    let mut pretended = pretended(&path);
+    let link = SerialLink::open(&options(&path)).expect("opens");
+    let (mut events, start, mut sent) = (Vec::new(), Instant::now(), 0);
+    while link.status().state != LinkState::Listening && start.elapsed() < Duration::from_secs(20) {
+        speak_at(&mut pretended.board, 115_200, sent);
+        sent += 20;
+    }
+    // Another sketch: the same numbers, at another speed.
+    let before = link.status().cadence.samples;
+    while link.status().baud != Some(57_600) && start.elapsed() < Duration::from_secs(60) {
+        speak_at(&mut pretended.board, 57_600, sent);
+        sent += 20;
+    }
+    for _ in 0..3 {
+        speak_at(&mut pretended.board, 57_600, sent);
+        sent += 20;
+    }
+    events.extend(link.take(Duration::from_millis(200)));
+    let status = link.status();
+    assert_eq!((status.state, status.baud), (LinkState::Listening, Some(57_600)));
+    assert!(before > 0 && status.cadence.samples > before, "{before} {}", status.cadence.samples);
+    let cause = gaps(&events).first().map(|gap| gap.cause.clone()).unwrap_or_default();
+    assert!(cause.contains("57600 baud"), "{cause}");
+}

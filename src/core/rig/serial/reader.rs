@@ -25,8 +25,9 @@ const BOOT: Duration = Duration::from_secs(4);
 const MUTE: Duration = Duration::from_secs(3);
 /// This many bytes without a reading are not a start that went wrong.
 const ENOUGH_BYTES: u64 = 300;
-/// How long to listen before speeds are doubted, and between two scans.
+/// How long to listen before speeds are doubted: where nothing was understood yet, and where it was; and between two scans.
 const DOUBT: Duration = Duration::from_millis(1500);
+const DOUBT_LATER: Duration = Duration::from_secs(4);
 const RESCAN: Duration = Duration::from_secs(10);
 /// With more printable bytes than this the speed is right: at half of it, about half of the bytes are.
 const TEXT: f64 = 0.9;
@@ -66,10 +67,12 @@ pub(super) struct PortReader {
 
 /// What is known of a connection.
 struct Connection {
-    opened: Instant,
     bytes: u64,
-    readings_before: u64,
     newest: Instant,
+    /// Something was understood since it was made.
+    understood: bool,
+    /// Readings when they last became more, when that was, and bytes by then.
+    progress: (u64, Instant, u64),
     woken: bool,
     /// The board was asked what it is.
     asked: bool,
@@ -112,10 +115,10 @@ impl PortReader {
         let now = Instant::now();
         let readings_before = self.shared.readings.load(Ordering::Relaxed);
         let mut connection = Connection {
-            opened: now,
             bytes: 0,
-            readings_before,
             newest: now,
+            understood: false,
+            progress: (readings_before, now, 0),
             woken: false,
             asked: false,
             scanned: None,
@@ -146,6 +149,13 @@ impl PortReader {
         let readings = self.shared.readings.load(Ordering::Relaxed);
         let mute = connection.newest.elapsed();
         let native = self.port.kind.native;
+        let heard = readings > connection.progress.0;
+        if heard {
+            connection.progress = (readings, Instant::now(), connection.bytes);
+            connection.understood = true;
+        }
+        let (_, since, bytes_then) = connection.progress;
+        let patience = if connection.understood { DOUBT_LATER } else { DOUBT };
         if mute >= MUTE {
             if native && !connection.woken {
                 connection.woken = true;
@@ -154,12 +164,12 @@ impl PortReader {
             if mute >= BOOT {
                 self.shared.set_state(LinkState::Silent { hint: self.silence() });
             }
-        } else if readings > connection.readings_before {
+        } else if heard {
             self.shared.set_state(LinkState::Listening);
             if !std::mem::replace(&mut connection.asked, true) {
                 self.ask(port);
             }
-        } else if connection.bytes >= ENOUGH_BYTES && connection.opened.elapsed() >= DOUBT {
+        } else if connection.bytes - bytes_then >= ENOUGH_BYTES && since.elapsed() >= patience {
             let due = connection.scanned.is_none_or(|scanned| scanned.elapsed() >= RESCAN);
             // Text that is no readings is not the fault of the speed.
             let is_text = lock(&self.shared.decoder).cadence().printable_share > TEXT;

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 /// How long each speed is listened to: five lines of a board that sends ten a second.
 const LISTEN: Duration = Duration::from_millis(600);
+/// The same where text comes that may become readings: three whole lines of a board that sends one a second.
+const LISTEN_TO_TEXT: Duration = Duration::from_secs(4);
 /// Readings that a speed must give.
 const READINGS: u64 = 3;
 /// Share of unreadable lines that a speed may give.
@@ -48,21 +50,32 @@ pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) 
 fn listen(port: &mut dyn SerialPort) -> Cadence {
     let mut decoder = Decoder::default();
     let (mut buffer, mut heard) = ([0; 1024], Vec::new());
-    let start = Instant::now();
-    while start.elapsed() < LISTEN {
+    let (start, mut any) = (Instant::now(), false);
+    loop {
+        let cadence = decoder.cadence();
+        let promises = any && start.elapsed() < LISTEN_TO_TEXT && is_text(&cadence) && !is_understood(&cadence);
+        if start.elapsed() >= LISTEN && !promises {
+            return cadence;
+        }
         match port.read(&mut buffer) {
-            Ok(0) => break,
-            Ok(count) => decoder.push(&buffer[..count], start.elapsed().as_secs_f64(), &mut heard),
+            Ok(0) => return decoder.cadence(),
+            Ok(count) => {
+                any = true;
+                decoder.push(&buffer[..count], start.elapsed().as_secs_f64(), &mut heard);
+            }
             Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
-            Err(_) => break,
+            Err(_) => return decoder.cadence(),
         }
         heard.clear();
     }
-    decoder.cadence()
+}
+
+fn is_text(cadence: &Cadence) -> bool {
+    cadence.printable_share >= PRINTABLE
 }
 
 fn is_understood(cadence: &Cadence) -> bool {
-    cadence.samples >= READINGS && cadence.bad_share <= BAD_SHARE && cadence.printable_share >= PRINTABLE
+    cadence.samples >= READINGS && cadence.bad_share <= BAD_SHARE && is_text(cadence)
 }
 
 #[cfg(all(test, target_os = "linux"))]
@@ -71,9 +84,9 @@ mod tests {
     use serialport::TTYPort;
     use std::io::Write;
 
-    /// A board that speaks at one speed: at any other its bytes arrive as nonsense. The end of a pseudo-terminal that a
-    /// board has knows the speed that is set at the other.
-    fn speak(board: &mut TTYPort, speed: u32, stop: &AtomicBool) {
+    /// A board that speaks at one speed, a line each so many ms: at any other its bytes arrive as nonsense. The end of a
+    /// pseudo-terminal that a board has knows the speed that is set at the other.
+    fn speak(board: &mut TTYPort, speed: u32, period_ms: u64, stop: &AtomicBool) {
         let mut i = 0u32;
         while !stop.load(Ordering::Relaxed) {
             let line = format!("flexL:{},flexR:2\n", i % 4096);
@@ -82,7 +95,7 @@ mod tests {
                 line.bytes().map(|byte| if right { byte } else { byte.rotate_left(3) | 0x80 }).collect::<Vec<u8>>();
             let _unheard = board.write_all(&bytes);
             i += 1;
-            std::thread::sleep(Duration::from_millis(10));
+            std::thread::sleep(Duration::from_millis(period_ms));
         }
     }
 
@@ -91,12 +104,21 @@ mod tests {
         let (mut board, mut port) = TTYPort::pair().expect("a pseudo-terminal");
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            scope.spawn(|| speak(&mut board, 57_600, &stop));
+            scope.spawn(|| speak(&mut board, 57_600, 10, &stop));
             let found = scan(&mut port, Baud::B115200, &stop);
             stop.store(true, Ordering::Relaxed);
             assert_eq!(found, Scan::Found(Baud::B57600));
         });
         assert_eq!(port.baud_rate().ok(), Some(57_600));
+        // One that sends two lines a second is listened to for longer.
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| speak(&mut board, 115_200, 500, &stop));
+            let found = scan(&mut port, Baud::B57600, &stop);
+            stop.store(true, Ordering::Relaxed);
+            assert_eq!(found, Scan::Found(Baud::B115200));
+        });
+        let stop = AtomicBool::new(true);
         // Told to stop, it leaves the port as it was.
         assert_eq!(scan(&mut port, Baud::B9600, &stop), Scan::Nothing);
         assert_eq!(port.baud_rate().ok(), Some(9_600));
