@@ -62,8 +62,17 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
     }
     let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
     let part = part_name(arguments, sensor, &store)?;
+    if arguments.points.is_some() && arguments.live.empty_close.is_none() {
+        arguments.live.refuse_beside_points()?;
+    }
     let record = match &arguments.points {
-        Some(file) => record_of_file(arguments, sensor, &part, file)?,
+        Some(file) => {
+            let record = record_of_file(arguments, sensor, &part, file)?;
+            match arguments.live.empty_close {
+                Some(seconds) => guided::watch_empty_close(&arguments.live, seconds, sensor, record, &store)?,
+                None => record,
+            }
+        }
         None => guided::record(arguments, sensor, &part, &store)?,
     };
     let calibration = Calibration::fit(Record { note: arguments.note.clone(), ..record })?;

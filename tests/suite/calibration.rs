@@ -16,7 +16,8 @@ use palpate_core::pretended::{HandPlan, HiddenParts, PretendedGripper, Pretended
 use palpate_core::recording::{BoardChunk, BoardInfo, Store, TrialId};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::calibration::Input;
-use palpate_core::sensing::calibration::{BendingZero, Calibration, Kind, Procedure, Readout};
+use palpate_core::sensing::calibration::{BendingZero, Calibration, Curve, Kind, Procedure, Readout};
+use palpate_core::sensing::electronics::StripPart;
 use palpate_core::study::{FingerFit, Known, Observation, Trust, fit_finger};
 use palpate_core::trial::PhaseMark;
 use palpate_core::wire::{CAPTURE_MAGIC, Captured, Decoder, Heard};
@@ -237,7 +238,8 @@ fn write_points(folder: &Path, name: &str, record: &palpate_core::sensing::calib
 fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let (_, calibrations) = calibrated(&parts(6, false), 6);
+    let hidden = parts(6, false);
+    let (_, calibrations) = calibrated(&hidden, 6);
     write_points(at, "strip.csv", &calibrations[0].1.record);
     write_points(at, "pad.csv", &calibrations[2].1.record);
     let made = json(at, &["calibrate", "flexL", "--part", "A7", "--points", "strip.csv", "--json"]);
@@ -250,6 +252,13 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
         "{text:?}"
     );
     assert_eq!(run(at, &["calibrate", "fsrL", "--part", "P1", "--points", "pad.csv", "--dry-run"]).code, Some(0));
+    // Weights from a file, and how the zero moves with bending from an empty close.
+    capture(&hidden, "rest=0.5; close empty bar=0.5", 4.0, &at.join("close.bytes"));
+    let pad = ["calibrate", "fsrL", "--part", "P1", "--points", "pad.csv"];
+    let close = ["--empty-close", "3.5", "--auto", "--dry-run", "--json", "--port"];
+    let learned = json(at, &[&pad[..], &close, &["close.bytes"]].concat());
+    assert!(learned["bending"]["knots"].as_array().unwrap().len() > 3, "{learned}");
+    refused(at, &[&pad[..], &["--port", "close.bytes"]].concat(), &["--port is of no use", "--empty-close"]);
     let listed = json(at, &["calibrate", "list", "--json"]);
     assert_eq!((listed["calibrations"].as_array().unwrap().len(), &listed["mounted"]["flexL"]), (2, &"A7".into()));
     assert_eq!(run(at, &["calibrate", "export", "--out", "c.json"]).code, Some(0));
@@ -273,12 +282,9 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     refused(at, &["calibrate", "flexL", "--port", "nowhere", "--auto"], &["nowhere"]);
 }
 
-#[test]
-fn a_captured_stream_is_calibrated_hands_free() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let parts = parts(7, true);
-    let script = parse_script("rest=2; angle=0 hold=2; angle=50 hold=3; angle=90 hold=3").unwrap();
+/// What a board sends while a script is done on the bench, as a file of captured bytes.
+fn capture(parts: &HiddenParts, script: &str, seconds: f64, file: &Path) {
+    let script = parse_script(script).unwrap();
     let hand =
         HandPlan { scene: Scene::default(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script };
     let (channels, most_steps, clock_start_us) = (4, 30, 0);
@@ -293,13 +299,21 @@ fn a_captured_stream_is_calibrated_hands_free() {
         seed: 1,
     };
     let mut gripper = PretendedGripper::new(setup).unwrap();
-    let mut file = CAPTURE_MAGIC.to_vec();
-    for k in 1..=1000 {
+    let mut bytes = CAPTURE_MAGIC.to_vec();
+    for k in 1..=(100.0 * seconds) as u32 {
         let arrived_s = 0.01 * f64::from(k);
         gripper.advance(arrived_s);
-        Captured::Bytes { arrived_s, bytes: gripper.take_bytes() }.write(&mut file).unwrap();
+        Captured::Bytes { arrived_s, bytes: gripper.take_bytes() }.write(&mut bytes).unwrap();
     }
-    std::fs::write(at.join("bench.bytes"), file).unwrap();
+    std::fs::write(file, bytes).unwrap();
+}
+
+#[test]
+fn a_captured_stream_is_calibrated_hands_free() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let parts = parts(7, true);
+    capture(&parts, "rest=2; angle=0 hold=2; angle=50 hold=3; angle=90 hold=3", 10.0, &at.join("bench.bytes"));
     let arguments =
         ["calibrate", "flexR", "--part", "B", "--port", "bench.bytes", "--auto", "--plan", "0,50,90", "--json"];
     let made = json(at, &arguments);
@@ -416,33 +430,48 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     assert!((kappa(&store) / before - 0.9).abs() < 0.01, "{} {before}", kappa(&store));
 }
 
-#[test]
-fn the_window_calibrates_step_by_step() {
-    let counts = Arc::new(Mutex::new(0.0));
-    let read = Arc::clone(&counts);
-    let listen: Listen = Arc::new(move |_| {
-        let read = Arc::clone(&read);
-        let counts = move || vec![Some(1400.0), Some(*read.lock().unwrap() as f32), Some(0.0), Some(0.0)];
-        Ok(Box::new(Scripted { counts, t_s: 0.0 }))
-    });
-    let panel = ALL_PANELS.iter().find(|panel| panel.name == "calibration");
-    let setup = BenchSetup { panel, size: [340.0, 520.0], listen, ..BenchSetup::default() };
-    let mut bench = Bench::new(setup, CpuRenderer::default());
-    bench.harness.get_by_label("right flex strip").click();
+/// A gripper on the bench, as its board reads it: counts of each sensor, and how far the empty hand has bent since it began
+/// to close (degrees).
+#[derive(Default)]
+struct OnTheBench {
+    counts: [f64; 4],
+    bends: Option<f64>,
+}
+
+/// A strip of 24 kOhm that rises to 2.2 times that.
+fn strip_counts(degrees: f64) -> f64 {
+    Input::on(&Board::default(), Sensor::FlexRight).counts(24e3 * (1.0 + 1.2 * degrees / 90.0))
+}
+
+/// A pad of 6 kOhm under 1 N.
+fn pad_counts(force: f64) -> f64 {
+    let input = Input::on(&Board::default(), Sensor::PadRight);
+    if force < 0.05 { 0.0 } else { input.counts(6e3 / force.powf(0.9)) }
+}
+
+/// Chooses a sensor and begins with a part.
+fn begin_calibration(bench: &mut Bench, sensor: Sensor, part: &str) {
+    bench.harness.get_by_label(sensor.label()).click();
     bench.harness.get_by_label("Part").focus();
     bench.harness.step();
-    bench.harness.get_by_label("Part").type_text("A7");
+    for _ in 0..4 {
+        bench.harness.key_press(egui::Key::Backspace);
+    }
+    bench.harness.get_by_label("Part").type_text(part);
     bench.harness.step();
-    let input = Input::on(&Board::default(), Sensor::FlexRight);
-    // A strip of 24 kOhm that rises to 2.2 times that, and has slipped a little at 60 degrees.
-    let ohm = |degrees: f64| 24e3 * (1.0 + 1.2 * degrees / 90.0);
-    let holds = [("hang straight", 0.0), ("by 30 degrees", 30.0), ("by 60 degrees", 61.5), ("by 90 degrees", 90.0)];
-    *counts.lock().unwrap() = input.counts(ohm(0.0));
     bench.harness.get_by_label("Begin calibration").click();
     bench.harness.step();
-    for (instruction, degrees) in holds {
-        let wanted = input.counts(ohm(degrees));
-        *counts.lock().unwrap() = wanted;
+}
+
+/// Sets what is asked for and takes it, once it has settled.
+fn take_points<'a>(
+    bench: &mut Bench,
+    hand: &Mutex<OnTheBench>,
+    sensor: Sensor,
+    holds: impl IntoIterator<Item = (&'a str, f64)>,
+) {
+    for (instruction, wanted) in holds {
+        hand.lock().unwrap().counts[sensor as usize] = wanted;
         bench.until_shown(true, instruction);
         bench.until_shown(true, &format!("{wanted:.0} counts, settled"));
         bench.harness.get_by_label("Take point").click();
@@ -450,10 +479,69 @@ fn the_window_calibrates_step_by_step() {
         bench.until_shown(false, instruction);
     }
     bench.until_shown(true, "all points are taken");
+}
+
+#[test]
+fn the_window_calibrates_step_by_step() {
+    let hand = Arc::new(Mutex::new(OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None }));
+    let read = Arc::clone(&hand);
+    let listen: Listen = Arc::new(move |_| {
+        let read = Arc::clone(&read);
+        let counts = move || {
+            let mut hand = read.lock().unwrap();
+            // Bending alone presses on the pad: 5 mN a degree. It opens again, and closes, and opens.
+            if let Some(degrees) = hand.bends {
+                let now = 45.0 - (45.0 - degrees).abs();
+                (hand.counts[1], hand.counts[3]) = (strip_counts(now), pad_counts(0.005 * now));
+                hand.bends = Some((degrees + 9.0) % 90.0);
+            }
+            hand.counts.map(|counts| Some(counts as f32)).to_vec()
+        };
+        Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+    });
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "calibration");
+    let setup = BenchSetup { panel, size: [340.0, 640.0], listen, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    begin_calibration(&mut bench, Sensor::FlexRight, "A7");
+    // It has slipped a little at 60 degrees.
+    let holds = [("hang straight", 0.0), ("by 30 degrees", 30.0), ("by 60 degrees", 61.5), ("by 90 degrees", 90.0)];
+    take_points(&mut bench, &hand, Sensor::FlexRight, holds.map(|(asked, degrees)| (asked, strip_counts(degrees))));
     bench.until_shown(true, "kOhm flat");
     bench.until_shown(true, "counts, settled");
+    assert!(bench.harness.query_by_label("Empty close").is_none(), "a strip has no such zero");
     compare("calibration_done", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
     bench.harness.get_by_label("Keep").click();
     bench.harness.step();
     bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
+    // A pad, and what bending does to it.
+    begin_calibration(&mut bench, Sensor::PadRight, "P3");
+    let plan = palpate_core::sensing::calibration::plan(Kind::Pad);
+    let asked: Vec<(String, f64)> = plan
+        .iter()
+        .map(|force| match *force {
+            0.0 => ("put nothing on it".to_owned(), 0.0),
+            force => (format!("put {:.0} g on", 1e3 * Kind::Pad.shown(force)), pad_counts(force)),
+        })
+        .collect();
+    take_points(&mut bench, &hand, Sensor::PadRight, asked.iter().map(|(asked, counts)| (asked.as_str(), *counts)));
+    bench.until_shown(true, "let the empty hand close once");
+    *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: Some(0.0) };
+    bench.harness.get_by_label("Empty close").click();
+    bench.harness.step();
+    bench.until_shown(true, "what bending alone shows, up to");
+    *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None };
+    bench.until_shown(true, "0 counts, settled");
+    // A plot knows the width of its labels after it has been drawn.
+    bench.harness.run_steps(4);
+    compare("calibration_pad", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
+    bench.harness.get_by_label("Keep").click();
+    bench.harness.step();
+    bench.until_shown(true, "version 1 of \"P3\", the right pad");
+    let store = bench.store();
+    let serving = store.serving(None, &[]).unwrap().calibrations;
+    let (_, pad) = serving.iter().find(|(sensor, _)| *sensor == Sensor::PadRight).unwrap();
+    let bending = pad.record.bending.as_ref().expect("learned");
+    let Curve::Pad(curve) = &pad.curve else { panic!("{pad:?}") };
+    let load = bending.preload(curve, 30f64.to_radians() / StripPart::ACTIVE_LENGTH);
+    assert!((load - 0.15).abs() < 0.03, "{load}");
 }

@@ -117,6 +117,7 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
     curve_plot(ui, kind, &running.points, fit, accent);
     if let Some(calibration) = fit {
         residual_plot(ui, kind, calibration, accent);
+        bending_plot(ui, calibration, accent);
     }
 }
 
@@ -129,6 +130,10 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Vec<Actio
     button(running.settled.is_ok(), "Take point", "Once the reading has settled", take);
     button(running.next.is_some(), "Leave out", "Go on without this one", Some(CalibrationWish::Skip));
     button(!running.points.is_empty(), "Take back", "Measure the last one again", Some(CalibrationWish::Undo));
+    if Kind::of(running.plan.sensor) == Kind::Pad {
+        let about = "Watch the empty hand close for 15 s: how the pad's zero moves with bending";
+        button(running.can_close, "Empty close", about, Some(CalibrationWish::EmptyClose));
+    }
     button(running.fit.is_ok(), "Keep", "Store it; old trials are read by it too", Some(CalibrationWish::Keep));
     button(true, "Stop", "Forget it", Some(CalibrationWish::Stop));
 }
@@ -178,6 +183,22 @@ fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, accent: Col
             plot.line(Line::new("off", vec![[*at, 0.0], [*at, *off]]).color(accent).width(1.5));
         }
         plot.points(Points::new("off", off.clone()).color(accent).radius(3.0));
+    });
+}
+
+/// What bending alone shows on a pad, as if it were a force.
+fn bending_plot(ui: &mut Ui, calibration: &Calibration, accent: Color32) {
+    let (Curve::Pad(curve), Some(bending)) = (&calibration.curve, &calibration.record.bending) else { return };
+    let reaches = bending.reaches();
+    ui.weak(format!("what bending alone shows, up to {} 1/m", three_digits(reaches)));
+    let line: PlotPoints<'_> = (0..=60)
+        .map(|k| {
+            let kappa = reaches * f64::from(k) / 60.0;
+            [kappa, bending.preload(curve, kappa)]
+        })
+        .collect();
+    plot("bending zero", 90.0, "N", "1/m").include_y(0.0).include_y(0.1).show(ui, |plot| {
+        plot.line(Line::new("load", line).color(accent).width(1.5));
     });
 }
 

@@ -5,10 +5,9 @@ use super::super::Failure;
 use super::super::terminal::{note, warn};
 use super::CalibrateArguments;
 use palpate_core::board::{Board, Reading, Sensor};
-use palpate_core::gripper::Side;
 use palpate_core::recording::Store;
 use palpate_core::rig::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
-use palpate_core::sensing::calibration::{BendingZero, Kind, Procedure, Readout, Record, Unsettled};
+use palpate_core::sensing::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
 use palpate_core::wire::Heard;
 use std::collections::VecDeque;
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
@@ -20,18 +19,34 @@ use std::time::{Duration, Instant};
 #[derive(Debug, clap::Args)]
 pub(super) struct LiveArguments {
     /// The port of the board, or a file of captured bytes; the only likely port where it is left out.
-    #[arg(long, value_name = "PORT|FILE", conflicts_with = "points")]
+    #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
     /// Angles (degrees) or weights (kg) to set, separated by commas, instead of the usual ones.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',', conflicts_with = "points")]
     plan: Vec<f64>,
     /// Take each point by itself, as soon as the reading has changed and settled; without it, Enter takes it.
-    #[arg(long, conflicts_with = "points")]
+    #[arg(long)]
     auto: bool,
     /// Of a pad: watch the empty hand close for so many seconds afterwards, to learn how its zero moves with bending. The
     /// strip of the same finger must be calibrated.
-    #[arg(long, value_name = "S", conflicts_with = "points")]
-    empty_close: Option<f64>,
+    #[arg(long, value_name = "S", value_parser = parse_seconds, num_args = 0..=1, default_missing_value = "15")]
+    pub(super) empty_close: Option<f64>,
+}
+
+impl LiveArguments {
+    /// Where points come from a file, the board is only needed for an empty close.
+    pub(super) fn refuse_beside_points(&self) -> Result<(), Failure> {
+        let given = [("--port", self.port.is_some()), ("--auto", self.auto)].into_iter().find(|(_, given)| *given);
+        given.map_or(Ok(()), |(name, _)| {
+            Err(format!("{name} is of no use here: the points come from a file. Leave it out, or add --empty-close")
+                .into())
+        })
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| (1.0..=600.0).contains(s));
+    seconds.ok_or_else(|| "write a number of seconds from 1 to 600".to_owned())
 }
 
 /// How long a board may take to say what it is (s).
@@ -85,11 +100,39 @@ pub(super) fn record(
     while procedure.next().is_some() {
         bench.one_point(&mut procedure, live.auto)?;
     }
-    if let Some(seconds) = live.empty_close {
-        let bending = bench.empty_close(&board, &procedure, store, live.auto, seconds)?;
-        procedure.set_bending(bending);
+    let record = procedure.record().clone();
+    match live.empty_close {
+        Some(seconds) => with_empty_close(&mut bench, &board, record, sensor, store, live.auto, seconds),
+        None => Ok(record),
     }
-    Ok(procedure.record().clone())
+}
+
+/// A pad whose points are known already, with the zero that bending gives it.
+pub(super) fn watch_empty_close(
+    live: &LiveArguments,
+    seconds: f64,
+    sensor: Sensor,
+    record: Record,
+    store: &Store,
+) -> Result<Record, Failure> {
+    let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
+    let board = bench.board()?;
+    with_empty_close(&mut bench, &board, record, sensor, store, live.auto, seconds)
+}
+
+fn with_empty_close(
+    bench: &mut Bench,
+    board: &Board,
+    record: Record,
+    sensor: Sensor,
+    store: &Store,
+    auto: bool,
+    seconds: f64,
+) -> Result<Record, Failure> {
+    let pad = Calibration::fit(record.clone())?;
+    let serving = store.serving(None, &[])?.calibrations;
+    let close = EmptyClose::begin(board, (sensor, pad), &serving, seconds)?;
+    Ok(Record { bending: Some(bench.empty_close(close, auto)?), ..record })
 }
 
 /// The board, and what it sends for some seconds.
@@ -280,25 +323,8 @@ impl Bench {
     }
 
     /// How the zero of a pad moves while its finger bends.
-    fn empty_close(
-        &mut self,
-        board: &Board,
-        procedure: &Procedure,
-        store: &Store,
-        auto: bool,
-        seconds: f64,
-    ) -> Result<BendingZero, Failure> {
-        let sensor = procedure.sensor();
-        let side = if matches!(sensor, Sensor::PadRight | Sensor::FlexRight) { Side::Right } else { Side::Left };
-        let strip = Kind::Flex.on(side);
-        let mut calibrations = store.serving(None, &[])?.calibrations;
-        if !calibrations.iter().any(|(own, _)| *own == strip) {
-            return Err(format!("the {} is not calibrated: do that first", strip.label()).into());
-        }
-        calibrations.retain(|(own, _)| *own != sensor);
-        calibrations.push((sensor, procedure.fit()?));
-        let readout = Readout::new(board, &calibrations)?;
-        note("take everything away and let the empty hand close to about half a bar, so that the fingers do not touch");
+    fn empty_close(&mut self, mut close: EmptyClose, auto: bool) -> Result<BendingZero, Failure> {
+        note(&close.instruction());
         if !auto {
             note("press Enter and begin");
             while self.wish()?.is_none() {
@@ -306,11 +332,13 @@ impl Bench {
             }
             self.pending.clear();
         }
-        let mut readings: Vec<Reading> = Vec::new();
-        while readings.last().zip(readings.first()).is_none_or(|(last, first)| last.t_s - first.t_s < seconds) {
+        loop {
             self.listen()?;
-            readings.extend(self.pending.drain(..));
+            while let Some(reading) = self.pending.pop_front() {
+                if close.feed(&reading) {
+                    return Ok(close.bending()?);
+                }
+            }
         }
-        Ok(BendingZero::from_empty_close(&readout.bending(side, &readings))?)
     }
 }

@@ -167,6 +167,12 @@ pub enum Fault {
     /// Points of bending for something that is not a pad.
     #[error("only a pad has a zero that moves with the bending of its finger")]
     NoBending,
+    /// A pad's zero over bending is wanted, but the strip that says how far the finger bends is not calibrated.
+    #[error("how far the finger bends is read by the {strip}, which is not calibrated: do that first")]
+    NoStrip {
+        /// Which strip.
+        strip: &'static str,
+    },
     /// Points of bending that tell nothing.
     #[error(
         "the empty close has {have} usable readings over {} 1/m of curvature: it must go to at least 5 1/m with the \

@@ -13,6 +13,7 @@
 //! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of these
 //! kinds from data sheets is used to refuse calibrations that cannot be; see [`Fault`].
 
+mod empty_close;
 mod fault;
 mod flex_curve;
 mod input;
@@ -28,6 +29,7 @@ mod record;
 mod straight_line;
 mod zero;
 
+pub use empty_close::EmptyClose;
 pub use fault::Fault;
 pub use flex_curve::FlexCurve;
 pub use input::{Input, Rail};

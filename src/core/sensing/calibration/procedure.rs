@@ -143,7 +143,14 @@ impl Procedure {
     pub fn instruction(&self) -> String {
         let place = self.sensor.label();
         let Some(next) = self.next() else {
-            return "all points are taken".to_owned();
+            return match (self.record.kind, &self.record.bending) {
+                (Kind::Pad, None) => {
+                    "all points are taken; let the empty hand close once, so that its bending is not felt as \
+                                      a force"
+                        .to_owned()
+                }
+                _ => "all points are taken".to_owned(),
+            };
         };
         match self.record.kind {
             Kind::Flex if next == 0.0 => format!("{place}: let the finger hang straight"),
@@ -302,7 +309,10 @@ mod tests {
             );
             now += 2.0;
         }
-        assert_eq!((procedure.left(), procedure.instruction().as_str()), (0, "all points are taken"));
+        assert_eq!(
+            (procedure.left(), procedure.instruction().as_str()),
+            (0, "all points are taken; let the empty hand close once, so that its bending is not felt as a force")
+        );
         let calibration = procedure.fit()?;
         assert_eq!(calibration.record.part, "P7");
         let force = calibration.stimulus(&input, input.counts(6e3)).ok_or("in range")?;

@@ -2,7 +2,7 @@
 
 use crate::board::{Board, Reading, Sensor};
 use crate::recording::Store;
-use crate::sensing::calibration::{Calibration, Point, Procedure};
+use crate::sensing::calibration::{Calibration, EmptyClose, Point, Procedure};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -17,6 +17,9 @@ pub enum CalibrationWish {
     Skip,
     /// Take the last point back.
     Undo,
+    /// Watch the empty hand close, to learn how the zero of a pad moves with bending; calibrations of the other parts are
+    /// read for it.
+    EmptyClose,
     /// Store what came out.
     Keep,
     /// Forget it.
@@ -62,6 +65,8 @@ pub struct RunningCalibration {
     pub not_taken: Option<String>,
     /// The points so far.
     pub points: Vec<Point>,
+    /// An empty close can be watched: a pad is calibrated, and none is being watched.
+    pub can_close: bool,
     /// What they come to, or why they come to nothing yet.
     pub fit: Result<Arc<Calibration>, String>,
 }
@@ -71,6 +76,7 @@ pub(super) struct Calibrating {
     plan: CalibrationPlan,
     /// From the first reading on.
     procedure: Option<Procedure>,
+    closing: Option<EmptyClose>,
     not_taken: Option<String>,
     /// The port was opened for it, and is given back with it.
     pub(super) owns_port: bool,
@@ -78,7 +84,7 @@ pub(super) struct Calibrating {
 
 impl Calibrating {
     pub(super) fn new(plan: CalibrationPlan, owns_port: bool) -> Self {
-        Self { plan, procedure: None, not_taken: None, owns_port }
+        Self { plan, procedure: None, closing: None, not_taken: None, owns_port }
     }
 
     /// Takes in a reading; fails where the board has no such channel.
@@ -87,14 +93,38 @@ impl Calibrating {
             Some(procedure) => procedure,
             empty @ None => empty.insert(begin(&self.plan, board)?),
         };
+        if let Some(closing) = &mut self.closing {
+            if closing.feed(reading) {
+                match closing.bending() {
+                    Ok(bending) => procedure.set_bending(bending),
+                    Err(fault) => self.not_taken = Some(fault.to_string()),
+                }
+                self.closing = None;
+            }
+            return Ok(());
+        }
         procedure.feed(reading);
         Ok(())
+    }
+
+    /// Begins to watch an empty close, with the calibrations that serve now.
+    pub(super) fn close_empty(&mut self, board: &Board, store: &Store) {
+        let Some(procedure) = &self.procedure else { return };
+        let begun = procedure.fit().map_err(|fault| fault.to_string()).and_then(|pad| {
+            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
+            let pad = (procedure.sensor(), pad);
+            EmptyClose::begin(board, pad, &serving.calibrations, EmptyClose::SECONDS).map_err(|fault| fault.to_string())
+        });
+        match begun {
+            Ok(closing) => (self.closing, self.not_taken) = (Some(closing), None),
+            Err(cause) => self.not_taken = Some(cause),
+        }
     }
 
     /// Takes a point, leaves one out, or takes one back.
     pub(super) fn grant(&mut self, wish: &CalibrationWish) {
         let Some(procedure) = &mut self.procedure else { return };
-        self.not_taken = None;
+        (self.closing, self.not_taken) = (None, None);
         match wish {
             CalibrationWish::Take(stimulus) => {
                 self.not_taken = procedure.take(*stimulus).err().map(|why| format!("not taken: {why}"));
@@ -103,7 +133,8 @@ impl Calibrating {
             CalibrationWish::Undo => {
                 procedure.undo();
             }
-            CalibrationWish::Begin(_) | CalibrationWish::Keep | CalibrationWish::Stop => {}
+            CalibrationWish::Begin(_) | CalibrationWish::EmptyClose | CalibrationWish::Keep | CalibrationWish::Stop => {
+            }
         }
     }
 
@@ -124,19 +155,26 @@ impl Calibrating {
     pub(super) fn view(&self, link: String) -> RunningCalibration {
         let procedure = self.procedure.as_ref();
         let waiting = || Err("no readings yet".to_owned());
+        let fit = procedure.map_or_else(
+            || Err("no points yet".to_owned()),
+            |procedure| procedure.fit().map(Arc::new).map_err(|fault| fault.to_string()),
+        );
+        let instruction = match (&self.closing, procedure) {
+            (Some(closing), _) => closing.instruction(),
+            (None, Some(procedure)) => procedure.instruction(),
+            (None, None) => link.clone(),
+        };
         RunningCalibration {
             plan: self.plan.clone(),
-            instruction: procedure.map_or_else(|| link.clone(), Procedure::instruction),
+            instruction,
             link,
             next: procedure.and_then(Procedure::next),
             latest: procedure.and_then(Procedure::latest),
             settled: procedure.map_or_else(waiting, |p| p.settled().map(|p| p.counts).map_err(|why| why.to_string())),
             not_taken: self.not_taken.clone(),
             points: procedure.map(|procedure| procedure.record().points.clone()).unwrap_or_default(),
-            fit: procedure.map_or_else(
-                || Err("no points yet".to_owned()),
-                |procedure| procedure.fit().map(Arc::new).map_err(|fault| fault.to_string()),
-            ),
+            can_close: !self.plan.sensor.is_flex() && self.closing.is_none() && fit.is_ok(),
+            fit,
         }
     }
 }

@@ -116,6 +116,13 @@ impl Desk {
                     self.read_calibrations();
                 }
             }
+            CalibrationWish::EmptyClose => {
+                let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection) else { return };
+                match open(&mut self.store, &self.path) {
+                    Ok(store) => calibrating.close_empty(&connection.board, store),
+                    Err(cause) => self.outlets.tell(Notice::Warning(cause)),
+                }
+            }
             CalibrationWish::Take(_) | CalibrationWish::Skip | CalibrationWish::Undo => {
                 if let Some(calibrating) = &mut self.calibrating {
                     calibrating.grant(wish);
