@@ -81,17 +81,25 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>
     };
     let listening = link.state == LinkState::Listening;
     let cadence = &link.cadence;
-    let real = match listening {
-        true => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
-        false => "REAL GRIPPER: no readings".to_owned(),
+    let real = match (listening, cadence.troubled) {
+        (true, true) => format!("REAL GRIPPER {:.0} Hz: many lines cannot be read", cadence.rate_hz),
+        (true, false) => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
+        (false, _) => "REAL GRIPPER: no readings".to_owned(),
     };
+    let remarks = [link.line_remarks(), link.wiring_remarks()].concat();
+    let trouble = !listening || cadence.troubled;
     let about = format!("{}: {}", link.port.path.display(), link.state.sentence());
+    let about = std::iter::once(about).chain(remarks.iter().cloned()).collect::<Vec<_>>().join("\n");
     for (source, text, about) in [
         (Source::Gripper, real, about),
         (Source::Simulation, "SIMULATED".to_owned(), "Show the simulation instead".to_owned()),
     ] {
         let chosen = context.source == source;
-        let ink = if source == Source::Gripper && !listening { colours.error } else { colours.text };
+        let ink = match source {
+            Source::Gripper if trouble => colours.error,
+            Source::Gripper if !remarks.is_empty() => colours.warning,
+            Source::Gripper | Source::Simulation => colours.text,
+        };
         let text = RichText::new(text).small().color(colour(ink));
         if ui.selectable_label(chosen, text).on_hover_text(about).clicked() {
             actions.push(Action::Show(source));

@@ -7,7 +7,8 @@ use super::theme::{colour, veil};
 use super::traces::GraspTrace;
 use egui::{Color32, Ui};
 use egui_plot::{
-    AxisHints, FilledArea, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text, VLine,
+    AxisHints, FilledArea, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform,
+    Span, Text, VLine,
 };
 use palpate_core::palette::{Theme, Trace};
 use palpate_core::units::three_digits;
@@ -80,11 +81,12 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
         let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
         widget = widget.legend(legend.position(egui_plot::Corner::RightTop));
     }
+    let gaps = gaps(context);
     let response = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(from..=to);
         plot_ui.set_plot_bounds_y(low..=high);
         add_hold(plot_ui, context, high - 0.04 * (high - low));
-        add_gaps(plot_ui, context);
+        add_gaps(plot_ui, &gaps, theme);
         for trace in context.traces.earlier() {
             add_curves(plot_ui, trace, plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0, false);
         }
@@ -102,6 +104,8 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
             width: bounds.width(),
         }
     });
+    let shade = veil(theme.colours().error, 0.55);
+    gaps.iter().for_each(|gap| hatch(ui, &response.transform, *gap, shade));
     if let Some(why) = nothing_read(context, plot) {
         let ink = colour(theme.colours().quiet_text);
         let room = response.response.rect.width() - 60.0;
@@ -171,16 +175,28 @@ fn seconds_at(value: f64, shown: &std::ops::RangeInclusive<f64>) -> String {
 }
 
 /// A plot of what does not move: no mouse, its axes as wide as those of the others.
-pub(super) fn still(id: &str, height: f32, y_label: &str, below: AxisHints<'static>, air_beside: f32) -> Plot<'static> {
+pub(super) fn still(
+    theme: Theme,
+    id: &str,
+    height: f32,
+    y_label: &str,
+    below: AxisHints<'static>,
+    air_beside: f32,
+) -> Plot<'static> {
     Plot::new(id.to_owned())
         .height(height)
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)
         .show_background(false)
-        .y_axis_min_width(44.0)
-        .y_axis_label(y_label.to_owned())
+        .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
+        .custom_y_axes(vec![
+            AxisHints::new_y()
+                .label(y_label.to_owned())
+                .min_thickness(44.0)
+                .label_spacing(egui::Rangef::new(14.0, 22.0)),
+        ])
         .custom_x_axes(vec![below.label_spacing(egui::Rangef::new(24.0, 40.0))])
         .set_margin_fraction(egui::vec2(air_beside, 0.12))
 }
@@ -201,16 +217,39 @@ fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, hei
     plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
 }
 
+/// Stretches of the current grasp in which readings are missing (s).
+fn gaps(context: &PanelContext<'_>) -> Vec<[f64; 2]> {
+    context.traces.current().map(GraspTrace::gaps).unwrap_or_default()
+}
+
+/// Distance between the strokes of a hatching.
+const STROKES: f32 = 7.0;
+
+/// Strokes across a stretch of time, which then looks like none in which something was read.
+fn hatch(ui: &Ui, transform: &PlotTransform, [from, to]: [f64; 2], shade: Color32) {
+    let frame = *transform.frame();
+    let [left, right] = [from, to].map(|t| transform.position_from_point_x(t));
+    let rect = egui::Rect::from_x_y_ranges(left..=right, frame.y_range()).intersect(frame);
+    if !rect.is_positive() {
+        return;
+    }
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    // Strokes belong to the plot and not to the gap, so that they stand still while it grows.
+    let first = ((rect.left() - frame.left() - rect.height()) / STROKES).floor() as i32;
+    let last = ((rect.right() - frame.left()) / STROKES).ceil() as i32;
+    for k in first..=last {
+        let foot = frame.left() + STROKES * k as f32;
+        let ends = [egui::pos2(foot, rect.bottom()), egui::pos2(foot + rect.height(), rect.top())];
+        painter.line_segment(ends, egui::Stroke::new(1.0, shade));
+    }
+}
+
 /// Shades the stretches in which readings are missing, so that nobody takes them for quiet ones.
-fn add_gaps(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>) {
-    let colours = context.view.theme.colours();
-    for [from, to] in context.traces.current().map(GraspTrace::gaps).unwrap_or_default() {
-        plot_ui.add(
-            Span::new("", from..=to)
-                .fill(veil(colours.error, 0.16))
-                .border_width(1.0)
-                .border_color(veil(colours.error, 0.5)),
-        );
+fn add_gaps(plot_ui: &mut egui_plot::PlotUi<'_>, gaps: &[[f64; 2]], theme: Theme) {
+    let error = theme.colours().error;
+    for [from, to] in gaps {
+        let span = Span::new("", *from..=*to).fill(veil(error, 0.16));
+        plot_ui.add(span.border_width(1.0).border_color(veil(error, 0.5)));
     }
 }
 

@@ -11,6 +11,7 @@ mod fit;
 mod grasp;
 mod interrupt;
 mod learning;
+mod link;
 mod plan;
 mod recognise;
 mod record;

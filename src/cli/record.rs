@@ -2,18 +2,18 @@
 
 use super::Failure;
 use super::interrupt::stop_flag;
+use super::link;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_core::grasping::record_board;
 use palpate_core::labelling::{FlagRemark, class_name, flaws, shown_name};
 use palpate_core::recording::{BoardRecorder, BoardTrialPlan, Recorded};
-use palpate_core::rig::serial::{
-    Baud, CUT, Control, LinkOptions, LinkState, LinkStatus, SerialLink, SerialPlan, SerialRig, list_ports,
-};
+use palpate_core::rig::serial::{Baud, Control, LinkOptions, LinkState, LinkStatus, SerialPlan, SerialRig, list_ports};
 use palpate_core::scene::Scene;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 /// Arguments of `palpate record`.
 #[derive(Debug, clap::Args)]
@@ -37,6 +37,9 @@ pub(super) struct RecordArguments {
     /// The speed of the port; without it the usual ones are tried.
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     baud: Option<Baud>,
+    /// How long to wait for a port that another program has (s).
+    #[arg(long, value_name = "S", default_value_t = link::USUAL_WAIT_S, value_parser = parse_wait)]
+    wait: f64,
     /// End the trial where the board vanishes, instead of waiting for it.
     #[arg(long)]
     no_reconnect: bool,
@@ -59,6 +62,11 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "write a number of seconds from 0.1 to 86400".to_owned())
 }
 
+fn parse_wait(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| (0.0..=86_400.0).contains(s));
+    seconds.ok_or_else(|| "write a number of seconds from 0 to 86400".to_owned())
+}
+
 fn parse_baud(text: &str) -> Result<Baud, String> {
     Baud::try_from(text.parse::<u32>().map_err(|e| e.to_string())?)
 }
@@ -70,6 +78,8 @@ struct Told {
     /// Its label, unless it has none yet.
     object: Option<String>,
     port: String,
+    /// The speed in use (bit/s); none for captured bytes.
+    baud: Option<u32>,
     samples: u64,
     lost: u64,
     bad_lines: u64,
@@ -98,12 +108,13 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     let object = arguments.object.as_deref().map(class_name).transpose()?;
     let mut store = open_store(store)?;
     let stop = stop_flag()?;
-    let link = SerialLink::open(&LinkOptions {
+    let options = LinkOptions {
         path: arguments.port.clone(),
         baud: arguments.baud,
         reconnect: !arguments.no_reconnect,
         replay_speed: if arguments.speed > 0.0 { arguments.speed } else { f64::INFINITY },
-    })?;
+    };
+    let link = link::open(&options, arguments.wait, || stop.load(Ordering::Relaxed))?;
     let control = match (arguments.drive, arguments.by_hand) {
         (true, _) => Control::Driven,
         (false, true) => Control::ByHand,
@@ -121,10 +132,9 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         bar.tick();
     });
     bar.finish_and_clear();
-    let (recorded, status) = outcome?;
-    let is_cut = recorded.warnings.iter().any(|text| text == CUT);
-    tell(recorded, object, &status, arguments.json)?;
-    if is_cut {
+    let grasp = outcome?;
+    tell(grasp.recorded, object, &grasp.status, arguments.json)?;
+    if grasp.cut {
         Err("the fingers did not do what they were told, so the trial ended early; it is stored".into())
     } else {
         Ok(())
@@ -155,6 +165,7 @@ fn tell(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: b
         flags: flaws(recorded.about.flags, object.as_deref()),
         object,
         port: recorded.about.port,
+        baud: status.baud,
         samples: cadence.samples,
         lost: cadence.lost,
         bad_lines: cadence.bad_lines,
@@ -182,7 +193,8 @@ fn tell(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: b
     }
     say(format!("samples       {} of {}", told.samples, told.channels.join(", ")))?;
     if let Some(detected) = &recorded.about.detected {
-        say(format!("format        {}: {}", detected.format.label(), detected.why))?;
+        let speed = told.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
+        say(format!("format        {}{speed}: {}", detected.format.label(), detected.why))?;
     }
     let (rate, jitter, delay) = (told.rate_hz, told.jitter_p95_ms, told.delay_p95_ms);
     say(format!("cadence       {rate:.2} Hz, jitter {jitter:.2} ms, delay {delay:.2} ms [95th percentiles]"))?;

@@ -17,7 +17,7 @@ use palpate_core::rig::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbI
 use palpate_core::scene::Scene;
 use palpate_core::study::{Course, Estimate, FingerFit, Known, Remainder};
 use palpate_core::wire::{Cadence, Rail};
-use palpate_core::workers::{Examine, FitTrials, FittedFinger};
+use palpate_core::workers::{Examine, FitTrials, FittedFinger, Listen, NotOpened};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -74,6 +74,40 @@ fn troubled() -> Observations {
     seen
 }
 
+/// True where the last click has put such a text onto the clipboard.
+fn has_copied(bench: &Bench, part: &str) -> bool {
+    bench.harness.output().platform_output.commands.iter().any(|command| match command {
+        egui::OutputCommand::CopyText(text) => text.contains(part),
+        _ => false,
+    })
+}
+
+#[test]
+fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let listen: Listen = Arc::new(|_| {
+            Err(NotOpened {
+                text: "cannot open port \"/dev/ttyACM0\": only members of the group dialout are allowed to. Run `sudo \
+                       usermod -aG dialout $USER`, then log out and in again"
+                    .to_owned(),
+                command: Some("sudo usermod -aG dialout $USER".to_owned()),
+                may_pass: false,
+            })
+        });
+        let setup = BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() };
+        let mut bench = bench("gripper", theme, setup);
+        bench.harness.get_by_label("Connect").click();
+        bench.harness.step();
+        bench.until_shown(true, "only members of the group dialout");
+        let picture = bench.harness.render().unwrap();
+        bench.harness.get_by_label("Copy the command for the port").click();
+        bench.harness.step();
+        assert!(has_copied(&bench, "sudo usermod -aG dialout $USER"));
+        picture
+    });
+    compare("gripper_refused", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
 #[test]
 fn the_doctor_looks_tells_and_can_be_stopped() {
     let [dark, light] = Theme::ALL.map(|theme| {
@@ -114,11 +148,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         let wrong = bench.harness.render().unwrap();
         bench.harness.get_by_label("Copy the command for modem-manager").click();
         bench.harness.step();
-        let copied = bench.harness.output().platform_output.commands.iter().any(|command| match command {
-            egui::OutputCommand::CopyText(text) => text.contains("77-palpate.rules"),
-            _ => false,
-        });
-        assert!(copied, "{:?}", bench.harness.output().platform_output.commands);
+        assert!(has_copied(&bench, "77-palpate.rules"));
         [good, wrong]
     });
     for (name, [dark, light]) in ["doctor_good", "doctor_wrong"].into_iter().zip(pairs(dark, light)) {

@@ -6,6 +6,7 @@
 use crate::program::{palpate, ran, refused};
 use crate::serial::start;
 use palpate_core::recording::{BoardTrial, Store};
+use palpate_core::rig::serial::{LinkOptions, SerialLink};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -185,6 +186,29 @@ fn a_board_that_restarts_counts_anew_and_its_readings_go_on() {
     assert_eq!(trial.gaps.len(), 1, "{:?}", trial.gaps);
     let gap = &trial.gaps[0];
     assert!((0.3..0.8).contains(&(gap.to_s - gap.from_s)), "{gap:?}");
+}
+
+#[test]
+fn a_port_that_another_program_has_is_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let emulated = Emulated::new(folder.path(), &[]);
+    let store = folder.path().join("trials.sqlite");
+    let other = SerialLink::open(&LinkOptions { path: Some(emulated.port()), ..LinkOptions::default() }).unwrap();
+    let record = |wait: &str| {
+        let mut command = palpate(&store);
+        command.arg("record").arg("--port").arg(emulated.port()).args(["--seconds", "1", "--json", "--wait", wait]);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        start(command)
+    };
+    let refused = ran(&record("0").wait_with_output().unwrap());
+    assert!(refused.code == Some(1) && refused.err.contains("it is open in another program"), "{refused:?}");
+    let waits = record("60");
+    std::thread::sleep(Duration::from_millis(1500));
+    drop(other);
+    let recorded = ran(&waits.wait_with_output().unwrap());
+    assert!(recorded.code == Some(0) && recorded.err.contains("tried each second"), "{recorded:?}");
+    let told: Value = serde_json::from_str(&recorded.out).unwrap();
+    assert!(told["samples"].as_u64() > Some(30) && told["baud"] == 115_200, "{told}");
 }
 
 #[test]

@@ -5,9 +5,10 @@ use super::{PanelContext, wrapped};
 use crate::app::actions::Action;
 use crate::app::plots::still;
 use crate::app::theme::colour;
-use egui::{Button, Color32, Grid, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_core::board::Sensor;
+use palpate_core::palette::Theme;
 use palpate_core::sensing::calibration::{Calibration, Curve, Kind, Point};
 use palpate_core::units::three_digits;
 use palpate_core::workers::{CalibrationPlan, CalibrationView, CalibrationWish, GripperWish, RunningCalibration};
@@ -113,11 +114,11 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
         }
         Err(why) => wrapped(ui, RichText::new(why).weak()),
     }
-    let accent = colour(context.view.theme.colours().accent);
-    curve_plot(ui, kind, &running.points, fit, accent);
+    let theme = context.view.theme;
+    curve_plot(ui, kind, &running.points, fit, theme);
     if let Some(calibration) = fit {
-        residual_plot(ui, kind, calibration, accent);
-        bending_plot(ui, calibration, accent);
+        residual_plot(ui, kind, calibration, theme);
+        bending_plot(ui, calibration, theme);
     }
 }
 
@@ -147,8 +148,9 @@ fn shown(kind: Kind, ohm: f64) -> f64 {
 }
 
 /// The points, and the curve through them.
-fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibration>, accent: Color32) {
+fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibration>, theme: Theme) {
     let Some(calibration) = fit else { return };
+    let accent = colour(theme.colours().accent);
     let input = &calibration.record.input;
     let measured: PlotPoints<'_> =
         points.iter().map(|p| [kind.shown(p.stimulus), shown(kind, input.ohm(p.counts))]).collect();
@@ -164,21 +166,22 @@ fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibratio
         })
         .collect();
     let axis = if kind == Kind::Flex { "kΩ" } else { "µS" };
-    plot("calibration curve", 140.0, axis, kind.unit()).show(ui, |plot| {
+    plot(theme, "calibration curve", 140.0, axis, kind.unit()).show(ui, |plot| {
         plot.line(Line::new("fitted", line).color(accent).width(1.5));
         plot.points(Points::new("measured", measured).color(accent).radius(3.5));
     });
 }
 
 /// What is left between curve and points.
-fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, accent: Color32) {
+fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, theme: Theme) {
+    let accent = colour(theme.colours().accent);
     let factor = if kind == Kind::Flex { 1f64.to_degrees() } else { 100.0 };
     let residuals = calibration.record.points.iter().zip(calibration.residuals());
     let off: Vec<[f64; 2]> = residuals.filter_map(|(p, off)| Some([kind.shown(p.stimulus), factor * off?])).collect();
     let worst = off.iter().map(|[_, off]| off.abs()).fold(0.0, f64::max);
     let unit = if kind == Kind::Flex { "degrees" } else { "%" };
     ui.weak(format!("off the curve, at most {} {unit}", three_digits(worst)));
-    plot("calibration residuals", 90.0, unit, kind.unit()).include_y(-0.5).include_y(0.5).show(ui, |plot| {
+    plot(theme, "calibration residuals", 90.0, unit, kind.unit()).include_y(-0.5).include_y(0.5).show(ui, |plot| {
         for [at, off] in &off {
             plot.line(Line::new("off", vec![[*at, 0.0], [*at, *off]]).color(accent).width(1.5));
         }
@@ -187,7 +190,8 @@ fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, accent: Col
 }
 
 /// What bending alone shows on a pad, as if it were a force.
-fn bending_plot(ui: &mut Ui, calibration: &Calibration, accent: Color32) {
+fn bending_plot(ui: &mut Ui, calibration: &Calibration, theme: Theme) {
+    let accent = colour(theme.colours().accent);
     let (Curve::Pad(curve), Some(bending)) = (&calibration.curve, &calibration.record.bending) else { return };
     let reaches = bending.reaches();
     ui.weak(format!("what bending alone shows, up to {} 1/m", three_digits(reaches)));
@@ -197,11 +201,11 @@ fn bending_plot(ui: &mut Ui, calibration: &Calibration, accent: Color32) {
             [kappa, bending.preload(curve, kappa)]
         })
         .collect();
-    plot("bending zero", 90.0, "N", "1/m").include_y(0.0).include_y(0.1).show(ui, |plot| {
+    plot(theme, "bending zero", 90.0, "N", "1/m").include_y(0.0).include_y(0.1).show(ui, |plot| {
         plot.line(Line::new("load", line).color(accent).width(1.5));
     });
 }
 
-fn plot(id: &str, height: f32, axis: &str, stimulus: &str) -> Plot<'static> {
-    still(id, height, axis, AxisHints::new_x().label(stimulus.to_owned()), 0.06)
+fn plot(theme: Theme, id: &str, height: f32, axis: &str, stimulus: &str) -> Plot<'static> {
+    still(theme, id, height, axis, AxisHints::new_x().label(stimulus.to_owned()), 0.06)
 }

@@ -1,13 +1,13 @@
 //! What is wrong between the gripper's board and this computer: the same list as `palpate doctor` prints, with cause, fix and
 //! a command to copy.
 
-use super::{PanelContext, port_field, wrapped};
+use super::{PanelContext, command_ui, port_field, wrapped};
 use crate::app::actions::Action;
 use crate::app::gripper_tools::ToolWish;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use egui::text::{LayoutJob, TextFormat};
-use egui::{Button, Color32, Frame, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
+use egui::{Color32, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
 use palpate_core::doctor::{CHECKS, Finding, USUAL_LISTEN_S, Verdict, is_sound, summary};
 use palpate_core::palette::Theme;
 use palpate_core::workers::{Examination, ExamineRequest};
@@ -130,17 +130,4 @@ fn mark_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
         Verdict::NotSeen => letter("–", colour(colours.quiet_text)),
     }
     response.on_hover_text(label);
-}
-
-/// A command with a button that copies it.
-fn command_ui(ui: &mut Ui, check: &str, command: &str) {
-    Frame::new().fill(ui.visuals().faint_bg_color).corner_radius(4).inner_margin(6).show(ui, |ui| {
-        ui.add(Label::new(RichText::new(command).monospace()).wrap());
-        let copy = ui.add(Button::new("Copy"));
-        let label = format!("Copy the command for {check}");
-        copy.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
-        if copy.on_hover_text("Paste it into a terminal").clicked() {
-            ui.copy_text(command.to_owned());
-        }
-    });
 }

@@ -231,5 +231,5 @@ fn line<'a>(course: &Course, values: &[f64], name: &str) -> Line<'a> {
 
 fn plot(theme: Theme, id: &str, height: f32) -> Plot<'static> {
     let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value));
-    still(id, height, "1/m", seconds, 0.0).grid_color(colour(theme.colours().border))
+    still(theme, id, height, "1/m", seconds, 0.0)
 }

@@ -1,7 +1,7 @@
 //! The real gripper: its port, how well its board keeps time, what its sensors show, where their zeros are, and the key
 //! that stops everything.
 
-use super::{PanelContext, wrapped};
+use super::{PanelContext, command_ui, wrapped};
 use crate::app::actions::Action;
 use crate::app::theme::{colour, veil};
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
@@ -26,7 +26,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
 /// What can be connected to.
 fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     if let Some(refused) = context.gripper.and_then(|gripper| gripper.refused.as_ref()) {
-        wrapped(ui, RichText::new(refused).color(ui.visuals().error_fg_color));
+        wrapped(ui, RichText::new(&refused.text).color(ui.visuals().error_fg_color));
+        if let Some(command) = &refused.command {
+            command_ui(ui, "the port", command);
+        }
         wrapped(ui, RichText::new("The panel Doctor, in the mode Label, examines port and board.").weak());
     } else {
         wrapped(ui, RichText::new("No gripper is connected. Everything works without one, simulated.").weak());

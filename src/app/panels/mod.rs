@@ -30,7 +30,7 @@ use super::actions::Action;
 use super::gripper_tools::GripperTools;
 use super::traces::{GraspTrace, Traces};
 use super::view_state::ViewState;
-use egui::{Label, RichText, TextEdit, Ui};
+use egui::{Button, Label, RichText, TextEdit, Ui};
 use palpate_core::grasping::IdentificationView;
 use palpate_core::objects::{EMPTY, catalogue};
 use palpate_core::rig::serial::Control;
@@ -232,6 +232,19 @@ pub(super) fn named(name: &str) -> Option<&'static PanelKind> {
 /// Text that breaks its lines.
 fn wrapped(ui: &mut Ui, text: RichText) {
     ui.add(Label::new(text).wrap());
+}
+
+/// A command that mends something, with a button that copies it.
+fn command_ui(ui: &mut Ui, mends: &str, command: &str) {
+    egui::Frame::new().fill(ui.visuals().faint_bg_color).corner_radius(4).inner_margin(6).show(ui, |ui| {
+        ui.add(Label::new(RichText::new(command).monospace()).wrap());
+        let copy = ui.add(Button::new("Copy"));
+        let label = format!("Copy the command for {mends}");
+        copy.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+        if copy.on_hover_text("Paste it into a terminal").clicked() {
+            ui.copy_text(command.to_owned());
+        }
+    });
 }
 
 /// True in the first frame in which something is shown after it was not: what a panel shows from elsewhere is then looked

@@ -2,6 +2,7 @@
 //! when told to, or by itself.
 
 use super::super::Failure;
+use super::super::link;
 use super::super::terminal::{note, warn};
 use super::CalibrateArguments;
 use palpate_core::board::{Board, Reading, Sensor};
@@ -156,7 +157,8 @@ impl Bench {
         let captured = port.is_some_and(Path::is_file);
         let replay_speed = if captured && hands_free { f64::INFINITY } else { 1.0 };
         let path = port.map(Path::to_owned);
-        let link = SerialLink::open(&LinkOptions { path, replay_speed, ..LinkOptions::default() })?;
+        let link =
+            link::open(&LinkOptions { path, replay_speed, ..LinkOptions::default() }, link::USUAL_WAIT_S, || false)?;
         let (told, keys) = channel();
         if !hands_free {
             // Ends with the program: a read of the keyboard cannot be interrupted.

@@ -16,6 +16,17 @@ pub enum BoardGraspError {
     Store(#[from] StoreError),
 }
 
+/// A grasp of the real gripper, as it was recorded.
+#[derive(Clone, Debug)]
+pub struct BoardGrasp {
+    /// What is in the store.
+    pub recorded: Recorded,
+    /// The link at its end.
+    pub status: LinkStatus,
+    /// It was driven, and ended early because the fingers did not do what they were told.
+    pub cut: bool,
+}
+
 /// Records on a rig that has begun, to its end. `tell` is called about once a second.
 pub fn record_board(
     mut rig: SerialRig,
@@ -23,7 +34,7 @@ pub fn record_board(
     plan: &BoardTrialPlan,
     store: &mut Store,
     tell: &mut dyn FnMut(&BoardRecorder, &LinkStatus),
-) -> Result<(Recorded, LinkStatus), BoardGraspError> {
+) -> Result<BoardGrasp, BoardGraspError> {
     let mut recorder = BoardRecorder::begin(store, plan, &rig.link().status(), rig.began_s())?;
     loop {
         match rig.next_event()? {
@@ -42,7 +53,7 @@ pub fn record_board(
         }
     }
     let status = rig.link().status();
-    let notes = rig.notes();
+    let (notes, cut) = (rig.notes(), rig.was_cut());
     drop(rig);
-    Ok((recorder.finish(store, &status, notes)?, status))
+    Ok(BoardGrasp { recorded: recorder.finish(store, &status, notes)?, status, cut })
 }

@@ -10,7 +10,7 @@ mod poses;
 mod run;
 mod summary;
 
-pub use board::{BoardGraspError, record_board};
+pub use board::{BoardGrasp, BoardGraspError, record_board};
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
 pub use deck::ObjectDeck;
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};

@@ -44,10 +44,13 @@ pub struct PortError {
 }
 
 /// A rule that keeps ModemManager away from the boards of Arduino.
-pub const MODEM_MANAGER_RULE: &str = "ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"";
+pub const MODEM_MANAGER_RULE: &str = "ATTRS{idVendor}==\"2341|2a03\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"";
 /// Puts that rule where udev finds it.
-pub const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
+pub const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341|2a03\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
      sudo tee /etc/udev/rules.d/77-palpate.rules && sudo udevadm control --reload && sudo udevadm trigger";
+
+/// A rule that lets whoever sits at the computer use the boards of Arduino; its file must come before 73 in the alphabet.
+pub const ACCESS_RULE: &str = "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"2341|2a03\", TAG+=\"uaccess\"";
 
 impl PortError {
     fn opening(trouble: PortTrouble, path: &Path, cause: impl Into<String>, fix: impl Into<String>) -> Self {
@@ -85,7 +88,10 @@ impl PortError {
         };
         let command = format!("sudo usermod -aG {group} $USER");
         let cause = format!("only members of the group {group} are allowed to");
-        let fix = format!("Run `{command}`, then log out and in again");
+        let fix = format!(
+            "Run `{command}`, then log out and in again. Or let whoever sits at this computer use such boards: put the udev \
+             rule {ACCESS_RULE} into /etc/udev/rules.d/70-palpate.rules, and plug the board in again"
+        );
         Self { command: Some(command), ..Self::opening(PortTrouble::Permission, path, cause, fix) }
     }
 

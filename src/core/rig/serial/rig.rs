@@ -59,10 +59,8 @@ pub struct SerialRig {
     conductor: Conductor,
     notes: Vec<String>,
     over: bool,
+    cut: bool,
 }
-
-/// What is noted of a driven trial whose fingers did not do what they were told.
-pub const CUT: &str = "ended early, and told to vent";
 
 impl SerialRig {
     /// Waits until the board speaks and the times of its readings have settled; the recording begins then.
@@ -97,7 +95,7 @@ impl SerialRig {
         };
         let conductor = Conductor::new(plan.control, plan.actuation_hz, began_s);
         let (marks, notes) = (VecDeque::new(), Vec::new());
-        Ok(Self { link, plan, stop, began_s, heard, marks, conductor, notes, over: false })
+        Ok(Self { link, plan, stop, began_s, heard, marks, conductor, notes, over: false, cut: false })
     }
 
     /// When it began, on the clock of the readings (s).
@@ -108,6 +106,11 @@ impl SerialRig {
     /// The link to its board.
     pub fn link(&self) -> &SerialLink {
         &self.link
+    }
+
+    /// True where it ended a driven trial early, whose fingers did not do what they were told.
+    pub fn was_cut(&self) -> bool {
+        self.cut
     }
 
     fn end_s(&self) -> f64 {
@@ -128,7 +131,8 @@ impl SerialRig {
     /// had happened, with a leap of pressure.
     fn cut(&mut self) {
         if self.plan.control == Control::Driven && !std::mem::replace(&mut self.over, true) {
-            self.notes.push(CUT.to_owned());
+            self.notes.push("ended early, and told to vent".to_owned());
+            self.cut = true;
         }
     }
 

@@ -79,7 +79,7 @@ pub(super) struct Desk {
     model: Option<String>,
     grasps: u32,
     ports: Vec<PortInfo>,
-    refused: Option<String>,
+    refused: Option<NotOpened>,
     /// The port that another program has, where it is to be opened as soon as that lets it go.
     retried: Option<Option<PathBuf>>,
     connection: Option<Connection>,
@@ -207,13 +207,13 @@ impl Desk {
 
     fn connect(&mut self, port: Option<&Path>) {
         self.refused = None;
-        if let Err(NotOpened { mut text, may_pass }) = self.open_stream(port) {
-            if may_pass {
+        if let Err(mut refused) = self.open_stream(port) {
+            if refused.may_pass {
                 self.retried = Some(port.map(Path::to_owned));
-                text.push_str("; until then it is tried each second");
+                refused.text.push_str("; until then it is tried each second");
             }
-            self.outlets.tell(Notice::Failed(text.clone()));
-            self.refused = Some(text);
+            self.outlets.tell(Notice::Failed(refused.text.clone()));
+            self.refused = Some(refused);
             self.ports = list_ports();
         }
     }
@@ -224,7 +224,7 @@ impl Desk {
         match self.open_stream(port.as_deref()) {
             Ok(()) => self.refused = None,
             Err(NotOpened { may_pass: true, .. }) => return self.retried = Some(port),
-            Err(NotOpened { text, .. }) => self.refused = Some(text),
+            Err(refused) => self.refused = Some(refused),
         }
         self.publish();
     }
@@ -272,7 +272,7 @@ impl Desk {
             let why = self.connection.as_ref().map(|c| c.stream.status().state.sentence()).unwrap_or_default();
             self.disconnect(&why);
             self.outlets.tell(Notice::Warning(why.clone()));
-            self.refused = Some(why);
+            self.refused = Some(why.into());
             self.publish();
         } else if self.published.elapsed() >= CALM {
             self.publish();

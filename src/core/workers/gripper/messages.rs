@@ -2,6 +2,7 @@
 
 use super::calibrating::{CalibrationView, CalibrationWish};
 use super::observing::ObserveRequest;
+use super::stream::NotOpened;
 use crate::grasping::IdentificationView;
 use crate::gripper::Phase;
 use crate::recognition::Model;
@@ -135,7 +136,7 @@ pub struct GripperView {
     /// The link; none while nothing is listened to.
     pub link: Option<LinkStatus>,
     /// Why the last port could not be opened.
-    pub refused: Option<String>,
+    pub refused: Option<NotOpened>,
     /// The ports that were found last.
     pub ports: Vec<PortInfo>,
     /// The newest reading.

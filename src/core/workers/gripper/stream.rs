@@ -59,13 +59,15 @@ impl BoardStream for SerialLink {
 pub struct NotOpened {
     /// Cause and fix, in a sentence.
     pub text: String,
+    /// A command that mends it, where there is one.
+    pub command: Option<String>,
     /// Another program has it, which may let it go.
     pub may_pass: bool,
 }
 
 impl From<String> for NotOpened {
     fn from(text: String) -> Self {
-        Self { text, may_pass: false }
+        Self { text, command: None, may_pass: false }
     }
 }
 
@@ -75,7 +77,10 @@ pub type Listen = Arc<dyn Fn(Option<&Path>) -> Result<Box<dyn BoardStream>, NotO
 /// Listens to a serial port.
 pub fn listen_to_port(port: Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> {
     let options = LinkOptions { path: port.map(Path::to_owned), ..LinkOptions::default() };
-    let link = SerialLink::open(&options)
-        .map_err(|error| NotOpened { text: error.to_string(), may_pass: error.trouble == PortTrouble::Busy })?;
+    let link = SerialLink::open(&options).map_err(|error| NotOpened {
+        text: error.to_string(),
+        may_pass: error.trouble == PortTrouble::Busy,
+        command: error.command,
+    })?;
     Ok(Box::new(link))
 }

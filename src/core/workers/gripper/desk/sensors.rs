@@ -140,7 +140,9 @@ impl Desk {
         }
         match (&self.connection, self.refused.take()) {
             (None, refused) => {
-                self.calibrated = Some(Err(refused.clone().unwrap_or_else(|| "no board is connected".to_owned())));
+                self.calibrated = Some(Err(refused
+                    .as_ref()
+                    .map_or_else(|| "no board is connected".to_owned(), |refused| refused.text.clone())));
                 self.refused = refused;
             }
             (Some(_), _) => self.calibrating = Some(Calibrating::new(plan.clone(), owns_port)),
