@@ -1,15 +1,20 @@
 //! `palpate doctor`: what is wrong between the gripper's board and this computer.
 
 use super::Failure;
-use super::terminal::{say, say_json};
+use super::link;
+use super::terminal::{note, say, say_json, table};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::doctor::{Finding, Observations, USUAL_LISTEN_S, examine, findings, is_sound, summary};
-use palpate_core::rig::serial::{Baud, LinkOptions};
+use palpate_core::board::KNOWN_AFTER;
+use palpate_core::doctor::{
+    Bleed, CrosstalkTest, Finding, Observations, USUAL_LISTEN_S, Verdict, examine, findings, is_sound, summary,
+};
+use palpate_core::rig::serial::{Baud, LinkEvent, LinkOptions};
+use palpate_core::wire::Heard;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// Arguments of `palpate doctor`.
 #[derive(Debug, clap::Args)]
@@ -22,6 +27,10 @@ pub(super) struct DoctorArguments {
     /// Rate of the board's serial line (bit/s); without it the usual ones are tried.
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     baud: Option<Baud>,
+    /// Test for crosstalk instead, step by step: each sensor in turn is moved by hand, alone, while those of the other finger
+    /// are watched. Ctrl+C ends it and says what was seen.
+    #[arg(long, conflicts_with = "seconds")]
+    crosstalk: bool,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -50,6 +59,9 @@ struct Told<'a> {
 pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let options = LinkOptions { path: arguments.port.clone(), baud: arguments.baud, ..LinkOptions::default() };
     let stop = super::interrupt::stop_flag()?;
+    if arguments.crosstalk {
+        return crosstalk(&options, &stop, arguments.json);
+    }
     // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new((arguments.seconds * 10.0) as u64);
     bar.set_style(ProgressStyle::with_template("listening {bar:40} bend a finger and press each pad meanwhile")?);
@@ -65,6 +77,75 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
         say_json(&Told { port, listened_s: seen.listened_s, sound, findings: found })?;
     } else {
         tell(&seen, &found)?;
+    }
+    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What `--crosstalk --json` prints.
+#[derive(Serialize)]
+struct Crosstalk<'a> {
+    sound: bool,
+    found: &'a [Bleed],
+    told: Vec<String>,
+}
+
+/// How long the board may be silent before the test is given up.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// Moves one sensor after the other, by the user's hands.
+fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
+    // Nobody moves what was captured long ago.
+    let replay_speed = if options.path.as_ref().is_some_and(|path| path.is_file()) { f64::INFINITY } else { 1.0 };
+    let options = LinkOptions { replay_speed, ..options.clone() };
+    let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
+    let (mut test, mut told) = (None, String::new());
+    let (mut heard, mut newest) = (0, Instant::now());
+    while !stop.load(Ordering::Relaxed) && !link.is_over() {
+        for event in link.take(Duration::from_millis(50)) {
+            let LinkEvent::Heard(Heard::Reading(reading)) = event else { continue };
+            newest = Instant::now();
+            heard += 1;
+            if heard < KNOWN_AFTER {
+                continue;
+            }
+            let test = match &mut test {
+                Some(test) => test,
+                empty @ None => empty.insert(CrosstalkTest::new(&link.status().board).ok_or_else(|| {
+                    let has = link.status().board.channels.join(", ");
+                    format!("crosstalk is seen between sensors of both fingers; the board has {has}")
+                })?),
+            };
+            test.feed(&reading);
+            let instruction = test.instruction();
+            if test.source().is_some() && told != instruction {
+                let [step, of] = test.step();
+                note(&format!("{step} of {of}: {instruction}"));
+                told = instruction;
+            }
+        }
+        if test.as_ref().is_some_and(|test: &CrosstalkTest| test.source().is_none()) {
+            break;
+        }
+        if newest.elapsed() > SILENCE {
+            return Err(
+                format!("no readings for {:.0} s. {}", SILENCE.as_secs_f64(), link.status().state.sentence()).into()
+            );
+        }
+    }
+    let Some(test) = test else {
+        return Err(format!("nothing was heard of the board. {}", link.status().state.sentence()).into());
+    };
+    let sound = !test.found().iter().any(|bleed| bleed.bleeds);
+    if json {
+        say_json(&Crosstalk { sound, found: test.found(), told: test.summary() })?;
+    } else {
+        let row = |bleed: &Bleed| {
+            let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));
+            let verdict = if bleed.bleeds { Verdict::Wrong } else { Verdict::Good };
+            vec![bleed.from.label().into(), bleed.into.label().into(), share, counts, verdict.name().into()]
+        };
+        table(&["moved", "watched", "shows [%]", "counts", ""], &test.found().iter().map(row).collect::<Vec<_>>())?;
+        test.summary().iter().try_for_each(say)?;
     }
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

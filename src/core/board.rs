@@ -92,6 +92,10 @@ impl Board {
     }
 }
 
+/// Readings after which it is known what a board is: it has answered who it is, or its counts have shown how far its
+/// converter goes.
+pub const KNOWN_AFTER: u32 = 5;
+
 /// One line of a board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {

@@ -12,7 +12,7 @@ use palpate_core::board::{Board, Reading, Sensor};
 use palpate_core::gripper::Phase;
 use palpate_core::gripper::{Gripper, Side, TorquePoint};
 use palpate_core::objects::{EMPTY, ObjectModel};
-use palpate_core::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_script};
+use palpate_core::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
 use palpate_core::recording::{BoardChunk, BoardInfo, Store, TrialId};
 use palpate_core::scene::Scene;
 use palpate_core::sensing::calibration::Input;
@@ -253,7 +253,7 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     );
     assert_eq!(run(at, &["calibrate", "fsrL", "--part", "P1", "--points", "pad.csv", "--dry-run"]).code, Some(0));
     // Weights from a file, and how the zero moves with bending from an empty close.
-    capture(&hidden, "rest=0.5; close empty bar=0.5", 4.0, &at.join("close.bytes"));
+    capture(&hidden, "rest=0.5; close empty bar=0.5", "", 4.0, &at.join("close.bytes"));
     let pad = ["calibrate", "fsrL", "--part", "P1", "--points", "pad.csv"];
     let close = ["--empty-close", "3.5", "--auto", "--dry-run", "--json", "--port"];
     let learned = json(at, &[&pad[..], &close, &["close.bytes"]].concat());
@@ -283,7 +283,7 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
 }
 
 /// What a board sends while a script is done on the bench, as a file of captured bytes.
-fn capture(parts: &HiddenParts, script: &str, seconds: f64, file: &Path) {
+pub(crate) fn capture(parts: &HiddenParts, script: &str, faults: &str, seconds: f64, file: &Path) {
     let script = parse_script(script).unwrap();
     let hand =
         HandPlan { scene: Scene::default(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script };
@@ -295,7 +295,7 @@ fn capture(parts: &HiddenParts, script: &str, seconds: f64, file: &Path) {
         channels,
         most_steps,
         clock_start_us,
-        faults: vec![],
+        faults: parse_faults(faults).unwrap(),
         seed: 1,
     };
     let mut gripper = PretendedGripper::new(setup).unwrap();
@@ -313,7 +313,7 @@ fn a_captured_stream_is_calibrated_hands_free() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let parts = parts(7, true);
-    capture(&parts, "rest=2; angle=0 hold=2; angle=50 hold=3; angle=90 hold=3", 10.0, &at.join("bench.bytes"));
+    capture(&parts, "rest=2; angle=0 hold=2; angle=50 hold=3; angle=90 hold=3", "", 10.0, &at.join("bench.bytes"));
     let arguments =
         ["calibrate", "flexR", "--part", "B", "--port", "bench.bytes", "--auto", "--plan", "0,50,90", "--json"];
     let made = json(at, &arguments);

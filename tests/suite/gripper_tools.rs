@@ -1,9 +1,12 @@
 //! Two panels that help with the real gripper, doctor and fit: by their labels, with a picture of what they show.
 
 use crate::bench::{Bench, BenchSetup};
+use crate::calibration::{capture, parts};
 use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use crate::panels::side_by_side;
+use crate::program::{refused, run};
+use crate::streams::Scripted;
 use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
@@ -18,6 +21,7 @@ use palpate_core::scene::Scene;
 use palpate_core::study::{Course, Estimate, FingerFit, Known, Remainder};
 use palpate_core::wire::{Cadence, Rail};
 use palpate_core::workers::{Examine, FitTrials, FittedFinger, Listen, NotOpened};
+use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -99,13 +103,89 @@ fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
         bench.harness.get_by_label("Connect").click();
         bench.harness.step();
         bench.until_shown(true, "only members of the group dialout");
-        let picture = bench.harness.render().unwrap();
+        // Below stand the ports of whatever computer this is.
+        let picture = image::imageops::crop_imm(&bench.harness.render().unwrap(), 0, 0, 320, 204).to_image();
         bench.harness.get_by_label("Copy the command for the port").click();
         bench.harness.step();
         assert!(has_copied(&bench, "sudo usermod -aG dialout $USER"));
         picture
     });
     compare("gripper_refused", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
+fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let moves = ["angleL=40", "angleR=40", "loadL=2N", "loadR=2N"];
+    let script: String = moves.iter().map(|step| format!("rest=2.2; {step} hold=1; ")).collect();
+    for (faults, sound) in [("", true), ("crosstalk=0.05@0", false)] {
+        capture(&parts(3, false), &format!("{script} rest=3"), faults, 16.0, &at.join("hand.bytes"));
+        let ran = run(at, &["doctor", "hand.bytes", "--crosstalk", "--json"]);
+        let told: Value = serde_json::from_str(&ran.out).unwrap();
+        assert_eq!((ran.code, &told["sound"]), (Some(i32::from(!sound)), &Value::Bool(sound)), "{ran:?}");
+        assert!(ran.err.contains("1 of 4: bend the left finger") && ran.err.contains("4 of 4: let go"), "{ran:?}");
+        let found = told["found"].as_array().unwrap();
+        assert_eq!(found.len(), 8, "{told}");
+        for bleed in found {
+            // Each channel takes from the one before it, which for the first is the last.
+            let [from, into] = ["from", "into"].map(|key| bleed[key].as_str().unwrap());
+            let next = [("flex-left", "flex-right"), ("flex-right", "pad-left"), ("pad-left", "pad-right")];
+            let follows = next.contains(&(from, into)) || (from, into) == ("pad-right", "flex-left");
+            assert_eq!(bleed["bleeds"], !sound && follows, "{bleed}");
+            let share = bleed["share"].as_f64().unwrap();
+            assert!(!bleed["bleeds"].as_bool().unwrap() || (share - 0.05).abs() < 0.02, "{bleed}");
+        }
+    }
+    let text = run(at, &["doctor", "hand.bytes", "--crosstalk"]);
+    assert!(text.out.contains("100 nF from each pin") && text.out.contains("WRONG"), "{text:?}");
+    refused(at, &["doctor", "nowhere", "--crosstalk"], &["nowhere"]);
+}
+
+#[test]
+fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
+    const REST: [f64; 4] = [1420.0, 1400.0, 0.0, 0.0];
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let hand = Arc::new(Mutex::new(REST));
+        let read = Arc::clone(&hand);
+        let listen: Listen = Arc::new(move |_| {
+            let read = Arc::clone(&read);
+            let counts = move || read.lock().unwrap().map(|counts| Some(counts as f32)).to_vec();
+            Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+        });
+        let setup = BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() };
+        let mut bench = bench("doctor", theme, setup);
+        bench.harness.get_by_label("Test for crosstalk").click();
+        bench.harness.step();
+        let mut pictures = Vec::new();
+        for (asked, moved, bleeds) in [("Bend the left finger", 0, 1), ("Bend the right finger", 1, 1)] {
+            bench.until_shown(true, asked);
+            let mut counts = REST;
+            counts[moved] += 600.0;
+            // The right strip takes a tenth of the left one; the left pad takes nothing.
+            counts[bleeds] += if moved == 0 { 60.0 } else { 0.0 };
+            *hand.lock().unwrap() = counts;
+            bench.until_shown(true, "Let go of the");
+            *hand.lock().unwrap() = REST;
+            bench.until_shown(false, "Let go of the");
+        }
+        bench.until_shown(true, "Press the left pad firmly");
+        bench.harness.run_steps(2);
+        pictures.push(bench.harness.render().unwrap());
+        bench.harness.get_by_label("Leave out").click();
+        bench.harness.step();
+        bench.until_shown(true, "sensor 4 of 4");
+        bench.harness.get_by_label("Stop").click();
+        bench.harness.step();
+        bench.until_shown(true, "The right flex strip shows 10.0 % of what the left flex strip does: +60 counts");
+        bench.until_shown(true, "Not moved: left pad, right pad");
+        bench.harness.run_steps(2);
+        pictures.push(bench.harness.render().unwrap());
+        pictures
+    });
+    for (k, name) in ["doctor_crosstalk", "doctor_crosstalk_found"].into_iter().enumerate() {
+        compare(name, &side_by_side(&dark[k], &light[k]), "the CPU renderer of the tests");
+    }
 }
 
 #[test]

@@ -7,17 +7,24 @@ use crate::app::gripper_tools::ToolWish;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use egui::text::{LayoutJob, TextFormat};
-use egui::{Color32, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
-use palpate_core::doctor::{CHECKS, Finding, USUAL_LISTEN_S, Verdict, is_sound, summary};
+use egui::{Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
+use palpate_core::doctor::{Bleed, CHECKS, Finding, USUAL_LISTEN_S, Verdict, is_sound, summary};
 use palpate_core::palette::Theme;
-use palpate_core::workers::{Examination, ExamineRequest};
+use palpate_core::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let view = context.tools.examiner.view().unwrap_or_default();
+    let crosstalk = context.gripper.and_then(|gripper| gripper.crosstalk.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        if let Some((crosstalk, running)) = crosstalk.and_then(|view| Some((view, view.running.as_ref()?))) {
+            return crosstalk_running_ui(ui, crosstalk, running, actions);
+        }
         match &view.running {
             Some((request, listened_s)) => running_ui(ui, request, *listened_s, actions),
             None => begin_ui(ui, actions),
+        }
+        if let Some((crosstalk, ended)) = crosstalk.and_then(|view| Some((view, view.ended.as_ref()?))) {
+            crosstalk_ended_ui(ui, crosstalk, ended);
         }
         match &view.last {
             Some(last) => examination_ui(ui, context.view.theme, last),
@@ -33,10 +40,72 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
 fn begin_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
     let port = port_field(ui, egui::Id::unique("doctor port"));
     let hint = "Bend a finger and press each pad meanwhile: more can be seen then.";
-    if ui.button("Examine").on_hover_text(format!("Listen for {USUAL_LISTEN_S} s")).clicked() {
-        actions.push(Action::Tool(ToolWish::Examine(ExamineRequest { port, seconds: USUAL_LISTEN_S })));
-    }
+    ui.horizontal_wrapped(|ui| {
+        if ui.button("Examine").on_hover_text(format!("Listen for {USUAL_LISTEN_S} s")).clicked() {
+            let port = port.clone();
+            actions.push(Action::Tool(ToolWish::Examine(ExamineRequest { port, seconds: USUAL_LISTEN_S })));
+        }
+        let about = "Each sensor in turn is moved alone, while those of the other finger are watched";
+        if ui.button("Test for crosstalk").on_hover_text(about).clicked() {
+            actions.push(Action::Gripper(GripperWish::Crosstalk(CrosstalkWish::Begin(port))));
+        }
+    });
     wrapped(ui, RichText::new(hint).weak());
+}
+
+fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCrosstalk, actions: &mut Vec<Action>) {
+    if let Some([step, of]) = running.step {
+        wrapped(ui, RichText::new(format!("Crosstalk test, sensor {step} of {of}")).weak());
+    }
+    wrapped(ui, RichText::new(format!("{}.", sentence(&running.instruction))).strong());
+    ui.horizontal_wrapped(|ui| {
+        for (text, about, wish) in [
+            ("Leave out", "Go on with the next sensor", CrosstalkWish::Skip),
+            ("Stop", "Say what was seen so far", CrosstalkWish::Stop),
+        ] {
+            if ui.button(text).on_hover_text(about).clicked() {
+                actions.push(Action::Gripper(GripperWish::Crosstalk(wish)));
+            }
+        }
+    });
+    bleeds_ui(ui, &view.found);
+}
+
+fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<String>, String>) {
+    ui.add_space(6.0);
+    let bleeds = view.found.iter().any(|bleed| bleed.bleeds);
+    match ended {
+        Err(cause) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+        Ok(told) => {
+            for (k, text) in told.iter().enumerate() {
+                let text = RichText::new(format!("{text}."));
+                wrapped(ui, if k == 0 && !bleeds { text.strong() } else { text });
+            }
+        }
+    }
+    bleeds_ui(ui, &view.found);
+}
+
+/// What each sensor that was moved did to those that were watched.
+fn bleeds_ui(ui: &mut Ui, found: &[Bleed]) {
+    if found.is_empty() {
+        return;
+    }
+    ui.add_space(4.0);
+    Grid::new("crosstalk").num_columns(3).spacing([12.0, 3.0]).striped(true).show(ui, |ui| {
+        for title in ["moved", "watched", "shows"] {
+            ui.weak(title);
+        }
+        ui.end_row();
+        for bleed in found {
+            ui.label(bleed.from.label());
+            ui.label(bleed.into.label());
+            let share = RichText::new(format!("{:5.1} %", 100.0 * bleed.share)).monospace();
+            let share = if bleed.bleeds { share.color(ui.visuals().error_fg_color) } else { share };
+            ui.label(share).on_hover_text(format!("{:+.0} counts at most", bleed.counts));
+            ui.end_row();
+        }
+    });
 }
 
 fn running_ui(ui: &mut Ui, request: &ExamineRequest, listened_s: f64, actions: &mut Vec<Action>) {

@@ -5,7 +5,7 @@ use super::super::Failure;
 use super::super::link;
 use super::super::terminal::{note, warn};
 use super::CalibrateArguments;
-use palpate_core::board::{Board, Reading, Sensor};
+use palpate_core::board::{Board, KNOWN_AFTER, Reading, Sensor};
 use palpate_core::recording::Store;
 use palpate_core::rig::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_core::sensing::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
@@ -179,12 +179,13 @@ impl Bench {
         })
     }
 
-    /// What the board says of itself, once readings come.
+    /// What the board is, once enough was heard of it.
     fn board(&mut self) -> Result<Board, Failure> {
         let start = Instant::now();
         loop {
             self.listen()?;
-            if !self.pending.is_empty() {
+            let over = self.link.is_over() && !self.pending.is_empty();
+            if over || self.pending.len() >= KNOWN_AFTER as usize {
                 return Ok(self.link.status().board);
             }
             if start.elapsed().as_secs_f64() > PATIENCE_S {

@@ -4,12 +4,14 @@
 //! To add a check, write it in `checks` and add one line to [`CHECKS`].
 
 mod checks;
+mod crosstalk;
 mod examine;
 #[cfg(test)]
 mod tests;
 mod traces;
 
 pub use checks::{CHECKS, Check};
+pub use crosstalk::{Bleed, CrosstalkTest};
 pub use examine::examine;
 pub use traces::{Trace, Traces};
 

@@ -50,9 +50,9 @@ pub use examiner::{Examination, Examine, ExamineRequest, Examiner, ExaminerView,
 pub use fitter::{FitTrials, FitWish, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{
-    BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, EndedTrial, GripperSetup, GripperView, GripperWish,
-    GripperWorker, LEAD_S, LatestReading, Listen, NotOpened, ObserveRequest, RunningCalibration, TrialPart,
-    TrialRequest, TrialView, listen_to_port,
+    BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, CrosstalkView, CrosstalkWish, EndedTrial,
+    GripperSetup, GripperView, GripperWish, GripperWorker, LEAD_S, LatestReading, Listen, NotOpened, ObserveRequest,
+    RunningCalibration, RunningCrosstalk, TrialPart, TrialRequest, TrialView, listen_to_port,
 };
 pub use labeller::{LabelView, LabelWish, Labeller, start_labeller};
 pub use latest::Latest;

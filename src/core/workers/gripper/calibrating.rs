@@ -1,6 +1,6 @@
 //! A calibration on the link that everybody shares: it listens to readings, is told what was set, and comes to a curve.
 
-use crate::board::{Board, Reading, Sensor};
+use crate::board::{Board, KNOWN_AFTER, Reading, Sensor};
 use crate::recording::Store;
 use crate::sensing::calibration::{Calibration, EmptyClose, Point, Procedure};
 use std::path::PathBuf;
@@ -74,8 +74,9 @@ pub struct RunningCalibration {
 /// A calibration that goes on in the gripper's thread.
 pub(super) struct Calibrating {
     plan: CalibrationPlan,
-    /// From the first reading on.
+    /// From the reading on after which the board is known.
     procedure: Option<Procedure>,
+    heard: u32,
     closing: Option<EmptyClose>,
     not_taken: Option<String>,
     /// The port was opened for it, and is given back with it.
@@ -84,11 +85,15 @@ pub(super) struct Calibrating {
 
 impl Calibrating {
     pub(super) fn new(plan: CalibrationPlan, owns_port: bool) -> Self {
-        Self { plan, procedure: None, closing: None, not_taken: None, owns_port }
+        Self { plan, procedure: None, heard: 0, closing: None, not_taken: None, owns_port }
     }
 
     /// Takes in a reading; fails where the board has no such channel.
     pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), String> {
+        self.heard = self.heard.saturating_add(1);
+        if self.heard < KNOWN_AFTER {
+            return Ok(());
+        }
         let procedure = match &mut self.procedure {
             Some(procedure) => procedure,
             empty @ None => empty.insert(begin(&self.plan, board)?),

@@ -5,6 +5,7 @@ mod sensors;
 mod trials;
 
 use super::calibrating::{Calibrating, CalibrationView};
+use super::crosstalk::{Crossing, CrosstalkView};
 use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialRequest};
 use super::observing::Observing;
 use super::plotted::{Plotted, Row};
@@ -91,6 +92,8 @@ pub(super) struct Desk {
     calibrating: Option<Calibrating>,
     observing: Vec<Observing>,
     calibrated: Option<Result<String, String>>,
+    crossing: Option<Crossing>,
+    crossed: CrosstalkView,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
     stretch: (u64, f64),
     channels: Arc<[Channel]>,
@@ -122,6 +125,8 @@ impl Desk {
             calibrating: None,
             observing: Vec::new(),
             calibrated: None,
+            crossing: None,
+            crossed: CrosstalkView::default(),
             stretch: (0, 0.0),
             channels: whole_fingers().into(),
             revision: 0,
@@ -201,6 +206,7 @@ impl Desk {
             // Whoever asked learns of it by the end of the request, and looks alone.
             GripperWish::Observe(_) => {}
             GripperWish::Calibrate(wish) => self.calibrate(&wish),
+            GripperWish::Crosstalk(wish) => self.look_for_crosstalk(wish),
             GripperWish::Quit => {}
         }
     }
@@ -253,6 +259,9 @@ impl Desk {
     fn disconnect(&mut self, why: &str) {
         self.end(false, Some(format!("ended early: {why}")));
         self.calibrating = None;
+        if let Some(crossing) = self.crossing.take() {
+            self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(crossing.summary()) };
+        }
         self.observing.clear();
         self.connection = None;
         self.retried = None;
@@ -333,6 +342,7 @@ impl Desk {
         {
             self.end_calibration(Some(Err(cause)));
         }
+        self.cross(reading);
     }
 
     fn plot(&self, rows: Vec<Row>) {
@@ -362,6 +372,13 @@ impl Desk {
             .as_ref()
             .map(|calibrating| calibrating.view(link.as_ref().map(|link| link.state.sentence()).unwrap_or_default()));
         let calibration = CalibrationView { running: calibration, ended: self.calibrated.clone() };
+        let crosstalk = match &self.crossing {
+            Some(crossing) => {
+                let state = link.as_ref().map(|link| link.state.sentence()).unwrap_or_default();
+                CrosstalkView { running: Some(crossing.view(state)), found: crossing.found(), ended: None }
+            }
+            None => self.crossed.clone(),
+        };
         let trial = self.running.as_ref().zip(connection).map(|(running, c)| running.view(c.stream.now_s()));
         self.outlets.view.publish(Arc::new(GripperView {
             revision: self.revision,
@@ -381,6 +398,7 @@ impl Desk {
             recognition_off: self.listener.as_ref().and_then(Listener::why_off),
             model: self.model.clone(),
             calibration: Some(Arc::new(calibration)),
+            crosstalk: Some(Arc::new(crosstalk)),
             console: connection.map(|c| c.stream.console()).unwrap_or_default().into(),
         }));
         (self.outlets.wake)();

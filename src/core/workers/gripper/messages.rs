@@ -1,6 +1,7 @@
 //! What travels between the gripper's thread and a window: wishes in, views out.
 
 use super::calibrating::{CalibrationView, CalibrationWish};
+use super::crosstalk::{CrosstalkView, CrosstalkWish};
 use super::observing::ObserveRequest;
 use super::stream::NotOpened;
 use crate::grasping::IdentificationView;
@@ -53,6 +54,8 @@ pub enum GripperWish {
     Observe(ObserveRequest),
     /// Something about a calibration.
     Calibrate(CalibrationWish),
+    /// Something about the doctor's crosstalk test.
+    Crosstalk(CrosstalkWish),
     /// End the thread.
     Quit,
 }
@@ -163,6 +166,8 @@ pub struct GripperView {
     pub model: Option<String>,
     /// A calibration.
     pub calibration: Option<Arc<CalibrationView>>,
+    /// The doctor's crosstalk test.
+    pub crosstalk: Option<Arc<CrosstalkView>>,
     /// The newest lines of the board.
     pub console: Arc<[ConsoleLine]>,
 }

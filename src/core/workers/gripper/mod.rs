@@ -10,6 +10,7 @@
 //! ```
 
 mod calibrating;
+mod crosstalk;
 mod desk;
 mod messages;
 mod observing;
@@ -20,6 +21,7 @@ mod stream;
 mod worker;
 
 pub use calibrating::{CalibrationPlan, CalibrationView, CalibrationWish, RunningCalibration};
+pub use crosstalk::{CrosstalkView, CrosstalkWish, RunningCrosstalk};
 pub use messages::{EndedTrial, GripperView, GripperWish, LEAD_S, LatestReading, TrialPart, TrialRequest, TrialView};
 pub use observing::ObserveRequest;
 pub use stream::{BoardStream, Listen, NotOpened, listen_to_port};

@@ -1,10 +1,13 @@
 //! What the sensors mean: calibrations of the parts, those that are being made, and zeros.
 
 use super::{Connection, Desk, open};
+use crate::board::Reading;
 use crate::sensing::calibration::{Drift, DriftLevel, Readout, Zero};
 use crate::workers::Notice;
 use crate::workers::gripper::calibrating::{Calibrating, CalibrationPlan, CalibrationWish};
+use crate::workers::gripper::crosstalk::{Crossing, CrosstalkView, CrosstalkWish};
 use crate::workers::gripper::plotted::Plotted;
+use std::path::Path;
 
 /// Readings before the closing from which the zeros are taken (s).
 const REST_S: f64 = 0.6;
@@ -132,20 +135,24 @@ impl Desk {
     }
 
     fn begin_calibration(&mut self, plan: &CalibrationPlan) {
+        match self.borrow_port(plan.port.as_deref()) {
+            Err(cause) => self.calibrated = Some(Err(cause)),
+            Ok(owns_port) => self.calibrating = Some(Calibrating::new(plan.clone(), owns_port)),
+        }
+    }
+
+    /// Sees to it that something is listened to; whether the port was opened for that, or why there is none.
+    fn borrow_port(&mut self, port: Option<&Path>) -> Result<bool, String> {
         let owns_port = self.connection.is_none();
         if owns_port {
-            self.connect(plan.port.as_deref());
-            // A calibration that could not begin is not begun behind anybody's back.
+            self.connect(port);
+            // What could not begin is not begun behind anybody's back.
             self.retried = None;
         }
-        match (&self.connection, self.refused.take()) {
-            (None, refused) => {
-                self.calibrated = Some(Err(refused
-                    .as_ref()
-                    .map_or_else(|| "no board is connected".to_owned(), |refused| refused.text.clone())));
-                self.refused = refused;
-            }
-            (Some(_), _) => self.calibrating = Some(Calibrating::new(plan.clone(), owns_port)),
+        match (&self.connection, &self.refused) {
+            (Some(_), _) => Ok(owns_port),
+            (None, Some(refused)) => Err(refused.text.clone()),
+            (None, None) => Err("no board is connected".to_owned()),
         }
     }
 
@@ -154,6 +161,43 @@ impl Desk {
         self.calibrated = ended;
         if owns_port {
             self.disconnect("the calibration has ended");
+        }
+    }
+
+    // The doctor's crosstalk test.
+
+    pub(super) fn look_for_crosstalk(&mut self, wish: CrosstalkWish) {
+        match wish {
+            CrosstalkWish::Begin(port) => match self.borrow_port(port.as_deref()) {
+                Err(cause) => self.crossed = CrosstalkView { ended: Some(Err(cause)), ..CrosstalkView::default() },
+                Ok(owns_port) => self.crossing = Some(Crossing::new(owns_port)),
+            },
+            CrosstalkWish::Skip => {
+                self.crossing.iter_mut().for_each(Crossing::skip);
+                if self.crossing.as_ref().is_some_and(Crossing::is_over) {
+                    self.end_crosstalk(None);
+                }
+            }
+            CrosstalkWish::Stop => self.end_crosstalk(None),
+        }
+    }
+
+    /// Takes a reading into the test that goes on, and ends it when it is over.
+    pub(super) fn cross(&mut self, reading: &Reading) {
+        let (Some(crossing), Some(connection)) = (&mut self.crossing, &self.connection) else { return };
+        match crossing.feed(reading, &connection.board) {
+            Ok(false) => {}
+            Ok(true) => self.end_crosstalk(None),
+            Err(cause) => self.end_crosstalk(Some(cause)),
+        }
+    }
+
+    fn end_crosstalk(&mut self, cause: Option<String>) {
+        let Some(crossing) = self.crossing.take() else { return };
+        let ended = cause.map_or_else(|| crossing.summary(), Err);
+        self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(ended) };
+        if crossing.owns_port {
+            self.disconnect("the crosstalk test has ended");
         }
     }
 }

@@ -1,0 +1,358 @@
+//! Whether one sensor bleeds into another: each is moved in turn, alone, while the sensors of the other finger are watched,
+//! which nobody touches. Those of the same finger say nothing here: bending a finger presses on its pad.
+//!
+//! ```text
+//!   leave both fingers alone   -> where every sensor rests
+//!   press the left pad         -> share of its change that the right strip and the right pad show
+//!   ...                           for every sensor of the board
+//! ```
+//!
+//! What a converter's multiplexer leaves behind follows the other sensor at once and in proportion. What moves without
+//! being in step with it was touched.
+
+use crate::board::{Board, Reading, Sensor};
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// Shares from this one on are told: a pad of 1 N at 1 % is 18 counts of 4095, and a degree of bend 10.
+const WORTH_TELLING: f64 = 0.01;
+/// Counts of 4095 that such a share must come to: four deviations of the usual noise.
+const LEAST_COUNTS: f64 = 8.0;
+/// Correlation from which on two sensors move in step.
+const IN_STEP: f64 = 0.8;
+/// A sensor that is to be moved must move by this much (counts of 4095): a press of 0.1 N, a bend of ten degrees.
+const MOVES: f64 = 150.0;
+/// It is back when it is this near to its rest (counts of 4095): strips creep.
+const BACK: f64 = 50.0;
+/// It must be back for this long (s).
+const BACK_S: f64 = 0.4;
+/// At rest no sensor changes by more than this (counts of 4095) for [`REST_S`] (s).
+const STILL: f64 = 30.0;
+const REST_S: f64 = 1.0;
+/// Readings that a rest must have.
+const LEAST_READINGS: usize = 10;
+
+/// What one sensor does to another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bleed {
+    /// The one that was moved.
+    pub from: Sensor,
+    /// The one that was watched.
+    pub into: Sensor,
+    /// Change of the second over that of the first.
+    pub share: f64,
+    /// How much the second changed by it, at most (counts).
+    pub counts: f64,
+    /// It is crosstalk: the second is in step with the first, by more than noise.
+    pub bleeds: bool,
+}
+
+/// The test, step by step. It knows no port: readings go in, instructions come out.
+#[derive(Clone, Debug)]
+pub struct CrosstalkTest {
+    /// Sensors of the board and their channels, in the order in which they are moved.
+    sensors: Vec<(Sensor, usize)>,
+    /// Counts of this converter for one of 4095.
+    scale: f64,
+    at: usize,
+    /// Times (s) and counts of the last second, while everything rests.
+    window: VecDeque<(f64, [Option<f64>; 4])>,
+    moving: Option<Moving>,
+    found: Vec<Bleed>,
+    left_out: Vec<Sensor>,
+}
+
+/// A sensor is being moved.
+#[derive(Clone, Debug)]
+struct Moving {
+    rest: [Option<f64>; 4],
+    /// Sums over the readings: of x², x y and y² for each watched sensor y.
+    sums: [[f64; 3]; 4],
+    /// Largest change so far, with its sign (counts).
+    most: f64,
+    /// Since when it is back (s).
+    back: Option<f64>,
+}
+
+impl CrosstalkTest {
+    /// Begins with a board; none where it has not got a sensor of each finger.
+    pub fn new(board: &Board) -> Option<Self> {
+        let sensors: Vec<(Sensor, usize)> =
+            Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, board.channel_of(sensor)?))).collect();
+        let both = [0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side));
+        both.then(|| Self {
+            sensors,
+            scale: f64::from(board.full_scale) / 4095.0,
+            at: 0,
+            window: VecDeque::new(),
+            moving: None,
+            found: Vec::new(),
+            left_out: Vec::new(),
+        })
+    }
+
+    /// The sensor that is to be moved; none when all have been.
+    pub fn source(&self) -> Option<Sensor> {
+        self.sensors.get(self.at).map(|(sensor, _)| *sensor)
+    }
+
+    /// Number of the step, from 1, and how many there are.
+    pub fn step(&self) -> [usize; 2] {
+        [(self.at + 1).min(self.sensors.len()), self.sensors.len()]
+    }
+
+    /// What to do, in words.
+    pub fn instruction(&self) -> String {
+        let Some(sensor) = self.source() else { return "that was all".to_owned() };
+        let (side, other) = if side_of(sensor) == 0 { ("left", "right") } else { ("right", "left") };
+        match &self.moving {
+            None => "leave both fingers alone".to_owned(),
+            Some(moving) if moving.most.abs() >= MOVES * self.scale => format!("let go of the {side} finger"),
+            Some(_) if sensor.is_flex() => {
+                format!("bend the {side} finger by hand and let go; do not touch the {other} one")
+            }
+            Some(_) => format!("press the {side} pad firmly and let go; do not touch the {other} finger"),
+        }
+    }
+
+    /// Takes in a reading.
+    pub fn feed(&mut self, reading: &Reading) {
+        let Some(source) = self.source() else { return };
+        let mut counts = [None; 4];
+        for (sensor, channel) in &self.sensors {
+            let count = reading.counts.get(*channel).copied().flatten().filter(|count| count.is_finite());
+            counts[*sensor as usize] = count.map(f64::from);
+        }
+        match &mut self.moving {
+            None => self.rest(reading.t_s, counts),
+            Some(moving) => {
+                if moving.add(source, &counts, reading.t_s, self.scale) {
+                    let found = moving.found(source, self.scale);
+                    self.found.extend(found);
+                    self.next();
+                }
+            }
+        }
+    }
+
+    /// Leaves out the sensor that is to be moved.
+    pub fn skip(&mut self) {
+        self.left_out.extend(self.source());
+        self.next();
+    }
+
+    /// What was found so far.
+    pub fn found(&self) -> &[Bleed] {
+        &self.found
+    }
+
+    /// What it comes to, in sentences: what bleeds into what, and what to do about it; or that nothing does.
+    pub fn summary(&self) -> Vec<String> {
+        let mut told: Vec<String> = self.found.iter().filter(|bleed| bleed.bleeds).map(Bleed::sentence).collect();
+        if !told.is_empty() {
+            told.push(
+                "The converter's multiplexer does not settle behind the high resistance of a divider: solder 100 nF from each \
+                 pin to ground, and throw away the first conversion of each channel, as our firmware does"
+                    .to_owned(),
+            );
+        } else if !self.found.is_empty() {
+            let percent = 100.0 * WORTH_TELLING;
+            told.push(format!("No sensor shows {percent:.0} % or more of what another does"));
+        }
+        let asked = self.left_out.iter().map(|sensor| sensor.label());
+        let left_out = asked.chain(self.sensors[self.at..].iter().map(|(sensor, _)| sensor.label()));
+        let left_out: Vec<&str> = left_out.collect();
+        if !left_out.is_empty() {
+            told.push(format!("Not moved: {}", left_out.join(", ")));
+        }
+        told
+    }
+
+    fn next(&mut self) {
+        self.at += 1;
+        self.moving = None;
+        self.window.clear();
+    }
+
+    fn rest(&mut self, t_s: f64, counts: [Option<f64>; 4]) {
+        // A clock that was set back begins anew.
+        if self.window.back().is_some_and(|(last, _)| t_s < *last) {
+            self.window.clear();
+        }
+        self.window.push_back((t_s, counts));
+        while self.window.front().is_some_and(|(first, _)| *first < t_s - REST_S) {
+            self.window.pop_front();
+        }
+        let since = self.window.front().map_or(t_s, |(first, _)| *first);
+        // A window is full when one more period would be too much.
+        if t_s - since < 0.95 * REST_S || self.window.len() < LEAST_READINGS {
+            return;
+        }
+        let mut rest = [None; 4];
+        for (place, rest) in rest.iter_mut().enumerate() {
+            let counts: Vec<f64> = self.window.iter().filter_map(|(_, counts)| counts[place]).collect();
+            let least = counts.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = counts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if most - least > STILL * self.scale {
+                return;
+            }
+            *rest = (!counts.is_empty()).then(|| counts.iter().sum::<f64>() / counts.len() as f64);
+        }
+        self.window.clear();
+        self.moving = Some(Moving { rest, sums: [[0.0; 3]; 4], most: 0.0, back: None });
+    }
+}
+
+impl Moving {
+    /// Takes in counts; true when the sensor has been moved and is back.
+    fn add(&mut self, source: Sensor, counts: &[Option<f64>; 4], t_s: f64, scale: f64) -> bool {
+        let change = |place: usize| Some(counts[place]? - self.rest[place]?);
+        let Some(x) = change(source as usize) else { return false };
+        for (place, sums) in self.sums.iter_mut().enumerate() {
+            if let (Some(count), Some(rest)) = (counts[place], self.rest[place]) {
+                let y = count - rest;
+                for (sum, term) in sums.iter_mut().zip([x * x, x * y, y * y]) {
+                    *sum += term;
+                }
+            }
+        }
+        if x.abs() > self.most.abs() {
+            self.most = x;
+        }
+        if self.most.abs() < MOVES * scale || x.abs() > BACK * scale {
+            self.back = None;
+            return false;
+        }
+        t_s - *self.back.get_or_insert(t_s) >= BACK_S
+    }
+
+    /// What the sensors of the other finger did meanwhile.
+    fn found(&self, source: Sensor, scale: f64) -> Vec<Bleed> {
+        let watched = |sensor: &Sensor| side_of(*sensor) != side_of(source) && self.rest[*sensor as usize].is_some();
+        let bleed = |into: Sensor| {
+            let [xx, xy, yy] = self.sums[into as usize];
+            let share = if xx > 0.0 { xy / xx } else { 0.0 };
+            let counts = share * self.most;
+            let in_step = xy.abs() >= IN_STEP * (xx * yy).sqrt();
+            let bleeds = in_step && share.abs() >= WORTH_TELLING && counts.abs() >= LEAST_COUNTS * scale;
+            Bleed { from: source, into, share, counts, bleeds }
+        };
+        Sensor::ALL.into_iter().filter(watched).map(bleed).collect()
+    }
+}
+
+impl Bleed {
+    /// In a sentence.
+    pub fn sentence(&self) -> String {
+        let (into, from) = (self.into.label(), self.from.label());
+        format!("The {into} shows {:.1} % of what the {from} does: {:+.0} counts", 100.0 * self.share, self.counts)
+    }
+}
+
+/// The finger of a sensor: 0 for the left one.
+fn side_of(sensor: Sensor) -> usize {
+    sensor as usize % 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hand that obeys, seen through a converter by which each channel takes a share of the one before it.
+    struct Hand {
+        test: CrosstalkTest,
+        t_s: f64,
+        share: f64,
+        /// Moves the right pad by itself while the left one is pressed.
+        clumsy: bool,
+    }
+
+    impl Hand {
+        fn new(share: f64) -> Self {
+            let test = CrosstalkTest::new(&Board::default()).expect("has both fingers");
+            Self { test, t_s: 0.0, share, clumsy: false }
+        }
+
+        fn feed(&mut self, mut counts: [f64; 4]) {
+            for k in (1..4).rev() {
+                counts[k] += self.share * (counts[k - 1] - counts[k]);
+            }
+            self.t_s += 0.02;
+            let noise = f64::from((self.t_s * 50.0).round() as i32 % 3 - 1);
+            let counts = counts.iter().map(|count| Some((count + noise) as f32)).collect();
+            self.test.feed(&Reading { t_s: self.t_s, arrived_s: self.t_s, seq: None, counts, line_bar: None });
+        }
+
+        fn rest(&mut self, seconds: f64) {
+            for _ in 0..(50.0 * seconds) as u32 {
+                self.feed([1420.0, 1400.0, 0.0, 0.0]);
+            }
+        }
+
+        /// Does what is asked for, to the end.
+        fn obey(&mut self) {
+            while let Some(sensor) = self.test.source() {
+                assert_eq!(self.test.instruction(), "leave both fingers alone");
+                self.rest(1.1);
+                assert!(self.test.instruction().contains("let go; do not touch"), "{}", self.test.instruction());
+                for k in 0..100u32 {
+                    let wave = (std::f64::consts::PI * f64::from(k) / 100.0).sin();
+                    let mut counts = [1420.0, 1400.0, 0.0, 0.0];
+                    counts[sensor as usize] += 600.0 * wave;
+                    if self.clumsy && sensor == Sensor::PadLeft && k > 80 {
+                        counts[3] += 40.0;
+                    }
+                    self.feed(counts);
+                }
+                self.rest(0.6);
+            }
+        }
+    }
+
+    #[test]
+    fn each_pair_that_bleeds_is_found_and_no_other() {
+        let mut hand = Hand::new(0.1);
+        assert_eq!(hand.test.step(), [1, 4]);
+        hand.obey();
+        let bleeds: Vec<(Sensor, Sensor, i32)> = hand
+            .test
+            .found()
+            .iter()
+            .filter(|bleed| bleed.bleeds)
+            .map(|bleed| (bleed.from, bleed.into, (1000.0 * bleed.share).round() as i32))
+            .collect();
+        use Sensor::{FlexLeft, FlexRight, PadLeft, PadRight};
+        // Of the change of the channel before, which keeps 90 % of its own.
+        assert_eq!(bleeds, [(FlexLeft, FlexRight, 100), (FlexRight, PadLeft, 111), (PadLeft, PadRight, 111)]);
+        assert_eq!(hand.test.found().len(), 8);
+        let told = hand.test.summary();
+        assert!(told.len() == 4 && told[0].contains("right flex strip shows 10.0 % of what the left flex strip does"));
+        assert!(told[3].contains("100 nF"), "{told:?}");
+    }
+
+    #[test]
+    fn a_sound_board_and_a_clumsy_hand_are_no_crosstalk() {
+        for clumsy in [false, true] {
+            let mut hand = Hand { clumsy, ..Hand::new(0.0) };
+            hand.obey();
+            let told = hand.test.summary();
+            assert_eq!(told, ["No sensor shows 1 % or more of what another does"], "{:?}", hand.test.found());
+        }
+    }
+
+    #[test]
+    fn what_does_not_rest_or_move_is_waited_for_and_may_be_left_out() {
+        let mut hand = Hand::new(0.0);
+        for k in 0..200 {
+            hand.feed([1420.0 + f64::from(k % 10) * 20.0, 1400.0, 0.0, 0.0]);
+        }
+        assert_eq!(hand.test.instruction(), "leave both fingers alone");
+        hand.test.skip();
+        hand.rest(3.0);
+        assert!(hand.test.instruction().starts_with("bend the right finger"), "{}", hand.test.instruction());
+        assert_eq!((hand.test.step(), hand.test.found()), ([2, 4], &[][..]));
+        assert_eq!(hand.test.summary(), ["Not moved: left flex strip, right flex strip, left pad, right pad"]);
+        let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
+        assert!(CrosstalkTest::new(&one).is_none(), "nothing could be watched");
+    }
+}
