@@ -191,12 +191,10 @@ pub(super) fn still(
         .show_background(false)
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
-        .custom_y_axes(vec![
-            AxisHints::new_y()
-                .label(y_label.to_owned())
-                .min_thickness(44.0)
-                .label_spacing(egui::Rangef::new(14.0, 22.0)),
-        ])
+        .y_axis_min_width(44.0)
+        .y_axis_label(y_label.to_owned())
+        .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
+        .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .custom_x_axes(vec![below.label_spacing(egui::Rangef::new(24.0, 40.0))])
         .set_margin_fraction(egui::vec2(air_beside, 0.12))
 }

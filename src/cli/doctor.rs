@@ -6,7 +6,8 @@ use super::terminal::{note, say, say_json, table};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_core::board::KNOWN_AFTER;
 use palpate_core::doctor::{
-    Bleed, CrosstalkTest, Finding, Observations, USUAL_LISTEN_S, Verdict, examine, findings, is_sound, summary,
+    Bleed, CrosstalkTest, Finding, Observations, USUAL_LISTEN_S, Verdict, WIRING_PAGE, examine, findings, is_sound,
+    summary, write_sketch,
 };
 use palpate_core::rig::serial::{Baud, LinkEvent, LinkOptions};
 use palpate_core::wire::Heard;
@@ -31,6 +32,12 @@ pub(super) struct DoctorArguments {
     /// are watched. Ctrl+C ends it and says what was seen.
     #[arg(long, conflicts_with = "seconds")]
     crosstalk: bool,
+    /// Print how the board is wired, which port is which, and what its lines are; and look at nothing.
+    #[arg(long, conflicts_with_all = ["crosstalk", "json"])]
+    wiring: bool,
+    /// Write the sketch for the Due into a folder, which Arduino wants to be called due_gripper; and look at nothing.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["crosstalk", "json", "wiring"])]
+    sketch: Option<PathBuf>,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -57,6 +64,14 @@ struct Told<'a> {
 }
 
 pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
+    if arguments.wiring {
+        say(WIRING_PAGE.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(folder) = &arguments.sketch {
+        write_sketch(folder)?.iter().try_for_each(|path| say(path.display().to_string()))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let options = LinkOptions { path: arguments.port.clone(), baud: arguments.baud, ..LinkOptions::default() };
     let stop = super::interrupt::stop_flag()?;
     if arguments.crosstalk {

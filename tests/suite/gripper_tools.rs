@@ -189,6 +189,33 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
 }
 
 #[test]
+fn wiring_and_sketch_come_with_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let page = run(at, &["doctor", "--wiring"]);
+    assert!(page.code == Some(0) && page.out.contains("47 k to 3.3 V") && page.out.contains("2341:003e"), "{page:?}");
+    for _ in 0..2 {
+        let told = run(at, &["doctor", "--sketch", "due_gripper"]);
+        assert!(told.code == Some(0) && told.out.contains("gripper_logic.h"), "{told:?}");
+    }
+    std::fs::write(at.join("due_gripper/due_gripper.ino"), "mine").unwrap();
+    refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "left as it is", "another folder"]);
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let setup = BenchSetup { size: [320.0, 680.0], ..BenchSetup::default() };
+        let mut bench = bench("doctor", theme, setup);
+        bench.harness.get_by_label("Wiring, and the sketch for the board").click();
+        bench.harness.run_steps(30);
+        assert_eq!(bench.harness.query_all_by_label("4.7 kΩ").count(), 2);
+        bench.harness.get_by_label("Copy the command for the sketch").click();
+        bench.harness.step();
+        assert!(has_copied(&bench, "palpate doctor --sketch due_gripper"));
+        bench.harness.run_steps(4);
+        bench.harness.render().unwrap()
+    });
+    compare("doctor_wiring", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
 fn the_doctor_looks_tells_and_can_be_stopped() {
     let [dark, light] = Theme::ALL.map(|theme| {
         let seen = Arc::new(Mutex::new(sound()));

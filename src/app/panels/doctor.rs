@@ -7,8 +7,10 @@ use crate::app::gripper_tools::ToolWish;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use egui::text::{LayoutJob, TextFormat};
-use egui::{Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
-use palpate_core::doctor::{Bleed, CHECKS, Finding, USUAL_LISTEN_S, Verdict, is_sound, summary};
+use egui::{CollapsingHeader, Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
+use palpate_core::doctor::{
+    Bleed, CHECKS, Finding, SKETCH, USUAL_LISTEN_S, Verdict, WIRING_RULES, is_sound, summary, wires,
+};
 use palpate_core::palette::Theme;
 use palpate_core::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
 
@@ -34,6 +36,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
                 wrapped(ui, RichText::new(format!("It checks that {}.", about.join(", "))).weak());
             }
         }
+        ui.add_space(6.0);
+        CollapsingHeader::new("Wiring, and the sketch for the board").show(ui, wiring_ui);
     });
 }
 
@@ -51,6 +55,37 @@ fn begin_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
         }
     });
     wrapped(ui, RichText::new(hint).weak());
+}
+
+/// How the board is wired.
+fn wiring_ui(ui: &mut Ui) {
+    let [volt, bleeding] = WIRING_RULES;
+    wrapped(ui, RichText::new(volt).color(ui.visuals().warn_fg_color));
+    Grid::new("wiring").num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
+        for title in ["pin", "to 3.3 V", "to ground"] {
+            ui.weak(title);
+        }
+        ui.end_row();
+        for wire in wires() {
+            ui.monospace(wire.pin);
+            ui.label(wire.above);
+            ui.label(wire.below);
+            ui.end_row();
+        }
+    });
+    wrapped(ui, RichText::new(bleeding));
+    wrapped(
+        ui,
+        RichText::new(
+            "Ports, pressure output and lines are told in full by the first of these; the second writes the sketch.",
+        )
+        .weak(),
+    );
+    for (mends, command) in
+        [("wiring", "palpate doctor --wiring".to_owned()), ("the sketch", format!("palpate doctor --sketch {SKETCH}"))]
+    {
+        command_ui(ui, mends, &command);
+    }
 }
 
 fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCrosstalk, actions: &mut Vec<Action>) {

@@ -173,7 +173,13 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, l
             let counts = latest.counts.get(column).copied().flatten();
             let counts = counts.map_or_else(|| "–".to_owned(), |counts| format!("{counts:4.0}"));
             ui.label(RichText::new(counts).monospace().weak()).on_hover_text("counts of the converter");
-            ui.label(RichText::new(felt_text(latest, sensor)).monospace());
+            let felt = RichText::new(felt_text(latest, sensor)).monospace();
+            if latest.beyond[sensor as usize] {
+                let about = "Beyond what it was calibrated with: read off the curve's extension";
+                ui.label(felt.color(ui.visuals().warn_fg_color)).on_hover_text(about);
+            } else {
+                ui.label(felt);
+            }
             match gripper.drift.iter().find(|drift| drift.sensor == sensor) {
                 Some(drift) => drift_badge(ui, context.view.theme, drift),
                 None => {

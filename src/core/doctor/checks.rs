@@ -1,6 +1,6 @@
 //! The checks, each from what was seen to what it means.
 
-use super::{Finding, Observations, Trace, Verdict};
+use super::{Finding, Observations, SKETCH, Trace, Verdict};
 use crate::board::{Board, Sensor};
 use crate::rig::serial::{LinkState, LinkStatus, MODEM_MANAGER_COMMAND, PortTrouble};
 use crate::units::three_digits;
@@ -43,6 +43,8 @@ enum Next {
     Upload,
     /// When it is mended, look again, for longer.
     Again,
+    /// Move one sensor after the other.
+    Crosstalk,
 }
 
 impl Next {
@@ -55,9 +57,10 @@ impl Next {
             Self::Upload => {
                 // The two ports of a Due are two boards to the tools of Arduino.
                 let board = if port?.kind.native { "arduino_due_x" } else { "arduino_due_x_dbg" };
-                let sketch = "assets/firmware/due_gripper";
-                Some(format!("arduino-cli compile --upload --fqbn arduino:sam:{board} --port {} {sketch}", path?))
+                let upload = format!("arduino-cli compile --upload --fqbn arduino:sam:{board} --port {}", path?);
+                Some(format!("palpate doctor --sketch {SKETCH} && {upload} {SKETCH}"))
             }
+            Self::Crosstalk => Some(format!("palpate doctor {} --crosstalk", path?)),
             Self::Again => Some(format!("palpate doctor {} --seconds 20", path?)),
         }
     }
@@ -92,7 +95,7 @@ pub const CHECKS: &[Check] = &[
     Check { name: "bits", about: "the converter gives 12 bits", look: bits, next: Next::Upload },
     Check { name: "saturation", about: "no channel is at its upper end", look: saturation, next: Next::Again },
     Check { name: "open-circuit", about: "every sensor is connected", look: open_circuit, next: Next::Again },
-    Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk, next: Next::Again },
+    Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk, next: Next::Crosstalk },
     Check { name: "rate", about: "samples come as often as they should", look: rate, next: Next::Again },
     Check { name: "clock", about: "the board's clock can be relied on", look: clock, next: Next::Upload },
 ];
@@ -230,12 +233,12 @@ fn silence(seen: &Observations) -> Told {
         told.because(
             "The native port sends only while the host holds DTR, which it does; so the sketch is not running, or prints on \
              the other port",
-            "Press the board's reset button once; upload assets/firmware/due_gripper, or set HOST to the port in use",
+            "Press the board's reset button once; upload our firmware, or set HOST to the port in use",
         )
     } else {
         told.because(
             "The board is not running a sketch that prints, or prints on its other port",
-            "Upload assets/firmware/due_gripper; on a Due, plug the cable into the native port (next to the reset button)",
+            "Upload our firmware; on a Due, plug the cable into the native port (next to the reset button)",
         )
     }
 }
@@ -297,7 +300,7 @@ fn firmware(seen: &Observations) -> Told {
         Some(version) => Told::good(format!("tactile-gripper, version {version}")),
         None => Told::note("the board does not say what it is").because(
             "It runs a sketch of its own: bits, reference voltage and resistors are taken for granted",
-            "Print a hello line as assets/firmware/due_gripper does, or upload that",
+            "Print a hello line as our firmware does, or upload that",
         ),
     }))
 }
@@ -442,7 +445,7 @@ fn bleeding(link: &LinkStatus, channel: usize, trace: &Trace, scale: f64) -> Opt
     }
     Some(Told::note(format!("{name} is never below {least:.0} counts")).because(
         format!("Something presses the pad all the time, or {before} bleeds into it"),
-        "Bend one finger by hand while the doctor listens: it then says which",
+        "Move one sensor after the other: that says which",
     ))
 }
 

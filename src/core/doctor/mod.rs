@@ -9,11 +9,13 @@ mod examine;
 #[cfg(test)]
 mod tests;
 mod traces;
+mod wiring;
 
 pub use checks::{CHECKS, Check};
 pub use crosstalk::{Bleed, CrosstalkTest};
 pub use examine::examine;
 pub use traces::{Trace, Traces};
+pub use wiring::{SKETCH, SketchError, WIRING_PAGE, WIRING_RULES, Wire, wires, write_sketch};
 
 use crate::rig::serial::{LinkStatus, PortError, PortInfo};
 use serde::Serialize;

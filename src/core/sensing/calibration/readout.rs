@@ -72,6 +72,12 @@ const MOST_MISSING: f64 = 0.2;
 /// Length of the window before the closing that is taken where the line pressure is not known (s).
 const REST_WINDOW_S: f64 = 0.3;
 
+/// Angles farther out than this of those that a strip was calibrated with are told (rad): 3 degrees.
+const ANGLE_BEYOND: f64 = 0.052;
+
+/// Forces larger by this share than the largest that a pad was calibrated with are told.
+const FORCE_BEYOND: f64 = 0.1;
+
 /// Readings below which a window says nothing of a zero.
 const LEAST_READINGS: usize = 5;
 
@@ -192,6 +198,41 @@ impl Readout {
         felt
     }
 
+    /// Which sensors, in the order of [`Sensor::ALL`], show more than they were calibrated with, by more than what a
+    /// calibration promises: what is told of them is read off the curve's extension.
+    pub fn beyond(&self, felt: &Felt) -> [bool; 4] {
+        let values = [felt.angle[0], felt.angle[1], felt.force[0], felt.force[1]];
+        std::array::from_fn(|place| {
+            let (Some(wired), Some(value)) = (&self.wired[place], values[place]) else { return false };
+            let [least, most] = wired.calibration.range();
+            match wired.calibration.curve {
+                Curve::Flex(_) => value < least - ANGLE_BEYOND || value > most + ANGLE_BEYOND,
+                Curve::Pad(_) => value > most * (1.0 + FORCE_BEYOND),
+            }
+        })
+    }
+
+    /// What of a trial was beyond the calibrations, in sentences.
+    fn beyond_remarks(&self, felt: &[Felt]) -> Vec<String> {
+        let mut counts = [0; 4];
+        for felt in felt {
+            counts.iter_mut().zip(self.beyond(felt)).for_each(|(count, beyond)| *count += u32::from(beyond));
+        }
+        let all = felt.len();
+        let of = |((sensor, wired), count): ((Sensor, &Option<Wired>), u32)| {
+            let calibration = &wired.as_ref()?.calibration;
+            let [_, most] = calibration.range();
+            let (label, told) = (sensor.label(), calibration.record.kind.told(most));
+            (count > 0).then(|| {
+                format!(
+                    "the {label} was beyond what it was calibrated with, up to {told}, in {count} of {all} readings: it is \
+                     read off the curve's extension there"
+                )
+            })
+        };
+        Sensor::ALL.into_iter().zip(&self.wired).zip(counts).filter_map(of).collect()
+    }
+
     /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`] is
     /// made from.
     pub fn bending(&self, side: Side, readings: &[Reading]) -> Vec<(f64, f64)> {
@@ -218,6 +259,7 @@ impl Readout {
             readings.iter().map(|reading| zeroed.felt(reading)).collect()
         };
         warnings.extend(self.saturated(readings));
+        warnings.extend(self.beyond_remarks(&felt));
         let mut channels = Vec::new();
         for channel in self.channels() {
             let missing = felt.iter().filter(|felt| felt.of(&channel).is_none()).count();

@@ -253,3 +253,20 @@ fn a_tare_wants_an_open_hand_at_rest() {
     let pressed = Reading { line_bar: Some(0.5), ..steady[0].clone() };
     assert_eq!(readout.tare(&[&steady[..], &[pressed]].concat()), Err(Unrest::Pressed { bar: 0.5 }));
 }
+
+#[test]
+fn what_is_beyond_the_calibrated_range_is_told() {
+    let mut parts = Parts::new(6);
+    let readout = parts.readout();
+    let mut beyond = |degrees, force| {
+        let felt = readout.felt(&parts.read(0.0, degrees, force));
+        readout.beyond(&felt)
+    };
+    assert_eq!(beyond([90.0, 0.0], [4.9, 0.0]), [false; 4]);
+    assert_eq!(beyond([100.0, -9.0], [0.0, 6.5]), [true, true, false, true]);
+    let mut readings: Vec<Reading> = (0..50).map(|i| parts.read(0.02 * f64::from(i), [0.0; 2], [0.0; 2])).collect();
+    readings.extend((50..60).map(|i| parts.read(0.02 * f64::from(i), [30.0; 2], [0.0, 7.0])));
+    let told = readout.derive(&readings, Some(0.9)).warnings;
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("right pad was beyond") && told[0].contains("0.500 kg, in 10 of 60"), "{told:?}");
+}

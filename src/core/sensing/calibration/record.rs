@@ -115,6 +115,12 @@ impl Calibration {
         }
     }
 
+    /// Least and largest angle (rad) or force (N) that it was calibrated with.
+    pub fn range(&self) -> [f64; 2] {
+        let set = self.record.points.iter().map(|point| point.stimulus);
+        [set.clone().fold(f64::INFINITY, f64::min), set.fold(f64::NEG_INFINITY, f64::max)]
+    }
+
     /// What came out, in a line.
     pub fn summary(&self) -> String {
         let often = |interval: Option<f64>, unit: &str| {

@@ -333,7 +333,8 @@ impl Desk {
         let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
         let rows = connection.plotted.push(reading, &felt, line_bar);
-        connection.latest = Some(LatestReading { counts: reading.counts.clone(), felt, line_bar });
+        let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&felt));
+        connection.latest = Some(LatestReading { counts, felt, beyond, line_bar });
         self.plot(rows);
         self.watch(reading);
         self.recognise(reading.t_s, &felt);

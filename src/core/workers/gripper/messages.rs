@@ -78,6 +78,8 @@ pub struct LatestReading {
     pub counts: Vec<Option<f32>>,
     /// Angle, curvature, force and pressure by the calibrations; nothing where there are none.
     pub felt: Felt,
+    /// Which sensors, in the order of `Sensor::ALL`, show more than they were calibrated with.
+    pub beyond: [bool; 4],
     /// Line pressure: as commanded, or as the board reports it (bar).
     pub line_bar: Option<f64>,
 }
