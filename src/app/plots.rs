@@ -260,20 +260,34 @@ fn add_curves(
     named: bool,
 ) {
     for curve in &plot.curves {
-        // Undefined values leave a gap.
-        let points: Vec<[f64; 2]> =
-            trace.t.iter().enumerate().map(|(k, t)| [*t, (curve.values)(trace, k).unwrap_or(f64::NAN)]).collect();
         let style = if curve.dashed { LineStyle::Dashed { length: 7.0 } } else { LineStyle::Solid };
         let name = if named { curve.name.as_str() } else { "" };
-        plot_ui.line(
-            Line::new(name, PlotPoints::from(points))
-                .id(egui::Id::unique((&curve.name, trace.grasp)))
-                .color(shade(curve))
-                .width(width)
-                .style(style)
-                .allow_hover(named),
-        );
+        for (run, points) in runs(trace, curve).into_iter().enumerate() {
+            plot_ui.line(
+                Line::new(name, PlotPoints::from(points))
+                    .id(egui::Id::unique((&curve.name, trace.grasp, run)))
+                    .color(shade(curve))
+                    .width(width)
+                    .style(style)
+                    .allow_hover(named),
+            );
+        }
     }
+}
+
+/// The stretches of a curve in which it is defined, points of time (s) and value. Between them nothing is drawn: a line
+/// of which one point is not a number is broken off there by some styles and forbidden by others.
+fn runs(trace: &GraspTrace, curve: &Curve) -> Vec<Vec<[f64; 2]>> {
+    let mut runs = vec![Vec::new()];
+    for (k, t) in trace.t.iter().enumerate() {
+        match ((curve.values)(trace, k).filter(|value| value.is_finite()), runs.last_mut()) {
+            (Some(value), Some(run)) => run.push([*t, value]),
+            (None, Some(run)) if !run.is_empty() => runs.push(Vec::new()),
+            _ => {}
+        }
+    }
+    runs.retain(|run| !run.is_empty());
+    runs
 }
 
 /// Shades the numerical error band about each curve.
@@ -324,6 +338,22 @@ fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_curve_is_drawn_where_it_is_defined() {
+        let nan = f32::NAN;
+        let channels = vec![vec![nan, 1.0, 2.0, nan, nan, 3.0, nan]];
+        let t: Vec<f64> = (0..7).map(f64::from).collect();
+        let trace = GraspTrace { t, channels, ..GraspTrace::default() };
+        let curve = Curve {
+            name: String::new(),
+            trace: Trace::Pressure,
+            dashed: true,
+            values: Box::new(|trace, k| Some(f64::from(trace.channels[0][k]))),
+            half_width: Box::new(|_, _| None),
+        };
+        assert_eq!(runs(&trace, &curve), [vec![[1.0, 1.0], [2.0, 2.0]], vec![[5.0, 3.0]]]);
+    }
 
     #[test]
     fn marks_are_few_and_round() {

@@ -6,11 +6,11 @@ use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use crate::panels::side_by_side;
 use crate::program::{refused, run};
-use crate::streams::Scripted;
+use crate::streams::{HeardOnce, Scripted};
 use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
-use palpate::app::ALL_PANELS;
+use palpate::app::{ALL_PANELS, Action};
 use palpate_core::board::{Board, Reading};
 use palpate_core::doctor::{Observations, Traces};
 use palpate_core::gripper::Side;
@@ -20,7 +20,7 @@ use palpate_core::rig::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbI
 use palpate_core::scene::Scene;
 use palpate_core::study::{Course, Estimate, FingerFit, Known, Remainder};
 use palpate_core::wire::{Cadence, Rail};
-use palpate_core::workers::{Examine, FitTrials, FittedFinger, Listen, NotOpened};
+use palpate_core::workers::{Examine, FitTrials, FittedFinger, GripperWish, Listen, NotOpened};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -186,6 +186,22 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
     for (k, name) in ["doctor_crosstalk", "doctor_crosstalk_found"].into_iter().enumerate() {
         compare(name, &side_by_side(&dark[k], &light[k]), "the CPU renderer of the tests");
     }
+}
+
+#[test]
+fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let listen: Listen = Arc::new(|_| Ok(Box::new(HeardOnce::with_a_gap())));
+        let setup = BenchSetup { size: [480.0, 220.0], listen, ..BenchSetup::default() };
+        let mut bench = bench("counts", theme, setup);
+        bench.tell(Action::Gripper(GripperWish::Connect(None)));
+        // It is silent then, and wakes the window now and then.
+        for _ in 0..20 {
+            bench.wait();
+        }
+        bench.harness.render().unwrap()
+    });
+    compare("gap", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Boards without a port, for what listens to one: readings that a test makes up, and the pretended gripper on a clock
 //! that runs as fast as it is asked.
 
-use palpate_core::board::{Board, Reading};
+use palpate_core::board::{Board, Gap, Reading};
 use palpate_core::pretended::{PretendedGripper, PretendedSetup};
 use palpate_core::rig::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
 use palpate_core::wire::{Cadence, Captured, ConsoleLine, Decoder, Heard};
@@ -44,6 +44,56 @@ impl<F: Fn() -> Vec<Option<f32>>> BoardStream for Scripted<F> {
         let time = |k: u32| self.t_s + 0.02 * f64::from(k);
         let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None };
         (0..50).map(|k| LinkEvent::Heard(Heard::Reading(reading(time(k))))).collect()
+    }
+
+    fn status(&self) -> LinkStatus {
+        listening(Board::default(), Cadence::default(), self.t_s)
+    }
+
+    fn now_s(&self) -> f64 {
+        self.t_s
+    }
+
+    fn send(&mut self, _: &str) -> Result<(), SendError> {
+        Ok(())
+    }
+
+    fn console(&self) -> Vec<ConsoleLine> {
+        Vec::new()
+    }
+
+    fn is_over(&self) -> bool {
+        false
+    }
+}
+
+/// What was heard once, and silence behind it.
+pub(crate) struct HeardOnce {
+    events: Vec<LinkEvent>,
+    t_s: f64,
+}
+
+impl HeardOnce {
+    /// Three seconds of strips that bend and pads that are pressed, at 50 Hz, of which eight tenths are missing.
+    pub(crate) fn with_a_gap() -> Self {
+        let reading = |k: u32| {
+            let t_s = 0.02 * f64::from(k);
+            let wave = (std::f64::consts::PI * t_s / 3.0).sin() as f32;
+            let counts = [1420.0 + 500.0 * wave, 1400.0 + 450.0 * wave, 900.0 * wave, 700.0 * wave].map(Some).to_vec();
+            LinkEvent::Heard(Heard::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }))
+        };
+        let gap = Gap { from_s: 1.0, to_s: 1.8, lost: Some(39), cause: "the board was unplugged".to_owned() };
+        let events = (0..=50).map(reading).chain([LinkEvent::Heard(Heard::Gap(gap))]).chain((90..=150).map(reading));
+        Self { events: events.collect(), t_s: 3.0 }
+    }
+}
+
+impl BoardStream for HeardOnce {
+    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
+        if self.events.is_empty() {
+            std::thread::sleep(patience);
+        }
+        std::mem::take(&mut self.events)
     }
 
     fn status(&self) -> LinkStatus {
