@@ -104,6 +104,7 @@ fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
         bench.harness.step();
         bench.until_shown(true, "only members of the group dialout");
         // Below stand the ports of whatever computer this is.
+        bench.harness.run_steps(3);
         let picture = image::imageops::crop_imm(&bench.harness.render().unwrap(), 0, 0, 320, 204).to_image();
         bench.harness.get_by_label("Copy the command for the port").click();
         bench.harness.step();
@@ -170,7 +171,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
             bench.until_shown(false, "Let go of the");
         }
         bench.until_shown(true, "Press the left pad firmly");
-        bench.harness.run_steps(2);
+        bench.harness.run_steps(3);
         pictures.push(bench.harness.render().unwrap());
         bench.harness.get_by_label("Leave out").click();
         bench.harness.step();
@@ -179,7 +180,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         bench.harness.step();
         bench.until_shown(true, "The right flex strip shows 10.0 % of what the left flex strip does: +60 counts");
         bench.until_shown(true, "Not moved: left pad, right pad");
-        bench.harness.run_steps(2);
+        bench.harness.run_steps(3);
         pictures.push(bench.harness.render().unwrap());
         pictures
     });
@@ -252,6 +253,8 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         bench.harness.step();
         bench.until_shown(true, "Nothing is wrong");
         assert!(bench.harness.query_by_label("crosstalk: good").is_some());
+        // Which button the pointer is on is known a frame later.
+        bench.harness.run_steps(3);
         let good = bench.harness.render().unwrap();
         *seen.lock().unwrap() = troubled();
         bench.harness.get_by_label("Port").focus();
@@ -268,6 +271,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         bench.until_shown(true, "things are wrong");
         bench.until_shown(true, "then stopped");
         assert!(bench.harness.query_by_label("lines: WRONG").is_some());
+        bench.harness.run_steps(3);
         let wrong = bench.harness.render().unwrap();
         bench.harness.get_by_label("Copy the command for modem-manager").click();
         bench.harness.step();
@@ -377,6 +381,7 @@ fn a_finger_is_fitted_and_used_without_the_mouse() {
         // Without the list, in which the time stands.
         let top = bench.harness.get_by_label("Fitted to trials 3, 4").rect().top() as u32;
         let picture = bench.harness.render().unwrap();
+        bench.harness.run_steps(3);
         let picture = image::imageops::crop_imm(&picture, 0, top, picture.width(), picture.height() - top).to_image();
         press(&mut bench, "Use this finger");
         let scene = bench.until(|s| s.scene.gripper.finger.bending_stiffness == 3.36e-3).scene.clone();
