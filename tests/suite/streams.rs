@@ -24,6 +24,7 @@ fn listening(board: Board, cadence: Cadence, now_s: f64) -> LinkStatus {
         cadence,
         rails: Vec::new(),
         looks_10_bit: false,
+        units: Vec::new(),
         reconnects: 0,
         now_s,
         dropped: [0; 2],

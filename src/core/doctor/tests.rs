@@ -28,6 +28,7 @@ fn sound() -> Observations {
         cadence,
         rails: vec![None; 4],
         looks_10_bit: false,
+        units: Vec::new(),
         reconnects: 0,
         now_s: 8.0,
         dropped: [0; 2],

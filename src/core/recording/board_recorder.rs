@@ -6,7 +6,7 @@ use super::calibrations::Serving;
 use super::disk::check_space;
 use super::store::{Store, TrialId};
 use super::store_error::StoreError;
-use crate::board::{Board, Gap};
+use crate::board::{Gap, Sensor};
 use crate::geometry::Pose;
 use crate::labelling::{Observed, Thinned, flags_of, sparkline};
 use crate::rig::serial::{LinkEvent, LinkStatus};
@@ -277,7 +277,7 @@ impl BoardRecorder {
             warnings.push(format!("{lost} reading(s) are missing for certain, in {gaps} gap(s)"));
         }
         warnings.extend(status.wiring_remarks());
-        let assumed = Board::default().channels.iter().any(|name| !self.about.board.channels.contains(name));
+        let assumed = Sensor::ALL.iter().any(|sensor| self.about.board.channel_of(*sensor).is_none());
         if assumed && cadence.samples > 0 {
             let names = self.about.board.channels.join(", ");
             warnings.push(format!("the board has not all of flexL, flexR, fsrL, fsrR, but {names}"));

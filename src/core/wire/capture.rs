@@ -160,7 +160,7 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
 impl Pace {
     fn go_on(&mut self, line: &[u8]) {
         let clock = match parse(line) {
-            Ok(Parsed::Named(_, fields)) => fields.iter().find_map(|field| match field.name.as_str() {
+            Ok(Parsed::Named { fields, .. }) => fields.iter().find_map(|field| match field.name.as_str() {
                 "t_us" => field.value.map(|us| us * 1e-6),
                 "ms" => field.value.map(|ms| ms * 1e-3),
                 _ => None,

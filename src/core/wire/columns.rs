@@ -1,7 +1,7 @@
 //! What the columns of CSV lines are called: by a line of names, whenever it comes; by the board's hello line; or by a
 //! guess that is told as one.
 
-use super::fields::{Cell, Field, Fields};
+use super::fields::{Cell, Field, Fields, names_a_sensor};
 use crate::board::{Board, Sensor};
 
 /// Names for columns.
@@ -22,8 +22,13 @@ enum Origin {
 }
 
 impl Columns {
-    pub(super) fn set_header(&mut self, names: Vec<String>) {
-        self.header = Some(names);
+    /// Takes names; false where they are words that would put the names of sensors out of use.
+    pub(super) fn set_header(&mut self, names: Vec<String>) -> bool {
+        let worse = !names_a_sensor(&names) && self.header.as_ref().is_some_and(|known| names_a_sensor(known));
+        if !worse {
+            self.header = Some(names);
+        }
+        !worse
     }
 
     /// Names for this many columns.

@@ -52,6 +52,8 @@ struct Reader {
     columns: Columns,
     /// Names of the channels, in the order of the counts.
     channels: Vec<String>,
+    /// The sensor on each of them.
+    sensors: Vec<Option<Sensor>>,
     /// What the board said of itself.
     hello: Option<Hello>,
     teleplot: Assembler,
@@ -74,6 +76,11 @@ const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
 /// Largest counter that is believed: beyond it whole numbers are not told apart.
 const LARGEST_COUNTER: f64 = 9.0e15;
 
+/// True where two names are those of one channel.
+fn is_same_channel(a: &str, b: &str) -> bool {
+    a.eq_ignore_ascii_case(b) || Sensor::ALL.iter().any(|sensor| sensor.is_called(a) && sensor.is_called(b))
+}
+
 impl Decoder {
     /// Takes in bytes that arrived at a time (s since the stream began) and adds what they say to `heard`.
     pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
@@ -95,6 +102,7 @@ impl Decoder {
         // Another sketch may be on the board when it comes back; it need not say hello.
         self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
+        self.reader.reach = Reach::default();
         self.reader.meter.forget_what_came_before();
     }
 
@@ -138,6 +146,12 @@ impl Decoder {
         self.reader.rails.at()
     }
 
+    /// The unit that stands behind a channel's numbers, for each that has one.
+    pub fn units(&self) -> Vec<(String, String)> {
+        let named = |(place, unit): (usize, &str)| Some((self.reader.channels.get(place)?.clone(), unit.to_owned()));
+        self.reader.shapes.units().filter_map(named).collect()
+    }
+
     /// True where the counts look like those of a converter with 10 bits, though it is taken for one with 12, or said to be
     /// one: a sketch may say so and forget `analogReadResolution`.
     pub fn looks_10_bit(&self) -> bool {
@@ -149,7 +163,7 @@ impl Reader {
     fn board(&self) -> Board {
         let mut board = self.said().cloned().unwrap_or_default();
         board.full_scale = self.full_scale();
-        let place = |name: &String| board.channels.iter().position(|known| known.eq_ignore_ascii_case(name));
+        let place = |name: &String| board.channels.iter().position(|known| is_same_channel(known, name));
         let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
         board.channels.clone_from(&self.channels);
@@ -161,13 +175,9 @@ impl Reader {
         self.hello.as_ref().map(|hello| &hello.board)
     }
 
-    /// How far its converter counts: as it says, but for counts beyond that. The sketch that says nothing is taken at its
-    /// counts, of which a strip's alone are most often beyond ten bits where there are more.
+    /// How far its converter counts: as it says, and else as its counts tell.
     fn full_scale(&self) -> u32 {
-        self.said().map_or(0, |board| board.full_scale).max(match self.reach.full_scale() {
-            FULL_10_BIT if self.hello.is_some() => 0,
-            reached => reached,
-        })
+        self.reach.full_scale(self.said().map(|board| board.full_scale))
     }
 
     fn looks_10_bit(&self) -> bool {
@@ -203,25 +213,26 @@ impl Reader {
         if line.starts_with(b"#") {
             return self.remark(line, arrived_s, heard);
         }
-        let (format, fields) = match self.check(line).and_then(|()| parse(line)) {
+        let (format, fields, odd) = match self.check(line).and_then(|()| parse(line)) {
             Err(why) => return self.bad(line, why, arrived_s),
             Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
-            Ok(Parsed::Columns(values)) => {
-                (Format::Csv, self.columns.name(values, self.hello.as_ref().map(|hello| &hello.board)))
+            Ok(Parsed::Columns(cells)) => {
+                let odd = cells.iter().any(|cell| !cell.plain);
+                (Format::Csv, self.columns.name(cells, self.hello.as_ref().map(|hello| &hello.board)), odd)
             }
-            Ok(Parsed::Named(Format::Teleplot, fields)) => {
+            Ok(Parsed::Named { format: Format::Teleplot, fields, odd }) => {
                 self.tail.add(line, arrived_s, Verdict::Read);
                 match self.teleplot.push(fields) {
                     None => return,
-                    Some(fields) => (Format::Teleplot, fields),
+                    Some(fields) => (Format::Teleplot, fields, odd),
                 }
             }
-            Ok(Parsed::Named(format, fields)) => (format, fields),
+            Ok(Parsed::Named { format, fields, odd }) => (format, fields, odd),
         };
         if format != Format::Teleplot {
             self.tail.add(line, arrived_s, Verdict::Read);
         }
-        match self.shapes.judge(Candidate { format, fields, arrived_s }) {
+        match self.shapes.judge(Candidate { format, fields, odd, arrived_s }) {
             Judged::Known(line) => {
                 self.give_up(arrived_s);
                 self.reading(&line, heard);
@@ -263,6 +274,7 @@ impl Reader {
         self.tail.add(line, arrived_s, Verdict::Said);
         if hello.is_some() && self.hello != hello {
             self.hello = hello;
+            self.reach = Reach::default();
             self.name_columns(heard);
             heard.push(Heard::Board(self.board()));
         }
@@ -270,8 +282,10 @@ impl Reader {
     }
 
     fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        if !self.columns.set_header(names) {
+            return self.bad(line, "it is neither numbers nor names of sensors", arrived_s);
+        }
         self.tail.add(line, arrived_s, Verdict::Said);
-        self.columns.set_header(names);
         self.name_columns(heard);
     }
 
@@ -294,20 +308,30 @@ impl Reader {
             }
         }
         self.shapes.roles(&mut self.channels);
+        self.find_sensors();
         heard.push(Heard::Board(self.board()));
+    }
+
+    fn find_sensors(&mut self) {
+        let sensor = |name: &String| Sensor::ALL.into_iter().find(|sensor| sensor.is_called(name));
+        self.sensors = self.channels.iter().map(sensor).collect();
     }
 
     fn reading(&mut self, line: &Candidate, heard: &mut Vec<Heard>) {
         let known = self.channels.len();
         let roles = self.shapes.roles(&mut self.channels);
         let mut counts = vec![None; self.channels.len()];
+        let mut sent = vec![false; self.channels.len()];
         let (mut counters, mut line_bar) = (Counters { unreadable: self.unreadable, ..Counters::default() }, None);
         let mut whole = true;
         for (role, Field { value, .. }) in roles.iter().zip(&line.fields) {
             let counter = value.filter(|value| (0.0..LARGEST_COUNTER).contains(value));
             match role {
                 // What no f32 can hold is no count of any converter.
-                Role::Channel(place) => counts[*place] = value.map(|value| value as f32).filter(|c| c.is_finite()),
+                Role::Channel(place) => {
+                    counts[*place] = value.map(|value| value as f32).filter(|c| c.is_finite());
+                    sent[*place] = true;
+                }
                 Role::Micros => counters.time = counter.map(|count| (count, 1e-6)),
                 Role::Millis if counters.time.is_none() => counters.time = counter.map(|count| (count, 1e-3)),
                 Role::Sequence => counters.seq = counter,
@@ -317,6 +341,7 @@ impl Reader {
             whole &= counter.is_some() || !matches!(role, Role::Micros | Role::Millis | Role::Sequence);
         }
         if self.channels.len() != known {
+            self.find_sensors();
             heard.push(Heard::Board(self.board()));
         }
         let stamp = if whole { self.clock.stamp(&counters, line.arrived_s) } else { None };
@@ -324,24 +349,32 @@ impl Reader {
             self.unreadable += 1;
             return self.meter.bad_line(line.arrived_s);
         };
-        if self.reach.add(self.largest(&counts)) {
+        let said = self.said().map(|board| board.full_scale);
+        let [strip, largest] = self.largest(&counts);
+        if self.reach.add(stamp.t_s, strip, largest, said) {
             heard.push(Heard::Board(self.board()));
         }
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
         let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { self.full_scale() };
-        self.rails.add(&counts, stamp.t_s, full_scale);
+        self.rails.add(&counts, &sent, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;
         heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
     }
 
-    /// The largest count of a gripper's sensors; what else a board sends need not come from its converter.
-    fn largest(&self, counts: &[Option<f32>]) -> f32 {
-        let is_sensor = |name: &String| Sensor::ALL.iter().any(|sensor| sensor.is_called(name));
-        let beyond = |count: &f32| *count > self.reach.full_scale() as f32;
-        let counts = self.channels.iter().zip(counts).filter_map(|(name, count)| Some((name, count.filter(beyond)?)));
-        counts.filter(|(name, _)| is_sensor(name)).map(|(_, count)| count).fold(0.0, f32::max)
+    /// The largest count of the strips, and of all sensors; what else a board sends need not come from its converter.
+    fn largest(&self, counts: &[Option<f32>]) -> [f32; 2] {
+        let mut largest = [0.0f32; 2];
+        for (sensor, count) in self.sensors.iter().zip(counts) {
+            if let (Some(sensor), Some(count)) = (sensor, count) {
+                largest[1] = largest[1].max(*count);
+                if sensor.is_flex() {
+                    largest[0] = largest[0].max(*count);
+                }
+            }
+        }
+        largest
     }
 
     fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<Heard>) {

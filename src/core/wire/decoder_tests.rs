@@ -224,8 +224,9 @@ fn of_a_line_that_lost_its_beginning_or_its_unit_nothing_is_taken() {
 #[test]
 fn a_word_in_place_of_a_number_costs_that_channel_alone() {
     // The middle one is missing in every third line, the last in every fifth.
-    let word =
-        |i: u32, every: u32, word: &str, number: u32| if i % every == 0 { word.to_owned() } else { number.to_string() };
+    let word = |i: u32, every: u32, word: &str, number: u32| {
+        if i.is_multiple_of(every) { word.to_owned() } else { number.to_string() }
+    };
     let named = |i| format!("flexL:{i},flexR:{},fsrL: {}", word(i, 3, "open", 7), word(i, 5, "disconnected", 8));
     let columns = |i| format!("{i},{},{}", word(i, 3, "err", 7), word(i, 5, "Disconnected", 8));
     for lines in [(1..90).map(named).collect::<Vec<_>>(), (1..90).map(columns).collect()] {
@@ -240,10 +241,61 @@ fn a_word_in_place_of_a_number_costs_that_channel_alone() {
 }
 
 #[test]
+fn a_unit_is_learned_with_the_first_number_that_has_it() {
+    let line = |i: u32| match i % 3 {
+        0 => format!("flexL:{}mV,fsrL:{}mV", 500 + i, 12 + i),
+        _ => format!("flexL:{}mV,fsrL:err", 500 + i),
+    };
+    for first in [0, 1] {
+        let (decoder, heard) = hear_lines(&(first..60).map(line).collect::<Vec<_>>());
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (60 - first as usize, 0), "{first}");
+        assert_eq!(decoder.units(), [("flexL".to_owned(), "mV".to_owned()), ("fsrL".to_owned(), "mV".to_owned())]);
+    }
+}
+
+#[test]
+fn what_a_board_says_while_it_sets_itself_up_is_no_reading() {
+    let chatter = [
+        "Sensor: 1 ok",
+        "Sensor: 2 ok",
+        "Gain, 2, high",
+        "Rate, 50, low",
+        "Calibrating, please wait",
+        "Calibrating, please wait",
+    ];
+    let lines: Vec<String> = chatter.iter().map(|line| (*line).to_owned()).chain((0..40).map(plain_line)).collect();
+    let (decoder, heard) = hear_lines(&lines);
+    assert_eq!((readings(&heard).len(), decoder.board().channels.len()), (40, 3), "{:?}", decoder.board().channels);
+    // Names that have been said are not put out of use by words.
+    let mut lines = vec!["flexL,flexR".to_owned()];
+    lines.extend(
+        (0..40).map(|i| if i == 20 { "Calibrating,please".to_owned() } else { format!("{},{}", 500 + i, 600 + i) }),
+    );
+    let (decoder, heard) = hear_lines(&lines);
+    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (39, 1));
+    assert_eq!(decoder.board().channels, ["flexL", "flexR"]);
+}
+
+#[test]
+fn resistors_are_found_by_the_sensor_whatever_its_channel_is_called() {
+    let lines = [
+        "# tactile-gripper fw=1 ch=flexL,fsrL rm=33000,3300",
+        "flex_L:1,FSR L:2",
+        "flex_L:1,fsr-l:2",
+        "flex_L:1,fsr-l:2",
+    ];
+    let (decoder, _) = hear_lines(&lines.map(str::to_owned));
+    assert_eq!(
+        (decoder.board().channels, decoder.board().divider_ohm),
+        (vec!["flex_L".into(), "fsr-l".into()], vec![33e3, 3.3e3])
+    );
+}
+
+#[test]
 fn the_converters_reach_is_told_by_the_counts_of_a_sketch_that_says_nothing() {
     let full_scale = |first: &str, strip: u32| {
         let sample = |i: u32| format!("flexL:{},flexR:{strip},fsrL:3,fsrR:0,heap:70000", strip + i % 3);
-        let lines: Vec<String> = std::iter::once(first.to_owned()).chain((0..30).map(sample)).collect();
+        let lines: Vec<String> = std::iter::once(first.to_owned()).chain((0..80).map(sample)).collect();
         let (decoder, heard) = hear_lines(&lines);
         let told =
             heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None });

@@ -78,8 +78,15 @@ pub(super) type Fields = Vec<Field>;
 /// What a line turned out to be.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Parsed {
-    /// Named numbers.
-    Named(Format, Fields),
+    /// Named numbers. Odd ones have words among them that are no numbers: a remark may look like that, too.
+    Named {
+        /// How they are written.
+        format: Format,
+        /// They.
+        fields: Fields,
+        /// Words are among them.
+        odd: bool,
+    },
     /// Numbers of a CSV line.
     Columns(Vec<Cell>),
     /// The names of CSV columns.
@@ -92,7 +99,7 @@ pub(super) struct Cell {
     pub(super) value: Option<f64>,
     pub(super) unit: String,
     /// It is a number, or one of the words that boards have for none: not just any word.
-    plain: bool,
+    pub(super) plain: bool,
 }
 
 impl Cell {
@@ -111,9 +118,11 @@ pub(super) fn parse(line: &[u8]) -> Result<Parsed, &'static str> {
     }
     match text.bytes().next() {
         None => Err("it is blank"),
-        Some(b'{') => json(text).map(|fields| Parsed::Named(Format::JsonLines, fields)),
-        Some(b'>') => teleplot(&text[1..]).map(|fields| Parsed::Named(Format::Teleplot, fields)),
-        Some(_) if text.contains(':') => plotter(text).map(|fields| Parsed::Named(Format::Plotter, fields)),
+        Some(b'{') => json(text).map(|fields| Parsed::Named { format: Format::JsonLines, fields, odd: false }),
+        Some(b'>') => teleplot(&text[1..]).map(|fields| Parsed::Named { format: Format::Teleplot, fields, odd: false }),
+        Some(_) if text.contains(':') => {
+            plotter(text).map(|(fields, odd)| Parsed::Named { format: Format::Plotter, fields, odd })
+        }
         Some(_) => csv(text),
     }
 }
@@ -180,15 +189,22 @@ fn add(fields: &mut Fields, name: &str, Cell { value, unit, .. }: Cell) -> Resul
 /// Separators of the plotter.
 const SEPARATORS: [char; 4] = [',', ';', ' ', '\t'];
 
-/// Names and values. What has no colon is passed over, as Arduino's plotter does.
-fn plotter(text: &str) -> Result<Fields, &'static str> {
+/// Names and values, and whether words are among them. What has no colon is passed over, as Arduino's plotter does; but
+/// behind a value a number without a name is the other half of it, with a blank where a digit was.
+fn plotter(text: &str) -> Result<(Fields, bool), &'static str> {
     let mut fields = Fields::new();
-    let mut any_plain = false;
+    let (mut any_plain, mut odd) = (false, false);
     let mut rest = text.trim_start_matches(SEPARATORS);
     while !rest.is_empty() {
         let (word, behind) = rest.split_at(rest.find(SEPARATORS).unwrap_or(rest.len()));
         rest = behind.trim_start_matches(SEPARATORS);
-        let Some((name, mut value)) = word.split_once(':') else { continue };
+        let Some((name, mut value)) = word.split_once(':') else {
+            if !fields.is_empty() && word.contains(|c: char| c.is_numeric()) {
+                return Err("a number has no name");
+            }
+            odd = true;
+            continue;
+        };
         if value.contains(':') {
             return Err("two colons stand in one value");
         }
@@ -203,9 +219,10 @@ fn plotter(text: &str) -> Result<Fields, &'static str> {
         }
         let cell = cell(value)?;
         any_plain |= cell.plain;
+        odd |= !cell.plain;
         add(&mut fields, name, cell)?;
     }
-    if any_plain { Ok(fields) } else { Err("it has no number") }
+    if any_plain { Ok((fields, odd)) } else { Err("it has no number") }
 }
 
 fn csv(text: &str) -> Result<Parsed, &'static str> {
@@ -236,13 +253,13 @@ fn csv(text: &str) -> Result<Parsed, &'static str> {
     }
 }
 
-/// Two names or more, all different; a single word is more likely a remark, and so are words with mere blanks between
-/// them, unless one is the name of a sensor.
+/// Two names or more, all different; a single word is more likely a remark, and so are words with blanks between them,
+/// unless one is the name of a sensor.
 fn header(texts: &[&str], separated: bool) -> Option<Vec<String>> {
     let names: Vec<String> = texts.iter().map(|text| text.trim().trim_matches('"').trim().to_owned()).collect();
     let different = names.iter().enumerate().all(|(i, name)| !names[..i].contains(name));
-    let known = |name: &String| Sensor::ALL.iter().any(|sensor| sensor.is_called(name));
-    let meant = separated || names.iter().any(known);
+    let of_words = |text: &&str| !text.trim().starts_with('"') && text.trim().contains(' ');
+    let meant = (separated && !texts.iter().any(of_words)) || names_a_sensor(&names);
     let is_one = |name: &String| {
         // With a digit it would begin as numbers do.
         name.starts_with(|c: char| c.is_alphabetic() || c == '_')
@@ -251,6 +268,11 @@ fn header(texts: &[&str], separated: bool) -> Option<Vec<String>> {
             && !NOTHING.iter().any(|word| name.eq_ignore_ascii_case(word))
     };
     (names.len() >= 2 && different && meant && names.iter().all(is_one)).then_some(names)
+}
+
+/// True where one of the names is that of a gripper's sensor.
+pub(super) fn names_a_sensor(names: &[String]) -> bool {
+    names.iter().any(|name| Sensor::ALL.iter().any(|sensor| sensor.is_called(name)))
 }
 
 /// `name:value`, or `name:time:value` with the time in ms; a unit and flags may follow.
@@ -315,7 +337,7 @@ mod tests {
 
     fn named(line: &str) -> Vec<(String, Option<f64>)> {
         match parse(line.as_bytes()) {
-            Ok(Parsed::Named(_, fields)) => fields.into_iter().map(|field| (field.name, field.value)).collect(),
+            Ok(Parsed::Named { fields, .. }) => fields.into_iter().map(|field| (field.name, field.value)).collect(),
             other => panic!("{line}: {other:?}"),
         }
     }
@@ -370,7 +392,7 @@ mod tests {
     #[test]
     fn a_unit_is_kept_beside_its_number() {
         let units = |line: &str| match parse(line.as_bytes()) {
-            Ok(Parsed::Named(_, fields)) => fields.into_iter().map(|field| field.unit).collect::<Vec<_>>(),
+            Ok(Parsed::Named { fields, .. }) => fields.into_iter().map(|field| field.unit).collect::<Vec<_>>(),
             Ok(Parsed::Columns(cells)) => cells.into_iter().map(|cell| cell.unit).collect(),
             other => panic!("{line}: {other:?}"),
         };
@@ -386,12 +408,15 @@ mod tests {
         };
         assert_eq!(header("flexL,flexR,t_us").as_deref(), Some("flexL|flexR|t_us"));
         assert_eq!(header("\"Flex L\"; \"_pad\"").as_deref(), Some("Flex L|_pad"));
+        assert_eq!(header("\"One word\",two").as_deref(), Some("One word|two"));
+        assert_eq!(header("Flex L, the clock").as_deref(), Some("Flex L|the clock"));
         assert_eq!(header("flexL fsrL").as_deref(), Some("flexL|fsrL"));
         for line in [
             "Calibrating...",
             "waiting for sensors",
             "waiting for 3 sensors",
             "Status: ready",
+            "Calibrating, please wait",
             "flexL,flexL",
             "err,open",
             ",,,",
@@ -412,6 +437,9 @@ mod tests {
             "flexL:x12",
             "flexL:5\u{1}2",
             "flexL:5:12",
+            "flexL:1 28,flexR:498",
+            "flexL:1432,5,flexR:3",
+            "t_us:2000 0,flexL:3",
             r#"{"flexL":512,"#,
             "[1,2]",
             "512,4 98",

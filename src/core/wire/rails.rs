@@ -34,33 +34,54 @@ const FULL_SCALES: [u32; 7] =
     [FULL_10_BIT, FULL_12_BIT, (1 << 14) - 1, (1 << 16) - 1, (1 << 18) - 1, (1 << 20) - 1, (1 << 24) - 1];
 /// Readings in a row that are beyond a full scale before a larger one is believed: one alone may be a damaged number.
 const BELIEVED: u32 = 3;
+/// A strip that has not been beyond ten bits for this long (s) is read with ten: with 12 it is above a quarter of the range,
+/// beside the resistor that it should have, from the first reading on.
+const TEN_BITS_AFTER_S: f64 = 1.0;
 
-/// How far a converter counts, by what it has sent: no less than ten bits.
-#[derive(Clone, Copy, Debug)]
+/// How far a converter counts, by what it has sent.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reach {
-    full_scale: u32,
-    beyond: u32,
-}
-
-impl Default for Reach {
-    fn default() -> Self {
-        Self { full_scale: FULL_10_BIT, beyond: 0 }
-    }
+    /// More than is said, or usual: at least three readings in a row were beyond.
+    more: Option<u32>,
+    /// Readings in a row that are beyond, and the least of them.
+    beyond: Option<(u32, f32)>,
+    /// Since when a strip is read (s).
+    strip_since_s: Option<f64>,
+    /// Readings in a row that are beyond ten bits; once there were enough, ten is out of the question.
+    past_ten: u32,
+    ten: bool,
 }
 
 impl Reach {
-    /// Takes in the largest count of a reading; true where it reaches farther from now on.
-    pub(super) fn add(&mut self, largest: f32) -> bool {
-        self.beyond = if largest > self.full_scale as f32 { self.beyond + 1 } else { 0 };
-        let larger = FULL_SCALES.into_iter().find(|full_scale| largest <= *full_scale as f32);
-        let Some(larger) = larger.filter(|_| self.beyond >= BELIEVED) else { return false };
-        *self = Self { full_scale: larger, beyond: 0 };
-        true
+    /// Takes in the largest counts of a reading, of the strips and of all sensors; true where the full scale is another from
+    /// now on. `said` is what the board says of it.
+    pub(super) fn add(&mut self, t_s: f64, strip: f32, largest: f32, said: Option<u32>) -> bool {
+        let before = self.full_scale(said);
+        self.beyond = match self.beyond {
+            _ if largest <= before as f32 => None,
+            None => Some((1, largest)),
+            Some((count, least)) => Some((count + 1, least.min(largest))),
+        };
+        if let Some((BELIEVED.., least)) = self.beyond {
+            self.more = FULL_SCALES.into_iter().find(|full_scale| least <= *full_scale as f32).or(self.more);
+            self.beyond = None;
+        }
+        if largest > FULL_10_BIT as f32 {
+            self.past_ten = self.past_ten.saturating_add(1);
+            self.ten &= self.past_ten < BELIEVED;
+        } else if self.past_ten < BELIEVED {
+            self.past_ten = 0;
+            if strip >= ANYTHING {
+                self.ten = t_s - *self.strip_since_s.get_or_insert(t_s) >= TEN_BITS_AFTER_S;
+            }
+        }
+        self.full_scale(said) != before
     }
 
-    /// The full scale.
-    pub(super) fn full_scale(self) -> u32 {
-        self.full_scale
+    /// The full scale: what is said, or else twelve bits, unless the counts tell otherwise.
+    pub(super) fn full_scale(self, said: Option<u32>) -> u32 {
+        let usual = if self.ten { FULL_10_BIT } else { FULL_12_BIT };
+        said.unwrap_or(usual).max(self.more.unwrap_or(0))
     }
 }
 
@@ -80,20 +101,22 @@ struct Channel {
 }
 
 impl RailWatch {
-    /// Takes in counts of a converter with this full scale.
-    pub(super) fn add(&mut self, counts: &[Option<f32>], t_s: f64, full_scale: u32) {
+    /// Takes in counts of a converter with this full scale. What is not sent at all says nothing.
+    pub(super) fn add(&mut self, counts: &[Option<f32>], sent: &[bool], t_s: f64, full_scale: u32) {
         self.channels.resize(counts.len(), Channel::default());
         self.now_s = t_s;
         self.since_s.get_or_insert(t_s);
         let full = full_scale as f32;
         let near = NEAR * (full + 1.0);
-        for (channel, count) in self.channels.iter_mut().zip(counts) {
+        for ((channel, count), sent) in self.channels.iter_mut().zip(counts).zip(sent) {
             channel.largest = channel.largest.max(count.unwrap_or(0.0));
             let rail = match count {
+                // What is beyond does not come from this converter.
+                Some(count) if *count > full + near => None,
                 Some(count) if *count >= full - near => Some(Rail::High),
                 Some(count) if *count <= near => Some(Rail::Low),
-                Some(_) => None,
-                None => Some(Rail::NoNumber),
+                None if *sent => Some(Rail::NoNumber),
+                Some(_) | None => None,
             };
             channel.at = rail.map(|rail| match channel.at {
                 Some((before, since)) if before == rail => (rail, since),
@@ -132,14 +155,25 @@ mod tests {
         let mut watch = RailWatch::default();
         for i in 0..100u32 {
             let t = 0.02 * f64::from(i);
-            watch.add(&[Some(4095.0), Some(2000.0), None, Some(0.0)], t, FULL_12_BIT);
+            watch.add(
+                &[Some(4095.0), Some(2000.0), None, Some(0.0), None],
+                &[true, true, true, true, false],
+                t,
+                FULL_12_BIT,
+            );
             let told = watch.at();
             assert_eq!(told[0], (t > 0.5).then_some(Rail::High), "{t}");
             assert_eq!((told[1], told[2]), (None, (t > 0.5).then_some(Rail::NoNumber)));
+            assert_eq!(told[4], None, "it is not sent any more");
             assert_eq!(told[3], (t > 0.5).then_some(Rail::Low), "{t}");
         }
-        watch.add(&[Some(4000.0), None, Some(9.0), Some(9.0)], 3.0, FULL_12_BIT);
-        assert_eq!(watch.at(), [None; 4]);
+        watch.add(
+            &[Some(4000.0), Some(5000.0), Some(9.0), Some(9.0), None],
+            &[true, true, true, true, false],
+            3.0,
+            FULL_12_BIT,
+        );
+        assert_eq!(watch.at(), [None; 5]);
     }
 
     /// Readings of shares of the supply at 50 Hz for ten seconds, and how often each end is told of each.
@@ -154,7 +188,7 @@ mod tests {
                 let sum: f64 = (0..average).map(|_| converter.counts(share, deviation * noise.normal())).sum();
                 Some((sum / f64::from(average)) as f32)
             });
-            watch.add(&counts, 0.02 * f64::from(i), levels as u32 - 1);
+            watch.add(&counts, &[true; 3], 0.02 * f64::from(i), levels as u32 - 1);
             for (times, told) in times.iter_mut().zip(watch.at()) {
                 times[0] += u32::from(told == Some(Rail::Low));
                 times[1] += u32::from(told == Some(Rail::High));
@@ -182,21 +216,51 @@ mod tests {
     #[test]
     fn a_converter_reaches_as_far_as_three_readings_in_a_row() {
         let mut reach = Reach::default();
-        assert!(!reach.add(1023.0) && !reach.add(20_002.0) && !reach.add(300.0));
-        assert_eq!(reach.full_scale(), 1023, "one number alone was damaged");
-        let steps = [1400.0, 1400.5, 1401.0, 4095.0, 9000.0, 9000.0, 9000.0, 2.0, 5e9, 5e9, 5e9].map(|count| {
-            reach.add(count);
-            reach.full_scale()
-        });
-        assert_eq!(steps, [1023, 1023, 4095, 4095, 4095, 4095, 16383, 16383, 16383, 16383, 16383]);
+        let mut now = 0.0;
+        let mut all = |said: Option<u32>, counts: &[f32]| {
+            counts.iter().for_each(|count| {
+                now += 0.02;
+                reach.add(now, 0.0, *count, said);
+            });
+            reach.full_scale(said)
+        };
+        assert_eq!(all(None, &[1400.0, 1400.0, 14_325.0, 300.0, 9000.0, 9000.0]), 4095, "single ones were damaged");
+        assert_eq!(all(None, &[300.0, 9000.0, 9000.0, 140_000.0]), 16_383, "the least of them tells");
+        assert_eq!(all(None, &[2.0, 5e9, 5e9, 5e9]), 16_383, "no converter counts as far");
+        assert_eq!(all(Some(65_535), &[9000.0]), 65_535);
+        let mut said = Reach::default();
+        assert!(
+            (0..9).all(|k| !said.add(f64::from(k), 1000.0, 1000.0, Some(4095))),
+            "a board that says so is believed"
+        );
+    }
+
+    #[test]
+    fn ten_bits_are_told_by_strips_within_a_second_and_by_pads_never() {
+        let full_scale = |strip: f32, pad: f32, last: &[f32]| {
+            let mut reach = Reach::default();
+            let mut changes = 0;
+            for k in 0..200u32 {
+                changes += u32::from(reach.add(0.02 * f64::from(k), strip, strip.max(pad), None));
+            }
+            for (k, count) in (0u32..).zip(last) {
+                changes += u32::from(reach.add(4.0 + 0.02 * f64::from(k), *count, *count, None));
+            }
+            (reach.full_scale(None), changes)
+        };
+        assert_eq!(full_scale(350.0, 0.0, &[]), (1023, 1));
+        assert_eq!(full_scale(1420.0, 0.0, &[]), (4095, 0));
+        assert_eq!(full_scale(0.0, 900.0, &[]), (4095, 0), "pads may be anywhere");
+        assert_eq!(full_scale(800.0, 0.0, &[1100.0]), (1023, 1), "one was damaged");
+        assert_eq!(full_scale(800.0, 0.0, &[1100.0; 3]), (4095, 2), "a strip beside more than it should have, bent");
     }
 
     #[test]
     fn ten_bits_are_suspected_from_the_largest_count() {
         let largest = |count: f32, seconds: f64| {
             let mut watch = RailWatch::default();
-            watch.add(&[Some(count)], 0.0, FULL_12_BIT);
-            watch.add(&[Some(10.0)], seconds, FULL_12_BIT);
+            watch.add(&[Some(count)], &[true], 0.0, FULL_12_BIT);
+            watch.add(&[Some(10.0)], &[true], seconds, FULL_12_BIT);
             assert_eq!((watch.is_connected(0), watch.is_connected(1)), (count >= 128.0, false));
             watch.looks_10_bit()
         };

@@ -11,6 +11,8 @@ use super::fields::{Field, Fields, Format, MAX_FIELDS};
 pub(super) struct Candidate {
     pub(super) format: Format,
     pub(super) fields: Fields,
+    /// Words are among its fields.
+    pub(super) odd: bool,
     pub(super) arrived_s: f64,
 }
 
@@ -57,14 +59,16 @@ impl Role {
 const CONFIRM: u32 = 2;
 /// The same where it is a part of the known one.
 const CONFIRM_PART: u32 = 20;
+/// The same where words are among them, as in what a board says while it sets itself up.
+const CONFIRM_ODD: u32 = 5;
 
 /// The fields that are believed, and those that might be next.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shapes {
     pub(super) format: Option<Format>,
     names: Vec<String>,
-    /// What stands behind their numbers.
-    units: Vec<String>,
+    /// What stands behind their numbers, where one has come already.
+    units: Vec<Option<String>>,
     roles: Vec<Role>,
     /// The newest line with other fields, and how many such came in a row.
     waiting: Option<(Candidate, u32)>,
@@ -85,18 +89,26 @@ impl Shapes {
     /// What to make of a line.
     pub(super) fn judge(&mut self, line: Candidate) -> Judged {
         if self.is_known(&line) {
+            for (known, field) in self.units.iter_mut().zip(&line.fields) {
+                if known.is_none() {
+                    *known = unit(field);
+                }
+            }
             // Whoever waits is given up by the caller, who has seen this line arrive.
             return Judged::Known(line);
         }
         let part = self.format == Some(line.format) && self.is_part(&line);
-        let needed = if part { CONFIRM_PART } else { CONFIRM };
+        let needed = match (part, line.odd) {
+            (true, _) => CONFIRM_PART,
+            (false, true) => CONFIRM_ODD,
+            (false, false) => CONFIRM,
+        };
         match self.waiting.take() {
             Some((before, count)) if before.format == line.format && same_names(&before, &line) => {
                 if count + 1 >= needed {
                     self.names = line.fields.iter().map(|field| field.name.clone()).collect();
-                    let unit =
-                        |(a, b): (&Field, &Field)| if a.value.is_some() { a.unit.clone() } else { b.unit.clone() };
-                    self.units = before.fields.iter().zip(&line.fields).map(unit).collect();
+                    self.units =
+                        before.fields.iter().zip(&line.fields).map(|(a, b)| unit(a).or_else(|| unit(b))).collect();
                     self.format = Some(line.format);
                     self.roles.clear();
                     return Judged::Changed(Box::new([before, line]));
@@ -130,7 +142,11 @@ impl Shapes {
         let known = self.names.iter().zip(&self.units);
         self.format == Some(line.format)
             && line.fields.len() == self.names.len()
-            && line.fields.iter().zip(known).all(|(field, (name, unit))| named(field, name) && has_unit(field, unit))
+            && line
+                .fields
+                .iter()
+                .zip(known)
+                .all(|(field, (name, known))| named(field, name) && agree(&unit(field), known))
     }
 
     /// Where the fields go; channels that are new are added to `channels`.
@@ -151,6 +167,13 @@ impl Shapes {
         &self.roles
     }
 
+    /// The unit behind the numbers of each channel that has one.
+    pub(super) fn units(&self) -> impl Iterator<Item = (usize, &str)> {
+        let channel = |role: &Role| if let Role::Channel(place) = role { Some(*place) } else { None };
+        let units = self.roles.iter().zip(&self.units);
+        units.filter_map(move |(role, unit)| Some((channel(role)?, unit.as_deref().filter(|unit| !unit.is_empty())?)))
+    }
+
     /// Names of the fields.
     pub(super) fn names(&self) -> &[String] {
         &self.names
@@ -167,12 +190,16 @@ impl Shapes {
     }
 }
 
-/// A number that is not there has no unit either.
-fn has_unit(field: &Field, unit: &str) -> bool {
-    field.value.is_none() || field.unit == unit
+/// A field's unit, which may be that it has none; a number that is not there says nothing of it.
+fn unit(field: &Field) -> Option<String> {
+    field.value.map(|_| field.unit.clone())
+}
+
+fn agree(a: &Option<String>, b: &Option<String>) -> bool {
+    a.is_none() || b.is_none() || a == b
 }
 
 fn same_names(a: &Candidate, b: &Candidate) -> bool {
-    let same = |(a, b): (&Field, &Field)| a.name == b.name && (has_unit(a, &b.unit) || b.value.is_none());
+    let same = |(a, b): (&Field, &Field)| a.name == b.name && agree(&unit(a), &unit(b));
     a.fields.len() == b.fields.len() && a.fields.iter().zip(&b.fields).all(same)
 }

@@ -110,6 +110,8 @@ pub struct LinkStatus {
     pub rails: Vec<Option<Rail>>,
     /// The counts look like those of ten bits.
     pub looks_10_bit: bool,
+    /// Channels whose numbers have a unit behind them, and which.
+    pub units: Vec<(String, String)>,
     /// How often the connection was taken up again.
     pub reconnects: u32,
     /// Time since the link was opened (s).
@@ -152,6 +154,10 @@ impl LinkStatus {
             };
             remarks.push(text.to_owned());
         }
+        let sensors = self.units.iter().filter(|(name, _)| Sensor::ALL.iter().any(|sensor| sensor.is_called(name)));
+        remarks.extend(sensors.map(|(name, unit)| {
+            format!("{name} comes in {unit}, and is taken for counts: print what analogRead gives, without a unit")
+        }));
         let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
         for (channel, (name, rail)) in self.board.channels.iter().zip(&self.rails).enumerate() {
             let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
@@ -364,6 +370,7 @@ impl SerialLink {
             cadence: decoder.cadence(),
             rails: decoder.rails(),
             looks_10_bit: decoder.looks_10_bit(),
+            units: decoder.units(),
             reconnects: shared.reconnects.load(Ordering::Relaxed),
             now_s: self.now_s(),
             dropped: [shared.bytes.dropped_bytes(), shared.events.dropped_readings()],
