@@ -223,12 +223,16 @@ fn gaps(context: &PanelContext<'_>) -> Vec<[f64; 2]> {
 /// Distance between the strokes of a hatching.
 const STROKES: f32 = 7.0;
 
+/// Stretches narrower than this are not hatched.
+const NARROW: f32 = 3.0;
+
 /// Strokes across a stretch of time, which then looks like none in which something was read.
 fn hatch(ui: &Ui, transform: &PlotTransform, [from, to]: [f64; 2], shade: Color32) {
     let frame = *transform.frame();
     let [left, right] = [from, to].map(|t| transform.position_from_point_x(t));
     let rect = egui::Rect::from_x_y_ranges(left..=right, frame.y_range()).intersect(frame);
-    if !rect.is_positive() {
+    // What is narrower shows by its colour.
+    if rect.width() < NARROW || rect.height() <= 0.0 {
         return;
     }
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
@@ -262,10 +266,10 @@ fn add_curves(
     for curve in &plot.curves {
         let style = if curve.dashed { LineStyle::Dashed { length: 7.0 } } else { LineStyle::Solid };
         let name = if named { curve.name.as_str() } else { "" };
-        for (run, points) in runs(trace, curve).into_iter().enumerate() {
+        for points in runs(trace, curve) {
             plot_ui.line(
                 Line::new(name, PlotPoints::from(points))
-                    .id(egui::Id::unique((&curve.name, trace.grasp, run)))
+                    .id(egui::Id::unique((&curve.name, trace.grasp)))
                     .color(shade(curve))
                     .width(width)
                     .style(style)
@@ -275,7 +279,7 @@ fn add_curves(
     }
 }
 
-/// The stretches of a curve in which it is defined, points of time (s) and value. Between them nothing is drawn: a line
+/// The stretches of a curve in which it is defined (the legend hides all that have one name and one id), points of time (s) and value. Between them nothing is drawn: a line
 /// of which one point is not a number is broken off there by some styles and forbidden by others.
 fn runs(trace: &GraspTrace, curve: &Curve) -> Vec<Vec<[f64; 2]>> {
     let mut runs = vec![Vec::new()];

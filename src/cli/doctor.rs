@@ -12,9 +12,11 @@ use palpate_core::doctor::{
 use palpate_core::rig::serial::{Baud, LinkEvent, LinkOptions};
 use palpate_core::wire::Heard;
 use serde::Serialize;
+use std::io::BufRead as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Arguments of `palpate doctor`.
@@ -29,7 +31,7 @@ pub(super) struct DoctorArguments {
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     baud: Option<Baud>,
     /// Test for crosstalk instead, step by step: each sensor in turn is moved by hand, alone, while those of the other finger
-    /// are watched. Ctrl+C ends it and says what was seen.
+    /// are watched. Enter leaves one out; Ctrl+C ends it and says what was seen.
     #[arg(long, conflicts_with = "seconds")]
     crosstalk: bool,
     /// Print how the board is wired, which port is which, and what its lines are; and look at nothing.
@@ -107,6 +109,20 @@ struct Crosstalk<'a> {
 /// How long the board may be silent before the test is given up.
 const SILENCE: Duration = Duration::from_secs(10);
 
+/// Says when Enter is pressed, for as long as anybody is there to press it.
+fn enter_keys() -> Result<Receiver<()>, Failure> {
+    let (told, keys) = channel();
+    // Ends with the program: a read of the keyboard cannot be interrupted.
+    std::thread::Builder::new().name("keys".to_owned()).spawn(move || {
+        for _line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if told.send(()).is_err() {
+                return;
+            }
+        }
+    })?;
+    Ok(keys)
+}
+
 /// Moves one sensor after the other, by the user's hands.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
     // Nobody moves what was captured long ago.
@@ -115,6 +131,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
     let (mut test, mut told) = (None, String::new());
     let (mut heard, mut newest) = (0, Instant::now());
+    let keys = enter_keys()?;
     while !stop.load(Ordering::Relaxed) && !link.is_over() {
         for event in link.take(Duration::from_millis(50)) {
             let LinkEvent::Heard(Heard::Reading(reading)) = event else { continue };
@@ -138,6 +155,9 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
                 told = instruction;
             }
         }
+        if let (Ok(()), Some(test)) = (keys.try_recv(), &mut test) {
+            test.skip();
+        }
         if test.as_ref().is_some_and(|test: &CrosstalkTest| test.source().is_none()) {
             break;
         }
@@ -150,7 +170,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     let Some(test) = test else {
         return Err(format!("nothing was heard of the board. {}", link.status().state.sentence()).into());
     };
-    let sound = !test.found().iter().any(|bleed| bleed.bleeds);
+    let sound = test.is_sound();
     if json {
         say_json(&Crosstalk { sound, found: test.found(), told: test.summary() })?;
     } else {

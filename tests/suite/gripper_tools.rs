@@ -11,7 +11,7 @@ use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Action};
-use palpate_core::board::{Board, Reading};
+use palpate_core::board::{Board, Reading, Sensor};
 use palpate_core::doctor::{Observations, Traces};
 use palpate_core::gripper::Side;
 use palpate_core::palette::Theme;
@@ -20,10 +20,12 @@ use palpate_core::rig::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbI
 use palpate_core::scene::Scene;
 use palpate_core::study::{Course, Estimate, FingerFit, Known, Remainder};
 use palpate_core::wire::{Cadence, Rail};
-use palpate_core::workers::{Examine, FitTrials, FittedFinger, GripperWish, Listen, NotOpened};
+use palpate_core::workers::{
+    CalibrationPlan, CalibrationWish, Examine, FitTrials, FittedFinger, GripperWish, Listen, NotOpened,
+};
 use serde_json::Value;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -139,6 +141,10 @@ fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
             assert!(!bleed["bleeds"].as_bool().unwrap() || (share - 0.05).abs() < 0.02, "{bleed}");
         }
     }
+    // What was never moved is not called sound.
+    capture(&parts(3, false), "rest=9", "", 4.0, &at.join("idle.bytes"));
+    let idle = run(at, &["doctor", "idle.bytes", "--crosstalk"]);
+    assert!(idle.code == Some(1) && idle.out.contains("Not moved: left flex strip"), "{idle:?}");
     let text = run(at, &["doctor", "hand.bytes", "--crosstalk"]);
     assert!(text.out.contains("100 nF from each pin") && text.out.contains("WRONG"), "{text:?}");
     refused(at, &["doctor", "nowhere", "--crosstalk"], &["nowhere"]);
@@ -181,6 +187,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         bench.harness.step();
         bench.until_shown(true, "The right flex strip shows 10.0 % of what the left flex strip does: +60 counts");
         bench.until_shown(true, "Not moved: left pad, right pad");
+        assert!(bench.harness.query_by_label_contains("STOP").is_none());
         bench.harness.run_steps(3);
         pictures.push(bench.harness.render().unwrap());
         pictures
@@ -204,6 +211,50 @@ fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
         bench.harness.render().unwrap()
     });
     compare("gap", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
+fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
+    const REST: [f64; 4] = [1420.0, 1400.0, 0.0, 0.0];
+    let hand = Arc::new(Mutex::new(REST));
+    let read = Arc::clone(&hand);
+    let open = Arc::new(AtomicU32::new(0));
+    let opened = Arc::clone(&open);
+    let listen: Listen = Arc::new(move |_| {
+        let (read, _) = (Arc::clone(&read), opened.fetch_add(1, Ordering::Relaxed));
+        let counts = move || read.lock().unwrap().map(|counts| Some(counts as f32)).to_vec();
+        Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+    });
+    let mut bench = bench("doctor", Theme::Dark, BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() });
+    let calibrate = || {
+        let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A".to_owned(), port: None };
+        Action::Gripper(GripperWish::Calibrate(CalibrationWish::Begin(plan)))
+    };
+    // What has the fingers is not disturbed.
+    bench.tell(calibrate());
+    bench.wait();
+    bench.harness.get_by_label("Test for crosstalk").click();
+    bench.harness.step();
+    bench.until_shown(true, "a calibration goes on: end it first");
+    bench.tell(Action::Gripper(GripperWish::Calibrate(CalibrationWish::Stop)));
+    bench.harness.get_by_label("Test for crosstalk").click();
+    bench.harness.step();
+    for (asked, moved) in [("Bend the left", 0), ("Bend the right", 1), ("Press the left", 2), ("Press the right", 3)] {
+        bench.until_shown(true, asked);
+        let mut counts = REST;
+        counts[moved] += 600.0;
+        *hand.lock().unwrap() = counts;
+        bench.until_shown(true, "Let go of the");
+        *hand.lock().unwrap() = REST;
+        bench.until_shown(false, "Let go of the");
+    }
+    bench.until_shown(true, "No sensor follows one of the other finger by 1 % or more");
+    // Each opened the port anew, for the one before had given it back.
+    assert_eq!(open.load(Ordering::Relaxed), 2);
+    bench.tell(calibrate());
+    while open.load(Ordering::Relaxed) < 3 {
+        bench.wait();
+    }
 }
 
 #[test]

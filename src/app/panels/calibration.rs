@@ -129,13 +129,14 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Vec<Actio
     };
     let take = running.next.map(CalibrationWish::Take);
     button(running.settled.is_ok(), "Take point", "Once the reading has settled", take);
-    button(running.next.is_some(), "Leave out", "Go on without this one", Some(CalibrationWish::Skip));
-    button(!running.points.is_empty(), "Take back", "Measure the last one again", Some(CalibrationWish::Undo));
+    let free = !running.closing;
+    button(free && running.next.is_some(), "Leave out", "Go on without this one", Some(CalibrationWish::Skip));
+    button(free && !running.points.is_empty(), "Take back", "Measure the last one again", Some(CalibrationWish::Undo));
     if Kind::of(running.plan.sensor) == Kind::Pad {
         let about = "Watch the empty hand close for 15 s: how the pad's zero moves with bending";
         button(running.can_close, "Empty close", about, Some(CalibrationWish::EmptyClose));
     }
-    button(running.fit.is_ok(), "Keep", "Store it; old trials are read by it too", Some(CalibrationWish::Keep));
+    button(free && running.fit.is_ok(), "Keep", "Store it; old trials are read by it too", Some(CalibrationWish::Keep));
     button(true, "Stop", "Forget it", Some(CalibrationWish::Stop));
 }
 

@@ -30,7 +30,7 @@ pub(super) struct LiveArguments {
     auto: bool,
     /// Of a pad: watch the empty hand close for so many seconds afterwards, to learn how its zero moves with bending. The
     /// strip of the same finger must be calibrated.
-    #[arg(long, value_name = "S", value_parser = parse_seconds, num_args = 0..=1, default_missing_value = "15")]
+    #[arg(long, value_name = "S", value_parser = parse_seconds)]
     pub(super) empty_close: Option<f64>,
 }
 
@@ -252,6 +252,7 @@ impl Bench {
         loop {
             // One by one, so that a hands-free procedure sees each plateau however fast the stream is.
             self.listen()?;
+            procedure.see(&self.link.status().board);
             while let Some(reading) = self.pending.pop_front() {
                 procedure.feed(&reading);
                 if auto && procedure.has_changed() && procedure.settled().is_ok() {

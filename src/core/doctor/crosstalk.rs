@@ -29,6 +29,8 @@ const BACK_S: f64 = 0.4;
 /// At rest no sensor changes by more than this (counts of 4095) for [`REST_S`] (s).
 const STILL: f64 = 30.0;
 const REST_S: f64 = 1.0;
+/// After this time (s) a sensor that does not rest is no longer watched.
+const PATIENCE_S: f64 = 6.0;
 /// Readings that a rest must have.
 const LEAST_READINGS: usize = 10;
 
@@ -43,6 +45,8 @@ pub struct Bleed {
     pub share: f64,
     /// How much the second changed by it, at most (counts).
     pub counts: f64,
+    /// The second moved at all.
+    pub moved: bool,
     /// It is crosstalk: the second is in step with the first, by more than noise.
     pub bleeds: bool,
 }
@@ -57,6 +61,11 @@ pub struct CrosstalkTest {
     at: usize,
     /// Times (s) and counts of the last second, while everything rests.
     window: VecDeque<(f64, [Option<f64>; 4])>,
+    /// Since when a rest is waited for (s), and which sensor keeps it from coming.
+    resting: Option<f64>,
+    restless: Option<Sensor>,
+    /// Those that were waited for in vain.
+    flickers: [bool; 4],
     moving: Option<Moving>,
     found: Vec<Bleed>,
     left_out: Vec<Sensor>,
@@ -68,6 +77,8 @@ struct Moving {
     rest: [Option<f64>; 4],
     /// Sums over the readings: of x², x y and y² for each watched sensor y.
     sums: [[f64; 3]; 4],
+    /// Largest change of each sensor (counts).
+    others: [f64; 4],
     /// Largest change so far, with its sign (counts).
     most: f64,
     /// Since when it is back (s).
@@ -85,6 +96,9 @@ impl CrosstalkTest {
             scale: f64::from(board.full_scale) / 4095.0,
             at: 0,
             window: VecDeque::new(),
+            resting: None,
+            restless: None,
+            flickers: [false; 4],
             moving: None,
             found: Vec::new(),
             left_out: Vec::new(),
@@ -106,7 +120,10 @@ impl CrosstalkTest {
         let Some(sensor) = self.source() else { return "that was all".to_owned() };
         let (side, other) = if side_of(sensor) == 0 { ("left", "right") } else { ("right", "left") };
         match &self.moving {
-            None => "leave both fingers alone".to_owned(),
+            None => match self.restless {
+                None => "leave both fingers alone".to_owned(),
+                Some(restless) => format!("leave both fingers alone: the {} does not rest", restless.label()),
+            },
             Some(moving) if moving.most.abs() >= MOVES * self.scale => format!("let go of the {side} finger"),
             Some(_) if sensor.is_flex() => {
                 format!("bend the {side} finger by hand and let go; do not touch the {other} one")
@@ -146,6 +163,11 @@ impl CrosstalkTest {
         &self.found
     }
 
+    /// True where every sensor was moved and nothing bleeds into anything.
+    pub fn is_sound(&self) -> bool {
+        self.source().is_none() && self.left_out.is_empty() && !self.found.iter().any(|bleed| bleed.bleeds)
+    }
+
     /// What it comes to, in sentences: what bleeds into what, and what to do about it; or that nothing does.
     pub fn summary(&self) -> Vec<String> {
         let mut told: Vec<String> = self.found.iter().filter(|bleed| bleed.bleeds).map(Bleed::sentence).collect();
@@ -157,8 +179,13 @@ impl CrosstalkTest {
             );
         } else if !self.found.is_empty() {
             let percent = 100.0 * WORTH_TELLING;
-            told.push(format!("No sensor shows {percent:.0} % or more of what another does"));
+            told.push(format!("No sensor follows one of the other finger by {percent:.0} % or more"));
         }
+        let touched = self.found.iter().filter(|bleed| bleed.moved && !bleed.bleeds);
+        told.extend(touched.map(|bleed| {
+            let (into, from) = (bleed.into.label(), bleed.from.label());
+            format!("The {into} moved while the {from} was moved, but not in step with it: was it touched? Test again")
+        }));
         let asked = self.left_out.iter().map(|sensor| sensor.label());
         let left_out = asked.chain(self.sensors[self.at..].iter().map(|(sensor, _)| sensor.label()));
         let left_out: Vec<&str> = left_out.collect();
@@ -171,6 +198,7 @@ impl CrosstalkTest {
     fn next(&mut self) {
         self.at += 1;
         self.moving = None;
+        (self.resting, self.restless) = (None, None);
         self.window.clear();
     }
 
@@ -183,23 +211,39 @@ impl CrosstalkTest {
         while self.window.front().is_some_and(|(first, _)| *first < t_s - REST_S) {
             self.window.pop_front();
         }
+        let waited_s = t_s - *self.resting.get_or_insert(t_s);
         let since = self.window.front().map_or(t_s, |(first, _)| *first);
         // A window is full when one more period would be too much.
         if t_s - since < 0.95 * REST_S || self.window.len() < LEAST_READINGS {
             return;
         }
+        let Some(source) = self.source() else { return };
         let mut rest = [None; 4];
-        for (place, rest) in rest.iter_mut().enumerate() {
+        self.restless = None;
+        for (sensor, rest) in Sensor::ALL.into_iter().zip(&mut rest) {
+            let place = sensor as usize;
             let counts: Vec<f64> = self.window.iter().filter_map(|(_, counts)| counts[place]).collect();
             let least = counts.iter().copied().fold(f64::INFINITY, f64::min);
             let most = counts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             if most - least > STILL * self.scale {
-                return;
+                // One that flickers for ever shall not keep the others from being looked at.
+                self.flickers[place] |= waited_s >= PATIENCE_S;
+                if !self.flickers[place] || sensor == source {
+                    self.restless = Some(sensor);
+                }
+                continue;
             }
             *rest = (!counts.is_empty()).then(|| counts.iter().sum::<f64>() / counts.len() as f64);
         }
+        let is_read = self.window.iter().any(|(_, counts)| counts[source as usize].is_some());
+        if !is_read {
+            return self.skip();
+        }
+        if self.restless.is_some() {
+            return;
+        }
         self.window.clear();
-        self.moving = Some(Moving { rest, sums: [[0.0; 3]; 4], most: 0.0, back: None });
+        self.moving = Some(Moving { rest, sums: [[0.0; 3]; 4], others: [0.0; 4], most: 0.0, back: None });
     }
 }
 
@@ -208,16 +252,23 @@ impl Moving {
     fn add(&mut self, source: Sensor, counts: &[Option<f64>; 4], t_s: f64, scale: f64) -> bool {
         let change = |place: usize| Some(counts[place]? - self.rest[place]?);
         let Some(x) = change(source as usize) else { return false };
+        if x.abs() > self.most.abs() {
+            self.most = x;
+        }
         for (place, sums) in self.sums.iter_mut().enumerate() {
             if let (Some(count), Some(rest)) = (counts[place], self.rest[place]) {
+                let most = &mut self.others[place];
+                *most = most.max((count - rest).abs());
+            }
+            // While it rests there is only noise and creep to be seen.
+            if x.abs() > BACK * scale
+                && let (Some(count), Some(rest)) = (counts[place], self.rest[place])
+            {
                 let y = count - rest;
                 for (sum, term) in sums.iter_mut().zip([x * x, x * y, y * y]) {
                     *sum += term;
                 }
             }
-        }
-        if x.abs() > self.most.abs() {
-            self.most = x;
         }
         if self.most.abs() < MOVES * scale || x.abs() > BACK * scale {
             self.back = None;
@@ -235,7 +286,8 @@ impl Moving {
             let counts = share * self.most;
             let in_step = xy.abs() >= IN_STEP * (xx * yy).sqrt();
             let bleeds = in_step && share.abs() >= WORTH_TELLING && counts.abs() >= LEAST_COUNTS * scale;
-            Bleed { from: source, into, share, counts, bleeds }
+            let moved = self.others[into as usize] > STILL * scale;
+            Bleed { from: source, into, share, counts, moved, bleeds }
         };
         Sensor::ALL.into_iter().filter(watched).map(bleed).collect()
     }
@@ -336,8 +388,45 @@ mod tests {
             let mut hand = Hand { clumsy, ..Hand::new(0.0) };
             hand.obey();
             let told = hand.test.summary();
-            assert_eq!(told, ["No sensor shows 1 % or more of what another does"], "{:?}", hand.test.found());
+            let sound = "No sensor follows one of the other finger by 1 % or more";
+            let touched =
+                "The right pad moved while the left pad was moved, but not in step with it: was it touched? Test again";
+            assert_eq!(told, if clumsy { vec![sound, touched] } else { vec![sound] }, "{:?}", hand.test.found());
+            assert!(hand.test.is_sound());
         }
+    }
+
+    #[test]
+    fn a_small_share_is_found_though_the_hand_is_slow() {
+        let mut hand = Hand::new(0.015);
+        while let Some(sensor) = hand.test.source() {
+            hand.rest(1.1);
+            // Half a minute goes by, in which a strip creeps.
+            for k in 0..1500u32 {
+                hand.feed([1420.0, 1400.0 + f64::from(k) / 500.0, 0.0, 0.0]);
+            }
+            for _ in 0..50 {
+                let mut counts = [1420.0, 1403.0, 0.0, 0.0];
+                counts[sensor as usize] += 1000.0;
+                hand.feed(counts);
+            }
+            hand.rest(0.6);
+        }
+        let bleeds: Vec<[Sensor; 2]> =
+            hand.test.found().iter().filter(|bleed| bleed.bleeds).map(|bleed| [bleed.from, bleed.into]).collect();
+        assert_eq!(bleeds.len(), 3, "{:?}", hand.test.found());
+    }
+
+    #[test]
+    fn one_that_flickers_or_says_nothing_does_not_hold_up_the_others() {
+        let mut test = CrosstalkTest::new(&Board::default()).expect("has both fingers");
+        for k in 0..500u32 {
+            let (t_s, flickers) = (0.02 * f64::from(k), if k % 2 == 0 { 300.0 } else { 0.0 });
+            let counts = vec![None, Some(1400.0), Some(0.0), Some(flickers)];
+            test.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None });
+        }
+        assert!(test.instruction().starts_with("bend the right finger"), "{}", test.instruction());
+        assert_eq!(test.summary().last().map(|told| told.starts_with("Not moved: left flex strip")), Some(true));
     }
 
     #[test]
@@ -346,12 +435,13 @@ mod tests {
         for k in 0..200 {
             hand.feed([1420.0 + f64::from(k % 10) * 20.0, 1400.0, 0.0, 0.0]);
         }
-        assert_eq!(hand.test.instruction(), "leave both fingers alone");
+        assert_eq!(hand.test.instruction(), "leave both fingers alone: the left flex strip does not rest");
         hand.test.skip();
         hand.rest(3.0);
         assert!(hand.test.instruction().starts_with("bend the right finger"), "{}", hand.test.instruction());
         assert_eq!((hand.test.step(), hand.test.found()), ([2, 4], &[][..]));
         assert_eq!(hand.test.summary(), ["Not moved: left flex strip, right flex strip, left pad, right pad"]);
+        assert!(!hand.test.is_sound());
         let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
         assert!(CrosstalkTest::new(&one).is_none(), "nothing could be watched");
     }

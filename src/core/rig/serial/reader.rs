@@ -177,7 +177,11 @@ impl PortReader {
                 self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() });
             } else if due {
                 self.try_speeds(port);
-                connection.scanned = Some(Instant::now());
+                // What came meanwhile was heard by the scan alone.
+                let now = Instant::now();
+                connection.scanned = Some(now);
+                connection.newest = now;
+                connection.progress = (readings, now, connection.bytes);
             }
         }
     }
@@ -203,7 +207,6 @@ impl PortReader {
                 "other speeds were tried".to_owned()
             }
         };
-        // What came meanwhile was heard by the scan alone.
         let at_s = self.shared.began.elapsed().as_secs_f64();
         self.shared.bytes.push(Captured::Interrupted { at_s, cause });
     }

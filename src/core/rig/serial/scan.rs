@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 const LISTEN: Duration = Duration::from_millis(600);
 /// The same where text comes that may become readings: three whole lines of a board that sends one a second.
 const LISTEN_TO_TEXT: Duration = Duration::from_secs(4);
+/// The same where nothing comes: a board that sends one line a second has sent one.
+const LISTEN_TO_NOTHING: Duration = Duration::from_millis(1200);
 /// Readings that a speed must give.
 const READINGS: u64 = 3;
 /// Share of unreadable lines that a speed may give.
@@ -37,7 +39,7 @@ pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) 
         if port.set_baud_rate(baud.rate()).is_err() || port.clear(ClearBuffer::Input).is_err() {
             continue;
         }
-        if is_understood(&listen(port)) {
+        if is_understood(&listen(port, stop)) {
             return Scan::Found(baud);
         }
     }
@@ -47,14 +49,18 @@ pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) 
     Scan::Nothing
 }
 
-fn listen(port: &mut dyn SerialPort) -> Cadence {
+fn listen(port: &mut dyn SerialPort, stop: &AtomicBool) -> Cadence {
     let mut decoder = Decoder::default();
     let (mut buffer, mut heard) = ([0; 1024], Vec::new());
     let (start, mut any) = (Instant::now(), false);
     loop {
         let cadence = decoder.cadence();
-        let promises = any && start.elapsed() < LISTEN_TO_TEXT && is_text(&cadence) && !is_understood(&cadence);
-        if start.elapsed() >= LISTEN && !promises {
+        let patience = match any {
+            false => LISTEN_TO_NOTHING,
+            true if is_text(&cadence) && !is_understood(&cadence) => LISTEN_TO_TEXT,
+            true => LISTEN,
+        };
+        if start.elapsed() >= patience || stop.load(Ordering::Relaxed) {
             return cadence;
         }
         match port.read(&mut buffer) {

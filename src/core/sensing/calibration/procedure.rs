@@ -15,6 +15,7 @@ use super::point::{Kind, Point};
 use super::record::{Calibration, Record};
 use super::{Fault, Rail};
 use crate::board::{Board, Reading, Sensor};
+use crate::sensing::electronics::Divider;
 use std::collections::VecDeque;
 
 /// When a reading counts as settled.
@@ -88,6 +89,8 @@ pub struct Procedure {
     silent: usize,
     /// Why the last point that was asked for was not taken.
     refusal: Option<Unsettled>,
+    /// The user has said what resistor is beside the sensor.
+    resistor_is_given: bool,
 }
 
 impl Procedure {
@@ -109,7 +112,17 @@ impl Procedure {
             window: VecDeque::new(),
             silent: 0,
             refusal: None,
+            resistor_is_given: resistor_ohm.is_some(),
         })
+    }
+
+    /// Learns more of the board: points are counts, and are read by what is known of it now.
+    pub fn see(&mut self, board: &Board) {
+        let input = &mut self.record.input;
+        let seen = input.seen_by(board, self.sensor);
+        let fixed_ohm = if self.resistor_is_given { input.divider.fixed_ohm } else { seen.divider.fixed_ohm };
+        *input = Input { divider: Divider { fixed_ohm, ..seen.divider }, ..seen };
+        self.column = board.channel_of(self.sensor).unwrap_or(self.column);
     }
 
     /// With other angles (rad) or forces (N) to be set.
@@ -233,6 +246,8 @@ impl Procedure {
         self.refusal = settled.err();
         let point = Point { stimulus, ..settled? };
         self.record.points.push(point);
+        // It was measured from the rest that the points had shown.
+        self.record.bending = None;
         self.left.pop_front();
         self.window.clear();
         Ok(point)
@@ -254,6 +269,7 @@ impl Procedure {
         self.refusal = None;
         let point = self.record.points.pop()?;
         self.left.push_front(point.stimulus);
+        self.record.bending = None;
         self.window.clear();
         Some(point)
     }
@@ -341,6 +357,23 @@ mod tests {
             700.0 + if ((t * 50.0).round() as u32).is_multiple_of(2) { 4.0 } else { -4.0 }
         });
         assert!(procedure.settled().is_ok_and(|point| (point.counts - 700.0).abs() < 0.3 && point.spread > 3.0));
+    }
+
+    #[test]
+    fn what_is_learned_of_the_board_later_serves_all_points() -> Result<(), Unsettled> {
+        let mut procedure = procedure();
+        feed(&mut procedure, 0.0, 1.1, |_| 600.0);
+        procedure.take(1.0)?;
+        assert!((procedure.record().input.ohm(600.0) - 4.7e3 * (4096.0 / 600.0 - 1.0)).abs() < 1e-6);
+        let channels = vec!["fsrR".into(), "flexL".into()];
+        procedure.see(&Board { full_scale: 1023, divider_ohm: vec![3.3e3, 33e3], channels, ..Board::default() });
+        assert!((procedure.record().input.ohm(600.0) - 3.3e3 * (1024.0 / 600.0 - 1.0)).abs() < 1e-6);
+        assert_eq!(procedure.column, 0);
+        // What the user says of the resistor holds against the board's word.
+        let mut told = Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
+        told.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
+        assert_eq!(told.record().input.divider.fixed_ohm, 1e3);
+        Ok(())
     }
 
     #[test]

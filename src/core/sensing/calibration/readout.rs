@@ -221,12 +221,12 @@ impl Readout {
         let all = felt.len();
         let of = |((sensor, wired), count): ((Sensor, &Option<Wired>), u32)| {
             let calibration = &wired.as_ref()?.calibration;
-            let [_, most] = calibration.range();
-            let (label, told) = (sensor.label(), calibration.record.kind.told(most));
+            let [least, most] = calibration.range().map(|end| calibration.record.kind.told(end));
+            let label = sensor.label();
             (count > 0).then(|| {
                 format!(
-                    "the {label} was beyond what it was calibrated with, up to {told}, in {count} of {all} readings: it is \
-                     read off the curve's extension there"
+                    "the {label} was outside of what it was calibrated with, {least} to {most}, in {count} of {all} readings: \
+                     it is read off the curve's extension there"
                 )
             })
         };

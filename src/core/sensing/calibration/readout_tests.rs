@@ -268,5 +268,5 @@ fn what_is_beyond_the_calibrated_range_is_told() {
     readings.extend((50..60).map(|i| parts.read(0.02 * f64::from(i), [30.0; 2], [0.0, 7.0])));
     let told = readout.derive(&readings, Some(0.9)).warnings;
     assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].contains("right pad was beyond") && told[0].contains("0.500 kg, in 10 of 60"), "{told:?}");
+    assert!(told[0].contains("right pad was outside") && told[0].contains("0.500 kg, in 10 of 60"), "{told:?}");
 }

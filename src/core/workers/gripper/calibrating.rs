@@ -65,11 +65,16 @@ pub struct RunningCalibration {
     pub not_taken: Option<String>,
     /// The points so far.
     pub points: Vec<Point>,
+    /// An empty close is being watched; until it is over, only stopping is possible.
+    pub closing: bool,
     /// An empty close can be watched: a pad is calibrated, and none is being watched.
     pub can_close: bool,
     /// What they come to, or why they come to nothing yet.
     pub fit: Result<Arc<Calibration>, String>,
 }
+
+/// Why nothing else is done meanwhile.
+const WATCHED: &str = "the empty close is being watched";
 
 /// A calibration that goes on in the gripper's thread.
 pub(super) struct Calibrating {
@@ -77,15 +82,15 @@ pub(super) struct Calibrating {
     /// From the reading on after which the board is known.
     procedure: Option<Procedure>,
     heard: u32,
+    /// The board as it was known last.
+    board: Option<Board>,
     closing: Option<EmptyClose>,
     not_taken: Option<String>,
-    /// The port was opened for it, and is given back with it.
-    pub(super) owns_port: bool,
 }
 
 impl Calibrating {
-    pub(super) fn new(plan: CalibrationPlan, owns_port: bool) -> Self {
-        Self { plan, procedure: None, heard: 0, closing: None, not_taken: None, owns_port }
+    pub(super) fn new(plan: CalibrationPlan) -> Self {
+        Self { plan, procedure: None, heard: 0, closing: None, not_taken: None, board: None }
     }
 
     /// Takes in a reading; fails where the board has no such channel.
@@ -98,6 +103,11 @@ impl Calibrating {
             Some(procedure) => procedure,
             empty @ None => empty.insert(begin(&self.plan, board)?),
         };
+        // What the board says of itself, or shows, may come later than its first readings.
+        if self.board.as_ref() != Some(board) {
+            procedure.see(board);
+            self.board = Some(board.clone());
+        }
         if let Some(closing) = &mut self.closing {
             if closing.feed(reading) {
                 match closing.bending() {
@@ -129,7 +139,11 @@ impl Calibrating {
     /// Takes a point, leaves one out, or takes one back.
     pub(super) fn grant(&mut self, wish: &CalibrationWish) {
         let Some(procedure) = &mut self.procedure else { return };
-        (self.closing, self.not_taken) = (None, None);
+        if self.closing.is_some() {
+            self.not_taken = Some(WATCHED.to_owned());
+            return;
+        }
+        self.not_taken = None;
         match wish {
             CalibrationWish::Take(stimulus) => {
                 self.not_taken = procedure.take(*stimulus).err().map(|why| format!("not taken: {why}"));
@@ -145,7 +159,7 @@ impl Calibrating {
 
     /// Stores what came out, and that the part sits where it was calibrated; none before the first reading.
     pub(super) fn keep(&self, store: &mut Store) -> Option<Result<String, String>> {
-        let procedure = self.procedure.as_ref()?;
+        let procedure = self.procedure.as_ref().filter(|_| self.closing.is_none())?;
         let stored = procedure.fit().map_err(|fault| fault.to_string()).and_then(|calibration| {
             let stored = store.add_calibration(&calibration.record).map_err(|error| error.to_string())?;
             store.mount_part(procedure.sensor(), &stored.record.part).map_err(|error| error.to_string())?;
@@ -175,7 +189,12 @@ impl Calibrating {
             link,
             next: procedure.and_then(Procedure::next),
             latest: procedure.and_then(Procedure::latest),
-            settled: procedure.map_or_else(waiting, |p| p.settled().map(|p| p.counts).map_err(|why| why.to_string())),
+            settled: match procedure {
+                _ if self.closing.is_some() => Err(WATCHED.to_owned()),
+                Some(procedure) => procedure.settled().map(|p| p.counts).map_err(|why| why.to_string()),
+                None => waiting(),
+            },
+            closing: self.closing.is_some(),
             not_taken: self.not_taken.clone(),
             points: procedure.map(|procedure| procedure.record().points.clone()).unwrap_or_default(),
             can_close: !self.plan.sensor.is_flex() && self.closing.is_none() && fit.is_ok(),

@@ -36,19 +36,14 @@ pub struct RunningCrosstalk {
 }
 
 /// A crosstalk test in the gripper's thread.
+#[derive(Default)]
 pub(super) struct Crossing {
     /// From the reading on after which the board is known.
     test: Option<CrosstalkTest>,
     heard: u32,
-    /// The port was opened for it, and is given back with it.
-    pub(super) owns_port: bool,
 }
 
 impl Crossing {
-    pub(super) fn new(owns_port: bool) -> Self {
-        Self { test: None, heard: 0, owns_port }
-    }
-
     /// Takes in a reading; true when the test is over. Fails where the board has too few sensors.
     pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<bool, String> {
         self.heard = self.heard.saturating_add(1);

@@ -65,6 +65,8 @@ struct Connection {
     drift: Vec<Drift>,
     latest: Option<LatestReading>,
     plotted: Plotted,
+    /// It was opened for a calibration or a test, and is given back when the last of them is done.
+    borrowed: bool,
     /// Tells when a grasp begins and ends by itself.
     segmenter: Segmenter,
 }
@@ -248,6 +250,7 @@ impl Desk {
             drift: Vec::new(),
             latest: None,
             plotted: Plotted::new(Vec::new(), 0),
+            borrowed: false,
             segmenter: Segmenter::new(&Board::default()),
         });
         self.read_calibrations();
@@ -258,7 +261,9 @@ impl Desk {
 
     fn disconnect(&mut self, why: &str) {
         self.end(false, Some(format!("ended early: {why}")));
-        self.calibrating = None;
+        if self.calibrating.take().is_some() {
+            self.calibrated = Some(Err(format!("nothing was stored: {why}")));
+        }
         if let Some(crossing) = self.crossing.take() {
             self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(crossing.summary()) };
         }
@@ -283,7 +288,8 @@ impl Desk {
             self.outlets.tell(Notice::Warning(why.clone()));
             self.refused = Some(why.into());
             self.publish();
-        } else if self.published.elapsed() >= CALM {
+        } else if self.published.elapsed() >= CALM || self.connection.is_none() {
+            // Without a board nothing else comes that would be published with it.
             self.publish();
         }
     }

@@ -137,31 +137,51 @@ impl Desk {
     fn begin_calibration(&mut self, plan: &CalibrationPlan) {
         match self.borrow_port(plan.port.as_deref()) {
             Err(cause) => self.calibrated = Some(Err(cause)),
-            Ok(owns_port) => self.calibrating = Some(Calibrating::new(plan.clone(), owns_port)),
+            Ok(()) => self.calibrating = Some(Calibrating::new(plan.clone())),
         }
     }
 
-    /// Sees to it that something is listened to; whether the port was opened for that, or why there is none.
-    fn borrow_port(&mut self, port: Option<&Path>) -> Result<bool, String> {
-        let owns_port = self.connection.is_none();
-        if owns_port {
-            self.connect(port);
-            // What could not begin is not begun behind anybody's back.
-            self.retried = None;
+    /// What has the fingers at present, where something has, in a sentence.
+    pub(super) fn occupied(&self) -> Option<&'static str> {
+        match (&self.running, &self.calibrating, &self.crossing) {
+            (Some(_), _, _) => Some("a trial goes on: end it first"),
+            (None, Some(_), _) => Some("a calibration goes on: end it first, in the panel Calibration"),
+            (None, None, Some(_)) => Some("a crosstalk test goes on: end it first, in the panel Doctor"),
+            (None, None, None) => None,
         }
-        match (&self.connection, &self.refused) {
-            (Some(_), _) => Ok(owns_port),
-            (None, Some(refused)) => Err(refused.text.clone()),
-            (None, None) => Err("no board is connected".to_owned()),
+    }
+
+    /// Sees to it that something is listened to and nothing else has the fingers; or says why not.
+    fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), String> {
+        if let Some(occupied) = self.occupied() {
+            return Err(occupied.to_owned());
+        }
+        if self.connection.is_some() {
+            return Ok(());
+        }
+        self.refused = None;
+        if let Err(refused) = self.open_stream(port) {
+            let cause = refused.text.clone();
+            self.outlets.tell(Notice::Failed(cause.clone()));
+            self.refused = Some(refused);
+            return Err(cause);
+        }
+        self.connection.iter_mut().for_each(|connection| connection.borrowed = true);
+        Ok(())
+    }
+
+    /// Gives a port back that was opened for what has ended now.
+    fn return_port(&mut self, why: &str) {
+        let unused = self.occupied().is_none();
+        if unused && self.connection.as_ref().is_some_and(|connection| connection.borrowed) {
+            self.disconnect(why);
         }
     }
 
     pub(super) fn end_calibration(&mut self, ended: Option<Result<String, String>>) {
-        let owns_port = self.calibrating.take().is_some_and(|calibrating| calibrating.owns_port);
+        self.calibrating = None;
         self.calibrated = ended;
-        if owns_port {
-            self.disconnect("the calibration has ended");
-        }
+        self.return_port("the calibration has ended");
     }
 
     // The doctor's crosstalk test.
@@ -170,7 +190,7 @@ impl Desk {
         match wish {
             CrosstalkWish::Begin(port) => match self.borrow_port(port.as_deref()) {
                 Err(cause) => self.crossed = CrosstalkView { ended: Some(Err(cause)), ..CrosstalkView::default() },
-                Ok(owns_port) => self.crossing = Some(Crossing::new(owns_port)),
+                Ok(()) => self.crossing = Some(Crossing::default()),
             },
             CrosstalkWish::Skip => {
                 self.crossing.iter_mut().for_each(Crossing::skip);
@@ -196,9 +216,7 @@ impl Desk {
         let Some(crossing) = self.crossing.take() else { return };
         let ended = cause.map_or_else(|| crossing.summary(), Err);
         self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(ended) };
-        if crossing.owns_port {
-            self.disconnect("the crosstalk test has ended");
-        }
+        self.return_port("the crosstalk test has ended");
     }
 }
 

@@ -16,7 +16,9 @@ impl Desk {
     pub(super) fn watch(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
         let events = connection.segmenter.push(reading);
-        let Some(request) = self.watching.clone() else { return };
+        // Hands that bend and press for a calibration or a test make no trials.
+        let free = self.calibrating.is_none() && self.crossing.is_none();
+        let Some(request) = self.watching.clone().filter(|_| free) else { return };
         // A trial that was asked for goes its own way.
         if self.running.as_ref().is_some_and(|running| !running.is_by_itself()) {
             return;
@@ -104,6 +106,9 @@ impl Desk {
     /// Begins a trial; one that goes on ends before it.
     pub(super) fn begin(&mut self, request: TrialRequest, from_s: Option<f64>) {
         self.end(false, None);
+        if let Some(occupied) = self.occupied() {
+            return self.outlets.tell(Notice::Warning(format!("no trial was begun: {occupied}")));
+        }
         let Some(connection) = &self.connection else {
             let text = "no board is connected: connect the gripper first";
             return self.outlets.tell(Notice::Warning(text.to_owned()));
