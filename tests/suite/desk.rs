@@ -181,6 +181,21 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     }
     desk.until_labelled(&[(1, Some("dubt"), false), (2, Some("dubt"), false)]);
     assert_eq!(desk.workbench().view().blind, blind);
+    // More letters at once than the last answer had, whose end the cursor stood at.
+    desk.record();
+    desk.harness.event(pressed(Key::Slash));
+    desk.harness.event(egui::Event::Text("syrin".to_owned()));
+    desk.harness.step();
+    for letter in ["g", "e"] {
+        desk.harness.step();
+        desk.harness.event(egui::Event::Text(letter.to_owned()));
+    }
+    desk.harness.step();
+    let field = desk.harness.get_by_role_and_label(Role::SearchInput, "Find an object");
+    assert_eq!(field.value().as_deref(), Some("syringe"));
+    desk.press(Key::Enter);
+    let typed = [(1, Some("dubt"), false), (2, Some("dubt"), false), (3, Some("syringe"), false)];
+    desk.until_labelled(&typed);
     // While the grasp goes on, too: the field is there as soon as it is wanted, and keeps the cursor up to the question.
     desk.press(Key::R);
     desk.until_shown(true, "Time in the trial");
@@ -189,7 +204,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     desk.until_shown(true, "what was it?");
     desk.type_text("be");
     desk.press(Key::Enter);
-    desk.until_labelled(&[(1, Some("dubt"), false), (2, Some("dubt"), false), (3, Some("cube"), false)]);
+    desk.until_labelled(&[&typed[..], &[(4, Some("cube"), false)]].concat());
     // Where no question is asked or coming, there is nothing to type into.
     desk.press(Key::Slash);
     assert!(desk.harness.query_by_role_and_label(Role::SearchInput, "Find an object").is_none());
@@ -200,9 +215,8 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
         desk.until_shown(true, "Time in the trial");
         desk.until_shown(false, "Time in the trial");
     }
-    let grasps = [(4, None, false), (5, None, false)];
-    let labelled = [(1, Some("dubt"), false), (2, Some("dubt"), false), (3, Some("cube"), false)];
-    desk.until_labelled(&[&labelled[..], &grasps[..]].concat());
+    let grasps = [(4, Some("cube"), false), (5, None, false), (6, None, false)];
+    desk.until_labelled(&[&typed[..], &grasps[..]].concat());
 }
 
 #[test]

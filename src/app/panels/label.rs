@@ -6,6 +6,7 @@ use crate::app::actions::{Action, DeskAction};
 use crate::app::bars::instruction;
 use crate::app::labelling::{LISTED, tags_of};
 use crate::app::theme::{colour, veil};
+use egui::text_edit::TextEditState;
 use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
 use palpate_core::labelling::{LabelledTrial, NextTrial};
 use palpate_core::objects::catalogue;
@@ -228,6 +229,12 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>)
     let draft = &context.view.draft;
     let mut search = draft.search.clone();
     let hint = "find an object, or name a new one ( / )";
+    if draft.focus_search {
+        // It goes to the end of what was typed on its way, and not to where it stood in the last answer.
+        let mut state = TextEditState::load(ui.ctx(), search_id()).unwrap_or_default();
+        state.cursor.set_char_range(None);
+        state.store(ui.ctx(), search_id());
+    }
     let field = TextEdit::singleline(&mut search).hint_text(hint).desired_width(f32::INFINITY).char_limit(80);
     let response = ui.add(field.id(search_id()));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
