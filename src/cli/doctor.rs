@@ -28,7 +28,7 @@ pub(super) struct DoctorArguments {
     #[arg(long, value_name = "S", default_value_t = USUAL_LISTEN_S, value_parser = seconds)]
     seconds: f64,
     /// Rate of the board's serial line (bit/s); without it the usual ones are tried.
-    #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
+    #[arg(long, value_name = "BAUD", value_parser = super::record::parse_baud)]
     baud: Option<Baud>,
     /// Test for crosstalk instead, step by step: each sensor in turn is moved by hand, alone, while those of the other finger
     /// are watched. Enter leaves one out; Ctrl+C ends it and says what was seen.
@@ -48,12 +48,6 @@ pub(super) struct DoctorArguments {
 fn seconds(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|s| (1.0..=600.0).contains(s));
     number.ok_or_else(|| "write a number of seconds from 1 to 600".to_owned())
-}
-
-fn parse_baud(text: &str) -> Result<Baud, String> {
-    let rates: Vec<String> = Baud::SCANNED.iter().map(|baud| baud.rate().to_string()).collect();
-    let found = Baud::SCANNED.into_iter().find(|baud| baud.rate().to_string() == text);
-    found.ok_or_else(|| format!("choose one of {}", rates.join(", ")))
 }
 
 /// What `--json` prints.
@@ -133,7 +127,9 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     let (mut heard, mut newest) = (0, Instant::now());
     let keys = enter_keys()?;
     while !stop.load(Ordering::Relaxed) && !link.is_over() {
-        for event in link.take(Duration::from_millis(50)) {
+        let events = link.take(Duration::from_millis(50));
+        let board = link.status().board;
+        for event in events {
             let LinkEvent::Heard(Heard::Reading(reading)) = event else { continue };
             newest = Instant::now();
             heard += 1;
@@ -142,11 +138,12 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
             }
             let test = match &mut test {
                 Some(test) => test,
-                empty @ None => empty.insert(CrosstalkTest::new(&link.status().board).ok_or_else(|| {
-                    let has = link.status().board.channels.join(", ");
+                empty @ None => empty.insert(CrosstalkTest::new(&board).ok_or_else(|| {
+                    let has = board.channels.join(", ");
                     format!("crosstalk is seen between sensors of both fingers; the board has {has}")
                 })?),
             };
+            test.see(&board);
             test.feed(&reading);
             let instruction = test.instruction();
             if test.source().is_some() && told != instruction {

@@ -67,7 +67,7 @@ fn parse_wait(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "write a number of seconds from 0 to 86400".to_owned())
 }
 
-fn parse_baud(text: &str) -> Result<Baud, String> {
+pub(super) fn parse_baud(text: &str) -> Result<Baud, String> {
     Baud::try_from(text.parse::<u32>().map_err(|e| e.to_string())?)
 }
 

@@ -92,9 +92,12 @@ impl Board {
     }
 }
 
-/// Readings after which it is known what a board is: it has answered who it is, or its counts have shown how far its
-/// converter goes.
+/// Readings after which a board's channels are known.
 pub const KNOWN_AFTER: u32 = 5;
+
+/// Time of readings (s) after which it is known what a board is: it has answered who it is, or its counts have shown how
+/// far its converter goes.
+pub const KNOWN_AFTER_S: f64 = 1.2;
 
 /// One line of a board.
 #[derive(Clone, Debug, PartialEq)]

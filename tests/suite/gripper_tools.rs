@@ -108,6 +108,7 @@ fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
         bench.until_shown(true, "only members of the group dialout");
         // Below stand the ports of whatever computer this is.
         bench.harness.run_steps(3);
+        bench.harness.run_steps(3);
         let picture = image::imageops::crop_imm(&bench.harness.render().unwrap(), 0, 0, 320, 204).to_image();
         bench.harness.get_by_label("Copy the command for the port").click();
         bench.harness.step();
@@ -433,7 +434,6 @@ fn a_finger_is_fitted_and_used_without_the_mouse() {
         // Without the list, in which the time stands.
         let top = bench.harness.get_by_label("Fitted to trials 3, 4").rect().top() as u32;
         let picture = bench.harness.render().unwrap();
-        bench.harness.run_steps(3);
         let picture = image::imageops::crop_imm(&picture, 0, top, picture.width(), picture.height() - top).to_image();
         press(&mut bench, "Use this finger");
         let scene = bench.until(|s| s.scene.gripper.finger.bending_stiffness == 3.36e-3).scene.clone();

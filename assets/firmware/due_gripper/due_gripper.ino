@@ -5,7 +5,9 @@
 
 /* SerialUSB is the native port (USB 2341:003e), which does not reset the board when it is opened. Serial is the
  * programming port (2341:003d) at 115200 baud. */
+#ifndef HOST
 #define HOST SerialUSB
+#endif
 
 /* Highest line pressure that is ever put out, in steps of 0.05 bar: 20 is 1.0 bar. 0 when no control box is wired; the
  * board then refuses to be told a pressure. Never above what the fingers bear: 30 is 1.5 bar. */

@@ -131,7 +131,12 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Vec<Actio
     button(running.settled.is_ok(), "Take point", "Once the reading has settled", take);
     let free = !running.closing;
     button(free && running.next.is_some(), "Leave out", "Go on without this one", Some(CalibrationWish::Skip));
-    button(free && !running.points.is_empty(), "Take back", "Measure the last one again", Some(CalibrationWish::Undo));
+    button(
+        running.closing || !running.points.is_empty(),
+        "Take back",
+        "Measure the last one again",
+        Some(CalibrationWish::Undo),
+    );
     if Kind::of(running.plan.sensor) == Kind::Pad {
         let about = "Watch the empty hand close for 15 s: how the pad's zero moves with bending";
         button(running.can_close, "Empty close", about, Some(CalibrationWish::EmptyClose));

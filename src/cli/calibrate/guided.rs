@@ -5,7 +5,7 @@ use super::super::Failure;
 use super::super::link;
 use super::super::terminal::{note, warn};
 use super::CalibrateArguments;
-use palpate_core::board::{Board, KNOWN_AFTER, Reading, Sensor};
+use palpate_core::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
 use palpate_core::recording::Store;
 use palpate_core::rig::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_core::sensing::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
@@ -103,7 +103,7 @@ pub(super) fn record(
     }
     let record = procedure.record().clone();
     match live.empty_close {
-        Some(seconds) => with_empty_close(&mut bench, &board, record, sensor, store, live.auto, seconds),
+        Some(seconds) => with_empty_close(&mut bench, record, sensor, store, live.auto, seconds),
         None => Ok(record),
     }
 }
@@ -117,13 +117,12 @@ pub(super) fn watch_empty_close(
     store: &Store,
 ) -> Result<Record, Failure> {
     let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
-    let board = bench.board()?;
-    with_empty_close(&mut bench, &board, record, sensor, store, live.auto, seconds)
+    bench.board()?;
+    with_empty_close(&mut bench, record, sensor, store, live.auto, seconds)
 }
 
 fn with_empty_close(
     bench: &mut Bench,
-    board: &Board,
     record: Record,
     sensor: Sensor,
     store: &Store,
@@ -132,7 +131,7 @@ fn with_empty_close(
 ) -> Result<Record, Failure> {
     let pad = Calibration::fit(record.clone())?;
     let serving = store.serving(None, &[])?.calibrations;
-    let close = EmptyClose::begin(board, (sensor, pad), &serving, seconds)?;
+    let close = EmptyClose::begin(&bench.link.status().board, (sensor, pad), &serving, seconds)?;
     Ok(Record { bending: Some(bench.empty_close(close, auto)?), ..record })
 }
 
@@ -185,7 +184,9 @@ impl Bench {
         loop {
             self.listen()?;
             let over = self.link.is_over() && !self.pending.is_empty();
-            if over || self.pending.len() >= KNOWN_AFTER as usize {
+            let span_s =
+                self.pending.back().zip(self.pending.front()).map_or(0.0, |(last, first)| last.t_s - first.t_s);
+            if over || (self.pending.len() >= KNOWN_AFTER as usize && span_s >= KNOWN_AFTER_S) {
                 return Ok(self.link.status().board);
             }
             if start.elapsed().as_secs_f64() > PATIENCE_S {

@@ -56,9 +56,16 @@ impl Next {
             Self::Ports => Some("palpate record --list".to_owned()),
             Self::Upload => {
                 // The two ports of a Due are two boards to the tools of Arduino.
-                let board = if port?.kind.native { "arduino_due_x" } else { "arduino_due_x_dbg" };
-                let upload = format!("arduino-cli compile --upload --fqbn arduino:sam:{board} --port {}", path?);
-                Some(format!("palpate doctor --sketch {SKETCH} && {upload} {SKETCH}"))
+                let write = format!("palpate doctor --sketch {SKETCH}");
+                let due = port.filter(|port| port.usb.as_ref().is_some_and(|usb| matches!(usb.pid, 0x003d | 0x003e)));
+                // Nothing is uploaded to another board by a command that somebody copies.
+                let Some(due) = due else { return Some(write) };
+                let (board, host) = match due.kind.native {
+                    true => ("arduino_due_x", ""),
+                    false => ("arduino_due_x_dbg", " --build-property compiler.cpp.extra_flags=-DHOST=Serial"),
+                };
+                let upload = format!("arduino-cli compile --upload --fqbn arduino:sam:{board}{host} --port {}", path?);
+                Some(format!("{write} && {upload} {SKETCH}"))
             }
             Self::Crosstalk => Some(format!("palpate doctor {} --crosstalk", path?)),
             Self::Again => Some(format!("palpate doctor {} --seconds 20", path?)),
@@ -315,6 +322,12 @@ fn bits(seen: &Observations) -> Told {
             .because(
                 "analogRead gives ten bits until it is told otherwise, and the board does not say how far it counts",
                 "Call analogReadResolution(12) in setup() for finer counts, and say adc=12 in a hello line",
+            );
+        }
+        if link.looks_10_bit && link.board.firmware.is_none() {
+            return Told::note(format!("no count is beyond ten bits; {full} is taken for granted")).because(
+                "Neither the board nor a flex strip tells how far the converter counts",
+                "Say adc=12, or adc=10, in a hello line",
             );
         }
         if link.looks_10_bit {

@@ -68,6 +68,8 @@ pub struct CrosstalkTest {
     flickers: [bool; 4],
     moving: Option<Moving>,
     found: Vec<Bleed>,
+    /// Those that could not be watched, and while which was moved.
+    unwatched: Vec<[Sensor; 2]>,
     left_out: Vec<Sensor>,
 }
 
@@ -101,8 +103,14 @@ impl CrosstalkTest {
             flickers: [false; 4],
             moving: None,
             found: Vec::new(),
+            unwatched: Vec::new(),
             left_out: Vec::new(),
         })
+    }
+
+    /// Learns more of the board.
+    pub fn see(&mut self, board: &Board) {
+        self.scale = f64::from(board.full_scale) / 4095.0;
     }
 
     /// The sensor that is to be moved; none when all have been.
@@ -145,6 +153,10 @@ impl CrosstalkTest {
             Some(moving) => {
                 if moving.add(source, &counts, reading.t_s, self.scale) {
                     let found = moving.found(source, self.scale);
+                    let other = |sensor: &Sensor| side_of(*sensor) != side_of(source);
+                    let watched = |sensor: &Sensor| found.iter().any(|bleed| bleed.into == *sensor);
+                    let others = self.sensors.iter().map(|(sensor, _)| *sensor).filter(other);
+                    self.unwatched.extend(others.filter(|sensor| !watched(sensor)).map(|into| [source, into]));
                     self.found.extend(found);
                     self.next();
                 }
@@ -165,7 +177,8 @@ impl CrosstalkTest {
 
     /// True where every sensor was moved and nothing bleeds into anything.
     pub fn is_sound(&self) -> bool {
-        self.source().is_none() && self.left_out.is_empty() && !self.found.iter().any(|bleed| bleed.bleeds)
+        let all = self.left_out.is_empty() && self.unwatched.is_empty();
+        self.source().is_none() && all && !self.found.iter().any(|bleed| bleed.bleeds)
     }
 
     /// What it comes to, in sentences: what bleeds into what, and what to do about it; or that nothing does.
@@ -186,6 +199,13 @@ impl CrosstalkTest {
             let (into, from) = (bleed.into.label(), bleed.from.label());
             format!("The {into} moved while the {from} was moved, but not in step with it: was it touched? Test again")
         }));
+        told.extend(self.unwatched.iter().map(|[from, into]| {
+            format!(
+                "The {} did not rest or has no numbers, so that nothing is known of what the {} does to it",
+                into.label(),
+                from.label()
+            )
+        }));
         let asked = self.left_out.iter().map(|sensor| sensor.label());
         let left_out = asked.chain(self.sensors[self.at..].iter().map(|(sensor, _)| sensor.label()));
         let left_out: Vec<&str> = left_out.collect();
@@ -198,7 +218,7 @@ impl CrosstalkTest {
     fn next(&mut self) {
         self.at += 1;
         self.moving = None;
-        (self.resting, self.restless) = (None, None);
+        (self.resting, self.restless, self.flickers) = (None, None, [false; 4]);
         self.window.clear();
     }
 
@@ -208,7 +228,9 @@ impl CrosstalkTest {
             self.window.clear();
         }
         self.window.push_back((t_s, counts));
-        while self.window.front().is_some_and(|(first, _)| *first < t_s - REST_S) {
+        // Of a slow board it takes longer to see enough.
+        while self.window.len() > LEAST_READINGS && self.window.front().is_some_and(|(first, _)| *first < t_s - REST_S)
+        {
             self.window.pop_front();
         }
         let waited_s = t_s - *self.resting.get_or_insert(t_s);

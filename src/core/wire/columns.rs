@@ -8,6 +8,8 @@ use crate::board::{Board, Sensor};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Columns {
     header: Option<Vec<String>>,
+    /// The header is from before an interruption: another sketch may be on the board by now.
+    header_is_old: bool,
     origin: Origin,
 }
 
@@ -25,10 +27,16 @@ impl Columns {
     /// Takes names; false where they are words that would put the names of sensors out of use.
     pub(super) fn set_header(&mut self, names: Vec<String>) -> bool {
         let worse = !names_a_sensor(&names) && self.header.as_ref().is_some_and(|known| names_a_sensor(known));
-        if !worse {
-            self.header = Some(names);
+        let taken = !worse || self.header_is_old;
+        if taken {
+            (self.header, self.header_is_old) = (Some(names), false);
         }
-        !worse
+        taken
+    }
+
+    /// The stream was interrupted.
+    pub(super) fn interrupt(&mut self) {
+        self.header_is_old = true;
     }
 
     /// Names for this many columns.

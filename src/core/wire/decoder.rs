@@ -61,6 +61,8 @@ struct Reader {
     meter: Meter,
     rails: RailWatch,
     reach: Reach,
+    /// The full scale that was told last.
+    told_scale: Option<u32>,
     tail: Tail,
     /// Lines since the last reading that could not be read.
     unreadable: u64,
@@ -103,6 +105,7 @@ impl Decoder {
         self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
         self.reader.reach = Reach::default();
+        self.reader.columns.interrupt();
         self.reader.meter.forget_what_came_before();
     }
 
@@ -351,7 +354,8 @@ impl Reader {
         };
         let said = self.said().map(|board| board.full_scale);
         let [strip, largest] = self.largest(&counts);
-        if self.reach.add(stamp.t_s, strip, largest, said) {
+        self.reach.add(stamp.t_s, strip, largest, said);
+        if self.told_scale.replace(self.full_scale()) != Some(self.full_scale()) {
             heard.push(Heard::Board(self.board()));
         }
         self.tell_gap(&stamp, heard);

@@ -254,6 +254,49 @@ fn a_unit_is_learned_with_the_first_number_that_has_it() {
 }
 
 #[test]
+fn a_number_without_a_name_belongs_to_every_line_or_was_torn_off() {
+    // A sketch that prints its scale behind its values, for Arduino's plotter.
+    let always = |i: u32| format!("flexL:{},flexR:7,0,1023", 500 + i);
+    let (decoder, heard) = hear_lines(&(0..60).map(always).collect::<Vec<_>>());
+    assert_eq!((decoder.board().channels.join(" ").as_str(), readings(&heard).len() > 55), ("flexL flexR", true));
+    // One bit, and a digit is a blank.
+    for torn in
+        ["flexL:2 03mV,flexR:2100,fsrL:14", "flexL:2003mV,flexR:2 00,fsrL:14", "flexL:2003mV,flexR:21,0,fsrL:14"]
+    {
+        let mut lines: Vec<String> = (0..100).map(plain_line).collect();
+        lines[50] = torn.to_owned();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{torn}");
+    }
+}
+
+#[test]
+fn another_sketch_after_an_interruption_is_another_board() {
+    let mut decoder = Decoder::default();
+    let (mut heard, mut t) = (Vec::new(), 0.0);
+    let mut say = |decoder: &mut Decoder, lines: &mut dyn Iterator<Item = String>| {
+        for line in lines {
+            t += 0.02;
+            decoder.push(format!("\n{line}\n").as_bytes(), t, &mut heard);
+        }
+        heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None })
+    };
+    let told = say(
+        &mut decoder,
+        &mut std::iter::once("flexL,fsrL".to_owned()).chain((0..80).map(|i| format!("{},3", 350 + i % 5))),
+    );
+    assert_eq!(told.map(|board| board.full_scale), Some(1023));
+    decoder.interrupt("unplugged");
+    // The same names serve on, but for others that are said; and the counts are judged anew.
+    let told = say(&mut decoder, &mut (0..20).map(|i| format!("{},3", 1400 + i)));
+    assert_eq!(told.map(|board| (board.full_scale, board.channels)), Some((4095, vec!["flexL".into(), "fsrL".into()])));
+    decoder.interrupt("unplugged");
+    let told =
+        say(&mut decoder, &mut std::iter::once("time,angle".to_owned()).chain((0..20).map(|i| format!("{i},3"))));
+    assert_eq!(told.map(|board| board.channels), Some(vec!["time".into(), "angle".into()]));
+}
+
+#[test]
 fn what_a_board_says_while_it_sets_itself_up_is_no_reading() {
     let chatter = [
         "Sensor: 1 ok",

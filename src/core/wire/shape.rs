@@ -4,7 +4,7 @@
 //! field: `51k` among `512` and `513` is a damaged number, not another unit.
 
 use super::checksum::KEY;
-use super::fields::{Field, Fields, Format, MAX_FIELDS};
+use super::fields::{Field, Fields, Format, MAX_FIELDS, NAMELESS};
 
 /// Fields of one line.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub(super) enum Role {
     LineBar,
     /// The checksum, which has been looked at.
     Checksum,
-    /// Nowhere: there are too many channels.
+    /// Nowhere: it has no name, or there are too many channels.
     Ignored,
 }
 
@@ -45,6 +45,7 @@ impl Role {
             () if is("seq") => Some(Self::Sequence),
             () if is("p_bar") => Some(Self::LineBar),
             () if is(KEY) => Some(Self::Checksum),
+            () if name.starts_with(NAMELESS) => Some(Self::Ignored),
             () => None,
         }
     }

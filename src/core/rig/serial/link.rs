@@ -143,11 +143,15 @@ impl LinkStatus {
     pub fn wiring_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.looks_10_bit {
-            let text = match self.board.full_scale <= TEN_BITS {
-                true => {
+            let said = self.board.firmware.is_some();
+            let text = match (self.board.full_scale <= TEN_BITS, said) {
+                (true, _) => {
                     "the counts are those of ten bits, and taken as such: analogReadResolution(12) in the sketch gives finer ones"
                 }
-                false => {
+                (false, false) => {
+                    "no count is beyond ten bits; twelve are taken for granted, since neither the board nor a strip tells"
+                }
+                (false, true) => {
                     "the counts look like those of ten bits, against the board's word, so that what is derived from them is \
                           wrong: call analogReadResolution(12) in the sketch"
                 }

@@ -139,6 +139,11 @@ impl Calibrating {
     /// Takes a point, leaves one out, or takes one back.
     pub(super) fn grant(&mut self, wish: &CalibrationWish) {
         let Some(procedure) = &mut self.procedure else { return };
+        if self.closing.is_some() && *wish == CalibrationWish::Undo {
+            // The board may have fallen silent: what was measured before is kept.
+            self.closing = None;
+            return;
+        }
         if self.closing.is_some() {
             self.not_taken = Some(WATCHED.to_owned());
             return;

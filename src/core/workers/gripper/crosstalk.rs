@@ -57,6 +57,7 @@ impl Crossing {
                 format!("crosstalk is seen between sensors of both fingers; the board has {has}")
             })?),
         };
+        test.see(board);
         test.feed(reading);
         Ok(test.source().is_none())
     }

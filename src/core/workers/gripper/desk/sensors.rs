@@ -166,7 +166,9 @@ impl Desk {
             self.refused = Some(refused);
             return Err(cause);
         }
-        self.connection.iter_mut().for_each(|connection| connection.borrowed = true);
+        // One that was waited for stays.
+        let borrowed = self.retried.take().is_none();
+        self.connection.iter_mut().for_each(|connection| connection.borrowed = borrowed);
         Ok(())
     }
 
