@@ -125,7 +125,8 @@ fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
     let moves = ["angleL=40", "angleR=40", "loadL=2N", "loadR=2N"];
     let script: String = moves.iter().map(|step| format!("rest=2.2; {step} hold=1; ")).collect();
     for (faults, sound) in [("", true), ("crosstalk=0.05@0", false)] {
-        capture(&parts(3, false), &format!("{script} rest=3"), faults, 16.0, &at.join("hand.bytes"));
+        // With hysteresis and drift.
+        capture(&parts(3, true), &format!("{script} rest=3"), faults, 16.0, &at.join("hand.bytes"));
         let ran = run(at, &["doctor", "hand.bytes", "--crosstalk", "--json"]);
         let told: Value = serde_json::from_str(&ran.out).unwrap();
         assert_eq!((ran.code, &told["sound"]), (Some(i32::from(!sound)), &Value::Bool(sound)), "{ran:?}");

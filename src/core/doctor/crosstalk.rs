@@ -22,8 +22,9 @@ const LEAST_COUNTS: f64 = 8.0;
 const IN_STEP: f64 = 0.8;
 /// A sensor that is to be moved must move by this much (counts of 4095): a press of 0.1 N, a bend of ten degrees.
 const MOVES: f64 = 150.0;
-/// It is back when it is this near to its rest (counts of 4095): strips creep.
+/// It is back when it is this near to its rest (counts of 4095), or by this share of how far it was away: strips creep.
 const BACK: f64 = 50.0;
+const BACK_SHARE: f64 = 0.25;
 /// It must be back for this long (s).
 const BACK_S: f64 = 0.4;
 /// At rest no sensor changes by more than this (counts of 4095) for [`REST_S`] (s).
@@ -292,7 +293,8 @@ impl Moving {
                 }
             }
         }
-        if self.most.abs() < MOVES * scale || x.abs() > BACK * scale {
+        let near = (BACK * scale).max(BACK_SHARE * self.most.abs());
+        if self.most.abs() < MOVES * scale || x.abs() > near {
             self.back = None;
             return false;
         }
