@@ -5,7 +5,7 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use crate::program::{json, palpate, ran, refused, run};
-use crate::streams::Scripted;
+use crate::streams::alike;
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::ALL_PANELS;
 use palpate_core::board::{Board, Reading, Sensor};
@@ -497,7 +497,7 @@ fn the_window_calibrates_step_by_step() {
             }
             hand.counts.map(|counts| Some(counts as f32)).to_vec()
         };
-        Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+        Ok(Box::new(alike(counts)))
     });
     let panel = ALL_PANELS.iter().find(|panel| panel.name == "calibration");
     let setup = BenchSetup { panel, size: [340.0, 640.0], listen, ..BenchSetup::default() };

@@ -6,7 +6,7 @@ use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use crate::panels::side_by_side;
 use crate::program::{refused, run};
-use crate::streams::{HeardOnce, Scripted};
+use crate::streams::{alike, once_with_a_gap};
 use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
@@ -161,7 +161,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         let listen: Listen = Arc::new(move |_| {
             let read = Arc::clone(&read);
             let counts = move || read.lock().unwrap().map(|counts| Some(counts as f32)).to_vec();
-            Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+            Ok(Box::new(alike(counts)))
         });
         let setup = BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
@@ -202,7 +202,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
 #[test]
 fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
     let [dark, light] = Theme::ALL.map(|theme| {
-        let listen: Listen = Arc::new(|_| Ok(Box::new(HeardOnce::with_a_gap())));
+        let listen: Listen = Arc::new(|_| Ok(Box::new(once_with_a_gap())));
         let setup = BenchSetup { size: [480.0, 220.0], listen, ..BenchSetup::default() };
         let mut bench = bench("counts", theme, setup);
         bench.tell(Action::Gripper(GripperWish::Connect(None)));
@@ -225,7 +225,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     let listen: Listen = Arc::new(move |_| {
         let (read, _) = (Arc::clone(&read), opened.fetch_add(1, Ordering::Relaxed));
         let counts = move || read.lock().unwrap().map(|counts| Some(counts as f32)).to_vec();
-        Ok(Box::new(Scripted { counts, t_s: 0.0 }))
+        Ok(Box::new(alike(counts)))
     });
     let mut bench = bench("doctor", Theme::Dark, BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() });
     let calibrate = || {

@@ -31,70 +31,53 @@ fn listening(board: Board, cadence: Cadence, now_s: f64) -> LinkStatus {
     }
 }
 
-/// Fifty readings of a second at a time, all alike.
-pub(crate) struct Scripted<F> {
-    pub(crate) counts: F,
-    pub(crate) t_s: f64,
-}
-
-impl<F: Fn() -> Vec<Option<f32>>> BoardStream for Scripted<F> {
-    fn take(&mut self, _: Duration) -> Vec<LinkEvent> {
-        std::thread::sleep(Duration::from_millis(2));
-        self.t_s += 1.0;
-        let counts = (self.counts)();
-        let time = |k: u32| self.t_s + 0.02 * f64::from(k);
-        let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None };
-        (0..50).map(|k| LinkEvent::Heard(Heard::Reading(reading(time(k))))).collect()
-    }
-
-    fn status(&self) -> LinkStatus {
-        listening(Board::default(), Cadence::default(), self.t_s)
-    }
-
-    fn now_s(&self) -> f64 {
-        self.t_s
-    }
-
-    fn send(&mut self, _: &str) -> Result<(), SendError> {
-        Ok(())
-    }
-
-    fn console(&self) -> Vec<ConsoleLine> {
-        Vec::new()
-    }
-
-    fn is_over(&self) -> bool {
-        false
-    }
-}
-
-/// What was heard once, and silence behind it.
-pub(crate) struct HeardOnce {
-    events: Vec<LinkEvent>,
+/// A board whose events a test makes up: those of the next look at it, and the time by then (s).
+pub(crate) struct MadeUp<F> {
+    next: F,
     t_s: f64,
 }
 
-impl HeardOnce {
-    /// Three seconds of strips that bend and pads that are pressed, at 50 Hz, of which eight tenths are missing.
-    pub(crate) fn with_a_gap() -> Self {
-        let reading = |k: u32| {
-            let t_s = 0.02 * f64::from(k);
-            let wave = (std::f64::consts::PI * t_s / 3.0).sin() as f32;
-            let counts = [1420.0 + 500.0 * wave, 1400.0 + 450.0 * wave, 900.0 * wave, 700.0 * wave].map(Some).to_vec();
-            LinkEvent::Heard(Heard::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }))
-        };
-        let gap = Gap { from_s: 1.0, to_s: 1.8, lost: Some(39), cause: "the board was unplugged".to_owned() };
-        let events = (0..=50).map(reading).chain([LinkEvent::Heard(Heard::Gap(gap))]).chain((90..=150).map(reading));
-        Self { events: events.collect(), t_s: 3.0 }
-    }
+/// Fifty readings of a second at a time, all alike.
+pub(crate) fn alike(counts: impl Fn() -> Vec<Option<f32>>) -> MadeUp<impl FnMut(Duration) -> (f64, Vec<LinkEvent>)> {
+    let mut t_s = 0.0;
+    let next = move |_| {
+        std::thread::sleep(Duration::from_millis(2));
+        t_s += 1.0;
+        let counts = counts();
+        (t_s, (0..50).map(|k| reading(t_s + 0.02 * f64::from(k), counts.clone())).collect())
+    };
+    MadeUp { next, t_s: 0.0 }
 }
 
-impl BoardStream for HeardOnce {
-    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
-        if self.events.is_empty() {
+/// Three seconds of strips that bend and pads that are pressed, at 50 Hz, of which eight tenths are missing; and silence
+/// behind them.
+pub(crate) fn once_with_a_gap() -> MadeUp<impl FnMut(Duration) -> (f64, Vec<LinkEvent>)> {
+    let sample = |k: u32| {
+        let t_s = 0.02 * f64::from(k);
+        let wave = (std::f64::consts::PI * t_s / 3.0).sin() as f32;
+        reading(t_s, [1420.0 + 500.0 * wave, 1400.0 + 450.0 * wave, 900.0 * wave, 700.0 * wave].map(Some).to_vec())
+    };
+    let gap = Gap { from_s: 1.0, to_s: 1.8, lost: Some(39), cause: "the board was unplugged".to_owned() };
+    let gap = LinkEvent::Heard(Heard::Gap(gap));
+    let mut events: Vec<LinkEvent> = (0..=50).map(sample).chain([gap]).chain((90..=150).map(sample)).collect();
+    let next = move |patience| {
+        if events.is_empty() {
             std::thread::sleep(patience);
         }
-        std::mem::take(&mut self.events)
+        (3.0, std::mem::take(&mut events))
+    };
+    MadeUp { next, t_s: 3.0 }
+}
+
+fn reading(t_s: f64, counts: Vec<Option<f32>>) -> LinkEvent {
+    LinkEvent::Heard(Heard::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }))
+}
+
+impl<F: FnMut(Duration) -> (f64, Vec<LinkEvent>)> BoardStream for MadeUp<F> {
+    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
+        let (t_s, events) = (self.next)(patience);
+        self.t_s = t_s;
+        events
     }
 
     fn status(&self) -> LinkStatus {
