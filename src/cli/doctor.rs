@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::link;
-use super::terminal::{note, say, say_json, table};
+use super::terminal::{note, say, say_json, table, typed_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_core::board::KNOWN_AFTER;
 use palpate_core::doctor::{
@@ -12,11 +12,9 @@ use palpate_core::doctor::{
 use palpate_core::rig::serial::{Baud, LinkEvent, LinkOptions};
 use palpate_core::wire::Heard;
 use serde::Serialize;
-use std::io::BufRead as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Arguments of `palpate doctor`.
@@ -103,20 +101,6 @@ struct Crosstalk<'a> {
 /// How long the board may be silent before the test is given up.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// Says when Enter is pressed, for as long as anybody is there to press it.
-fn enter_keys() -> Result<Receiver<()>, Failure> {
-    let (told, keys) = channel();
-    // Ends with the program: a read of the keyboard cannot be interrupted.
-    std::thread::Builder::new().name("keys".to_owned()).spawn(move || {
-        for _line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if told.send(()).is_err() {
-                return;
-            }
-        }
-    })?;
-    Ok(keys)
-}
-
 /// Moves one sensor after the other, by the user's hands.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
     // Nobody moves what was captured long ago.
@@ -125,7 +109,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
     let (mut test, mut told) = (None, String::new());
     let (mut heard, mut newest) = (0, Instant::now());
-    let keys = enter_keys()?;
+    let keys = typed_lines()?;
     while !stop.load(Ordering::Relaxed) && !link.is_over() {
         let events = link.take(Duration::from_millis(50));
         let board = link.status().board;
@@ -138,10 +122,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
             }
             let test = match &mut test {
                 Some(test) => test,
-                empty @ None => empty.insert(CrosstalkTest::new(&board).ok_or_else(|| {
-                    let has = board.channels.join(", ");
-                    format!("crosstalk is seen between sensors of both fingers; the board has {has}")
-                })?),
+                empty @ None => empty.insert(CrosstalkTest::new(&board)?),
             };
             test.see(&board);
             test.feed(&reading);
@@ -152,7 +133,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
                 told = instruction;
             }
         }
-        if let (Ok(()), Some(test)) = (keys.try_recv(), &mut test) {
+        if let (Ok(_enter), Some(test)) = (keys.try_recv(), &mut test) {
             test.skip();
         }
         if test.as_ref().is_some_and(|test: &CrosstalkTest| test.source().is_none()) {

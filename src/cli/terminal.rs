@@ -2,7 +2,8 @@
 
 use super::Failure;
 use std::error::Error;
-use std::io::{ErrorKind, IsTerminal as _, Write};
+use std::io::{BufRead as _, ErrorKind, IsTerminal as _, Write};
+use std::sync::mpsc::{Receiver, channel};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
 use tracing_subscriber::util::SubscriberInitExt as _;
@@ -27,6 +28,20 @@ pub(super) fn warn(line: &str) {
 /// Prints what is going on, or what to do next, beside the results.
 pub(super) fn note(line: &str) {
     let _unheard = writeln!(std::io::stderr(), "{line}");
+}
+
+/// The lines that are typed, as they come; none any more once nobody is there to type.
+pub(super) fn typed_lines() -> Result<Receiver<String>, Failure> {
+    let (told, lines) = channel();
+    // Ends with the program: a read of the keyboard cannot be interrupted.
+    std::thread::Builder::new().name("keys".to_owned()).spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if told.send(line).is_err() {
+                return;
+            }
+        }
+    })?;
+    Ok(lines)
 }
 
 /// Shows what the program itself logs as a warning or worse on standard error; libraries keep their thoughts to

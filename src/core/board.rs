@@ -31,6 +31,11 @@ impl Sensor {
         }
     }
 
+    /// The sensor whose channel has such a name; see [`Sensor::is_called`].
+    pub fn called(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|sensor| sensor.is_called(name))
+    }
+
     /// True for the names that boards may give its channel: case, blanks, hyphens and underscores say nothing.
     pub fn is_called(self, name: &str) -> bool {
         let letters = name.chars().filter(|c| !" -_".contains(*c)).map(|c| c.to_ascii_lowercase());

@@ -3,7 +3,7 @@
 
 use super::super::Failure;
 use super::super::link;
-use super::super::terminal::{note, warn};
+use super::super::terminal::{note, typed_lines, warn};
 use super::CalibrateArguments;
 use palpate_core::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
 use palpate_core::recording::Store;
@@ -11,7 +11,7 @@ use palpate_core::rig::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_core::sensing::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
 use palpate_core::wire::Heard;
 use std::collections::VecDeque;
-use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
@@ -158,17 +158,7 @@ impl Bench {
         let path = port.map(Path::to_owned);
         let link =
             link::open(&LinkOptions { path, replay_speed, ..LinkOptions::default() }, link::USUAL_WAIT_S, || false)?;
-        let (told, keys) = channel();
-        if !hands_free {
-            // Ends with the program: a read of the keyboard cannot be interrupted.
-            std::thread::Builder::new().name("keys".to_owned()).spawn(move || {
-                for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-                    if told.send(line).is_err() {
-                        return;
-                    }
-                }
-            })?;
-        }
+        let keys = if hands_free { channel().1 } else { typed_lines()? };
         Ok(Self {
             link,
             keys,

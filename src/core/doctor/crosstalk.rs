@@ -89,12 +89,15 @@ struct Moving {
 }
 
 impl CrosstalkTest {
-    /// Begins with a board; none where it has not got a sensor of each finger.
-    pub fn new(board: &Board) -> Option<Self> {
+    /// Begins with a board; refuses one that has not got a sensor of each finger, in a sentence.
+    pub fn new(board: &Board) -> Result<Self, String> {
         let sensors: Vec<(Sensor, usize)> =
             Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, board.channel_of(sensor)?))).collect();
-        let both = [0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side));
-        both.then(|| Self {
+        if ![0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
+            let has = board.channels.join(", ");
+            return Err(format!("crosstalk is seen between sensors of both fingers; the board has {has}"));
+        }
+        Ok(Self {
             sensors,
             scale: f64::from(board.full_scale) / 4095.0,
             at: 0,
@@ -467,6 +470,6 @@ mod tests {
         assert_eq!(hand.test.summary(), ["Not moved: left flex strip, right flex strip, left pad, right pad"]);
         assert!(!hand.test.is_sound());
         let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
-        assert!(CrosstalkTest::new(&one).is_none(), "nothing could be watched");
+        assert!(CrosstalkTest::new(&one).is_err(), "nothing could be watched");
     }
 }

@@ -80,7 +80,7 @@ const LARGEST_COUNTER: f64 = 9.0e15;
 
 /// True where two names are those of one channel.
 fn is_same_channel(a: &str, b: &str) -> bool {
-    a.eq_ignore_ascii_case(b) || Sensor::ALL.iter().any(|sensor| sensor.is_called(a) && sensor.is_called(b))
+    a.eq_ignore_ascii_case(b) || Sensor::called(a).is_some_and(|sensor| sensor.is_called(b))
 }
 
 impl Decoder {
@@ -254,8 +254,7 @@ impl Reader {
     /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
     fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
-        let is_known =
-            |name: &String| !Role::is_channel(name) || Sensor::ALL.iter().any(|sensor| sensor.is_called(name));
+        let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
         if names.first().is_some_and(is_known) {
             self.header(names, line, arrived_s, heard);
         }
@@ -316,8 +315,7 @@ impl Reader {
     }
 
     fn find_sensors(&mut self) {
-        let sensor = |name: &String| Sensor::ALL.into_iter().find(|sensor| sensor.is_called(name));
-        self.sensors = self.channels.iter().map(sensor).collect();
+        self.sensors = self.channels.iter().map(|name| Sensor::called(name)).collect();
     }
 
     fn reading(&mut self, line: &Candidate, heard: &mut Vec<Heard>) {

@@ -279,7 +279,7 @@ fn header(texts: &[&str], separated: bool) -> Option<Vec<String>> {
 
 /// True where one of the names is that of a gripper's sensor.
 pub(super) fn names_a_sensor(names: &[String]) -> bool {
-    names.iter().any(|name| Sensor::ALL.iter().any(|sensor| sensor.is_called(name)))
+    names.iter().any(|name| Sensor::called(name).is_some())
 }
 
 /// `name:value`, or `name:time:value` with the time in ms; a unit and flags may follow.

@@ -158,7 +158,7 @@ impl LinkStatus {
             };
             remarks.push(text.to_owned());
         }
-        let sensors = self.units.iter().filter(|(name, _)| Sensor::ALL.iter().any(|sensor| sensor.is_called(name)));
+        let sensors = self.units.iter().filter(|(name, _)| Sensor::called(name).is_some());
         remarks.extend(sensors.map(|(name, unit)| {
             format!("{name} comes in {unit}, and is taken for counts: print what analogRead gives, without a unit")
         }));

@@ -52,10 +52,7 @@ impl Crossing {
         }
         let test = match &mut self.test {
             Some(test) => test,
-            empty @ None => empty.insert(CrosstalkTest::new(board).ok_or_else(|| {
-                let has = board.channels.join(", ");
-                format!("crosstalk is seen between sensors of both fingers; the board has {has}")
-            })?),
+            empty @ None => empty.insert(CrosstalkTest::new(board)?),
         };
         test.see(board);
         test.feed(reading);
