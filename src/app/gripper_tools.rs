@@ -1,6 +1,6 @@
 //! The threads that help with the real gripper, each behind a panel of its own.
 
-use palpate_core::workers::{
+use palpate_lab::workers::{
     Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish,
     TrainedModel, Trainer, Wake,
 };

@@ -6,22 +6,24 @@ use super::recognise::{StageOne, load_model, named};
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json, warn};
 use glam::Vec2;
-use palpate_core::drawing::Camera;
-use palpate_core::grasping::{GraspSummary, Identification, PoseSampler, grasp};
-use palpate_core::gripper::Phase;
-use palpate_core::objects::{EMPTY, ObjectModel, catalogue};
-use palpate_core::palette::Theme;
-use palpate_core::picture::{PictureView, Stage};
-use palpate_core::recognition::{StopReason, StopRule};
-use palpate_core::recording::{TrialId, file_name_of};
-use palpate_core::scene::{Between, Scene};
-use palpate_core::trial::Trial;
-use palpate_core::units::{mm, three_digits};
+use palpate_geometry::drawing::Camera;
+use palpate_geometry::palette::Theme;
+use palpate_geometry::units::{mm, three_digits};
+use palpate_lab::grasping::{GraspSummary, Identification, grasp};
+use palpate_lab::picture::{PictureView, Stage};
+use palpate_learn::{StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
-use rand::RngExt;
-use rand::SeedableRng;
+use palpate_sim::gripper::Phase;
+use palpate_sim::objects::{EMPTY, ObjectModel, catalogue};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::{Between, Scene};
+use palpate_store::file_name_of;
+use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::TrialId;
+use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::hash::{BuildHasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -100,7 +102,7 @@ struct Told {
 const SIZE: [u32; 2] = [1280, 800];
 
 pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let seed = arguments.seed.unwrap_or_else(|| rand::rng().random_range(0..1_000_000));
+    let seed = arguments.seed.unwrap_or_else(|| RandomState::new().hash_one(0) % 1_000_000);
     let random = (arguments.object.is_none() && arguments.scene.scene.is_none()).then(|| random_object(seed));
     let mut nominal = arguments.scene.scene(arguments.object.as_deref().or(random.as_deref()))?;
     if arguments.as_released {

@@ -22,14 +22,13 @@ mod study;
 mod terminal;
 mod train;
 mod trials;
-mod workshop;
 
 use crate::app::{WindowOptions, open_window};
 use clap::{CommandFactory, Parser, Subcommand};
-use palpate_core::objects::{EMPTY, anchored, catalogue};
-use palpate_core::recognition::Model;
-use palpate_core::recording::Store;
-use palpate_core::scene::Scene;
+use palpate_learn::Model;
+use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_sim::scene::Scene;
+use palpate_store::Store;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -94,9 +93,6 @@ enum Command {
     Bench(bench::BenchArguments),
     /// Run an experiment and print what came out.
     Study(study::StudyArguments),
-    /// Write the built-in objects anew.
-    #[command(hide = true)]
-    Workshop(workshop::WorkshopArguments),
 }
 
 /// Opens the window on an object.
@@ -180,7 +176,6 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study)?,
-        Some(Command::Workshop(workshop)) => workshop::run(workshop, store)?,
         None => window(arguments)?,
     }
     Ok(ExitCode::SUCCESS)

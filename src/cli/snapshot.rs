@@ -4,14 +4,14 @@ use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::say;
 use glam::Vec2;
-use palpate_core::drawing::{Camera, DrawList, StandardView};
-use palpate_core::grasping::prepare;
-use palpate_core::palette::Theme;
-use palpate_core::picture::{PictureView, Stage};
-use palpate_core::recording::TrialId;
-use palpate_core::scene::Scene;
-use palpate_core::trial::Frame;
+use palpate_geometry::drawing::{Camera, DrawList, StandardView};
+use palpate_geometry::palette::Theme;
+use palpate_lab::grasping::prepare;
+use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use palpate_sim::frame::Frame;
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate snapshot`.

@@ -1,9 +1,9 @@
 //! A recogniser that says what its script says, whatever it is given: the window can be tested without depending on
 //! what a trained model happens to answer.
 
-use palpate_core::recognition::{
+use palpate_lab::datasets::labels_of_catalogue;
+use palpate_learn::{
     Arrays, DataCard, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser, Sequence, StopRule, Verdict,
-    labels_of_catalogue,
 };
 use std::sync::Arc;
 

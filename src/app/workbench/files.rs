@@ -4,11 +4,11 @@ use super::{Workbench, ghost_of};
 use crate::app::actions::{Answer, Message};
 use crate::app::files::{Ask, ask};
 use glam::Vec2;
-use palpate_core::objects::anchored;
-use palpate_core::picture::PictureView;
-use palpate_core::scene::Scene;
-use palpate_core::workers::{GhostGrasp, Snapshot};
+use palpate_lab::picture::PictureView;
+use palpate_lab::workers::{GhostGrasp, Snapshot};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use palpate_sim::objects::anchored;
+use palpate_sim::scene::Scene;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

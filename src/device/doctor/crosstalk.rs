@@ -1,0 +1,475 @@
+//! Whether one sensor bleeds into another: each is moved in turn, alone, while the sensors of the other finger are watched,
+//! which nobody touches. Those of the same finger say nothing here: bending a finger presses on its pad.
+//!
+//! ```text
+//!   leave both fingers alone   -> where every sensor rests
+//!   press the left pad         -> share of its change that the right strip and the right pad show
+//!   ...                           for every sensor of the board
+//! ```
+//!
+//! What a converter's multiplexer leaves behind follows the other sensor at once and in proportion. What moves without
+//! being in step with it was touched.
+
+use palpate_tactile::board::{Board, Reading, Sensor};
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// Shares from this one on are told: a pad of 1 N at 1 % is 18 counts of 4095, and a degree of bend 10.
+const WORTH_TELLING: f64 = 0.01;
+/// Counts of 4095 that such a share must come to: four deviations of the usual noise.
+const LEAST_COUNTS: f64 = 8.0;
+/// Correlation from which on two sensors move in step.
+const IN_STEP: f64 = 0.8;
+/// A sensor that is to be moved must move by this much (counts of 4095): a press of 0.1 N, a bend of ten degrees.
+const MOVES: f64 = 150.0;
+/// It is back when it is this near to its rest (counts of 4095), or by this share of how far it was away: strips creep.
+const BACK: f64 = 50.0;
+const BACK_SHARE: f64 = 0.25;
+/// It must be back for this long (s).
+const BACK_S: f64 = 0.4;
+/// At rest no sensor changes by more than this (counts of 4095) for [`REST_S`] (s).
+const STILL: f64 = 30.0;
+const REST_S: f64 = 1.0;
+/// After this time (s) a sensor that does not rest is no longer watched.
+const PATIENCE_S: f64 = 6.0;
+/// Readings that a rest must have.
+const LEAST_READINGS: usize = 10;
+
+/// What one sensor does to another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bleed {
+    /// The one that was moved.
+    pub from: Sensor,
+    /// The one that was watched.
+    pub into: Sensor,
+    /// Change of the second over that of the first.
+    pub share: f64,
+    /// How much the second changed by it, at most (counts).
+    pub counts: f64,
+    /// The second moved at all.
+    pub moved: bool,
+    /// It is crosstalk: the second is in step with the first, by more than noise.
+    pub bleeds: bool,
+}
+
+/// The test, step by step. It knows no port: readings go in, instructions come out.
+#[derive(Clone, Debug)]
+pub struct CrosstalkTest {
+    /// Sensors of the board and their channels, in the order in which they are moved.
+    sensors: Vec<(Sensor, usize)>,
+    /// Counts of this converter for one of 4095.
+    scale: f64,
+    at: usize,
+    /// Times (s) and counts of the last second, while everything rests.
+    window: VecDeque<(f64, [Option<f64>; 4])>,
+    /// Since when a rest is waited for (s), and which sensor keeps it from coming.
+    resting: Option<f64>,
+    restless: Option<Sensor>,
+    /// Those that were waited for in vain.
+    flickers: [bool; 4],
+    moving: Option<Moving>,
+    found: Vec<Bleed>,
+    /// Those that could not be watched, and while which was moved.
+    unwatched: Vec<[Sensor; 2]>,
+    left_out: Vec<Sensor>,
+}
+
+/// A sensor is being moved.
+#[derive(Clone, Debug)]
+struct Moving {
+    rest: [Option<f64>; 4],
+    /// Sums over the readings: of x², x y and y² for each watched sensor y.
+    sums: [[f64; 3]; 4],
+    /// Largest change of each sensor (counts).
+    others: [f64; 4],
+    /// Largest change so far, with its sign (counts).
+    most: f64,
+    /// Since when it is back (s).
+    back: Option<f64>,
+}
+
+impl CrosstalkTest {
+    /// Begins with a board; refuses one that has not got a sensor of each finger, in a sentence.
+    pub fn new(board: &Board) -> Result<Self, String> {
+        let sensors: Vec<(Sensor, usize)> =
+            Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, board.channel_of(sensor)?))).collect();
+        if ![0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
+            let has = board.channels.join(", ");
+            return Err(format!("crosstalk is seen between sensors of both fingers; the board has {has}"));
+        }
+        Ok(Self {
+            sensors,
+            scale: f64::from(board.full_scale) / 4095.0,
+            at: 0,
+            window: VecDeque::new(),
+            resting: None,
+            restless: None,
+            flickers: [false; 4],
+            moving: None,
+            found: Vec::new(),
+            unwatched: Vec::new(),
+            left_out: Vec::new(),
+        })
+    }
+
+    /// Learns more of the board.
+    pub fn see(&mut self, board: &Board) {
+        self.scale = f64::from(board.full_scale) / 4095.0;
+    }
+
+    /// The sensor that is to be moved; none when all have been.
+    pub fn source(&self) -> Option<Sensor> {
+        self.sensors.get(self.at).map(|(sensor, _)| *sensor)
+    }
+
+    /// Number of the step, from 1, and how many there are.
+    pub fn step(&self) -> [usize; 2] {
+        [(self.at + 1).min(self.sensors.len()), self.sensors.len()]
+    }
+
+    /// What to do, in words.
+    pub fn instruction(&self) -> String {
+        let Some(sensor) = self.source() else { return "that was all".to_owned() };
+        let (side, other) = if side_of(sensor) == 0 { ("left", "right") } else { ("right", "left") };
+        match &self.moving {
+            None => match self.restless {
+                None => "leave both fingers alone".to_owned(),
+                Some(restless) => format!("leave both fingers alone: the {} does not rest", restless.label()),
+            },
+            Some(moving) if moving.most.abs() >= MOVES * self.scale => format!("let go of the {side} finger"),
+            Some(_) if sensor.is_flex() => {
+                format!("bend the {side} finger by hand and let go; do not touch the {other} one")
+            }
+            Some(_) => format!("press the {side} pad firmly and let go; do not touch the {other} finger"),
+        }
+    }
+
+    /// Takes in a reading.
+    pub fn feed(&mut self, reading: &Reading) {
+        let Some(source) = self.source() else { return };
+        let mut counts = [None; 4];
+        for (sensor, channel) in &self.sensors {
+            let count = reading.counts.get(*channel).copied().flatten().filter(|count| count.is_finite());
+            counts[*sensor as usize] = count.map(f64::from);
+        }
+        match &mut self.moving {
+            None => self.rest(reading.t_s, counts),
+            Some(moving) => {
+                if moving.add(source, &counts, reading.t_s, self.scale) {
+                    let found = moving.found(source, self.scale);
+                    let other = |sensor: &Sensor| side_of(*sensor) != side_of(source);
+                    let watched = |sensor: &Sensor| found.iter().any(|bleed| bleed.into == *sensor);
+                    let others = self.sensors.iter().map(|(sensor, _)| *sensor).filter(other);
+                    self.unwatched.extend(others.filter(|sensor| !watched(sensor)).map(|into| [source, into]));
+                    self.found.extend(found);
+                    self.next();
+                }
+            }
+        }
+    }
+
+    /// Leaves out the sensor that is to be moved.
+    pub fn skip(&mut self) {
+        self.left_out.extend(self.source());
+        self.next();
+    }
+
+    /// What was found so far.
+    pub fn found(&self) -> &[Bleed] {
+        &self.found
+    }
+
+    /// True where every sensor was moved and nothing bleeds into anything.
+    pub fn is_sound(&self) -> bool {
+        let all = self.left_out.is_empty() && self.unwatched.is_empty();
+        self.source().is_none() && all && !self.found.iter().any(|bleed| bleed.bleeds)
+    }
+
+    /// What it comes to, in sentences: what bleeds into what, and what to do about it; or that nothing does.
+    pub fn summary(&self) -> Vec<String> {
+        let mut told: Vec<String> = self.found.iter().filter(|bleed| bleed.bleeds).map(Bleed::sentence).collect();
+        if !told.is_empty() {
+            told.push(
+                "The converter's multiplexer does not settle behind the high resistance of a divider: solder 100 nF from each \
+                 pin to ground, and throw away the first conversion of each channel, as our firmware does"
+                    .to_owned(),
+            );
+        } else if !self.found.is_empty() {
+            let percent = 100.0 * WORTH_TELLING;
+            told.push(format!("No sensor follows one of the other finger by {percent:.0} % or more"));
+        }
+        let touched = self.found.iter().filter(|bleed| bleed.moved && !bleed.bleeds);
+        told.extend(touched.map(|bleed| {
+            let (into, from) = (bleed.into.label(), bleed.from.label());
+            format!("The {into} moved while the {from} was moved, but not in step with it: was it touched? Test again")
+        }));
+        told.extend(self.unwatched.iter().map(|[from, into]| {
+            format!(
+                "The {} did not rest or has no numbers, so that nothing is known of what the {} does to it",
+                into.label(),
+                from.label()
+            )
+        }));
+        let asked = self.left_out.iter().map(|sensor| sensor.label());
+        let left_out = asked.chain(self.sensors[self.at..].iter().map(|(sensor, _)| sensor.label()));
+        let left_out: Vec<&str> = left_out.collect();
+        if !left_out.is_empty() {
+            told.push(format!("Not moved: {}", left_out.join(", ")));
+        }
+        told
+    }
+
+    fn next(&mut self) {
+        self.at += 1;
+        self.moving = None;
+        (self.resting, self.restless, self.flickers) = (None, None, [false; 4]);
+        self.window.clear();
+    }
+
+    fn rest(&mut self, t_s: f64, counts: [Option<f64>; 4]) {
+        // A clock that was set back begins anew.
+        if self.window.back().is_some_and(|(last, _)| t_s < *last) {
+            self.window.clear();
+        }
+        self.window.push_back((t_s, counts));
+        // Of a slow board it takes longer to see enough.
+        while self.window.len() > LEAST_READINGS && self.window.front().is_some_and(|(first, _)| *first < t_s - REST_S)
+        {
+            self.window.pop_front();
+        }
+        let waited_s = t_s - *self.resting.get_or_insert(t_s);
+        let since = self.window.front().map_or(t_s, |(first, _)| *first);
+        // A window is full when one more period would be too much.
+        if t_s - since < 0.95 * REST_S || self.window.len() < LEAST_READINGS {
+            return;
+        }
+        let Some(source) = self.source() else { return };
+        let mut rest = [None; 4];
+        self.restless = None;
+        for (sensor, rest) in Sensor::ALL.into_iter().zip(&mut rest) {
+            let place = sensor as usize;
+            let counts: Vec<f64> = self.window.iter().filter_map(|(_, counts)| counts[place]).collect();
+            let least = counts.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = counts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if most - least > STILL * self.scale {
+                // One that flickers for ever shall not keep the others from being looked at.
+                self.flickers[place] |= waited_s >= PATIENCE_S;
+                if !self.flickers[place] || sensor == source {
+                    self.restless = Some(sensor);
+                }
+                continue;
+            }
+            *rest = (!counts.is_empty()).then(|| counts.iter().sum::<f64>() / counts.len() as f64);
+        }
+        let is_read = self.window.iter().any(|(_, counts)| counts[source as usize].is_some());
+        if !is_read {
+            return self.skip();
+        }
+        if self.restless.is_some() {
+            return;
+        }
+        self.window.clear();
+        self.moving = Some(Moving { rest, sums: [[0.0; 3]; 4], others: [0.0; 4], most: 0.0, back: None });
+    }
+}
+
+impl Moving {
+    /// Takes in counts; true when the sensor has been moved and is back.
+    fn add(&mut self, source: Sensor, counts: &[Option<f64>; 4], t_s: f64, scale: f64) -> bool {
+        let change = |place: usize| Some(counts[place]? - self.rest[place]?);
+        let Some(x) = change(source as usize) else { return false };
+        if x.abs() > self.most.abs() {
+            self.most = x;
+        }
+        for (place, sums) in self.sums.iter_mut().enumerate() {
+            if let (Some(count), Some(rest)) = (counts[place], self.rest[place]) {
+                let most = &mut self.others[place];
+                *most = most.max((count - rest).abs());
+            }
+            // While it rests there is only noise and creep to be seen.
+            if x.abs() > BACK * scale
+                && let (Some(count), Some(rest)) = (counts[place], self.rest[place])
+            {
+                let y = count - rest;
+                for (sum, term) in sums.iter_mut().zip([x * x, x * y, y * y]) {
+                    *sum += term;
+                }
+            }
+        }
+        let near = (BACK * scale).max(BACK_SHARE * self.most.abs());
+        if self.most.abs() < MOVES * scale || x.abs() > near {
+            self.back = None;
+            return false;
+        }
+        t_s - *self.back.get_or_insert(t_s) >= BACK_S
+    }
+
+    /// What the sensors of the other finger did meanwhile.
+    fn found(&self, source: Sensor, scale: f64) -> Vec<Bleed> {
+        let watched = |sensor: &Sensor| side_of(*sensor) != side_of(source) && self.rest[*sensor as usize].is_some();
+        let bleed = |into: Sensor| {
+            let [xx, xy, yy] = self.sums[into as usize];
+            let share = if xx > 0.0 { xy / xx } else { 0.0 };
+            let counts = share * self.most;
+            let in_step = xy.abs() >= IN_STEP * (xx * yy).sqrt();
+            let bleeds = in_step && share.abs() >= WORTH_TELLING && counts.abs() >= LEAST_COUNTS * scale;
+            let moved = self.others[into as usize] > STILL * scale;
+            Bleed { from: source, into, share, counts, moved, bleeds }
+        };
+        Sensor::ALL.into_iter().filter(watched).map(bleed).collect()
+    }
+}
+
+impl Bleed {
+    /// In a sentence.
+    pub fn sentence(&self) -> String {
+        let (into, from) = (self.into.label(), self.from.label());
+        format!("The {into} shows {:.1} % of what the {from} does: {:+.0} counts", 100.0 * self.share, self.counts)
+    }
+}
+
+/// The finger of a sensor: 0 for the left one.
+fn side_of(sensor: Sensor) -> usize {
+    sensor as usize % 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hand that obeys, seen through a converter by which each channel takes a share of the one before it.
+    struct Hand {
+        test: CrosstalkTest,
+        t_s: f64,
+        share: f64,
+        /// Moves the right pad by itself while the left one is pressed.
+        clumsy: bool,
+    }
+
+    impl Hand {
+        fn new(share: f64) -> Self {
+            let test = CrosstalkTest::new(&Board::default()).expect("has both fingers");
+            Self { test, t_s: 0.0, share, clumsy: false }
+        }
+
+        fn feed(&mut self, mut counts: [f64; 4]) {
+            for k in (1..4).rev() {
+                counts[k] += self.share * (counts[k - 1] - counts[k]);
+            }
+            self.t_s += 0.02;
+            let noise = f64::from((self.t_s * 50.0).round() as i32 % 3 - 1);
+            let counts = counts.iter().map(|count| Some((count + noise) as f32)).collect();
+            self.test.feed(&Reading { t_s: self.t_s, arrived_s: self.t_s, seq: None, counts, line_bar: None });
+        }
+
+        fn rest(&mut self, seconds: f64) {
+            for _ in 0..(50.0 * seconds) as u32 {
+                self.feed([1420.0, 1400.0, 0.0, 0.0]);
+            }
+        }
+
+        /// Does what is asked for, to the end.
+        fn obey(&mut self) {
+            while let Some(sensor) = self.test.source() {
+                assert_eq!(self.test.instruction(), "leave both fingers alone");
+                self.rest(1.1);
+                assert!(self.test.instruction().contains("let go; do not touch"), "{}", self.test.instruction());
+                for k in 0..100u32 {
+                    let wave = (std::f64::consts::PI * f64::from(k) / 100.0).sin();
+                    let mut counts = [1420.0, 1400.0, 0.0, 0.0];
+                    counts[sensor as usize] += 600.0 * wave;
+                    if self.clumsy && sensor == Sensor::PadLeft && k > 80 {
+                        counts[3] += 40.0;
+                    }
+                    self.feed(counts);
+                }
+                self.rest(0.6);
+            }
+        }
+    }
+
+    #[test]
+    fn each_pair_that_bleeds_is_found_and_no_other() {
+        let mut hand = Hand::new(0.1);
+        assert_eq!(hand.test.step(), [1, 4]);
+        hand.obey();
+        let bleeds: Vec<(Sensor, Sensor, i32)> = hand
+            .test
+            .found()
+            .iter()
+            .filter(|bleed| bleed.bleeds)
+            .map(|bleed| (bleed.from, bleed.into, (1000.0 * bleed.share).round() as i32))
+            .collect();
+        use Sensor::{FlexLeft, FlexRight, PadLeft, PadRight};
+        // Of the change of the channel before, which keeps 90 % of its own.
+        assert_eq!(bleeds, [(FlexLeft, FlexRight, 100), (FlexRight, PadLeft, 111), (PadLeft, PadRight, 111)]);
+        assert_eq!(hand.test.found().len(), 8);
+        let told = hand.test.summary();
+        assert!(told.len() == 4 && told[0].contains("right flex strip shows 10.0 % of what the left flex strip does"));
+        assert!(told[3].contains("100 nF"), "{told:?}");
+    }
+
+    #[test]
+    fn a_sound_board_and_a_clumsy_hand_are_no_crosstalk() {
+        for clumsy in [false, true] {
+            let mut hand = Hand { clumsy, ..Hand::new(0.0) };
+            hand.obey();
+            let told = hand.test.summary();
+            let sound = "No sensor follows one of the other finger by 1 % or more";
+            let touched =
+                "The right pad moved while the left pad was moved, but not in step with it: was it touched? Test again";
+            assert_eq!(told, if clumsy { vec![sound, touched] } else { vec![sound] }, "{:?}", hand.test.found());
+            assert!(hand.test.is_sound());
+        }
+    }
+
+    #[test]
+    fn a_small_share_is_found_though_the_hand_is_slow() {
+        let mut hand = Hand::new(0.015);
+        while let Some(sensor) = hand.test.source() {
+            hand.rest(1.1);
+            // Half a minute goes by, in which a strip creeps.
+            for k in 0..1500u32 {
+                hand.feed([1420.0, 1400.0 + f64::from(k) / 500.0, 0.0, 0.0]);
+            }
+            for _ in 0..50 {
+                let mut counts = [1420.0, 1403.0, 0.0, 0.0];
+                counts[sensor as usize] += 1000.0;
+                hand.feed(counts);
+            }
+            hand.rest(0.6);
+        }
+        let bleeds: Vec<[Sensor; 2]> =
+            hand.test.found().iter().filter(|bleed| bleed.bleeds).map(|bleed| [bleed.from, bleed.into]).collect();
+        assert_eq!(bleeds.len(), 3, "{:?}", hand.test.found());
+    }
+
+    #[test]
+    fn one_that_flickers_or_says_nothing_does_not_hold_up_the_others() {
+        let mut test = CrosstalkTest::new(&Board::default()).expect("has both fingers");
+        for k in 0..500u32 {
+            let (t_s, flickers) = (0.02 * f64::from(k), if k % 2 == 0 { 300.0 } else { 0.0 });
+            let counts = vec![None, Some(1400.0), Some(0.0), Some(flickers)];
+            test.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None });
+        }
+        assert!(test.instruction().starts_with("bend the right finger"), "{}", test.instruction());
+        assert_eq!(test.summary().last().map(|told| told.starts_with("Not moved: left flex strip")), Some(true));
+    }
+
+    #[test]
+    fn what_does_not_rest_or_move_is_waited_for_and_may_be_left_out() {
+        let mut hand = Hand::new(0.0);
+        for k in 0..200 {
+            hand.feed([1420.0 + f64::from(k % 10) * 20.0, 1400.0, 0.0, 0.0]);
+        }
+        assert_eq!(hand.test.instruction(), "leave both fingers alone: the left flex strip does not rest");
+        hand.test.skip();
+        hand.rest(3.0);
+        assert!(hand.test.instruction().starts_with("bend the right finger"), "{}", hand.test.instruction());
+        assert_eq!((hand.test.step(), hand.test.found()), ([2, 4], &[][..]));
+        assert_eq!(hand.test.summary(), ["Not moved: left flex strip, right flex strip, left pad, right pad"]);
+        assert!(!hand.test.is_sound());
+        let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
+        assert!(CrosstalkTest::new(&one).is_err(), "nothing could be watched");
+    }
+}

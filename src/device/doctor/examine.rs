@@ -1,0 +1,46 @@
+//! One look at a port: open it, ask the board who it is, listen.
+
+use super::{Observations, Traces};
+use crate::serial::{LinkEvent, LinkOptions, SerialLink, is_running, list_ports};
+use crate::wire::Heard;
+use std::time::{Duration, Instant};
+
+/// How long events are waited for at a time.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// When the board is asked who it is: it may restart when the port is opened.
+const ASKED_AT: [Duration; 2] = [Duration::from_millis(300), Duration::from_millis(4500)];
+
+/// Opens a port and listens for a time. `goes_on` is asked again and again, and told how long it has listened (s); it ends the
+/// look early by saying no.
+pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(f64) -> bool) -> Observations {
+    let mut seen = Observations {
+        ports: list_ports(),
+        refused: None,
+        modem_manager: is_running("ModemManager"),
+        link: None,
+        listened_s: 0.0,
+        traces: Traces::default(),
+    };
+    let link = match SerialLink::open(options) {
+        Ok(link) => link,
+        Err(refused) => return Observations { refused: Some(refused), ..seen },
+    };
+    let began = Instant::now();
+    let mut asked = 0;
+    while began.elapsed() < listen && goes_on(began.elapsed().as_secs_f64()) && !link.is_over() {
+        if ASKED_AT.get(asked).is_some_and(|at| began.elapsed() >= *at) {
+            asked += 1;
+            // A board that cannot be told is told about by the checks.
+            let _told = link.send("?");
+        }
+        for event in link.take(PATIENCE) {
+            if let LinkEvent::Heard(Heard::Reading(reading)) = event {
+                seen.traces.add(&reading);
+            }
+        }
+    }
+    seen.listened_s = began.elapsed().as_secs_f64();
+    seen.link = Some(link.status());
+    seen
+}

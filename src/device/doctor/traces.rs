@@ -1,0 +1,139 @@
+//! What each channel did while it was listened to: its range, and how much it changes with the one that is read before it.
+
+use palpate_tactile::board::Reading;
+
+/// A channel that changes by more than this within [`WITHIN_S`] moves (counts): far more than noise, a few degrees of bend.
+const MOVES: f64 = 40.0;
+
+/// Changes are looked at over this time (s): a hand bends a finger in several times that.
+const WITHIN_S: f64 = 0.2;
+
+/// Changes that are remembered.
+const MOST_CHANGES: usize = 1000;
+
+/// One channel and how it changes with the one before it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// Readings with a number.
+    pub numbers: u64,
+    /// Readings without one.
+    pub without: u64,
+    /// Least count.
+    pub least: f64,
+    /// Largest count.
+    pub most: f64,
+    /// Least count over the count of the channel before it at that time.
+    least_share: f64,
+    /// Time (s), count of the channel before, and own count, from which changes are counted.
+    from: Option<[f64; 3]>,
+    /// Own change over that of the channel before, wherever that one moves.
+    slopes: Vec<f64>,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        let (least, most) = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { numbers: 0, without: 0, least, most, least_share: 0.0, from: None, slopes: Vec::new() }
+    }
+}
+
+impl Trace {
+    fn add(&mut self, t: f64, count: Option<f32>, before: Option<f32>) {
+        let Some(y) = count.map(f64::from) else {
+            self.without += 1;
+            self.from = None;
+            return;
+        };
+        self.numbers += 1;
+        self.most = self.most.max(y);
+        let is_least = y < self.least;
+        self.least = self.least.min(y);
+        let Some(x) = before.map(f64::from) else { return };
+        if is_least {
+            self.least_share = y / x;
+        }
+        let [since, from_x, from_y] = *self.from.get_or_insert([t, x, y]);
+        let moved = (x - from_x).abs() > MOVES;
+        if moved && self.slopes.len() < MOST_CHANGES {
+            self.slopes.push((y - from_y) / (x - from_x));
+        }
+        if moved || t - since >= WITHIN_S {
+            self.from = Some([t, x, y]);
+        }
+    }
+
+    /// Share of the channel before that it takes, if it does: at its least it reads that share, and now and then, when the
+    /// other moves and nothing else happens, it moves by about that share. A pad that something presses all the time reads one
+    /// too, but does not move with it; one that is pressed by a closing finger moves far more.
+    pub fn takes(&self) -> Option<f64> {
+        let share = self.least_share;
+        let like = |slope: &&f64| (**slope - share).abs() < 0.5 * share;
+        let alike = self.slopes.iter().filter(like).count();
+        let often = alike >= FEWEST && alike * 10 >= self.slopes.len();
+        (often && share.is_finite()).then_some(share)
+    }
+}
+
+/// Changes that must be alike.
+const FEWEST: usize = 4;
+
+/// All channels, in the order in which the board reads them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Traces {
+    /// One for each.
+    pub channels: Vec<Trace>,
+}
+
+impl Traces {
+    /// Takes in a reading.
+    pub fn add(&mut self, reading: &Reading) {
+        let width = reading.counts.len();
+        self.channels.resize(self.channels.len().max(width), Trace::default());
+        for (channel, trace) in self.channels.iter_mut().enumerate().take(width) {
+            let before = channel.checked_sub(1).and_then(|before| reading.counts[before]);
+            trace.add(reading.t_s, reading.counts[channel], before);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn traces(rows: impl Iterator<Item = [Option<f32>; 3]>) -> Traces {
+        let mut traces = Traces::default();
+        for counts in rows {
+            let reading = Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts: counts.to_vec(), line_bar: None };
+            traces.add(&reading);
+        }
+        traces
+    }
+
+    #[test]
+    fn a_channel_that_takes_a_fifth_of_the_one_before_is_seen_to() {
+        // Pressed meanwhile, while the one before it rests: that is not its doing.
+        let press = |k: u8| if (100..150).contains(&k) { 500.0 } else { 0.0 };
+        let bent = |k: u8| 1000.0 + 7.0 * f32::from(k.min(99));
+        let told = traces((0..200_u8).map(|k| [Some(bent(k)), Some(0.2 * bent(k) + press(k)), Some(50.0)]));
+        let share = told.channels[1].takes().expect("it does");
+        assert!((share - 0.2).abs() < 1e-4);
+        assert_eq!((told.channels[0].takes(), told.channels[2].takes()), (None, None));
+        assert_eq!((told.channels[0].least, told.channels[0].most), (1000.0, 1693.0));
+    }
+
+    #[test]
+    fn a_channel_that_is_held_or_goes_its_own_way_takes_nothing() {
+        let bent = |k: u8| 1000.0 + 7.0 * f32::from(k);
+        let told = traces((0..100_u8).map(|k| [Some(bent(k)), Some(300.0), Some(300.0 + 10.0 * f32::from(k))]));
+        assert_eq!((told.channels[1].takes(), told.channels[2].takes()), (None, None));
+        let closing = traces((0..100_u8).map(|k| [Some(bent(k)), Some(200.0 + 2.0 * bent(k)), None]));
+        assert_eq!(closing.channels[1].takes(), Some(2.2), "what no multiplexer does is left to the check");
+    }
+
+    #[test]
+    fn readings_without_a_number_are_counted_and_no_more() {
+        let told = traces((0..4_u8).map(|k| [Some(1.0), (k > 0).then_some(2.0), None]));
+        assert_eq!((told.channels[1].numbers, told.channels[1].without), (3, 1));
+        assert_eq!((told.channels[2].numbers, told.channels[2].without), (0, 4));
+    }
+}

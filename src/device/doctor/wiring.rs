@@ -1,0 +1,124 @@
+//! How the gripper's board is wired, and the sketch that runs on it: what a mender needs beside the findings. The files are
+//! those of `assets/firmware/due_gripper`, so that the program has them wherever it was installed.
+
+use palpate_tactile::board::Sensor;
+use palpate_tactile::electronics::{PadPart, StripPart};
+use std::fs;
+use std::io::{ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+/// Wiring, ports and lines of the board, as a page of Markdown.
+pub const WIRING_PAGE: &str = include_str!("../../../assets/firmware/due_gripper/README.md");
+
+/// Name of the sketch, and of its folder: Arduino wants them to be the same.
+pub const SKETCH: &str = "due_gripper";
+
+const SKETCH_FILES: [(&str, &str); 3] = [
+    ("due_gripper.ino", include_str!("../../../assets/firmware/due_gripper/due_gripper.ino")),
+    ("gripper_logic.h", include_str!("../../../assets/firmware/due_gripper/gripper_logic.h")),
+    ("README.md", WIRING_PAGE),
+];
+
+/// What must be known before anything is soldered.
+pub const WIRING_RULES: [&str; 2] = [
+    "The Due bears 3.3 V at its pins and no more: feed the dividers from its 3.3 V pin, never from 5 V.",
+    "100 nF from each pin to ground, at the pin: without it one channel bleeds into the next.",
+];
+
+/// A divider: what is between the pin and 3.3 V, and what between the pin and ground.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wire {
+    /// The pin.
+    pub pin: &'static str,
+    /// Its sensor.
+    pub sensor: Sensor,
+    /// To 3.3 V.
+    pub above: String,
+    /// To ground.
+    pub below: String,
+}
+
+/// The dividers of the four sensors.
+pub fn wires() -> [Wire; 4] {
+    let kilo = |ohm: f64| format!("{} kΩ", ohm * 1e-3);
+    let pins = ["A0", "A1", "A2", "A3"];
+    Sensor::ALL.map(|sensor| {
+        let (pin, part) = (pins[sensor as usize], sensor.label().to_owned());
+        let (above, below) = match sensor.is_flex() {
+            true => (kilo(StripPart::DIVIDER_OHM), part),
+            false => (part, kilo(PadPart::DIVIDER_OHM)),
+        };
+        Wire { pin, sensor, above, below }
+    })
+}
+
+/// Why the sketch could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SketchError {
+    /// Something else has that name, or the sketch was changed there.
+    #[error("\"{path}\" is there already and is another: it was left as it is. Choose another folder")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file system.
+    #[error("cannot write \"{path}\": {cause}. Choose a folder that you may write to")]
+    System {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: std::io::Error,
+    },
+}
+
+/// Writes the sketch into a folder, which is made where it is missing; which files it has. One that is there and is not
+/// the same is left as it is, and then nothing is written.
+pub fn write_sketch(folder: &Path) -> Result<Vec<PathBuf>, SketchError> {
+    fs::create_dir_all(folder).map_err(|cause| SketchError::System { path: folder.to_owned(), cause })?;
+    let files = SKETCH_FILES.map(|(name, text)| (folder.join(name), text));
+    let mut missing = Vec::new();
+    for (path, text) in &files {
+        match fs::read(path) {
+            Ok(there) if there == text.as_bytes() => {}
+            Ok(_) => return Err(SketchError::Exists { path: path.clone() }),
+            Err(error) if error.kind() == ErrorKind::NotFound => missing.push((path, text)),
+            Err(cause) => return Err(SketchError::System { path: path.clone(), cause }),
+        }
+    }
+    for (path, text) in missing {
+        let written = fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
+        written.map_err(|cause| SketchError::System { path: path.clone(), cause })?;
+    }
+    Ok(files.map(|(path, _)| path).to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_says_what_the_dividers_are() {
+        for wire in wires() {
+            let row = WIRING_PAGE.lines().find(|line| line.starts_with(&format!("| {} |", wire.pin))).expect("a row");
+            let resistor = if wire.sensor.is_flex() { "47 k to 3.3 V" } else { "4.7 k to ground" };
+            assert!(row.contains(wire.sensor.label()) && row.contains(resistor), "{row}");
+        }
+        assert_eq!([&wires()[1].above, &wires()[3].below], ["47 kΩ", "4.7 kΩ"]);
+    }
+
+    #[test]
+    fn the_sketch_is_written_once_and_nothing_is_overwritten() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let at = folder.path().join("new/due_gripper");
+        let written = write_sketch(&at)?;
+        assert_eq!((written.len(), write_sketch(&at)?), (3, written.clone()));
+        assert!(fs::read_to_string(&written[0])?.contains("gripper_logic.h"));
+        fs::write(&written[1], "mine")?;
+        fs::remove_file(&written[0])?;
+        assert!(matches!(write_sketch(&at), Err(SketchError::Exists { .. })));
+        assert!(!written[0].exists() && fs::read_to_string(&written[1])? == "mine");
+        fs::write(folder.path().join("file"), "")?;
+        assert!(matches!(write_sketch(&folder.path().join("file/due")), Err(SketchError::System { .. })));
+        Ok(())
+    }
+}

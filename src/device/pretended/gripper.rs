@@ -1,0 +1,437 @@
+//! The pretended gripper: fingers, sensors, board and line, with whatever goes wrong on the way. It has no port and no
+//! clock of its own: told how late it is and what the host said, it gives bytes. The same seed, the same times and the
+//! same words of the host give the same bytes.
+
+use super::board::{BoardSetup, FirmwareBoard, sign};
+use super::faults::{Fault, FaultKind};
+use super::hand::{Began, Hand, HandPlan};
+use super::parts::{HiddenParts, Sensors, Stimulus};
+use super::script::Step;
+use super::uart::misread;
+use palpate_sim::objects::ObjectError;
+use palpate_tactile::board::Sensor;
+use palpate_tactile::electronics::Converter;
+use palpate_tactile::model::Stream;
+use serde::Serialize;
+
+/// Resistor of the inputs beyond the four sensors, as the hello line says (ohm).
+const SPARE_OHM: u32 = 4700;
+
+/// Times that differ by less are the same (s): what sums of periods leave in rounding, and less than a tick of the clock.
+const SAME_TIME_S: f64 = 5e-7;
+
+/// What the gripper is and does.
+#[derive(Clone, Debug)]
+pub struct PretendedSetup {
+    /// What its fingers do.
+    pub hand: HandPlan,
+    /// What its sensors are made of.
+    pub parts: HiddenParts,
+    /// Samples per second.
+    pub rate_hz: u32,
+    /// Channels: the four sensors, then spare inputs that swing slowly.
+    pub channels: usize,
+    /// Highest pressure that its board puts out, in steps of 0.05 bar; 0: the control box is worked by hand.
+    pub most_steps: u8,
+    /// What the board's clock shows when it starts (µs).
+    pub clock_start_us: u32,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
+    /// Names noise and faults.
+    pub seed: u64,
+}
+
+/// Something worth telling.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum Happening {
+    /// The fingers close.
+    Grasp {
+        /// Which grasp, from 1.
+        number: u32,
+        /// On what.
+        object: String,
+    },
+    /// A bend and a load are held on the bench.
+    Hold {
+        /// Bend of the strips (degrees).
+        bend_deg: [f64; 2],
+        /// Load on the pads (N).
+        load_n: [f64; 2],
+        /// For how long (s).
+        seconds: f64,
+    },
+    /// The script is at its end.
+    ScriptDone,
+    /// A fault begins.
+    Fault {
+        /// Which, as on the command line.
+        fault: String,
+    },
+    /// The board vented because the host fell silent.
+    Watchdog,
+    /// The simulation stopped.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+    /// A host opened the port.
+    HostCame,
+    /// It closed the port.
+    HostLeft,
+    /// The port is open under this name.
+    Port {
+        /// Path of the terminal.
+        path: String,
+    },
+    /// Lines were given up because the host does not read.
+    Overrun {
+        /// How many bytes.
+        bytes: u64,
+    },
+}
+
+/// Something worth telling, and when.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Happened {
+    /// Time since the first host (s).
+    pub t_s: f64,
+    /// What.
+    #[serde(flatten)]
+    pub what: Happening,
+}
+
+/// The gripper.
+#[derive(Debug)]
+pub struct PretendedGripper {
+    hand: Hand,
+    parts: HiddenParts,
+    sensors: Sensors,
+    board_setup: BoardSetup,
+    board: FirmwareBoard,
+    /// What it says when it has restarted.
+    restarted: String,
+    clock_start_us: u32,
+    faults: Vec<Fault>,
+    /// Which faults have been told of.
+    struck: Vec<bool>,
+    converter: Conversions,
+    now_s: f64,
+    /// A moment at which the board's clock was read: our time (s) and its own since it was made, unwrapped (µs).
+    anchor: (f64, u64),
+    line_chance: Stream,
+    garbage: Stream,
+    /// Held back by a burst.
+    held_back: Vec<u8>,
+    released_s: f64,
+    bytes: Vec<u8>,
+    happened: Vec<Happened>,
+    /// What the board printed, before anything went wrong with it.
+    printed: String,
+}
+
+impl PretendedGripper {
+    /// Makes it and starts its board. Takes some tenths of a second for each object.
+    pub fn new(setup: PretendedSetup) -> Result<Self, ObjectError> {
+        let spare = (1..).map(|k| format!("aux{k}"));
+        let channels = Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).chain(spare).take(setup.channels);
+        let ohm = [setup.parts.strips.map(|s| s.divider_ohm), setup.parts.pads.map(|p| p.divider_ohm)];
+        let ohm = ohm.concat().into_iter().map(|ohm| ohm.round() as u32).chain(std::iter::repeat(SPARE_OHM));
+        let board_setup = BoardSetup {
+            period_us: 1_000_000 / setup.rate_hz.max(1),
+            channels: channels.collect(),
+            divider_ohm: ohm.take(setup.channels).collect(),
+            bits: 12,
+            most_steps: setup.most_steps,
+        };
+        let mut hello = String::new();
+        let board = FirmwareBoard::begin(board_setup.clone(), setup.clock_start_us, &mut hello);
+        Ok(Self {
+            hand: Hand::new(setup.hand)?,
+            sensors: setup.parts.sensors(f64::from(setup.rate_hz)),
+            converter: Conversions::new(&setup.parts, setup.seed, setup.channels),
+            parts: setup.parts,
+            board_setup,
+            board,
+            restarted: hello,
+            clock_start_us: setup.clock_start_us,
+            struck: vec![false; setup.faults.len()],
+            faults: setup.faults,
+            now_s: 0.0,
+            anchor: (0.0, u64::from(setup.clock_start_us)),
+            line_chance: Stream::new(setup.seed, "line", "chance"),
+            garbage: Stream::new(setup.seed, "line", "garbage"),
+            held_back: Vec::new(),
+            released_s: 0.0,
+            bytes: Vec::new(),
+            happened: Vec::new(),
+            printed: String::new(),
+        })
+    }
+
+    /// What its sensors are made of.
+    pub fn parts(&self) -> &HiddenParts {
+        &self.parts
+    }
+
+    /// Adds a step to its script.
+    pub fn add_step(&mut self, step: Step) -> Result<(), ObjectError> {
+        self.hand.add(step)
+    }
+
+    /// Bytes that have come out since it was asked last.
+    pub fn take_bytes(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.bytes)
+    }
+
+    /// What has happened since it was asked last.
+    pub fn take_happened(&mut self) -> Vec<Happened> {
+        std::mem::take(&mut self.happened)
+    }
+
+    /// What its board has printed since it was asked last: every line whole, whatever happened to it afterwards.
+    pub fn take_printed(&mut self) -> String {
+        std::mem::take(&mut self.printed)
+    }
+
+    /// The fault of a kind that is on now.
+    pub fn fault(&self, kind: FaultKind) -> Option<Fault> {
+        self.faults.iter().copied().find(|fault| fault.kind == kind && fault.is_on(self.now_s))
+    }
+
+    /// Lets time pass until `t` (s since the first host).
+    pub fn advance(&mut self, t: f64) {
+        loop {
+            let due_s = self.due_s();
+            if due_s > t + SAME_TIME_S {
+                break;
+            }
+            self.now_s = due_s.max(self.now_s);
+            self.tell_faults();
+            if self.fault(FaultKind::Reset).is_some() {
+                self.restart();
+                continue;
+            }
+            self.sample();
+        }
+        self.now_s = t.max(self.now_s);
+        self.release();
+    }
+
+    /// Takes what the host sent, now.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        let mut said = String::new();
+        let clock_us = self.clock_us(self.now_s) as u32;
+        for &byte in bytes {
+            let was_bar = self.board.line_bar();
+            if self.board.hear(byte, clock_us, &mut said) {
+                self.hand.take_over(self.now_s, was_bar);
+            }
+        }
+        self.send(&said);
+    }
+
+    /// When the board's next sample is due, in our time (s).
+    fn due_s(&self) -> f64 {
+        let (anchor_s, anchor_us) = self.anchor;
+        let ahead = self.board.next_us().wrapping_sub(anchor_us as u32);
+        anchor_s + f64::from(ahead) * 1e-6 / self.clock_rate()
+    }
+
+    /// The board's clock at a time, unwrapped (µs).
+    fn clock_us(&self, t: f64) -> u64 {
+        let (anchor_s, anchor_us) = self.anchor;
+        anchor_us + ((t - anchor_s) * self.clock_rate() * 1e6).max(0.0) as u64
+    }
+
+    /// Seconds of the board's clock per second.
+    fn clock_rate(&self) -> f64 {
+        1.0 + 1e-6 * self.fault(FaultKind::Clock).map_or(0.0, |fault| fault.value)
+    }
+
+    fn sample(&mut self) {
+        let hello = std::mem::take(&mut self.restarted);
+        self.send(&hello);
+        let due = self.board.next_us();
+        let (_, anchor_us) = self.anchor;
+        let clock_us = anchor_us + u64::from(due.wrapping_sub(anchor_us as u32));
+        self.anchor = (self.now_s, clock_us);
+        let felt = self.hand.at(self.now_s, self.board.line_bar());
+        self.tell_hand();
+        if let Some(bar) = self.hand.own_bar() {
+            self.board.set_by_hand((bar * 20.0).round() as u8);
+        }
+        let shares = self.shares(felt);
+        self.converter.strike(&self.faults, self.now_s);
+        let converter = &mut self.converter;
+        let mut said = String::new();
+        self.board.poll(due, &mut |channel| converter.convert(channel, &shares), &mut said);
+        if said.starts_with("# vent") {
+            self.tell(Happening::Watchdog);
+        }
+        self.send(&said);
+    }
+
+    /// Shares of the supply on all inputs.
+    fn shares(&mut self, felt: Stimulus) -> Vec<f64> {
+        let spare = |k: usize| 0.5 + 0.4 * (self.now_s * (k as f64 + 1.0) * 0.2).sin();
+        let mut shares: Vec<f64> = self.sensors.shares(felt).into_iter().chain((0..4).map(spare)).collect();
+        for fault in self.faults.iter().filter(|fault| fault.is_on(self.now_s)) {
+            let channel = fault.value as usize;
+            if let (FaultKind::Open, Some(share)) = (fault.kind, shares.get_mut(channel)) {
+                // A strip is to ground: without it the input is pulled up. A pad is to the supply.
+                *share = if channel < 2 { 1.0 } else { 0.0 };
+            }
+        }
+        shares
+    }
+
+    /// The board starts again, and is silent until the fault is over.
+    fn restart(&mut self) {
+        let until = self.fault(FaultKind::Reset).map_or(self.now_s, |fault| fault.until_s);
+        self.restarted.clear();
+        self.board = FirmwareBoard::begin(self.board_setup.clone(), self.clock_start_us, &mut self.restarted);
+        self.now_s = until;
+        self.anchor = (until, u64::from(self.clock_start_us));
+    }
+
+    /// Notes that something happened now.
+    pub fn tell(&mut self, what: Happening) {
+        self.happened.push(Happened { t_s: self.now_s, what });
+    }
+
+    fn tell_faults(&mut self) {
+        for k in 0..self.faults.len() {
+            if !self.struck[k] && self.faults[k].from_s <= self.now_s {
+                self.struck[k] = true;
+                self.tell(Happening::Fault { fault: self.faults[k].to_string() });
+            }
+        }
+    }
+
+    fn tell_hand(&mut self) {
+        for began in self.hand.take_began() {
+            self.tell(match began {
+                Began::Grasp { number, object } => Happening::Grasp { number, object },
+                Began::Hold { bend_deg, load_n, seconds } => Happening::Hold { bend_deg, load_n, seconds },
+                Began::Done => Happening::ScriptDone,
+                Began::Failed(reason) => Happening::Failed { reason },
+            });
+        }
+    }
+
+    /// Puts what the board printed on the line, as far as the line lets it.
+    fn send(&mut self, said: &str) {
+        self.printed.push_str(said);
+        for line in said.split_inclusive('\n') {
+            let sent = self.on_the_line(line);
+            self.held_back.extend(sent);
+        }
+    }
+
+    /// What becomes of a line.
+    fn on_the_line(&mut self, line: &str) -> Vec<u8> {
+        let chance = self.line_chance.within(0.0, 1.0);
+        let where_cut = self.line_chance.within(0.0, line.len() as f64) as usize;
+        if self.fault(FaultKind::Silent).is_some() || self.fault(FaultKind::Loss).is_some_and(|f| chance < f.value) {
+            return Vec::new();
+        }
+        let mut sent = line.as_bytes().to_vec();
+        if let Some(fault) = self.fault(FaultKind::Nan) {
+            sent = self.without_number(line, fault.value as usize).into_bytes();
+        }
+        if self.fault(FaultKind::Partial).is_some_and(|fault| chance < fault.value) {
+            sent.truncate(where_cut);
+        }
+        if self.fault(FaultKind::Byte).is_some_and(|fault| chance < fault.value) {
+            sent.remove(where_cut);
+        }
+        if self.fault(FaultKind::Garbage).is_some() {
+            sent = line.bytes().map(|_| self.garbage.within(0.0, 256.0) as u8).collect();
+        }
+        match self.fault(FaultKind::Baud) {
+            Some(fault) => misread(&sent, fault.value, 1.0),
+            None => sent,
+        }
+    }
+
+    /// A line in which a channel has no number: what a board prints for it, which the checksum covers.
+    fn without_number(&self, line: &str, channel: usize) -> String {
+        let name = self.board_setup.channels.get(channel);
+        let Some((name, body)) = name.zip(line.rsplit_once(",ck:").map(|(body, _)| body)) else {
+            return line.to_owned();
+        };
+        let field = |field: &str| match field.split_once(':') {
+            Some((key, _)) if key == name => format!("{key}:nan"),
+            _ => field.to_owned(),
+        };
+        let mut line = body.split(',').map(field).collect::<Vec<_>>().join(",");
+        sign(&mut line, ",ck:");
+        line
+    }
+
+    /// Lets go what a burst holds back, when its time has come.
+    fn release(&mut self) {
+        if let Some(burst) = self.fault(FaultKind::Burst) {
+            if self.now_s - self.released_s < burst.value {
+                return;
+            }
+            self.released_s = self.now_s;
+        }
+        self.bytes.append(&mut self.held_back);
+    }
+}
+
+/// The board's converter, with what is wrong with it now.
+#[derive(Debug)]
+struct Conversions {
+    noise_counts: f64,
+    noise: Stream,
+    ten_bits: bool,
+    crosstalk: f64,
+    at_rail: Vec<bool>,
+    stuck: Vec<bool>,
+    kept: Vec<u32>,
+}
+
+impl Conversions {
+    fn new(parts: &HiddenParts, seed: u64, channels: usize) -> Self {
+        Self {
+            noise_counts: parts.noise_counts,
+            noise: Stream::new(seed, "converter", "noise"),
+            ten_bits: false,
+            crosstalk: 0.0,
+            at_rail: vec![false; channels],
+            stuck: vec![false; channels],
+            kept: vec![0; channels],
+        }
+    }
+
+    /// Takes in what is wrong at a time (s).
+    fn strike(&mut self, faults: &[Fault], t: f64) {
+        let on = |kind: FaultKind| faults.iter().filter(move |fault| fault.kind == kind && fault.is_on(t));
+        self.ten_bits = on(FaultKind::TenBit).next().is_some();
+        self.crosstalk = on(FaultKind::Crosstalk).map(|fault| fault.value).next().unwrap_or(0.0);
+        for channel in 0..self.kept.len() {
+            self.at_rail[channel] = on(FaultKind::Rail).any(|fault| fault.value as usize == channel);
+            self.stuck[channel] = on(FaultKind::Stuck).any(|fault| fault.value as usize == channel);
+        }
+    }
+
+    /// One conversion of a channel, of shares of the supply: counts.
+    fn convert(&mut self, channel: usize, shares: &[f64]) -> u32 {
+        let noise = self.noise.normal();
+        if self.stuck[channel] {
+            return self.kept[channel];
+        }
+        let before = shares[(channel + self.kept.len() - 1) % self.kept.len()];
+        let share = shares[channel] + self.crosstalk * (before - shares[channel]);
+        let share = if self.at_rail[channel] { 1.0 } else { share };
+        let levels = if self.ten_bits { 1024.0 } else { Converter::DUE.levels };
+        let noise = noise * self.noise_counts * levels / Converter::DUE.levels;
+        // On the rail there is no noise: nothing is above it.
+        let noise = if self.at_rail[channel] { 0.0 } else { noise };
+        self.kept[channel] = Converter { levels, ..Converter::DUE }.counts(share, noise) as u32;
+        self.kept[channel]
+    }
+}

@@ -1,0 +1,398 @@
+//! What the fingers do: they grasp by themselves as at a hand-driven control box, or as a host drives them, or a script
+//! bends and loads them on the bench. Grasps are simulated; the bench is held by hand.
+
+use super::parts::Stimulus;
+use super::script::Step;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{Phase, Programme};
+use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::run::{SimEvent, SimRun};
+use palpate_sim::scene::Scene;
+use palpate_tactile::Sensors;
+use palpate_tactile::electronics::StripPart;
+use std::collections::VecDeque;
+
+/// Length of a simulation that is driven from outside (s): a day, after which the fingers stay as they are.
+const LONGEST_GRASP_S: f64 = 86_400.0;
+
+/// How long fingers are left alone after a programme has ended (s).
+const SETTLE_S: f64 = 0.5;
+
+/// How often fingers that a host drives look at the pressure (1/s): a control box obeys at once, and a host may set any moment.
+const DRIVEN_HZ: u32 = 300;
+
+/// A host that vents for so long has let go: what it presses next is another grasp (s).
+const LET_GO_S: f64 = 0.5;
+
+/// Time in which hands bend a strip or put a weight down (s).
+const RAMP_S: f64 = 0.3;
+
+/// Something that is there to be grasped.
+#[derive(Clone, Debug)]
+struct Graspable {
+    name: String,
+    model: Option<ObjectModel>,
+    poses: PoseSampler,
+}
+
+/// What the hand is to do.
+#[derive(Clone, Debug)]
+pub struct HandPlan {
+    /// The gripper, its programme, and how objects lie.
+    pub scene: Scene,
+    /// What it grasps by itself and for a host, one after the other.
+    pub objects: Vec<String>,
+    /// Names the poses.
+    pub seed: u64,
+    /// From grasp to grasp (s); none: it waits for a host.
+    pub grasp_every_s: Option<f64>,
+    /// Steps on the bench, which come before its own grasps and instead of them.
+    pub script: Vec<Step>,
+}
+
+/// What the fingers are in the middle of.
+#[derive(Debug)]
+enum Doing {
+    Rest,
+    Held { from: Stimulus, to: Stimulus, since_s: f64, until_s: f64 },
+    Grasp(Box<LiveGrasp>),
+}
+
+/// What began, for those who want to know.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Began {
+    /// The fingers close on something.
+    Grasp { number: u32, object: String },
+    /// A bend and a load are held.
+    Hold { bend_deg: [f64; 2], load_n: [f64; 2], seconds: f64 },
+    /// The script is at its end.
+    Done,
+    /// The simulation had to stop; the fingers stay as they are.
+    Failed(String),
+}
+
+/// The hand.
+#[derive(Debug)]
+pub(super) struct Hand {
+    plan: HandPlan,
+    things: Vec<Graspable>,
+    script: VecDeque<Step>,
+    scripted: bool,
+    doing: Doing,
+    grasps: u32,
+    next_s: f64,
+    /// A host has set a pressure: it drives from now on.
+    driven: bool,
+    vented_since_s: Option<f64>,
+    began: Vec<Began>,
+    last: Stimulus,
+}
+
+impl Hand {
+    /// Loads what it will need, which takes some tenths of a second for each object.
+    pub(super) fn new(plan: HandPlan) -> Result<Self, ObjectError> {
+        let in_script = plan.script.iter().filter_map(|step| match step {
+            Step::Grasp { object, .. } => Some(object.clone()),
+            Step::Hold { .. } => None,
+        });
+        let mut wanted: Vec<String> = plan.objects.iter().cloned().chain(in_script).collect();
+        wanted.sort();
+        wanted.dedup();
+        let mut hand = Self {
+            script: plan.script.iter().cloned().collect(),
+            scripted: !plan.script.is_empty(),
+            plan,
+            things: Vec::new(),
+            doing: Doing::Rest,
+            grasps: 0,
+            next_s: 0.0,
+            driven: false,
+            vented_since_s: None,
+            began: Vec::new(),
+            last: Stimulus::default(),
+        };
+        for name in wanted {
+            hand.load(&name)?;
+        }
+        Ok(hand)
+    }
+
+    fn load(&mut self, name: &str) -> Result<usize, ObjectError> {
+        if let Some(known) = self.things.iter().position(|thing| thing.name == name) {
+            return Ok(known);
+        }
+        let mut scene = self.plan.scene.clone();
+        name.clone_into(&mut scene.object.source);
+        let model = scene.load_object()?;
+        let poses = PoseSampler::new(&scene, model.as_ref());
+        self.things.push(Graspable { name: name.to_owned(), model, poses });
+        Ok(self.things.len() - 1)
+    }
+
+    /// Adds a step to the script.
+    pub(super) fn add(&mut self, step: Step) -> Result<(), ObjectError> {
+        if let Step::Grasp { object, .. } = &step {
+            self.load(&object.clone())?;
+        }
+        self.script.push_back(step);
+        self.scripted = true;
+        Ok(())
+    }
+
+    /// What began since it was asked last.
+    pub(super) fn take_began(&mut self) -> Vec<Began> {
+        std::mem::take(&mut self.began)
+    }
+
+    /// Line pressure that the hand's own programme sets (bar); none when it has none.
+    pub(super) fn own_bar(&self) -> Option<f64> {
+        match &self.doing {
+            Doing::Grasp(grasp) if grasp.programme.is_some() => Some(grasp.line_bar),
+            Doing::Rest | Doing::Held { .. } if !self.driven => Some(0.0),
+            Doing::Rest | Doing::Held { .. } | Doing::Grasp(_) => None,
+        }
+    }
+
+    /// A host has set a pressure at a time (s), instead of the one there was (bar): whatever was going on by itself is over.
+    pub(super) fn take_over(&mut self, t: f64, was_bar: f64) {
+        if self.driven {
+            // So far the old pressure was on.
+            self.at(t, was_bar);
+        } else {
+            (self.driven, self.doing) = (true, Doing::Rest);
+            self.script.clear();
+        }
+    }
+
+    /// What the sensors feel at a time (s), which never goes back; `host_bar` is the pressure that the host has set (bar).
+    pub(super) fn at(&mut self, t: f64, host_bar: f64) -> Stimulus {
+        if self.driven {
+            self.follow_host(t, host_bar);
+        } else {
+            self.go_on(t);
+        }
+        self.last = match &mut self.doing {
+            Doing::Rest => Stimulus::default(),
+            Doing::Held { from, to, since_s, .. } => from.towards(*to, ((t - *since_s) / RAMP_S).clamp(0.0, 1.0)),
+            Doing::Grasp(grasp) => {
+                let felt = grasp.at(t, host_bar);
+                self.began.extend(grasp.failed.take().map(Began::Failed));
+                felt
+            }
+        };
+        self.last
+    }
+
+    fn follow_host(&mut self, t: f64, bar: f64) {
+        if bar <= 0.0 {
+            self.vented_since_s.get_or_insert(t);
+            return;
+        }
+        let let_go = self.vented_since_s.take().is_some_and(|since| t - since >= LET_GO_S);
+        if let_go || matches!(self.doing, Doing::Rest) {
+            self.grasp_next(t, None);
+        }
+    }
+
+    /// Goes on with the script, or with its own grasps.
+    fn go_on(&mut self, t: f64) {
+        let busy = match &self.doing {
+            Doing::Rest => false,
+            Doing::Held { until_s, .. } => t < *until_s,
+            Doing::Grasp(grasp) => t < grasp.ends_s,
+        };
+        if busy {
+            return;
+        }
+        if let Some(step) = self.script.pop_front() {
+            self.take_step(&step, t);
+        } else if self.scripted {
+            if !matches!(self.doing, Doing::Rest) {
+                self.began.push(Began::Done);
+                self.doing = Doing::Rest;
+            }
+        } else if let Some(every) = self.plan.grasp_every_s.filter(|_| t >= self.next_s) {
+            self.next_s = t + every;
+            let programme = self.plan.scene.programme.clone();
+            self.grasp_next(t, Some(programme));
+        }
+    }
+
+    fn take_step(&mut self, step: &Step, t: f64) {
+        match step {
+            Step::Hold { bend, load, seconds } => {
+                let to = Stimulus { kappa: bend.map(|angle| angle / StripPart::ACTIVE_LENGTH), force: *load };
+                self.doing = Doing::Held { from: self.last, to, since_s: t, until_s: t + seconds };
+                let bend_deg = bend.map(f64::to_degrees);
+                self.began.push(Began::Hold { bend_deg, load_n: *load, seconds: *seconds });
+            }
+            Step::Grasp { object, bar } => {
+                let mut programme = self.plan.scene.programme.clone();
+                programme.peak_bar = bar.unwrap_or(programme.peak_bar);
+                // Loaded when the step was added.
+                if let Some(thing) = self.things.iter().position(|thing| thing.name == *object) {
+                    self.grasp(thing, t, Some(programme));
+                }
+            }
+        }
+    }
+
+    fn grasp_next(&mut self, t: f64, programme: Option<Programme>) {
+        let turn = self.grasps as usize % self.plan.objects.len().max(1);
+        let name = self.plan.objects.get(turn).map_or(EMPTY, String::as_str);
+        if let Some(thing) = self.things.iter().position(|thing| thing.name == name) {
+            self.grasp(thing, t, programme);
+        }
+    }
+
+    fn grasp(&mut self, thing: usize, t: f64, programme: Option<Programme>) {
+        self.grasps += 1;
+        let Graspable { name, model, poses } = &self.things[thing];
+        let (scene, _) = poses.draw(model.as_ref(), self.plan.seed.wrapping_add(u64::from(self.grasps)));
+        self.began.push(Began::Grasp { number: self.grasps, object: name.clone() });
+        self.doing = Doing::Grasp(Box::new(LiveGrasp::new(&scene, model.as_ref(), t, programme)));
+    }
+}
+
+/// A simulated grasp that is driven while it runs.
+#[derive(Debug)]
+struct LiveGrasp {
+    rig: SimRun,
+    sensors: Sensors,
+    start_s: f64,
+    ends_s: f64,
+    /// The hand's own; none when a host drives.
+    programme: Option<Programme>,
+    line_bar: f64,
+    /// Time since the start (s) and what was felt, at the last frame and at the one to come.
+    frames: [(f64, Stimulus); 2],
+    failed: Option<String>,
+}
+
+impl LiveGrasp {
+    fn new(scene: &Scene, object: Option<&ObjectModel>, start_s: f64, programme: Option<Programme>) -> Self {
+        let lasts = |p: &Programme| f64::from(p.total_ticks()) / f64::from(scene.timing.actuation_hz.max(1)) + SETTLE_S;
+        let ends_s = start_s + programme.as_ref().map_or(LONGEST_GRASP_S, lasts);
+        let mut endless = scene.clone();
+        endless.timing.duration_s = LONGEST_GRASP_S;
+        if programme.is_none() {
+            (endless.timing.sample_hz, endless.timing.actuation_hz) = (DRIVEN_HZ, DRIVEN_HZ);
+        }
+        let sensors = Sensors::whole_fingers(&scene.gripper);
+        let rig = SimRun::new(&endless, object).0;
+        Self { rig, sensors, start_s, ends_s, programme, line_bar: 0.0, frames: Default::default(), failed: None }
+    }
+
+    fn at(&mut self, t: f64, host_bar: f64) -> Stimulus {
+        let t = t - self.start_s;
+        while self.frames[1].0 < t {
+            match self.rig.next_event() {
+                Ok(SimEvent::ActuationDue { tick }) => {
+                    let own = self.programme.as_ref().map(|programme| programme.command(tick));
+                    let (bar, phase) = own.unwrap_or((host_bar, Phase::Close));
+                    self.line_bar = bar;
+                    self.rig.command(bar, phase);
+                }
+                Ok(SimEvent::Sampled(frame)) => self.frames = [self.frames[1], (frame.t, self.feel(&frame))],
+                Ok(SimEvent::Finished) => self.frames[1].0 = f64::INFINITY,
+                Err(error) => {
+                    self.failed = Some(error.to_string());
+                    self.frames[1].0 = f64::INFINITY;
+                }
+            }
+        }
+        let [(before_s, before), (after_s, after)] = self.frames;
+        // Before the first frame there is nothing to go from.
+        if !after_s.is_finite() || after_s <= before_s {
+            return after;
+        }
+        before.towards(after, ((t - before_s) / (after_s - before_s)).clamp(0.0, 1.0))
+    }
+
+    fn feel(&self, frame: &Frame) -> Stimulus {
+        let values = self.sensors.read(frame);
+        let mut felt = Stimulus::default();
+        for (channel, value) in self.sensors.channels().iter().zip(values) {
+            let (side, value) = (channel.side.index(), value.unwrap_or_default());
+            match channel.quantity {
+                palpate_tactile::Quantity::Curvature => felt.kappa[side] = value,
+                palpate_tactile::Quantity::Force => felt.force[side] = value,
+                palpate_tactile::Quantity::Pressure => {}
+            }
+        }
+        felt
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sim::scene::Accuracy;
+
+    fn plan() -> HandPlan {
+        let mut scene = Scene::default();
+        scene.solver.accuracy = Accuracy::Draft;
+        scene.object.fixed = true;
+        HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script: Vec::new() }
+    }
+
+    fn run(hand: &mut Hand, from_s: f64, to_s: f64, bar: f64) -> Stimulus {
+        let samples = ((to_s - from_s) * 50.0).round() as u32;
+        (1..=samples).map(|k| hand.at(from_s + f64::from(k) / 50.0, bar)).last().unwrap_or_default()
+    }
+
+    #[test]
+    fn bends_and_loads_are_held_as_the_script_says() {
+        let script = super::super::script::parse_script("angle=90 hold=1; load=1N hold=1").expect("sound");
+        let mut hand = Hand::new(HandPlan { script, ..plan() }).expect("nothing to load");
+        let bent = run(&mut hand, 0.0, 0.9, 0.0);
+        // 90 degrees over 55.37 mm: 28.4 1/m.
+        assert!((bent.kappa[0] - 28.37).abs() < 0.01 && bent.kappa[0] == bent.kappa[1] && bent.force == [0.0; 2]);
+        let loaded = run(&mut hand, 0.9, 1.9, 0.0);
+        assert_eq!(loaded, Stimulus { kappa: [0.0; 2], force: [1.0; 2] });
+        assert_eq!(run(&mut hand, 1.9, 3.0, 0.0), Stimulus::default());
+        let began = hand.take_began();
+        assert!(matches!(began[..], [Began::Hold { .. }, Began::Hold { .. }, Began::Done]), "{began:?}");
+    }
+
+    #[test]
+    fn a_host_bends_the_fingers_as_far_as_the_pressure_says() {
+        let mut hand = Hand::new(plan()).expect("nothing to load");
+        hand.take_over(0.0, 0.0);
+        assert_eq!(hand.at(0.02, 0.0), Stimulus::default());
+        // 0.5 bar are 0.03 N m on joints of 0.42 N m/rad and 10 mm: 7.14 1/m, less what gravity does.
+        let bent = run(&mut hand, 0.02, 1.5, 0.5);
+        assert!((bent.kappa[0] - 7.14).abs() < 0.4 && bent.force == [0.0; 2], "{bent:?}");
+        let open = run(&mut hand, 1.5, 3.0, 0.0);
+        assert!(open.kappa[0].abs() < 0.6, "{open:?}");
+        run(&mut hand, 3.0, 3.1, 0.5);
+        assert!((0..50).all(|k| hand.at(3.1 + 0.02 * f64::from(k), 0.5).kappa[0].is_finite()));
+        let began = hand.take_began();
+        assert_eq!(began.len(), 2, "a new grasp after it has let go: {began:?}");
+    }
+
+    #[test]
+    fn a_pressure_is_obeyed_when_it_is_set_and_not_at_some_tick() {
+        // The same step, a tenth of a tick of the programme apart: the bend follows by as much.
+        let after = |late_s: f64| {
+            let mut hand = Hand::new(plan()).expect("nothing to load");
+            hand.take_over(0.0, 0.0);
+            run(&mut hand, 0.0, 1.0, 0.3);
+            hand.take_over(1.0 + late_s, 0.3);
+            hand.at(1.06, 0.6).kappa[0]
+        };
+        let bends = [0.0, 0.01, 0.02, 0.03].map(after);
+        assert!(bends.windows(2).all(|pair| pair[0] > pair[1] + 0.05), "{bends:?}");
+    }
+
+    #[test]
+    fn by_itself_it_grasps_again_and_again() {
+        let mut hand = Hand::new(HandPlan { grasp_every_s: Some(5.0), ..plan() }).expect("nothing to load");
+        let held = run(&mut hand, 0.0, 2.5, 0.0);
+        assert!(held.kappa[0] > 5.0 && hand.own_bar() == Some(1.0), "{held:?}");
+        run(&mut hand, 2.5, 10.2, 0.0);
+        let grasps = hand.take_began();
+        assert_eq!(grasps.len(), 3, "at 0, 5 and 10 s: {grasps:?}");
+    }
+}

@@ -1,0 +1,201 @@
+//! What the pretended gripper is made of: values that nobody knows of a real one, and that a calibration finds out.
+
+use palpate_tactile::electronics::{Divider, FlexStrip, ForcePad, PadPart, StripPart};
+use palpate_tactile::model::Stream;
+use serde::{Deserialize, Serialize};
+
+/// A strip and its divider.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StripSetup {
+    /// The part; its `reaching` is 1 on the bench and on the finger.
+    #[serde(flatten)]
+    pub part: StripPart,
+    /// Fixed resistor (ohm).
+    pub divider_ohm: f64,
+}
+
+/// A pad and its divider.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PadSetup {
+    /// The part: `gain` is its conductance (S) at `full` newtons, which is 1.
+    #[serde(flatten)]
+    pub part: PadPart,
+    /// Load that bending puts on it, per curvature of the finger (N m). Pads fire when they are bent (Interlink's guide,
+    /// "false triggering"), so that the zero of a pad moves as its finger closes.
+    pub bending_load: f64,
+    /// Fixed resistor (ohm).
+    pub divider_ohm: f64,
+}
+
+/// Everything that is hidden in the pretended gripper's electronics. What is hidden in its fingers stands in the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HiddenParts {
+    /// Strips, left and right.
+    pub strips: [StripSetup; 2],
+    /// Pads, left and right.
+    pub pads: [PadSetup; 2],
+    /// Deviation of the noise of a single conversion (counts of 12 bits).
+    pub noise_counts: f64,
+    /// Strips creep, and pads read more while unloading.
+    pub hysteresis: bool,
+    /// Conductance of pads grows under load.
+    pub drift: bool,
+}
+
+impl HiddenParts {
+    /// Parts within the tolerances of their data sheets, drawn from a seed.
+    pub fn drawn(seed: u64) -> Self {
+        let mut random = Stream::new(seed, "pretended gripper", "parts");
+        let mut strip = || {
+            let off = random.within(-StripPart::FLAT_TOLERANCE, StripPart::FLAT_TOLERANCE);
+            let bent = random.within(StripPart::BENT_OVER_FLAT[0], StripPart::BENT_OVER_FLAT[1]);
+            let flat_ohm = StripPart::NOMINAL_OHM * (1.0 + off);
+            let part = StripPart { flat_ohm, rise_per_rad: StripPart::rise(bent), ..StripPart::nominal() };
+            StripSetup { part, divider_ohm: StripPart::DIVIDER_OHM }
+        };
+        let strips = [strip(), strip()];
+        let mut pad = || {
+            let off = random.within(-PadPart::GAIN_TOLERANCE, PadPart::GAIN_TOLERANCE);
+            let part = PadPart {
+                full: 1.0,
+                gain: PadPart::NOMINAL_SIEMENS * (1.0 + off),
+                exponent: random.within(PadPart::EXPONENT[0], PadPart::EXPONENT[1]),
+                threshold: Some(PadPart::LEAST_FORCE * random.within(0.8, 1.2)),
+                reaching: 1.0,
+            };
+            PadSetup {
+                part,
+                bending_load: random.within(MOST_BENDING_LOAD[0], MOST_BENDING_LOAD[1]),
+                divider_ohm: 4.7e3,
+            }
+        };
+        let pads = [pad(), pad()];
+        Self { strips, pads, noise_counts: 2.0, hysteresis: true, drift: true }
+    }
+
+    /// Complains about values that no part has; says which.
+    pub fn check(&self) -> Result<(), String> {
+        let positive = |name: &str, value: f64| {
+            let fine = value.is_finite() && value > 0.0;
+            if fine { Ok(()) } else { Err(format!("{name} is {value}; it must be a positive number")) }
+        };
+        for strip in &self.strips {
+            positive("flat_ohm", strip.part.flat_ohm)?;
+            positive("rise_per_rad", strip.part.rise_per_rad)?;
+            positive("divider_ohm", strip.divider_ohm)?;
+            positive("reaching", strip.part.reaching)?;
+        }
+        for pad in &self.pads {
+            positive("full", pad.part.full)?;
+            positive("gain", pad.part.gain)?;
+            positive("exponent", pad.part.exponent)?;
+            positive("divider_ohm", pad.divider_ohm)?;
+            positive("reaching", pad.part.reaching)?;
+        }
+        if self.noise_counts >= 0.0 { Ok(()) } else { Err("noise_counts is negative".to_owned()) }
+    }
+
+    /// The four sensors, read so many times a second (1/s).
+    pub(super) fn sensors(&self, rate_hz: f64) -> Sensors {
+        let strips = self.strips.map(|setup| {
+            let mut strip = FlexStrip::new(setup.part, rate_hz);
+            (strip.one_way, strip.folds, strip.creeps) = (true, true, self.hysteresis);
+            (strip, Divider::of_strip(setup.divider_ohm))
+        });
+        let pads = self.pads.map(|setup| {
+            let mut pad = ForcePad::new(setup.part, rate_hz);
+            (pad.hysteretic, pad.drifts) = (self.hysteresis, self.drift);
+            (pad, setup.bending_load, Divider::of_pad(setup.divider_ohm))
+        });
+        Sensors { strips, pads }
+    }
+}
+
+/// Load that bending puts on a pad, least and most (N m). Assumed: 0.07 to 0.3 N when the finger is closed on nothing
+/// at 1 bar (14 1/m), so that it shows above the threshold of some pads and not of others.
+const MOST_BENDING_LOAD: [f64; 2] = [0.005, 0.02];
+
+/// What the fingers do to their sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Stimulus {
+    /// Mean curvature, left and right (1/m).
+    pub kappa: [f64; 2],
+    /// Normal force on the pad, left and right (N).
+    pub force: [f64; 2],
+}
+
+impl Stimulus {
+    /// The one that is `share` of the way to another.
+    pub(super) fn towards(self, other: Self, share: f64) -> Self {
+        let mix = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|side| a[side] + (b[side] - a[side]) * share);
+        Self { kappa: mix(self.kappa, other.kappa), force: mix(self.force, other.force) }
+    }
+}
+
+/// The sensors at work.
+#[derive(Clone, Debug)]
+pub(super) struct Sensors {
+    strips: [(FlexStrip, Divider); 2],
+    pads: [(ForcePad, f64, Divider); 2],
+}
+
+impl Sensors {
+    /// Shares of the supply on the four inputs, in the order of [`palpate_tactile::board::Sensor::ALL`].
+    pub(super) fn shares(&mut self, stimulus: Stimulus) -> [f64; 4] {
+        let mut shares = [0.0; 4];
+        for side in 0..2 {
+            let kappa = stimulus.kappa[side];
+            let (strip, divider) = &mut self.strips[side];
+            shares[side] = divider.share_of_ohm(strip.ohm(kappa));
+            let (pad, bending_load, divider) = &mut self.pads[side];
+            let load = stimulus.force[side] + *bending_load * kappa.max(0.0);
+            shares[2 + side] = divider.share_of_siemens(pad.conductance(load));
+        }
+        shares
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawn_parts_are_within_their_data_sheets_and_named_by_their_seed() {
+        assert_eq!(HiddenParts::drawn(3), HiddenParts::drawn(3));
+        for seed in 0..50 {
+            let parts = HiddenParts::drawn(seed);
+            assert_eq!(parts.check(), Ok(()));
+            for strip in parts.strips {
+                assert!((17.5e3..=32.5e3).contains(&strip.part.flat_ohm), "{strip:?}");
+                let bent = 1.0 + strip.part.rise_per_rad * std::f64::consts::FRAC_PI_2;
+                assert!((2.0..=2.5).contains(&bent), "{strip:?}");
+            }
+            for pad in parts.pads {
+                assert!((0.8..=1.0).contains(&pad.part.exponent) && (1.0 / pad.part.gain - 6e3).abs() < 251.0);
+            }
+            assert_ne!(parts.strips[0], parts.strips[1]);
+        }
+    }
+
+    #[test]
+    fn parts_survive_being_written_down() {
+        let parts = HiddenParts::drawn(5);
+        let text = serde_json::to_string(&parts).expect("plain numbers");
+        assert_eq!(serde_json::from_str::<HiddenParts>(&text).expect("just written"), parts);
+    }
+
+    #[test]
+    fn half_a_kilogram_on_a_nominal_pad_reads_what_the_law_says() {
+        let mut parts = HiddenParts::drawn(1);
+        parts.pads[0].part = PadPart { gain: 1.0 / 6e3, exponent: 0.9, ..parts.pads[0].part };
+        (parts.hysteresis, parts.drift) = (false, false);
+        let force = 0.5 * palpate_geometry::units::STANDARD_GRAVITY;
+        let stimulus = Stimulus { force: [force, 0.0], ..Stimulus::default() };
+        let [flat, _, pressed, idle] = parts.sensors(50.0).shares(stimulus);
+        let ratio = 4.7e3 * force.powf(0.9) / 6e3;
+        assert!((pressed - ratio / (1.0 + ratio)).abs() < 1e-12 && idle == 0.0);
+        let ohm = parts.strips[0].part.flat_ohm;
+        assert!((flat - ohm / (ohm + 47e3)).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,414 @@
+//! A link to a board: what it says, in order and without loss, whatever happens to the cable.
+//!
+//! ```text
+//!   "serial-read"                 "serial-decode"              whoever listens
+//!   reads, stamps  --bytes-->     Decoder      --events-->     take(): readings, gaps, bytes
+//!   opens again after a loss                                   status(), console(), send()
+//! ```
+//!
+//! Both queues are bounded; what does not fit is counted and becomes a gap.
+
+use super::baud::Baud;
+use super::port_error::PortError;
+use super::ports::{PortInfo, choose, describe, list_ports};
+use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
+use super::reader::{PortReader, discard_old, open_port};
+use super::replay::Replay;
+use crate::wire::{ConsoleLine, Decoder, Rail};
+use palpate_tactile::board::Detected;
+use palpate_tactile::board::{Board, Sensor};
+use palpate_tactile::cadence::Cadence;
+use palpate_tactile::capture::Captured;
+use serde::Serialize;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Full scale of ten bits.
+const TEN_BITS: u32 = 1023;
+
+/// What to listen to, and how.
+#[derive(Clone, Debug)]
+pub struct LinkOptions {
+    /// A port, a link to one, or a file of captured bytes; the only likely port where nothing is named.
+    pub path: Option<PathBuf>,
+    /// The speed; without it the usual ones are tried.
+    pub baud: Option<Baud>,
+    /// Whether a board that vanishes is waited for.
+    pub reconnect: bool,
+    /// How fast captured bytes are played, as a multiple of the pace they came at; infinite for as fast as they are taken.
+    pub replay_speed: f64,
+}
+
+impl Default for LinkOptions {
+    fn default() -> Self {
+        Self { path: None, baud: None, reconnect: true, replay_speed: 1.0 }
+    }
+}
+
+/// Where a link stands.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "state")]
+pub enum LinkState {
+    /// Just opened; boards restart when they are connected to.
+    Waiting,
+    /// Readings come.
+    Listening,
+    /// Nothing comes.
+    Silent {
+        /// What to try.
+        hint: String,
+    },
+    /// Bytes come that are no lines of a board, at any speed.
+    Unreadable {
+        /// What to try.
+        hint: String,
+    },
+    /// The port is gone; it is looked for.
+    Lost {
+        /// Why.
+        cause: String,
+    },
+    /// It is over.
+    Ended {
+        /// Why, where it was not asked for.
+        cause: Option<String>,
+    },
+}
+
+impl LinkState {
+    /// In a sentence for the user.
+    pub fn sentence(&self) -> String {
+        match self {
+            Self::Waiting => "Waiting for the board (it restarts when it is connected to)".to_owned(),
+            Self::Listening => "Listening".to_owned(),
+            Self::Silent { hint } | Self::Unreadable { hint } => hint.clone(),
+            Self::Lost { cause } => format!("Connection lost: {cause}. Looking for the board each second"),
+            Self::Ended { cause: Some(cause) } => format!("Ended: {cause}"),
+            Self::Ended { cause: None } => "Ended".to_owned(),
+        }
+    }
+}
+
+/// Everything that can be shown of a link.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LinkStatus {
+    /// Where it stands.
+    #[serde(flatten)]
+    pub state: LinkState,
+    /// What is listened to.
+    pub port: PortInfo,
+    /// The speed in use (bit/s); none for captured bytes.
+    pub baud: Option<u32>,
+    /// What is known of the board.
+    pub board: Board,
+    /// How its lines are read; none before two of them agree.
+    pub detected: Option<Detected>,
+    /// How well it keeps time.
+    pub cadence: Cadence,
+    /// Channels at an end of the converter's range, or without numbers.
+    pub rails: Vec<Option<Rail>>,
+    /// The counts look like those of ten bits.
+    pub looks_10_bit: bool,
+    /// Channels whose numbers have a unit behind them, and which.
+    pub units: Vec<(String, String)>,
+    /// How often the connection was taken up again.
+    pub reconnects: u32,
+    /// Time since the link was opened (s).
+    pub now_s: f64,
+    /// Bytes, and readings, that this computer was too slow to take.
+    pub dropped: [u64; 2],
+}
+
+impl LinkStatus {
+    /// What is wrong with the line, and what to try, in sentences.
+    pub fn line_remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.cadence.troubled {
+            let bad = self.cadence.bad_lines;
+            remarks.push(format!(
+                "many lines cannot be read, {bad} so far: look at them in the console; a short cable straight into the \
+                 computer helps, and no other program on the port"
+            ));
+        }
+        if let [bytes, readings] = self.dropped
+            && bytes + readings > 0
+        {
+            remarks.push(format!("this computer was too slow for {bytes} bytes and {readings} readings"));
+        }
+        remarks
+    }
+
+    /// What is wrong with the sensors' wiring as far as counts tell, in sentences.
+    pub fn wiring_remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.looks_10_bit {
+            let said = self.board.firmware.is_some();
+            let text = match (self.board.full_scale <= TEN_BITS, said) {
+                (true, _) => {
+                    "the counts are those of ten bits, and taken as such: analogReadResolution(12) in the sketch gives finer ones"
+                }
+                (false, false) => {
+                    "no count is beyond ten bits; twelve are taken for granted, since neither the board nor a strip tells"
+                }
+                (false, true) => {
+                    "the counts look like those of ten bits, against the board's word, so that what is derived from them is \
+                          wrong: call analogReadResolution(12) in the sketch"
+                }
+            };
+            remarks.push(text.to_owned());
+        }
+        let sensors = self.units.iter().filter(|(name, _)| Sensor::called(name).is_some());
+        remarks.extend(sensors.map(|(name, unit)| {
+            format!("{name} comes in {unit}, and is taken for counts: print what analogRead gives, without a unit")
+        }));
+        let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
+        for (channel, (name, rail)) in self.board.channels.iter().zip(&self.rails).enumerate() {
+            let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
+            remarks.extend(match (rail, sensor.is_some_and(Sensor::is_flex)) {
+                (Some(Rail::High), true) => {
+                    Some(format!("{name} is at the upper end of the range: the strip or one of its wires has come off"))
+                }
+                (Some(Rail::Low), true) => Some(format!("{name} reads nothing: the strip is shorted, or its divider not fed")),
+                (Some(Rail::High), false) => Some(format!(
+                    "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
+                     ground that is missing or too large"
+                )),
+                (Some(Rail::NoNumber), _) => sensor.map(|_| {
+                    format!("{name} has no numbers: an open circuit as the sketch sees it; look at its lines in the console")
+                }),
+                // A pad that nothing touches reads nothing.
+                (Some(Rail::Low), false) | (None, _) => None,
+            });
+        }
+        remarks
+    }
+
+    /// At what speed it is heard, and how its lines are read.
+    pub fn heard_as(&self) -> String {
+        let speed = self.baud.map(|baud| format!("{baud} baud"));
+        let format = self.detected.as_ref().map(|detected| detected.why.clone());
+        speed.into_iter().chain(format).collect::<Vec<String>>().join("; ")
+    }
+}
+
+/// What the threads of a link share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) bytes: ByteQueue,
+    pub(super) events: EventQueue,
+    pub(super) decoder: Mutex<Decoder>,
+    pub(super) state: Mutex<LinkState>,
+    pub(super) port: Mutex<PortInfo>,
+    /// The way back to the board, while there is one.
+    pub(super) writer: Mutex<Option<Box<dyn serialport::SerialPort>>>,
+    pub(super) baud: AtomicU32,
+    pub(super) reconnects: AtomicU32,
+    /// Readings so far, for the reader: it tells noise from a board by them.
+    pub(super) readings: AtomicU64,
+    pub(super) stop: AtomicBool,
+    pub(super) began: Instant,
+}
+
+impl Shared {
+    fn new(port: PortInfo, when_full: WhenFull) -> Arc<Self> {
+        Arc::new(Self {
+            bytes: ByteQueue::new(when_full),
+            events: EventQueue::new(when_full),
+            decoder: Mutex::default(),
+            state: Mutex::new(LinkState::Waiting),
+            port: Mutex::new(port),
+            writer: Mutex::new(None),
+            baud: AtomicU32::new(0),
+            reconnects: AtomicU32::new(0),
+            readings: AtomicU64::new(0),
+            stop: AtomicBool::new(false),
+            began: Instant::now(),
+        })
+    }
+
+    pub(super) fn set_state(&self, state: LinkState) {
+        *lock(&self.state) = state;
+    }
+
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Sleeps in pieces, so that stopping is prompt.
+    pub(super) fn sleep(&self, time: Duration) {
+        const PIECE: Duration = Duration::from_millis(20);
+        let until = Instant::now() + time;
+        while !self.is_stopped() {
+            match until.checked_duration_since(Instant::now()) {
+                Some(left) if !left.is_zero() => std::thread::sleep(left.min(PIECE)),
+                _ => return,
+            }
+        }
+    }
+
+    /// Decodes until there is nothing more to come.
+    fn decode(&self) {
+        let mut heard = Vec::new();
+        while let Some(pieces) = self.bytes.take() {
+            for piece in pieces {
+                {
+                    let mut decoder = lock(&self.decoder);
+                    match &piece {
+                        Captured::Bytes { arrived_s, bytes } => decoder.push(bytes, *arrived_s, &mut heard),
+                        Captured::Interrupted { cause, .. } => decoder.interrupt(cause),
+                    }
+                    self.readings.store(decoder.readings(), Ordering::Relaxed);
+                }
+                let events = heard.drain(..).map(LinkEvent::Heard);
+                self.events.push(std::iter::once(LinkEvent::Captured(piece)).chain(events));
+            }
+        }
+        self.events.close();
+    }
+}
+
+/// Why a line could not be sent to the board.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// There is no board at the moment.
+    #[error("the board is not connected, so that it was not told")]
+    NotConnected,
+    /// The port did not take it.
+    #[error("the board was not told: {0}")]
+    Port(String),
+}
+
+/// An open link. Dropping it closes the port.
+#[derive(Debug)]
+pub struct SerialLink {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl SerialLink {
+    /// Opens a port, or a file of captured bytes, and begins to listen.
+    pub fn open(options: &LinkOptions) -> Result<Self, PortError> {
+        let port = match &options.path {
+            Some(path) if is_capture(path) => return Self::replay(path, options.replay_speed),
+            Some(path) => describe(path),
+            None => choose(&list_ports())?,
+        };
+        let shared = Shared::new(port.clone(), WhenFull::Drop);
+        let baud = options.baud.unwrap_or(Baud::B115200);
+        let opened = open_port(&port.path, baud)?;
+        discard_old(opened.as_ref(), port.kind);
+        *lock(&shared.writer) = opened.try_clone().ok();
+        let reader = PortReader::new(Arc::clone(&shared), port, baud, options);
+        Self::start(&shared, move || reader.run(opened))
+    }
+
+    fn replay(path: &Path, speed: f64) -> Result<Self, PortError> {
+        let replay = Replay::open(path, speed)?;
+        let port = PortInfo {
+            path: path.to_owned(),
+            title: "captured bytes".to_owned(),
+            usb: None,
+            kind: super::ports::BoardKind::default(),
+        };
+        let shared = Shared::new(port, WhenFull::Wait);
+        let for_thread = Arc::clone(&shared);
+        Self::start(&shared, move || replay.run(&for_thread))
+    }
+
+    fn start(shared: &Arc<Shared>, read: impl FnOnce() + Send + 'static) -> Result<Self, PortError> {
+        let mut link = Self { shared: Arc::clone(shared), threads: Vec::new() };
+        let path = lock(&shared.port).path.clone();
+        let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
+        let failed = |error: std::io::Error| PortError::of(&path, &error.into(), &[]);
+        let decoding = Arc::clone(shared);
+        link.threads.push(thread("serial-decode").spawn(move || decoding.decode()).map_err(failed)?);
+        let closing = Arc::clone(shared);
+        let reading = thread("serial-read").spawn(move || {
+            read();
+            closing.bytes.close();
+        });
+        match reading {
+            Ok(reading) => link.threads.push(reading),
+            Err(error) => {
+                shared.bytes.close();
+                return Err(failed(error));
+            }
+        }
+        Ok(link)
+    }
+
+    /// What has come since the last call; if nothing has, waits for it up to a time.
+    pub fn take(&self, patience: Duration) -> Vec<LinkEvent> {
+        self.shared.events.take(patience)
+    }
+
+    /// True when everything was taken and nothing more will come.
+    pub fn is_over(&self) -> bool {
+        self.shared.events.is_over()
+    }
+
+    /// This computer's clock as the readings have it (s since the link was opened).
+    pub fn now_s(&self) -> f64 {
+        self.shared.began.elapsed().as_secs_f64()
+    }
+
+    /// Sends a line to the board.
+    pub fn send(&self, line: &str) -> Result<(), SendError> {
+        let mut writer = lock(&self.shared.writer);
+        let port = writer.as_mut().ok_or(SendError::NotConnected)?;
+        port.write_all(format!("{line}\n").as_bytes()).map_err(|error| SendError::Port(error.to_string()))
+    }
+
+    /// Everything that can be shown.
+    pub fn status(&self) -> LinkStatus {
+        let shared = &self.shared;
+        let decoder = lock(&shared.decoder);
+        let baud = shared.baud.load(Ordering::Relaxed);
+        LinkStatus {
+            state: lock(&shared.state).clone(),
+            port: lock(&shared.port).clone(),
+            baud: (baud > 0).then_some(baud),
+            board: decoder.board(),
+            detected: decoder.detected(),
+            cadence: decoder.cadence(),
+            rails: decoder.rails(),
+            looks_10_bit: decoder.looks_10_bit(),
+            units: decoder.units(),
+            reconnects: shared.reconnects.load(Ordering::Relaxed),
+            now_s: self.now_s(),
+            dropped: [shared.bytes.dropped_bytes(), shared.events.dropped_readings()],
+        }
+    }
+
+    /// The newest lines as they came, oldest first.
+    pub fn console(&self) -> Vec<ConsoleLine> {
+        lock(&self.shared.decoder).console().cloned().collect()
+    }
+
+    /// Stops listening; what has come can still be taken.
+    pub fn stop(&self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for SerialLink {
+    fn drop(&mut self) {
+        self.stop();
+        // Whoever waits for room waits in vain from now on.
+        self.shared.events.close();
+        self.shared.bytes.close();
+        for thread in self.threads.drain(..) {
+            // A panic in the thread has printed itself; there is nobody left to tell here.
+            let _ended = thread.join();
+        }
+    }
+}
+
+/// True for a file of bytes; ports are devices.
+fn is_capture(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file())
+}

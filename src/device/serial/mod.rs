@@ -1,0 +1,18 @@
+//! The real gripper's board on a serial port.
+
+mod baud;
+mod link;
+#[cfg(all(test, unix))]
+mod link_tests;
+mod port_error;
+mod ports;
+mod queue;
+mod reader;
+mod replay;
+mod scan;
+
+pub use baud::Baud;
+pub use link::{LinkOptions, LinkState, LinkStatus, SendError, SerialLink};
+pub use port_error::{ACCESS_RULE, MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
+pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};
+pub use queue::LinkEvent;

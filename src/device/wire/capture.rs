@@ -1,0 +1,112 @@
+//! Files of captured bytes, to be replayed. Two forms; the first four bytes tell which:
+//!
+//! - records with their times of arrival, see [`palpate_tactile::capture`];
+//! - raw bytes, as any terminal program saves them. Without times of arrival they get the pace of the board's own clock
+//!   where its lines have one, else that of 50 lines a second.
+
+use super::fields::{Parsed, parse};
+use palpate_tactile::capture::{CAPTURE_MAGIC, Captured, LONGEST_RECORD, read_record};
+use std::io::{self, Read};
+
+/// Time between lines that have no clock (s): the paper's board takes 50 samples a second.
+const PACE_S: f64 = 0.02;
+/// Two lines of a raw file further apart than this are not of one stretch (s).
+const FARTHEST_S: f64 = 10.0;
+
+/// Reads a captured file piece by piece, in bounded memory.
+#[derive(Debug)]
+pub struct CaptureReader<R> {
+    source: R,
+    form: Form,
+}
+
+#[derive(Debug)]
+enum Form {
+    Stamped,
+    Raw { pace: Pace, waiting: Vec<u8>, ended: bool },
+}
+
+/// The clock that a raw file is given.
+#[derive(Debug, Default)]
+struct Pace {
+    now_s: f64,
+    clock: Option<f64>,
+}
+
+impl<R: Read> CaptureReader<R> {
+    /// A reader of either form.
+    pub fn new(mut source: R) -> io::Result<Self> {
+        let mut head = Vec::new();
+        source.by_ref().take(CAPTURE_MAGIC.len() as u64).read_to_end(&mut head)?;
+        let form = if head == CAPTURE_MAGIC {
+            Form::Stamped
+        } else {
+            Form::Raw { pace: Pace::default(), waiting: head, ended: false }
+        };
+        Ok(Self { source, form })
+    }
+
+    /// The next line of a raw file, with what ends it.
+    fn raw(source: &mut R, pace: &mut Pace, waiting: &mut Vec<u8>, ended: &mut bool) -> io::Result<Option<Captured>> {
+        loop {
+            let end = waiting.iter().position(|byte| *byte == b'\n').map(|at| at + 1);
+            let end = end.or_else(|| (*ended || waiting.len() >= LONGEST_RECORD).then_some(waiting.len()));
+            if let Some(end) = end {
+                if end == 0 {
+                    return Ok(None);
+                }
+                let bytes: Vec<u8> = waiting.drain(..end).collect();
+                pace.go_on(&bytes);
+                return Ok(Some(Captured::Bytes { arrived_s: pace.now_s, bytes }));
+            }
+            let read = source.by_ref().take(4096).read_to_end(waiting)?;
+            *ended = read == 0;
+        }
+    }
+}
+
+impl Pace {
+    fn go_on(&mut self, line: &[u8]) {
+        let clock = match parse(line) {
+            Ok(Parsed::Named { fields, .. }) => fields.iter().find_map(|field| match field.name.as_str() {
+                "t_us" => field.value.map(|us| us * 1e-6),
+                "ms" => field.value.map(|ms| ms * 1e-3),
+                _ => None,
+            }),
+            _ => None,
+        };
+        let step = clock.zip(self.clock).map(|(now, before)| now - before);
+        self.now_s += step.filter(|step| (0.0..FARTHEST_S).contains(step)).unwrap_or(PACE_S);
+        self.clock = clock.or(self.clock);
+    }
+}
+
+impl<R: Read> Iterator for CaptureReader<R> {
+    type Item = io::Result<Captured>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match &mut self.form {
+            Form::Stamped => read_record(&mut self.source),
+            Form::Raw { pace, waiting, ended } => Self::raw(&mut self.source, pace, waiting, ended),
+        }
+        .transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn raw_files_get_the_pace_of_their_clock_or_of_fifty_lines_a_second() -> io::Result<()> {
+        let times = |text: &str| -> io::Result<Vec<f64>> {
+            CaptureReader::new(text.as_bytes())?.map(|piece| piece.map(|piece| piece.arrived_s())).collect()
+        };
+        let close = |found: &[f64], wanted: &[f64]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(close(&times("1,2\n3,4\r\n5,6")?, &[0.02, 0.04, 0.06]));
+        let clocked = times("t_us:1000,a:1\nt_us:6000,a:1\nt_us:16000,a:1\n")?;
+        assert!(clocked.len() == 3 && close(&clocked, &[0.02, 0.025, 0.035]), "{clocked:?}");
+        assert!(times("")?.is_empty());
+        Ok(())
+    }
+}

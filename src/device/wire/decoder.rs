@@ -1,0 +1,388 @@
+//! Bytes to readings. The board's way of writing is found out from its lines and may be asked for; what cannot be read is
+//! counted and told as a gap, and nothing is put in its place.
+
+use super::cadence::Meter;
+use super::checksum;
+use super::clock::{Counters, Stamp, StreamClock};
+use super::columns::Columns;
+use super::fields::{Field, Parsed, parse};
+use super::hello::{self, Hello};
+use super::lines::{Line, LineSplitter};
+use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch, Reach};
+use super::shape::{Candidate, Judged, Role, Shapes};
+use super::tail::{ConsoleLine, Tail, Verdict};
+use super::teleplot::Assembler;
+use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
+use palpate_tactile::cadence::Cadence;
+
+/// What was heard, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Heard {
+    /// A line of the board.
+    Reading(Reading),
+    /// Readings are missing before the one that comes next.
+    Gap(Gap),
+    /// What is known of the board has changed. Its channels are only ever added to, or renamed in place.
+    Board(Board),
+    /// A remark of the board, without its `#`.
+    Said(String),
+}
+
+/// Listens to one board. Memory stays bounded whatever it sends.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    splitter: LineSplitter,
+    reader: Reader,
+}
+
+/// A decoder without the line that is going on.
+#[derive(Clone, Debug, Default)]
+struct Reader {
+    shapes: Shapes,
+    columns: Columns,
+    /// Names of the channels, in the order of the counts.
+    channels: Vec<String>,
+    /// The sensor on each of them.
+    sensors: Vec<Option<Sensor>>,
+    /// What the board said of itself.
+    hello: Option<Hello>,
+    teleplot: Assembler,
+    clock: StreamClock,
+    meter: Meter,
+    rails: RailWatch,
+    reach: Reach,
+    /// The full scale that was told last.
+    told_scale: Option<u32>,
+    tail: Tail,
+    /// Lines since the last reading that could not be read.
+    unreadable: u64,
+    /// Why readings may be missing before the next one.
+    broken: Option<String>,
+    /// The newest reading's time (s).
+    last_s: Option<f64>,
+}
+
+/// Beside a resistor up to this (ohm) a strip, which has 17.5 kOhm or more (data sheet), is above a quarter of the range.
+const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
+
+/// Largest counter that is believed: beyond it whole numbers are not told apart.
+const LARGEST_COUNTER: f64 = 9.0e15;
+
+/// True where two names are those of one channel.
+fn is_same_channel(a: &str, b: &str) -> bool {
+    a.eq_ignore_ascii_case(b) || Sensor::called(a).is_some_and(|sensor| sensor.is_called(b))
+}
+
+impl Decoder {
+    /// Takes in bytes that arrived at a time (s since the stream began) and adds what they say to `heard`.
+    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let Self { splitter, reader } = self;
+        reader.meter.bytes(bytes, arrived_s);
+        splitter.push(bytes, |line| match line {
+            Line::Whole(line) => reader.line(line, arrived_s, heard),
+            Line::First(line) => reader.first(line, arrived_s, heard),
+            Line::TooLong => reader.bad(b"", "it does not end", arrived_s),
+        });
+    }
+
+    /// The stream was interrupted; readings that are found missing when it goes on are put down to `cause`.
+    pub fn interrupt(&mut self, cause: &str) {
+        self.splitter.interrupt();
+        self.reader.teleplot = Assembler::default();
+        self.reader.shapes.give_up();
+        self.reader.clock.interrupt();
+        // Another sketch may be on the board when it comes back; it need not say hello.
+        self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
+        self.reader.broken = Some(cause.to_owned());
+        self.reader.reach = Reach::default();
+        self.reader.columns.interrupt();
+        self.reader.meter.forget_what_came_before();
+    }
+
+    /// What is known of the board.
+    pub fn board(&self) -> Board {
+        self.reader.board()
+    }
+
+    /// True once the board has said what it is.
+    pub fn knows_board(&self) -> bool {
+        self.reader.hello.is_some()
+    }
+
+    /// How its lines are read; none before two of them agree.
+    pub fn detected(&self) -> Option<Detected> {
+        let format = self.reader.shapes.format?;
+        let why = match format {
+            Format::Csv => format!("{}; {}", format.mark(), self.reader.columns.why()),
+            Format::Plotter | Format::Teleplot | Format::JsonLines => format.mark().to_owned(),
+        };
+        Some(Detected { format, why, time: self.reader.clock.source() })
+    }
+
+    /// How well it keeps time.
+    pub fn cadence(&self) -> Cadence {
+        self.reader.meter.cadence(self.reader.clock.drift())
+    }
+
+    /// How many readings there were so far; [`Decoder::cadence`] says more, for more work.
+    pub fn readings(&self) -> u64 {
+        self.reader.meter.readings()
+    }
+
+    /// The newest lines as they came, oldest first.
+    pub fn console(&self) -> impl Iterator<Item = &ConsoleLine> {
+        self.reader.tail.lines()
+    }
+
+    /// For each channel, where it has said nothing of its sensor for half a second or more.
+    pub fn rails(&self) -> Vec<Option<Rail>> {
+        self.reader.rails.at()
+    }
+
+    /// The unit that stands behind a channel's numbers, for each that has one.
+    pub fn units(&self) -> Vec<(String, String)> {
+        let named = |(place, unit): (usize, &str)| Some((self.reader.channels.get(place)?.clone(), unit.to_owned()));
+        self.reader.shapes.units().filter_map(named).collect()
+    }
+
+    /// True where the counts look like those of a converter with 10 bits, though it is taken for one with 12, or said to be
+    /// one: a sketch may say so and forget `analogReadResolution`.
+    pub fn looks_10_bit(&self) -> bool {
+        self.reader.looks_10_bit()
+    }
+}
+
+impl Reader {
+    fn board(&self) -> Board {
+        let mut board = self.said().cloned().unwrap_or_default();
+        board.full_scale = self.full_scale();
+        let place = |name: &String| board.channels.iter().position(|known| is_same_channel(known, name));
+        let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
+        board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
+        board.channels.clone_from(&self.channels);
+        board
+    }
+
+    /// What the board said of itself.
+    fn said(&self) -> Option<&Board> {
+        self.hello.as_ref().map(|hello| &hello.board)
+    }
+
+    /// How far its converter counts: as it says, and else as its counts tell.
+    fn full_scale(&self) -> u32 {
+        self.reach.full_scale(self.said().map(|board| board.full_scale))
+    }
+
+    fn looks_10_bit(&self) -> bool {
+        let Some(said) = self.said().filter(|_| self.rails.looks_10_bit()) else {
+            return self.rails.looks_10_bit();
+        };
+        // Against the board's word only strips speak: they are never near zero.
+        let board = self.board();
+        let is_told_by = |sensor: Sensor| {
+            let place = board.channel_of(sensor).filter(|_| sensor.is_flex());
+            let ohm = |place: usize| board.divider_ohm.get(place).copied().unwrap_or(0.0);
+            place.is_some_and(|place| self.rails.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
+        };
+        said.full_scale >= FULL_12_BIT && Sensor::ALL.into_iter().any(is_told_by)
+    }
+
+    fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
+        self.tail.add(line, arrived_s, Verdict::Bad(why));
+        self.give_up(arrived_s);
+        self.unreadable += 1;
+        self.meter.bad_line(arrived_s);
+    }
+
+    /// Counts the line that waited for another like it as one that could not be read.
+    fn give_up(&mut self, arrived_s: f64) {
+        if self.shapes.give_up() {
+            self.unreadable += 1;
+            self.meter.bad_line(arrived_s);
+        }
+    }
+
+    fn line(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        if line.starts_with(b"#") {
+            return self.remark(line, arrived_s, heard);
+        }
+        let (format, fields, odd) = match self.check(line).and_then(|()| parse(line)) {
+            Err(why) => return self.bad(line, why, arrived_s),
+            Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
+            Ok(Parsed::Columns(cells)) => {
+                let odd = cells.iter().any(|cell| !cell.plain);
+                (Format::Csv, self.columns.name(cells, self.hello.as_ref().map(|hello| &hello.board)), odd)
+            }
+            Ok(Parsed::Named { format: Format::Teleplot, fields, odd }) => {
+                self.tail.add(line, arrived_s, Verdict::Read);
+                match self.teleplot.push(fields) {
+                    None => return,
+                    Some(fields) => (Format::Teleplot, fields, odd),
+                }
+            }
+            Ok(Parsed::Named { format, fields, odd }) => (format, fields, odd),
+        };
+        if format != Format::Teleplot {
+            self.tail.add(line, arrived_s, Verdict::Read);
+        }
+        match self.shapes.judge(Candidate { format, fields, odd, arrived_s }) {
+            Judged::Known(line) => {
+                self.give_up(arrived_s);
+                self.reading(&line, heard);
+            }
+            Judged::Changed(lines) => lines.iter().for_each(|line| self.reading(line, heard)),
+            Judged::Waits { given_up } => {
+                for _ in 0..given_up {
+                    self.unreadable += 1;
+                    self.meter.bad_line(arrived_s);
+                }
+            }
+        }
+    }
+
+    /// A first line is most often the rest of one, and passed over. A line of names is read: a board that is reset by being
+    /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
+    fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let Ok(Parsed::Header(names)) = parse(line) else { return };
+        let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
+        if names.first().is_some_and(is_known) {
+            self.header(names, line, arrived_s, heard);
+        }
+    }
+
+    /// Refuses a line of numbers whose checksum is wrong, or missing though the board said that there is one.
+    fn check(&self, line: &[u8]) -> Result<(), &'static str> {
+        let has_one = checksum::ends_in_one(line, ':')?;
+        let wanted = self.hello.as_ref().is_some_and(|hello| hello.checked);
+        if wanted && !has_one { Err("its checksum is missing") } else { Ok(()) }
+    }
+
+    fn remark(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        let text = std::str::from_utf8(line).map_err(|_not_text| "it holds bytes that are no text");
+        let (text, hello) = match text.and_then(|text| Ok((text, hello::parse(text)?))) {
+            Ok(said) => said,
+            Err(why) => return self.bad(line, why, arrived_s),
+        };
+        self.tail.add(line, arrived_s, Verdict::Said);
+        if hello.is_some() && self.hello != hello {
+            self.hello = hello;
+            self.reach = Reach::default();
+            self.name_columns(heard);
+            heard.push(Heard::Board(self.board()));
+        }
+        heard.push(Heard::Said(text.strip_prefix('#').unwrap_or(text).trim().to_owned()));
+    }
+
+    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+        if !self.columns.set_header(names) {
+            return self.bad(line, "it is neither numbers nor names of sensors", arrived_s);
+        }
+        self.tail.add(line, arrived_s, Verdict::Said);
+        self.name_columns(heard);
+    }
+
+    /// Columns that have gone by other names so far get those that have become known.
+    fn name_columns(&mut self, heard: &mut Vec<Heard>) {
+        if self.shapes.format != Some(Format::Csv) {
+            return;
+        }
+        let said = self.hello.as_ref().map(|hello| &hello.board);
+        let names = self.columns.names(self.shapes.names().len(), said);
+        let before = self.shapes.roles(&mut self.channels).to_vec();
+        if !self.shapes.rename(&names) {
+            return;
+        }
+        for (column, (role, name)) in before.iter().zip(names).enumerate() {
+            if let Role::Channel(place) = role {
+                // What turns out to be a counter leaves a channel behind that stays empty from now on.
+                let name = if Role::is_channel(&name) { name } else { format!("column {}", column + 1) };
+                self.channels[*place] = name;
+            }
+        }
+        self.shapes.roles(&mut self.channels);
+        self.find_sensors();
+        heard.push(Heard::Board(self.board()));
+    }
+
+    fn find_sensors(&mut self) {
+        self.sensors = self.channels.iter().map(|name| Sensor::called(name)).collect();
+    }
+
+    fn reading(&mut self, line: &Candidate, heard: &mut Vec<Heard>) {
+        let known = self.channels.len();
+        let roles = self.shapes.roles(&mut self.channels);
+        let mut counts = vec![None; self.channels.len()];
+        let mut sent = vec![false; self.channels.len()];
+        let (mut counters, mut line_bar) = (Counters { unreadable: self.unreadable, ..Counters::default() }, None);
+        let mut whole = true;
+        for (role, Field { value, .. }) in roles.iter().zip(&line.fields) {
+            let counter = value.filter(|value| (0.0..LARGEST_COUNTER).contains(value));
+            match role {
+                // What no f32 can hold is no count of any converter.
+                Role::Channel(place) => {
+                    counts[*place] = value.map(|value| value as f32).filter(|c| c.is_finite());
+                    sent[*place] = true;
+                }
+                Role::Micros => counters.time = counter.map(|count| (count, 1e-6)),
+                Role::Millis if counters.time.is_none() => counters.time = counter.map(|count| (count, 1e-3)),
+                Role::Sequence => counters.seq = counter,
+                Role::LineBar => line_bar = *value,
+                Role::Millis | Role::Checksum | Role::Ignored => {}
+            }
+            whole &= counter.is_some() || !matches!(role, Role::Micros | Role::Millis | Role::Sequence);
+        }
+        if self.channels.len() != known {
+            self.find_sensors();
+            heard.push(Heard::Board(self.board()));
+        }
+        let stamp = if whole { self.clock.stamp(&counters, line.arrived_s) } else { None };
+        let Some(stamp) = stamp else {
+            self.unreadable += 1;
+            return self.meter.bad_line(line.arrived_s);
+        };
+        let said = self.said().map(|board| board.full_scale);
+        let [strip, largest] = self.largest(&counts);
+        self.reach.add(stamp.t_s, strip, largest, said);
+        if self.told_scale.replace(self.full_scale()) != Some(self.full_scale()) {
+            heard.push(Heard::Board(self.board()));
+        }
+        self.tell_gap(&stamp, heard);
+        self.last_s = Some(stamp.t_s);
+        self.meter.reading(&stamp, line.arrived_s);
+        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { self.full_scale() };
+        self.rails.add(&counts, &sent, stamp.t_s, full_scale);
+        let Stamp { t_s, seq, .. } = stamp;
+        heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
+    }
+
+    /// The largest count of the strips, and of all sensors; what else a board sends need not come from its converter.
+    fn largest(&self, counts: &[Option<f32>]) -> [f32; 2] {
+        let mut largest = [0.0f32; 2];
+        for (sensor, count) in self.sensors.iter().zip(counts) {
+            if let (Some(sensor), Some(count)) = (sensor, count) {
+                largest[1] = largest[1].max(*count);
+                if sensor.is_flex() {
+                    largest[0] = largest[0].max(*count);
+                }
+            }
+        }
+        largest
+    }
+
+    fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<Heard>) {
+        let unreadable = std::mem::take(&mut self.unreadable);
+        let broken = self.broken.take();
+        let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
+        let cause = match (broken, stamp.restarted, unreadable) {
+            (Some(cause), true, _) => format!("{cause}; the board began anew"),
+            (Some(cause), false, _) => cause,
+            (None, true, _) => "the board began anew".to_owned(),
+            (None, false, 0) if stamp.missing.is_none() => "nothing arrived".to_owned(),
+            (None, false, 0) => "lost on the way".to_owned(),
+            (None, false, 1) => "a line could not be read".to_owned(),
+            (None, false, n) => format!("{n} lines could not be read"),
+        };
+        self.meter.gap(stamp.missing);
+        heard.push(Heard::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
+    }
+}

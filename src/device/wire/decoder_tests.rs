@@ -1,0 +1,450 @@
+//! Whole streams through the decoder: every format, every fault, any bytes.
+
+use super::*;
+use palpate_tactile::board::{Board, Gap, Reading, Sensor};
+use palpate_tactile::board::{Format, TimeSource};
+use proptest::prelude::*;
+
+/// What a stream says, with each chunk arriving at its time.
+fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<Heard>) {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    for (t, bytes) in chunks {
+        decoder.push(bytes, t, &mut heard);
+    }
+    (decoder, heard)
+}
+
+/// Lines that arrive every 20 ms, the first behind the end of another.
+fn hear_lines(lines: &[String]) -> (Decoder, Vec<Heard>) {
+    let lines: Vec<String> = lines.iter().map(|line| format!("\n{line}\n")).collect();
+    hear(lines.iter().enumerate().map(|(i, line)| (0.02 * i as f64, line.as_bytes())))
+}
+
+fn readings(heard: &[Heard]) -> Vec<&Reading> {
+    heard.iter().filter_map(|h| if let Heard::Reading(reading) = h { Some(reading) } else { None }).collect()
+}
+
+fn gaps(heard: &[Heard]) -> Vec<&Gap> {
+    heard.iter().filter_map(|h| if let Heard::Gap(gap) = h { Some(gap) } else { None }).collect()
+}
+
+fn firmware_line(i: u32) -> String {
+    let (us, a, b) = (20_000 * u64::from(i) + 123_456, 2000 + i % 7, 2100 + i % 5);
+    format!("t_us:{us},seq:{i},flexL:{a}.125,flexR:{b},fsrL:12.5,fsrR:0,p_bar:0.55")
+}
+
+const HELLO: &str = "# tactile-gripper fw=1 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700";
+
+#[test]
+fn the_firmwares_stream_is_heard_whole() {
+    let mut lines = vec![HELLO.to_owned()];
+    lines.extend((0..100).map(firmware_line));
+    let (decoder, heard) = hear_lines(&lines);
+    let readings = readings(&heard);
+    assert_eq!((readings.len(), gaps(&heard).len()), (100, 0));
+    assert_eq!(readings[40].counts, [Some(2005.125), Some(2100.0), Some(12.5), Some(0.0)]);
+    assert_eq!(readings[40].line_bar, Some(0.55));
+    assert!(readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 1e-6));
+    assert_eq!(decoder.board().divider_ohm, [47e3, 47e3, 4.7e3, 4.7e3]);
+    let detected = decoder.detected().map(|d| (d.format, d.time));
+    assert_eq!(detected, Some((Format::Plotter, TimeSource::Device)));
+    assert_eq!(decoder.cadence().bad_lines, 0);
+}
+
+#[test]
+fn the_same_stream_is_found_in_every_format() {
+    type Write = fn(u32) -> String;
+    let formats: [(Format, Write); 5] = [
+        (Format::Plotter, |i| format!("flexL:{i} flexR:{} fsrL:nan fsrR:4", i + 1)),
+        (Format::Csv, |i| format!("{i};{};;4", i + 1)),
+        (Format::Csv, |i| format!("{i}\t{}\tnan\t4", i + 1)),
+        (Format::Teleplot, |i| format!(">flexL:{i}\n>flexR:{}\n>fsrL:nan\n>fsrR:4", i + 1)),
+        (Format::JsonLines, |i| format!(r#"{{"flexL":{i},"flexR":{},"fsrL":null,"fsrR":4}}"#, i + 1)),
+    ];
+    for (format, write) in formats {
+        let lines: Vec<String> = std::iter::once("rest of a line".to_owned()).chain((10..60).map(write)).collect();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!(decoder.detected().map(|d| d.format), Some(format));
+        let readings = readings(&heard);
+        // Teleplot's last reading is complete when the next begins.
+        assert!(readings.len() >= 49, "{format:?}: {}", readings.len());
+        assert_eq!(decoder.board().channels, Board::default().channels, "{format:?}");
+        for (reading, i) in readings.iter().zip(10u8..) {
+            let i = f32::from(i);
+            assert_eq!(reading.counts, [Some(i), Some(i + 1.0), None, Some(4.0)], "{format:?}");
+        }
+    }
+}
+
+#[test]
+fn a_header_that_comes_late_renames_the_columns() {
+    let mut lines: Vec<String> = (0..30).map(|i| format!("{},{i},7,8,9", 20 * i)).collect();
+    lines[10] = "ms,flexR,flexL,fsrL,fsrR".to_owned();
+    let (decoder, heard) = hear_lines(&lines);
+    let board = decoder.board();
+    assert_eq!(board.channels, ["column 1", "flexR", "flexL", "fsrL", "fsrR"]);
+    assert_eq!(readings(&heard).last().map(|r| r.counts.clone()), {
+        Some(vec![None, Some(29.0), Some(7.0), Some(8.0), Some(9.0)])
+    });
+    assert_eq!(decoder.detected().map(|d| d.time), Some(TimeSource::Device));
+    assert_eq!(board.channel_of(Sensor::FlexRight), Some(1));
+}
+
+#[test]
+fn lost_lines_and_bad_lines_are_gaps_and_nothing_is_invented() {
+    let mut lines: Vec<String> = (0..300).map(firmware_line).collect();
+    lines[50] = lines[50][..40].to_owned();
+    lines[80] = "\u{fffd}garbage~~".to_owned();
+    lines[120] = format!("{}{}", &lines[120][..60], lines[121]);
+    lines.drain(200..204);
+    lines.remove(121);
+    let (decoder, heard) = hear_lines(&lines);
+    let gaps = gaps(&heard);
+    assert_eq!(gaps.iter().map(|gap| gap.lost).collect::<Vec<_>>(), [Some(1), Some(1), Some(2), Some(4)]);
+    assert_eq!((gaps[1].cause.as_str(), gaps[3].cause.as_str()), ("a line could not be read", "lost on the way"));
+    for reading in readings(&heard) {
+        let i = reading.seq.unwrap_or_default();
+        let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
+        assert_eq!(reading.counts, wanted, "{i}");
+    }
+    let cadence = decoder.cadence();
+    assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (292, 8, 3));
+}
+
+/// A line with its checksum.
+fn signed(line: &str, mark: &str) -> String {
+    format!("{line}{mark}{}", checksum::checksum(line.as_bytes()))
+}
+
+#[test]
+fn a_digit_that_is_lost_is_a_bad_line_where_lines_have_checksums() {
+    let sound: Vec<String> = (0..600).map(|i| signed(&firmware_line(i), ",ck:")).collect();
+    let hello = signed(&HELLO.replace("fw=1", "fw=2"), " ck=");
+    for first in [hello, "# heard too late for the hello".to_owned()] {
+        let mut lines = sound.clone();
+        // Every byte of a line in turn, each from a line of its own; the last of them is cut before its checksum.
+        let damaged: Vec<usize> = (100..600).step_by(5).collect();
+        for (at, line) in damaged.iter().enumerate() {
+            let end = lines[*line].find(",ck").unwrap_or_default();
+            let lost = at % (lines[*line].len() - 1);
+            lines[*line].remove(lost);
+            if at + 1 == damaged.len() {
+                lines[*line] = sound[*line][..end].to_owned();
+            }
+        }
+        let (decoder, heard) = hear_lines(&std::iter::once(first).chain(lines).collect::<Vec<_>>());
+        let cadence = decoder.cadence();
+        assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (500, 100, 100));
+        for reading in readings(&heard) {
+            let i = reading.seq.unwrap_or_default();
+            let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
+            assert_eq!((&reading.counts[..], i % 5 == 0 && i >= 100), (&wanted[..], false), "{i}");
+        }
+        assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL", "fsrR"], "the checksum is none");
+    }
+}
+
+#[test]
+fn a_board_that_comes_back_with_another_sketch_needs_no_checksums() {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    let hello = signed("# tactile-gripper fw=2 adc=12 ch=flexL", " ck=");
+    decoder.push(format!("{hello}\nflexL:1\nflexL:2\n").as_bytes(), 0.0, &mut heard);
+    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (0, 2), "they lack what was said of them");
+    decoder.interrupt("unplugged");
+    decoder.push(b"\nflexL:1\nflexL:2\n", 1.0, &mut heard);
+    assert_eq!(readings(&heard).len(), 2);
+}
+
+#[test]
+fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
+    let mut decoder = Decoder::default();
+    let mut heard = Vec::new();
+    let mut t = 0.0;
+    decoder.push(b"\n", t, &mut heard);
+    for i in 0..150u32 {
+        if i == 100 {
+            t += 3.0;
+            decoder.interrupt("the cable was pulled");
+            decoder.push(b"45,fsrR:0\n", t, &mut heard);
+        }
+        let restarted = i % 100;
+        decoder.push(format!("{}\n", firmware_line(restarted)).as_bytes(), t, &mut heard);
+        t += 0.02;
+    }
+    let gaps = gaps(&heard);
+    assert_eq!(gaps.len(), 1);
+    assert!(gaps[0].cause.starts_with("the cable was pulled") && gaps[0].to_s - gaps[0].from_s > 2.9, "{gaps:?}");
+    assert_eq!(readings(&heard).len(), 150);
+}
+
+#[test]
+fn ten_bits_are_seen_whatever_the_board_says_unless_it_has_reasons() {
+    let looks = |hello: &str, count: u32, pad: u32| {
+        let sample = |i: u32| format!("t_us:{},flexL:{},flexR:{count},fsrL:{pad},fsrR:0", 20_000 * i, count + i % 3);
+        let lines: Vec<String> = std::iter::once(hello.to_owned()).chain((0..300).map(sample)).collect();
+        let (decoder, _) = hear_lines(&lines);
+        (decoder.looks_10_bit(), decoder.rails()[0])
+    };
+    assert_eq!(looks("# no hello", 350, 0), (true, None));
+    assert_eq!(looks(HELLO, 350, 0), (true, None), "a strip is above a quarter of the range");
+    assert_eq!(looks(HELLO, 1021, 0), (true, Some(Rail::High)), "and this one is open");
+    assert_eq!(looks(HELLO, 1400, 900), (false, None));
+    assert_eq!(looks(&HELLO.replace("47000", "100000"), 800, 0), (false, None), "beside 100 kOhm it may be lower");
+    assert_eq!(looks(HELLO, 0, 900), (false, Some(Rail::Low)), "a pad may be anywhere");
+    assert_eq!(looks(&HELLO.replace("adc=12", "adc=10"), 350, 0), (false, None), "it says so");
+}
+
+/// A line without a checksum, as other people's sketches write them.
+fn plain_line(i: u32) -> String {
+    format!("flexL:{}mV,flexR:{},fsrL:{}", 2000 + i % 7, 2100 + i % 5, 12 + i % 3)
+}
+
+#[test]
+fn of_a_line_that_lost_its_beginning_or_its_unit_nothing_is_taken() {
+    let whole = plain_line(50);
+    // Behind the first name and its colon only a value with its unit tells.
+    for from in 1..whole.len() {
+        let mut lines: Vec<String> = (0..100).map(plain_line).collect();
+        lines[50] = whole[from..].to_owned();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{}", &whole[from..]);
+        assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL"], "{}", &whole[from..]);
+    }
+    for damaged in
+        ["flexL:2003m,flexR:2100,fsrL:14", "flexL:2003,flexR:2100,fsrL:14", "flexL:2003mV,flexR:210o,fsrL:14"]
+    {
+        let mut lines: Vec<String> = (0..100).map(plain_line).collect();
+        lines[50] = damaged.to_owned();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{damaged}");
+    }
+}
+
+#[test]
+fn a_word_in_place_of_a_number_costs_that_channel_alone() {
+    // The middle one is missing in every third line, the last in every fifth.
+    let word = |i: u32, every: u32, word: &str, number: u32| {
+        if i.is_multiple_of(every) { word.to_owned() } else { number.to_string() }
+    };
+    let named = |i| format!("flexL:{i},flexR:{},fsrL: {}", word(i, 3, "open", 7), word(i, 5, "disconnected", 8));
+    let columns = |i| format!("{i},{},{}", word(i, 3, "err", 7), word(i, 5, "Disconnected", 8));
+    for lines in [(1..90).map(named).collect::<Vec<_>>(), (1..90).map(columns).collect()] {
+        let (decoder, heard) = hear_lines(&lines);
+        let readings = readings(&heard);
+        assert_eq!((readings.len(), decoder.cadence().bad_lines), (89, 0), "{}", lines[2]);
+        for (i, reading) in (1u8..).zip(readings) {
+            let wanted = [Some(f32::from(i)), (i % 3 != 0).then_some(7.0), (i % 5 != 0).then_some(8.0)];
+            assert_eq!(reading.counts, wanted, "{}", lines[usize::from(i) - 1]);
+        }
+    }
+}
+
+#[test]
+fn a_unit_is_learned_with_the_first_number_that_has_it() {
+    let line = |i: u32| match i % 3 {
+        0 => format!("flexL:{}mV,fsrL:{}mV", 500 + i, 12 + i),
+        _ => format!("flexL:{}mV,fsrL:err", 500 + i),
+    };
+    for first in [0, 1] {
+        let (decoder, heard) = hear_lines(&(first..60).map(line).collect::<Vec<_>>());
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (60 - first as usize, 0), "{first}");
+        assert_eq!(decoder.units(), [("flexL".to_owned(), "mV".to_owned()), ("fsrL".to_owned(), "mV".to_owned())]);
+    }
+}
+
+#[test]
+fn a_number_without_a_name_belongs_to_every_line_or_was_torn_off() {
+    // A sketch that prints its scale behind its values, for Arduino's plotter.
+    let always = |i: u32| format!("flexL:{},flexR:7,0,1023", 500 + i);
+    let (decoder, heard) = hear_lines(&(0..60).map(always).collect::<Vec<_>>());
+    assert_eq!((decoder.board().channels.join(" ").as_str(), readings(&heard).len() > 55), ("flexL flexR", true));
+    // One bit, and a digit is a blank.
+    for torn in
+        ["flexL:2 03mV,flexR:2100,fsrL:14", "flexL:2003mV,flexR:2 00,fsrL:14", "flexL:2003mV,flexR:21,0,fsrL:14"]
+    {
+        let mut lines: Vec<String> = (0..100).map(plain_line).collect();
+        lines[50] = torn.to_owned();
+        let (decoder, heard) = hear_lines(&lines);
+        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{torn}");
+    }
+}
+
+#[test]
+fn another_sketch_after_an_interruption_is_another_board() {
+    let mut decoder = Decoder::default();
+    let (mut heard, mut t) = (Vec::new(), 0.0);
+    let mut say = |decoder: &mut Decoder, lines: &mut dyn Iterator<Item = String>| {
+        for line in lines {
+            t += 0.02;
+            decoder.push(format!("\n{line}\n").as_bytes(), t, &mut heard);
+        }
+        heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None })
+    };
+    let told = say(
+        &mut decoder,
+        &mut std::iter::once("flexL,fsrL".to_owned()).chain((0..80).map(|i| format!("{},3", 350 + i % 5))),
+    );
+    assert_eq!(told.map(|board| board.full_scale), Some(1023));
+    decoder.interrupt("unplugged");
+    // The same names serve on, but for others that are said; and the counts are judged anew.
+    let told = say(&mut decoder, &mut (0..20).map(|i| format!("{},3", 1400 + i)));
+    assert_eq!(told.map(|board| (board.full_scale, board.channels)), Some((4095, vec!["flexL".into(), "fsrL".into()])));
+    decoder.interrupt("unplugged");
+    let told =
+        say(&mut decoder, &mut std::iter::once("time,angle".to_owned()).chain((0..20).map(|i| format!("{i},3"))));
+    assert_eq!(told.map(|board| board.channels), Some(vec!["time".into(), "angle".into()]));
+}
+
+#[test]
+fn what_a_board_says_while_it_sets_itself_up_is_no_reading() {
+    let chatter = [
+        "Sensor: 1 ok",
+        "Sensor: 2 ok",
+        "Gain, 2, high",
+        "Rate, 50, low",
+        "Calibrating, please wait",
+        "Calibrating, please wait",
+    ];
+    let lines: Vec<String> = chatter.iter().map(|line| (*line).to_owned()).chain((0..40).map(plain_line)).collect();
+    let (decoder, heard) = hear_lines(&lines);
+    assert_eq!((readings(&heard).len(), decoder.board().channels.len()), (40, 3), "{:?}", decoder.board().channels);
+    // Names that have been said are not put out of use by words.
+    let mut lines = vec!["flexL,flexR".to_owned()];
+    lines.extend(
+        (0..40).map(|i| if i == 20 { "Calibrating,please".to_owned() } else { format!("{},{}", 500 + i, 600 + i) }),
+    );
+    let (decoder, heard) = hear_lines(&lines);
+    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (39, 1));
+    assert_eq!(decoder.board().channels, ["flexL", "flexR"]);
+}
+
+#[test]
+fn resistors_are_found_by_the_sensor_whatever_its_channel_is_called() {
+    let lines = [
+        "# tactile-gripper fw=1 ch=flexL,fsrL rm=33000,3300",
+        "flex_L:1,FSR L:2",
+        "flex_L:1,fsr-l:2",
+        "flex_L:1,fsr-l:2",
+    ];
+    let (decoder, _) = hear_lines(&lines.map(str::to_owned));
+    assert_eq!(
+        (decoder.board().channels, decoder.board().divider_ohm),
+        (vec!["flex_L".into(), "fsr-l".into()], vec![33e3, 3.3e3])
+    );
+}
+
+#[test]
+fn the_converters_reach_is_told_by_the_counts_of_a_sketch_that_says_nothing() {
+    let full_scale = |first: &str, strip: u32| {
+        let sample = |i: u32| format!("flexL:{},flexR:{strip},fsrL:3,fsrR:0,heap:70000", strip + i % 3);
+        let lines: Vec<String> = std::iter::once(first.to_owned()).chain((0..80).map(sample)).collect();
+        let (decoder, heard) = hear_lines(&lines);
+        let told =
+            heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None });
+        assert_eq!(told, Some(decoder.board()));
+        decoder.board().full_scale
+    };
+    let remark = "# no hello";
+    assert_eq!([355, 1420, 5700, 22_700].map(|strip| full_scale(remark, strip)), [1023, 4095, 16_383, 65_535]);
+    // It is believed, but for what goes beyond.
+    assert_eq!([355, 1420, 5700].map(|strip| full_scale(HELLO, strip)), [4095, 4095, 16_383]);
+    let ten = HELLO.replace("adc=12", "adc=10");
+    assert_eq!([355, 1420].map(|strip| full_scale(&ten, strip)), [1023, 4095]);
+}
+
+#[test]
+fn another_sketch_is_believed_after_two_of_its_lines() {
+    let lines: Vec<String> =
+        (0..20).map(|i| if i < 10 { format!("{i},1,2,3") } else { format!("grip:{i} bend:2") }).collect();
+    let (decoder, heard) = hear_lines(&lines);
+    assert_eq!(readings(&heard).len(), 20);
+    assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL", "fsrR", "grip", "bend"]);
+    assert_eq!(decoder.cadence().bad_lines, 0);
+}
+
+/// Bytes like a line's, a fault in them, or none at all.
+fn bytes() -> impl Strategy<Value = Vec<u8>> {
+    prop_oneof![
+        3 => (0u32..500).prop_map(|i| format!("{}\n", firmware_line(i)).into_bytes()),
+        1 => prop::collection::vec(any::<u8>(), 0..60),
+        1 => (0u32..500, 0usize..90).prop_map(|(i, cut)| {
+            let line = firmware_line(i);
+            line.as_bytes()[..cut.min(line.len())].to_vec()
+        }),
+        1 => "[0-9,;: \t\r\n{}>#\"a-z.-]{0,80}".prop_map(String::into_bytes),
+    ]
+}
+
+#[test]
+fn nonsense_at_a_wrong_speed_is_not_held_against_the_lines() {
+    let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+    decoder.push(b"\xff\xfe\n\x81\x90\n\xa0\n", 0.1, &mut heard);
+    assert!(decoder.cadence().bad_lines > 0);
+    decoder.interrupt("the speed was found to be 250000 baud");
+    for k in 0..5 {
+        decoder.push(format!("flexL:{k},flexR:2\n").as_bytes(), 0.2 + 0.02 * f64::from(k), &mut heard);
+    }
+    assert_eq!((decoder.cadence().bad_lines, decoder.cadence().samples > 2), (0, true));
+    // Once something was read, what cannot be read counts.
+    decoder.push(b"\xff\n", 0.4, &mut heard);
+    decoder.interrupt("the cable was pulled");
+    assert_eq!(decoder.cadence().bad_lines, 1);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn whatever_comes_time_moves_on_and_counts_add_up(chunks in prop::collection::vec((bytes(), 0.0f64..0.5), 0..150)) {
+        let mut decoder = Decoder::default();
+        let (mut heard, mut t) = (Vec::new(), 0.0);
+        for (chunk, wait) in &chunks {
+            t += wait;
+            decoder.push(chunk, t, &mut heard);
+        }
+        let (mut last, mut channels) = (f64::NEG_INFINITY, 0);
+        for event in &heard {
+            match event {
+                Heard::Reading(reading) => {
+                    prop_assert!(reading.t_s > last && reading.t_s <= reading.arrived_s + 1e-3, "{reading:?}");
+                    prop_assert_eq!(reading.counts.len(), channels);
+                    prop_assert!(reading.counts.iter().flatten().all(|count| count.is_finite()));
+                    last = reading.t_s;
+                }
+                Heard::Gap(gap) => prop_assert!(gap.from_s == last && gap.to_s > gap.from_s, "{gap:?}"),
+                Heard::Board(board) => {
+                    prop_assert!(board.channels.len() >= channels && board.channels.len() <= 64);
+                    channels = board.channels.len();
+                }
+                Heard::Said(_) => {}
+            }
+        }
+        prop_assert_eq!(decoder.cadence().samples as usize, readings(&heard).len());
+    }
+
+    #[test]
+    fn how_a_stream_is_cut_does_not_matter(chunks in prop::collection::vec(bytes(), 0..60), cut in 1usize..97) {
+        let whole: Vec<u8> = chunks.concat();
+        let (_, at_once) = hear([(1.0, whole.as_slice())]);
+        let (_, in_pieces) = hear(whole.chunks(cut).map(|chunk| (1.0, chunk)));
+        prop_assert_eq!(at_once, in_pieces);
+    }
+}
+
+#[test]
+fn names_that_are_the_first_line_are_read_where_they_are_whole() {
+    let after = |first: &str| {
+        let text: String = (0..20).map(|i| format!("{},{i},21{i:02},20{i:02},5,6\n", 20_000 * i)).collect();
+        let (decoder, heard) = hear([(0.0, first.as_bytes()), (0.5, text.as_bytes())]);
+        (decoder.board().channels, readings(&heard).len())
+    };
+    let (channels, read) = after("t_us,seq,flexR,flexL,fsrL,fsrR\n");
+    assert_eq!((channels.join(" ").as_str(), read), ("flexR flexL fsrL fsrR", 20));
+    // Of the first name something is missing: nobody knows what it is.
+    for cut in ["us,seq,flexR,flexL,fsrL,fsrR\n", "1,2,3,4\n", "\n"] {
+        let (channels, read) = after(cut);
+        assert!(!channels.contains(&"flexR".to_owned()) && read >= 18, "{cut}: {channels:?}, {read}");
+    }
+}

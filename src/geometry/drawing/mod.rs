@@ -1,0 +1,125 @@
+//! What there is to draw, as plain data: shapes, camera, labels. Made without a graphics card, drawn by any renderer.
+//!
+//! World coordinates in metres, z up. Overlay coordinates in points from the top left corner; a point is a pixel on an
+//! ordinary screen.
+
+mod camera;
+mod overlay;
+
+pub use camera::{Camera, StandardView};
+pub use overlay::{Align, Overlay, Shape2};
+
+use crate::SurfaceMesh;
+use crate::palette::Rgb;
+use glam::{Mat4, Vec3};
+use std::sync::Arc;
+
+/// Everything in one picture.
+#[derive(Clone, Debug)]
+pub struct DrawList {
+    /// From where it is seen.
+    pub camera: Camera,
+    /// Backdrop colours, above and below.
+    pub backdrop: [Rgb; 2],
+    /// Ball that holds everything which casts a shadow: centre and radius (m).
+    pub shadow_bounds: (Vec3, f32),
+    /// The ground and its grid.
+    pub ground: Option<Ground>,
+    /// Rigid things.
+    pub solids: Vec<Solid>,
+    /// Things shown for comparison: translucent, without shadow.
+    pub ghosts: Vec<Solid>,
+    /// Soft fingers.
+    pub fingers: Vec<SoftFinger>,
+    /// Forces.
+    pub arrows: Vec<Arrow>,
+    /// Flat shapes and text on top.
+    pub overlay: Overlay,
+}
+
+/// The ground, level with z = `height`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Its height (m).
+    pub height: f32,
+    /// Its colour.
+    pub colour: Rgb,
+    /// Colour of the grid: a line every 10 mm, a stronger one every 50 mm.
+    pub grid: Rgb,
+    /// Radius at which it has faded into the backdrop (m).
+    pub radius: f32,
+}
+
+/// A rigid thing somewhere in the world.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// Its surface; the same `Arc` in the next picture means that nothing has to be uploaded again.
+    pub mesh: Arc<SurfaceMesh>,
+    /// Its place.
+    pub world_from_mesh: Mat4,
+    /// How shiny it is, 0 matt to 1.
+    pub gloss: f32,
+}
+
+/// A soft finger as a smooth skin over a chain of frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SoftFinger {
+    /// Frames along the neutral axis, from palm to tip.
+    pub frames: Vec<FingerFrame>,
+    /// What its cross-section looks like.
+    pub section: Section,
+    /// Loads on the pad.
+    pub taxels: TaxelField,
+    /// Pressure that has the brightest colour (Pa).
+    pub full_scale: f32,
+}
+
+/// A place on the neutral axis of a finger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FingerFrame {
+    /// Arc length from the palm (m).
+    pub arc: f32,
+    /// Position (m).
+    pub position: Vec3,
+    /// Unit vector towards the tip.
+    pub along: Vec3,
+    /// Unit vector out of the pad.
+    pub inward: Vec3,
+}
+
+/// Cross-section of a finger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// Width across the bending plane (m).
+    pub width: f32,
+    /// Height of the pad in front of the neutral axis (m).
+    pub pad: f32,
+    /// Radius of the pad's crown (m).
+    pub crown_radius: f32,
+    /// Depth of the bellows behind the neutral axis (m).
+    pub back: f32,
+}
+
+/// Loads on a pad, row by row from palm to tip.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TaxelField {
+    /// Rows along the finger.
+    pub rows: u32,
+    /// Columns across it.
+    pub columns: u32,
+    /// For each taxel its pressure (Pa) and how far it is pushed in (m).
+    pub loads: Vec<[f32; 2]>,
+}
+
+/// An arrow, for a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrow {
+    /// Where it begins (m).
+    pub from: Vec3,
+    /// Where its point is (m).
+    pub to: Vec3,
+    /// Radius of the shaft (m).
+    pub radius: f32,
+    /// Its colour.
+    pub colour: Rgb,
+}

@@ -1,0 +1,279 @@
+//! Meshes from and to files: OBJ with its materials through tobj, STL (binary or text) through stl_io.
+
+use super::TriMesh;
+use crate::palette::Rgb;
+use glam::DVec3;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Files larger than this are refused before they are parsed (bytes): some five million triangles.
+const LARGEST_FILE: usize = 256 << 20;
+
+/// Triangles beyond this are refused: drawing and baking would take minutes.
+const MOST_TRIANGLES: usize = 2_000_000;
+
+/// Part of a mesh file that shares one material.
+#[derive(Clone, Debug)]
+pub struct ColouredPart {
+    /// The triangles.
+    pub mesh: TriMesh,
+    /// The material's diffuse colour where the file names one.
+    pub colour: Option<Rgb>,
+}
+
+/// Why a mesh file could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshFileError {
+    /// The file type is not one we read.
+    #[error("\"{name}\" is a {kind} file; Palpate reads meshes from .obj and .stl (export it as one of these)")]
+    Unsupported {
+        /// File name.
+        name: String,
+        /// Its extension, or "typeless".
+        kind: String,
+    },
+    /// The file could not be opened.
+    #[error("cannot read the mesh \"{name}\": {cause}")]
+    Unreadable {
+        /// File name.
+        name: String,
+        /// What the system says.
+        cause: String,
+    },
+    /// The contents are not what the file type promises.
+    #[error("the mesh \"{name}\" is damaged: {cause}")]
+    Damaged {
+        /// File name.
+        name: String,
+        /// What is wrong.
+        cause: String,
+    },
+    /// Too big to be meant.
+    #[error("the mesh \"{name}\" is too large: {what}; reduce it in a modelling tool")]
+    TooLarge {
+        /// File name.
+        name: String,
+        /// How large it is and what the limit is.
+        what: String,
+    },
+}
+
+/// Reads `name` through `read`, which returns a file's bytes given its path relative to wherever `name` lives, so
+/// that embedded and real files are read alike. A missing material file only costs the colours.
+pub fn read_mesh(
+    name: &str,
+    read: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
+) -> Result<Vec<ColouredPart>, MeshFileError> {
+    let extension = Path::new(name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if extension != "obj" && extension != "stl" {
+        return Err(MeshFileError::Unsupported {
+            name: name.to_owned(),
+            kind: if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") },
+        });
+    }
+    let bytes =
+        read(name).map_err(|cause| MeshFileError::Unreadable { name: name.to_owned(), cause: cause.to_string() })?;
+    if bytes.len() > LARGEST_FILE {
+        return Err(too_large(name, bytes.len() >> 20, "MiB", LARGEST_FILE >> 20));
+    }
+    let parts = if extension == "obj" {
+        parse_obj(name, &bytes, read)?
+    } else {
+        vec![ColouredPart { mesh: parse_stl(name, bytes)?, colour: None }]
+    };
+    let triangles: usize = parts.iter().map(|p| p.mesh.triangles.len()).sum();
+    if triangles > MOST_TRIANGLES {
+        return Err(too_large(name, triangles, "triangles", MOST_TRIANGLES));
+    }
+    Ok(parts)
+}
+
+fn too_large(name: &str, found: usize, unit: &str, limit: usize) -> MeshFileError {
+    MeshFileError::TooLarge { name: name.to_owned(), what: format!("{found} {unit}, the limit is {limit}") }
+}
+
+fn damaged(name: &str, cause: &dyn std::fmt::Display) -> MeshFileError {
+    MeshFileError::Damaged { name: name.to_owned(), cause: cause.to_string() }
+}
+
+fn parse_obj(
+    name: &str,
+    bytes: &[u8],
+    read: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
+) -> Result<Vec<ColouredPart>, MeshFileError> {
+    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
+    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+    let load_materials = |file: &Path| {
+        let path = folder.join(file);
+        match path.to_str().map(read) {
+            Some(Ok(text)) => tobj::load_mtl_buf(&mut Cursor::new(text)),
+            _ => Err(tobj::LoadError::OpenFileFailed),
+        }
+    };
+    let (models, materials) =
+        tobj::load_obj_buf(&mut Cursor::new(bytes), &options, load_materials).map_err(|e| damaged(name, &e))?;
+    let materials = match materials {
+        Ok(materials) => materials,
+        Err(error) => {
+            tracing::debug!("{name}: no materials ({error})");
+            Vec::new()
+        }
+    };
+    let part = |model: tobj::Model| -> Result<ColouredPart, MeshFileError> {
+        let mesh = model.mesh;
+        if !mesh.indices.len().is_multiple_of(3) || !mesh.positions.len().is_multiple_of(3) {
+            return Err(damaged(name, &"a face has fewer than three corners"));
+        }
+        let colour = mesh.material_id.and_then(|id| materials.get(id)).and_then(|m| m.diffuse);
+        Ok(ColouredPart {
+            mesh: TriMesh {
+                points: mesh.positions.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect(),
+                triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
+            },
+            colour: colour.map(Rgb::from_unit),
+        })
+    };
+    models.into_iter().map(part).collect()
+}
+
+fn parse_stl(name: &str, mut bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
+    // A binary file announces its count; believe it only when the bytes are there. Its header may say "solid" too.
+    let announced = bytes.get(80..84).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
+    let expected = announced.map(|n| 84 + 50 * n);
+    let looks_like_text = bytes.trim_ascii_start().starts_with(b"solid") && expected != Some(bytes.len());
+    if !looks_like_text && expected.is_none_or(|expected| expected > bytes.len()) {
+        let cause = match announced {
+            Some(n) => format!("it announces {n} triangles but ends after {} bytes", bytes.len()),
+            None => "it ends before the triangle count".to_owned(),
+        };
+        return Err(damaged(name, &cause));
+    }
+    // The reader tells the two kinds apart by how a file begins, and stops at the end of the first solid.
+    if looks_like_text {
+        bytes = as_one_solid(&String::from_utf8_lossy(&bytes));
+    } else if let Some(first) = bytes.first_mut() {
+        *first = 0;
+    }
+    let mut reader = Cursor::new(bytes);
+    let mesh = stl_io::read_stl(&mut reader).map_err(|e| damaged(name, &e))?;
+    Ok(TriMesh {
+        points: mesh.vertices.iter().map(|v| DVec3::from_array(<[f32; 3]>::from(*v).map(f64::from))).collect(),
+        triangles: mesh.faces.iter().map(|f| f.vertices.map(|i| i as u32)).collect(),
+    })
+}
+
+/// A text STL whose solids are one, with the header that the reader expects.
+fn as_one_solid(text: &str) -> Vec<u8> {
+    let mut one = String::from("solid all\n");
+    for line in text.lines().map(str::trim) {
+        if !line.starts_with("solid") && !line.starts_with("endsolid") {
+            one.push_str(line);
+            one.push('\n');
+        }
+    }
+    one.push_str("endsolid all\n");
+    one.into_bytes()
+}
+
+/// Writes parts as OBJ text and its material text, with enough digits for a micrometre in a metre.
+///
+/// Equal input gives equal text. `materials_file` is the name by which the OBJ refers to the material text.
+pub fn write_obj(title: &str, materials_file: &str, parts: &[(&str, ColouredPart)]) -> (String, String) {
+    use std::fmt::Write as _;
+    let mut obj = format!("# {title}\nmtllib {materials_file}\n");
+    let mut mtl = format!("# {title}\n");
+    let mut offset = 1;
+    for (name, part) in parts {
+        let [r, g, b] = part.colour.unwrap_or(Rgb(200, 200, 200)).to_unit();
+        // Writing to a String cannot fail.
+        let _infallible = write!(mtl, "newmtl {name}\nKd {r:.3} {g:.3} {b:.3}\n");
+        let _infallible = write!(obj, "o {name}\nusemtl {name}\n");
+        for p in &part.mesh.points {
+            let [x, y, z] = p.to_array().map(plain_number);
+            let _infallible = writeln!(obj, "v {x} {y} {z}");
+        }
+        for t in &part.mesh.triangles {
+            let [a, b, c] = t.map(|i| i + offset);
+            let _infallible = writeln!(obj, "f {a} {b} {c}");
+        }
+        offset += part.mesh.points.len() as u32;
+    }
+    (obj, mtl)
+}
+
+/// Micrometres as text, without trailing zeros or a negative zero.
+fn plain_number(x: f64) -> String {
+    let text = format!("{x:.6}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Primitive;
+
+    fn in_memory(files: Vec<(&'static str, Vec<u8>)>) -> impl Fn(&str) -> std::io::Result<Vec<u8>> {
+        move |path| {
+            let found = files.iter().find(|(name, _)| *name == path);
+            found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound))
+        }
+    }
+
+    #[test]
+    fn obj_and_materials_survive_a_round_trip() {
+        let mesh = Primitive::Cuboid { half: DVec3::new(0.01, 0.02, 0.03) }.tessellate();
+        let part = ColouredPart { mesh: mesh.clone(), colour: Some(Rgb(255, 51, 0)) };
+        let (obj, mtl) = write_obj("cube", "cube.mtl", &[("red", part)]);
+        let read = in_memory(vec![("d/cube.obj", obj.into_bytes()), ("d/cube.mtl", mtl.into_bytes())]);
+        let parts = read_mesh("d/cube.obj", &read).expect("what we wrote");
+        assert_eq!(parts.len(), 1);
+        assert_eq!(parts[0].colour, Some(Rgb(255, 51, 0)));
+        let corners = |m: &TriMesh| m.triangles.iter().map(|t| m.corners(*t)).collect::<Vec<_>>();
+        for (got, want) in corners(&parts[0].mesh).iter().zip(corners(&mesh)) {
+            assert!((0..3).all(|i| got[i].abs_diff_eq(want[i], 1e-9)));
+        }
+    }
+
+    #[test]
+    fn a_missing_material_file_costs_only_the_colour() {
+        let text = "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n";
+        let parts = read_mesh("a.obj", &in_memory(vec![("a.obj", text.into())])).expect("readable");
+        assert_eq!((parts.len(), parts[0].colour), (1, None));
+    }
+
+    #[test]
+    fn a_binary_stl_that_lies_about_its_length_is_damaged() {
+        let mut bytes = vec![0; 84];
+        bytes[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+        let result = read_mesh("a.stl", &in_memory(vec![("a.stl", bytes)]));
+        assert!(matches!(result, Err(MeshFileError::Damaged { .. })));
+    }
+
+    #[test]
+    fn stl_comes_in_many_dresses() {
+        let facet = |z: f32| {
+            format!(
+                "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
+            )
+        };
+        let count =
+            |bytes: Vec<u8>| read_mesh("a.stl", &in_memory(vec![("a.stl", bytes)])).map(|p| p[0].mesh.triangles.len());
+        let two = format!("solid a\n{}endsolid a\nsolid b\n{}endsolid b\n", facet(0.0), facet(1.0));
+        assert_eq!(count(two.into_bytes()).expect("two solids"), 2);
+        assert_eq!(count(format!("\n  solid\n{}endsolid", facet(0.0)).into_bytes()).expect("no name"), 1);
+        let mut binary = b"solid by some exporter\n".to_vec();
+        binary.resize(80, b' ');
+        binary.extend(1u32.to_le_bytes());
+        binary.extend([0; 50]);
+        assert_eq!(count(binary).expect("binary"), 1);
+        assert!(count(format!("solid a\n{}", &facet(0.0)[..40]).into_bytes()).is_err(), "cut short");
+    }
+
+    #[test]
+    fn other_formats_are_refused_by_name() {
+        let result = read_mesh("robot.dae", &in_memory(vec![]));
+        let text = result.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(text.contains(".dae") && text.contains(".obj"), "{text}");
+    }
+}

@@ -1,0 +1,219 @@
+//! Recognising an object grasp by grasp: what the model says while the fingers close, what is believed after each
+//! grasp, and whether that is enough. The same for a window, a command and the real gripper.
+
+use palpate_learn::{Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, StopReason, StopRule, Verdict};
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::Phase;
+use palpate_sim::scene::Scene;
+use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors};
+use std::sync::Arc;
+
+/// Why a model cannot recognise what a gripper feels.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IdentifyError {
+    /// The model was made for imported channels, or for a layout that does not exist.
+    #[error("{cause}")]
+    Layout {
+        /// What is wrong.
+        cause: LayoutError,
+    },
+    /// The model reads other channels than the gripper has.
+    #[error("{cause}")]
+    Channels {
+        /// Which differ.
+        cause: ModelError,
+    },
+}
+
+/// A model at work on successive grasps of one object.
+pub struct Identification {
+    model: Arc<Model>,
+    labels: Arc<Labels>,
+    rule: StopRule,
+    sensors: Option<Sensors>,
+    live: Option<Box<dyn LiveRecogniser>>,
+    /// Readings of the grasp that is going on, for the answer to it by itself.
+    readings: Sequence,
+    belief: Belief,
+    /// The newest answer to the grasp that is going on.
+    verdict: Option<Verdict>,
+    /// The hold has ended; what comes after is not listened to.
+    closed: bool,
+    decision: Option<StopReason>,
+}
+
+impl std::fmt::Debug for Identification {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Identification").field("belief", &self.belief).field("decision", &self.decision).finish()
+    }
+}
+
+/// What can be shown of an identification at any moment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentificationView {
+    /// What can be answered.
+    pub labels: Arc<Labels>,
+    /// Whether sizes and shapes are among it (stage one).
+    pub has_stage_one: bool,
+    /// When it stops.
+    pub rule: StopRule,
+    /// The newest answer to the grasp that is going on, or to the last one; none before the first readings.
+    pub verdict: Option<Verdict>,
+    /// True while the fingers close and hold, and the answer still changes.
+    pub listening: bool,
+    /// What was believed after each grasp that is over.
+    pub beliefs: Vec<Pmf>,
+    /// Why it stopped, once it has.
+    pub decision: Option<StopReason>,
+}
+
+impl IdentificationView {
+    /// The name that was decided on: a class, or `unknown`; none while it goes on.
+    pub fn decided(&self) -> Option<&str> {
+        let belief = self.beliefs.last()?;
+        Some(match self.decision? {
+            StopReason::Unknown => "unknown",
+            StopReason::Sure | StopReason::GraspLimit => &self.labels.classes[belief.top().0].name,
+        })
+    }
+}
+
+impl Identification {
+    /// Ready for the first grasp.
+    pub fn new(model: Arc<Model>, rule: StopRule) -> Self {
+        let live = model.recogniser.live();
+        Self {
+            labels: Arc::new(model.card.labels.clone()),
+            model,
+            rule,
+            sensors: None,
+            live,
+            readings: Sequence::default(),
+            belief: Belief::default(),
+            verdict: None,
+            closed: true,
+            decision: None,
+        }
+    }
+
+    /// The model at work.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Forgets all grasps: another object is in the hand.
+    pub fn start_over(&mut self) {
+        self.belief = Belief::default();
+        self.verdict = None;
+        self.decision = None;
+        self.closed = true;
+    }
+
+    /// When to stop from now on. A decision stands; between two grasps it may turn out that no other is needed.
+    pub fn set_rule(&mut self, rule: StopRule) {
+        self.rule = rule;
+        if self.closed && self.decision.is_none() {
+            self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
+        }
+    }
+
+    /// Another grasp of the same object begins, on a gripper that is modelled; frames follow with [`Self::push`].
+    pub fn begin_grasp(&mut self, scene: &Scene) -> Result<(), IdentifyError> {
+        self.closed = true;
+        let layout = self.model.card.data.layout.as_deref().unwrap_or("C1+F");
+        let sensors = SensorLayout::named(layout)
+            .and_then(|layout| Sensors::new(&layout, &scene.gripper, PressureArea::Participation))
+            .map_err(|cause| IdentifyError::Layout { cause })?;
+        let names: Vec<String> = sensors.channels().iter().map(Channel::name).collect();
+        self.begin_grasp_of(&names)?;
+        self.sensors = Some(sensors);
+        Ok(())
+    }
+
+    /// Another grasp of the same object begins, on a gripper whose readings have these channels; rows of them follow with
+    /// [`Self::push_row`].
+    pub fn begin_grasp_of(&mut self, channels: &[String]) -> Result<(), IdentifyError> {
+        self.closed = true;
+        self.model.check_channels(channels).map_err(|cause| IdentifyError::Channels { cause })?;
+        self.sensors = None;
+        self.readings = Sequence::default();
+        self.verdict = None;
+        self.closed = false;
+        if let Some(live) = &mut self.live {
+            live.begin(self.belief.now());
+        }
+        Ok(())
+    }
+
+    /// Takes in a frame of the grasp; true when there is a new answer.
+    pub fn push(&mut self, frame: &Frame) -> bool {
+        if self.closed {
+            return false;
+        }
+        if frame.phase == Phase::Release {
+            self.end_grasp();
+            return true;
+        }
+        let Some(sensors) = &self.sensors else { return false };
+        let row: Vec<f32> = sensors.read(frame).into_iter().map(|v| v.unwrap_or_default() as f32).collect();
+        self.push_row(frame.t as f32, &row)
+    }
+
+    /// Takes in a row of channels at a time since the closing began (s); true when there is a new answer.
+    pub fn push_row(&mut self, t: f32, row: &[f32]) -> bool {
+        if self.closed {
+            return false;
+        }
+        self.readings.t_s.push(t);
+        self.readings.values.extend_from_slice(row);
+        let answer = self.live.as_mut().and_then(|live| live.push(t, row));
+        let new = answer.is_some();
+        self.verdict = answer.or_else(|| self.verdict.take());
+        new
+    }
+
+    /// The grasp is over: what it says is added to the belief. Nothing happens where it has ended already.
+    pub fn end_grasp(&mut self) {
+        if std::mem::replace(&mut self.closed, true) || self.readings.is_empty() {
+            return;
+        }
+        let recogniser = &self.model.recogniser;
+        let streamed = self.live.as_mut().and_then(|live| live.finish());
+        let verdict = streamed.unwrap_or_else(|| recogniser.recognise(&self.readings, self.belief.now()));
+        let alone = match self.belief.now() {
+            Some(_) => recogniser.recognise(&self.readings, None).pmf,
+            None => verdict.pmf.clone(),
+        };
+        self.belief.add(verdict.pmf.clone(), alone);
+        self.verdict = Some(verdict);
+        self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
+    }
+
+    /// Why it stopped, once it has.
+    pub fn decision(&self) -> Option<StopReason> {
+        self.decision
+    }
+
+    /// What is believed after the grasps so far.
+    pub fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// The newest answer to the grasp that is going on, or to the last one.
+    pub fn verdict(&self) -> Option<&Verdict> {
+        self.verdict.as_ref()
+    }
+
+    /// Everything that can be shown.
+    pub fn view(&self) -> IdentificationView {
+        IdentificationView {
+            labels: Arc::clone(&self.labels),
+            has_stage_one: self.model.recogniser.has_stage_one(),
+            rule: self.rule,
+            verdict: self.verdict.clone(),
+            listening: !self.closed,
+            beliefs: self.belief.steps().to_vec(),
+            decision: self.decision,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What a grasp came to, in a few numbers: the object that `palpate grasp --json` prints.
+
+use palpate_sim::frame::{Frame, Quality};
+use palpate_sim::gripper::{Phase, Side};
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::Trial;
+use palpate_tactile::{ContactPatch, PressureArea, Span, curvature};
+use serde::Serialize;
+
+/// Normal force on a pad that counts as contact (N): below the 0.15 N at which the real force sensor wakes, well above
+/// rounding.
+const CONTACT_FORCE: f64 = 1e-3;
+
+/// A grasp in a few numbers. Pairs are left, right.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GraspSummary {
+    /// Name of the object.
+    pub object: String,
+    /// False when a number became infinite or NaN.
+    pub finite: bool,
+    /// False when any step missed the solver's tolerance.
+    pub converged: bool,
+    /// What was guessed, mended or cut short.
+    pub warnings: Vec<String>,
+    /// First sample at which either pad carried load (s); null when never.
+    pub contact_onset_s: Option<f64>,
+    /// The end of the hold; null when the trial has none.
+    pub hold: Option<HoldSummary>,
+    /// How far the object's frame moved from start to hold (m); null for an empty hand.
+    pub object_moved_m: Option<f64>,
+    /// Solver statistics.
+    pub quality: Quality,
+}
+
+/// Means over the last quarter of the hold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HoldSummary {
+    /// Normal force on each pad (N).
+    pub force_n: [f64; 2],
+    /// Curvature of each whole finger (1/m).
+    pub curvature_per_m: [f64; 2],
+    /// Pressure over the participation area of each pad (Pa).
+    pub pressure_pa: [f64; 2],
+}
+
+impl GraspSummary {
+    /// Reads a trial that was made from `scene`.
+    pub fn new(trial: &Trial, scene: &Scene) -> Self {
+        let count = scene.gripper.taxels().count();
+        let touches = |frame: &&Frame| Side::BOTH.iter().any(|s| frame.normal_force(*s, count) > CONTACT_FORCE);
+        let held: Vec<&Frame> = trial.frames.iter().filter(|f| f.phase == Phase::Hold).collect();
+        let place = |frame: &Frame| frame.world_from_object.map(|pose| pose.position);
+        let moved = || Some((place(held.last()?)? - place(trial.frames.first()?)?).length());
+        Self {
+            object: trial.info.object.clone(),
+            finite: trial.info.quality.finite,
+            converged: trial.info.quality.converged,
+            warnings: trial.info.warnings.clone(),
+            contact_onset_s: trial.frames.iter().find(touches).map(|frame| frame.t),
+            hold: HoldSummary::new(&held[held.len() - held.len().div_ceil(4)..], scene),
+            object_moved_m: moved(),
+            quality: trial.info.quality.clone(),
+        }
+    }
+}
+
+impl HoldSummary {
+    fn new(frames: &[&Frame], scene: &Scene) -> Option<Self> {
+        if frames.is_empty() {
+            return None;
+        }
+        let gripper = &scene.gripper;
+        let grid = gripper.taxels();
+        let mean = |value: &dyn Fn(&Frame, Side) -> f64| {
+            Side::BOTH.map(|side| frames.iter().map(|f| value(f, side)).sum::<f64>() / frames.len() as f64)
+        };
+        let patch = |frame: &Frame, side: Side| ContactPatch::new(frame, side, &grid, &Span::WHOLE);
+        Some(Self {
+            force_n: mean(&|frame, side| patch(frame, side).force()),
+            curvature_per_m: mean(&|frame, side| {
+                let q = frame.joints(side);
+                curvature(&palpate_sim::gripper::BentFinger::new(&gripper.finger, q), q, &Span::WHOLE)
+            }),
+            pressure_pa: mean(&|frame, side| {
+                patch(frame, side).pressure(PressureArea::Participation).unwrap_or_default()
+            }),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::grasp;
+    use palpate_geometry::Primitive;
+    use palpate_sim::objects::ObjectModel;
+    use palpate_sim::scene::{Effect, Setting};
+
+    #[test]
+    fn a_larger_ball_is_met_earlier_and_bends_the_fingers_less() {
+        let scene = Scene::default();
+        let of = |radius: f64| {
+            let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius }, 400.0, 0.6);
+            GraspSummary::new(&grasp(&scene, Some(&ball), 0), &scene)
+        };
+        let (small, large) = (of(0.015), of(0.030));
+        let (hold_small, hold_large) = (small.hold.expect("held"), large.hold.expect("held"));
+        assert!(large.contact_onset_s < small.contact_onset_s && large.contact_onset_s.is_some());
+        assert!(hold_large.curvature_per_m[0] < hold_small.curvature_per_m[0]);
+        assert!(hold_large.force_n[1] > 0.1 && hold_large.pressure_pa[1] > 100.0);
+    }
+
+    #[test]
+    fn an_empty_hand_touches_nothing_but_itself() {
+        let mut scene = Scene::default();
+        let summary = GraspSummary::new(&grasp(&scene, None, 0), &scene);
+        let [left, right] = summary.hold.expect("held").force_n;
+        assert!(left > 0.05 && (left / right - 1.0).abs() < 1e-6, "{left} N and {right} N");
+        assert!(summary.contact_onset_s.is_some() && summary.object_moved_m.is_none());
+        scene.effects.set(Effect::FingerContact, Setting::Off);
+        let summary = GraspSummary::new(&grasp(&scene, None, 0), &scene);
+        assert_eq!(summary.contact_onset_s, None);
+        assert_eq!(summary.hold.map(|hold| hold.force_n), Some([0.0, 0.0]));
+    }
+}

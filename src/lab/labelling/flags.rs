@@ -1,0 +1,373 @@
+//! What is wrong with a trial of the real gripper, found from what was heard during it, when it ends. A flag is no verdict:
+//! the trial is kept and learned from unless somebody discards it.
+//!
+//! | flag | raised when |
+//! |---|---|
+//! | no contact | no pad felt anything while the hand closed and held |
+//! | saturated | a channel was at an end of its range for more than 2 % of that time |
+//! | interrupted | the connection broke, readings are missing for longer than 0.1 s, or a sensor is in less than half of them |
+//! | cadence | readings were lost, the rate is off by more than 2 %, the jitter is above half a period |
+
+use palpate_sim::gripper::Phase;
+use palpate_store::labels::{Flag, FlagRemark};
+use palpate_tactile::board::{Board, Gap, Reading, Sensor};
+use palpate_tactile::cadence::Cadence;
+use palpate_tactile::calibration::{Calibration, Input, Rail, Readout};
+use palpate_tactile::electronics::PadPart;
+use palpate_tactile::trial::PhaseMark;
+
+/// Readings in a row that make a contact: one alone may be a knock.
+const IN_A_ROW: usize = 3;
+/// How far beyond its noise at rest a pad without a calibration must rise, in deviations.
+const DEVIATIONS: f64 = 6.0;
+/// A pad on a bent finger may feel up to 0.3 N without any touch; where its calibration does not know of that, a touch is
+/// more (N).
+const BENT_FORCE: f64 = 0.4;
+/// Share of the pressed time at an end of the range that is worth a flag.
+const SATURATED_SHARE: f64 = 0.02;
+/// A shorter time without readings is no interruption (s), or fewer than three missing readings.
+const LEAST_GAP_S: f64 = 0.1;
+/// How far the rate may be off, as a share of it.
+const RATE_SHARE: f64 = 0.02;
+/// Length of the window at rest where nobody says when the closing began (s).
+const REST_S: f64 = 0.3;
+
+/// A step of the control box (bar).
+const PRESSURE_STEP_BAR: f64 = 0.05;
+
+/// What a trial holds when it ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed<'a> {
+    /// The board.
+    pub board: &'a Board,
+    /// Its readings; of a long trial a part of them, evenly spread.
+    pub readings: &'a [Reading],
+    /// Where readings are missing.
+    pub gaps: &'a [Gap],
+    /// Why the connection broke, each time.
+    pub interruptions: &'a [String],
+    /// How well the board kept time.
+    pub cadence: &'a Cadence,
+    /// The phases of the grasp, where they are known.
+    pub phases: &'a [PhaseMark],
+    /// The calibrations of its parts, where there are any.
+    pub calibrations: &'a [(Sensor, Calibration)],
+}
+
+/// What is wrong with a trial, whatever it is of; see [`flaws`].
+pub fn flags_of(trial: &Observed<'_>) -> Vec<FlagRemark> {
+    let raised = [
+        (Flag::NoContact, trial.no_contact()),
+        (Flag::Saturated, trial.saturated()),
+        (Flag::Interrupted, trial.interrupted()),
+        (Flag::Cadence, trial.bad_cadence()),
+    ];
+    raised.into_iter().filter_map(|(flag, remark)| Some(FlagRemark { flag, remark: remark? })).collect()
+}
+
+impl Observed<'_> {
+    /// Readings before the closing, and those of closing and hold: by the phases where they are known, else by the pressure
+    /// that the board reports; else all after the first tenths of a second.
+    fn split(&self) -> (&[Reading], &[Reading]) {
+        let start = |phase: Phase| self.phases.iter().find(|mark| mark.phase == phase).map(|mark| mark.from_s);
+        let pressures = || self.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?)));
+        let most = pressures().map(|(_, bar)| bar).fold(0.0, f64::max);
+        let first = self.readings.first().map_or(0.0, |reading| reading.t_s);
+        let (closing, release) = match (start(Phase::Close), pressures().find(|(_, bar)| *bar > 0.0)) {
+            (Some(closing), _) => (closing, start(Phase::Release)),
+            (None, Some((closing, _))) => {
+                let full = pressures().rfind(|(_, bar)| *bar > most - PRESSURE_STEP_BAR);
+                (closing, full.map(|(t_s, _)| t_s.next_up()))
+            }
+            (None, None) => (first + REST_S, None),
+        };
+        let release = release.filter(|release| *release > closing).unwrap_or(f64::INFINITY);
+        let from = self.readings.partition_point(|reading| reading.t_s < closing);
+        let to = self.readings.partition_point(|reading| reading.t_s < release).max(from);
+        (&self.readings[..from], &self.readings[from..to])
+    }
+
+    /// None where a pad felt something, or where there is no pad to feel.
+    fn no_contact(&self) -> Option<String> {
+        let (rest, pressed) = self.split();
+        if pressed.is_empty() {
+            return (!self.readings.is_empty()).then(|| "it ended before the hand began to close".to_owned());
+        }
+        let pads = [Sensor::PadLeft, Sensor::PadRight];
+        let felt: Vec<PadRise> = pads.into_iter().filter_map(|pad| self.rise(pad, rest, pressed)).collect();
+        if felt.is_empty() || felt.iter().any(|pad| pad.rise > pad.least) {
+            return None;
+        }
+        let each: Vec<String> = felt.iter().map(PadRise::told).collect();
+        Some(format!("no pad felt anything: {}", each.join(", ")))
+    }
+
+    /// How far a pad rose: in newtons where it is calibrated, else in counts.
+    fn rise(&self, pad: Sensor, rest: &[Reading], pressed: &[Reading]) -> Option<PadRise> {
+        let column = self.board.channel_of(pad)?;
+        if let Some((_, calibration)) = self.calibrations.iter().find(|(sensor, _)| *sensor == pad) {
+            let readout = Readout::new(self.board, self.calibrations).ok()?;
+            let readout = readout.clone().with_zero(readout.zero_from(rest));
+            let side = usize::from(pad == Sensor::PadRight);
+            let rise = lasting_peak(pressed.iter().map(|reading| readout.felt(reading).force[side]));
+            let least = if calibration.record.bending.is_some() { PadPart::LEAST_FORCE } else { BENT_FORCE };
+            return Some(PadRise { pad, rise: rise?, least, unit: "N" });
+        }
+        let counts = |reading: &Reading| reading.counts.get(column).copied().flatten().map(f64::from);
+        let (middle, deviation) = middle_and_deviation(rest.iter().filter_map(counts).collect())?;
+        let peak = lasting_peak(pressed.iter().map(counts))?;
+        let nominal = PadPart::NOMINAL_SIEMENS * BENT_FORCE.powf(PadPart::NOMINAL_EXPONENT);
+        let least = Input::on(self.board, pad).counts(1.0 / nominal);
+        Some(PadRise { pad, rise: peak - middle, least: (DEVIATIONS * deviation).max(least), unit: "counts" })
+    }
+
+    fn saturated(&self) -> Option<String> {
+        let (_, pressed) = self.split();
+        let told = |sensor: Sensor| {
+            let column = self.board.channel_of(sensor)?;
+            let made_with = self.calibrations.iter().find(|(own, _)| *own == sensor).map(|(_, c)| c.record.input);
+            let usual = Input::on(self.board, sensor);
+            let input = made_with.map_or(usual, |input| input.seen_by(self.board, sensor));
+            let counts = pressed.iter().filter_map(|reading| reading.counts.get(column).copied().flatten());
+            let at_its_end = |count: &f32| match input.rail(f64::from(*count)) {
+                // A pad that nothing presses conducts nothing.
+                Some(Rail::Open) => sensor.is_flex(),
+                Some(Rail::Short) => true,
+                None => false,
+            };
+            let (count, all) = (counts.filter(at_its_end).count(), pressed.len());
+            let worth_it = count >= IN_A_ROW && count as f64 > SATURATED_SHARE * all as f64;
+            let percent = 100.0 * count as f64 / all.max(1) as f64;
+            worth_it
+                .then(|| format!("the {} is at the end of its range for {percent:.0} % of the grasp", sensor.label()))
+        };
+        joined(Sensor::ALL.into_iter().filter_map(told))
+    }
+
+    fn interrupted(&self) -> Option<String> {
+        let period = self.rate().map_or(0.0, |rate| 1.0 / rate);
+        let long = |gap: &&Gap| gap.to_s - gap.from_s > LEAST_GAP_S.max(3.5 * period);
+        let began = self.readings.first().map_or(0.0, |reading| reading.t_s);
+        let told = |gap: &Gap| {
+            let (from, length) = (gap.from_s - began, gap.to_s - gap.from_s);
+            format!("nothing for {length:.2} s from {from:.2} s on: {}", gap.cause)
+        };
+        let gaps = self.gaps.iter().filter(long).map(told);
+        // What broke the connection is the cause of a gap as well, where anything came after it.
+        let untold = |cause: &&String| !self.gaps.iter().any(|gap| gap.cause.contains(cause.as_str()));
+        let broken = self.interruptions.iter().filter(untold).cloned();
+        joined(gaps.chain(broken).chain(Sensor::ALL.into_iter().filter_map(|sensor| self.without_numbers(sensor))))
+    }
+
+    /// A sensor that most readings say nothing of: an open circuit, as far as the board can tell.
+    fn without_numbers(&self, sensor: Sensor) -> Option<String> {
+        let column = self.board.channel_of(sensor)?;
+        let is_missing = |reading: &&Reading| reading.counts.get(column).copied().flatten().is_none();
+        let (missing, all) = (self.readings.iter().filter(is_missing).count(), self.readings.len());
+        let percent = 100.0 * missing as f64 / all.max(1) as f64;
+        (percent > 50.0).then(|| format!("the {} gave no number in {percent:.0} % of the readings", sensor.label()))
+    }
+
+    fn bad_cadence(&self) -> Option<String> {
+        let Cadence { lost, gaps, rate_hz, jitter_p95_ms, samples, .. } = self.cadence;
+        let mut told = Vec::new();
+        if *samples > 0 && *lost > 0 {
+            let share = 100.0 * *lost as f64 / (*samples + *lost) as f64;
+            told.push(format!("{lost} readings lost, {share:.1} %"));
+        }
+        if let Some(stated) = self.board.rate_hz.filter(|stated| *stated > 0.0 && *gaps == 0 && *rate_hz > 0.0) {
+            let off = rate_hz / stated - 1.0;
+            if off.abs() > RATE_SHARE {
+                told.push(format!("{rate_hz:.2} Hz instead of {stated:.0}, {:+.1} %", 100.0 * off));
+            }
+        }
+        let half_period_ms = self.rate().map_or(f64::INFINITY, |rate| 500.0 / rate);
+        if *jitter_p95_ms > half_period_ms {
+            told.push(format!("jitter {jitter_p95_ms:.1} ms, above half a period, {half_period_ms:.1} ms"));
+        }
+        joined(told.into_iter())
+    }
+
+    /// Readings per second: as the board says, or as they came.
+    fn rate(&self) -> Option<f64> {
+        self.board.rate_hz.or(Some(self.cadence.rate_hz)).filter(|rate| rate.is_finite() && *rate > 0.0)
+    }
+}
+
+/// How far a pad rose while the hand was closed.
+struct PadRise {
+    pad: Sensor,
+    rise: f64,
+    least: f64,
+    unit: &'static str,
+}
+
+impl PadRise {
+    fn told(&self) -> String {
+        let digits = if self.unit == "N" { 2 } else { 0 };
+        let Self { pad, rise, least, unit } = self;
+        format!("{rise:.digits$} {unit} on the {}, a touch is {least:.digits$} {unit}", pad.label())
+    }
+}
+
+fn joined(parts: impl Iterator<Item = String>) -> Option<String> {
+    let parts: Vec<String> = parts.collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// The largest value that some readings in a row reach; readings without one are passed over.
+fn lasting_peak(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let values: Vec<f64> = values.flatten().filter(|value| value.is_finite()).collect();
+    let least = |window: &[f64]| window.iter().copied().fold(f64::INFINITY, f64::min);
+    values.windows(IN_A_ROW.min(values.len().max(1))).map(least).max_by(f64::total_cmp)
+}
+
+/// Median and standard deviation, the latter from the median deviation, so that a knock does no harm. At least that of the
+/// rounding to whole counts.
+pub(super) fn middle_and_deviation(mut values: Vec<f64>) -> Option<(f64, f64)> {
+    let middle = median(&mut values)?;
+    let mut off: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
+    // For normally distributed noise.
+    let deviation = 1.4826 * median(&mut off)?;
+    Some((middle, deviation.max(12f64.sqrt().recip())))
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sim::objects::EMPTY;
+    use palpate_store::labels::{cadence_line, flaws};
+
+    /// Three seconds at 50 Hz: at rest, closed from 0.5 s on, released from 2.5 s on; the pads rise by `rise` counts.
+    fn readings(rise: f32) -> Vec<Reading> {
+        let reading = |k: u32| {
+            let t_s = 0.02 * f64::from(k);
+            let noise = (k % 3) as f32;
+            let pressed = (1.0..2.5).contains(&t_s);
+            let pad = if pressed { rise } else { 0.0 } + noise;
+            let counts = vec![Some(1400.0 + noise), Some(1400.0), Some(pad), Some(pad)];
+            Reading { t_s, arrived_s: t_s, seq: Some(k.into()), counts, line_bar: None }
+        };
+        (0..150).map(reading).collect()
+    }
+
+    fn marks() -> Vec<PhaseMark> {
+        let mark = |from_s, phase| PhaseMark { from_s, phase, line_bar: None };
+        vec![mark(0.5, Phase::Close), mark(1.5, Phase::Hold), mark(2.5, Phase::Release)]
+    }
+
+    fn good() -> Cadence {
+        Cadence { samples: 150, rate_hz: 50.0, jitter_p95_ms: 0.4, ..Cadence::default() }
+    }
+
+    fn flags(readings: &[Reading], gaps: &[Gap], interruptions: &[String], cadence: &Cadence) -> Vec<FlagRemark> {
+        let board = Board { rate_hz: Some(50.0), ..Board::default() };
+        let phases = marks();
+        let observed =
+            Observed { board: &board, readings, gaps, interruptions, cadence, phases: &phases, calibrations: &[] };
+        flags_of(&observed)
+    }
+
+    #[test]
+    fn a_good_trial_has_no_flags() {
+        assert_eq!(flags(&readings(1500.0), &[], &[], &good()), []);
+        assert_eq!(cadence_line(&good()), "50.00 Hz, jitter 0.4 ms, 0 lost");
+    }
+
+    #[test]
+    fn a_hand_that_missed_is_flagged_and_an_empty_one_may() {
+        for missed in [readings(0.0), readings(600.0), {
+            // One reading alone is a knock.
+            let mut knocked = readings(0.0);
+            knocked[80].counts[2] = Some(3000.0);
+            knocked
+        }] {
+            let found = flags(&missed, &[], &[], &good());
+            assert_eq!(found.iter().map(|found| found.flag).collect::<Vec<_>>(), [Flag::NoContact]);
+            assert!(found[0].remark.contains("counts on the left pad"), "{found:?}");
+            assert_eq!(flaws(found.clone(), Some("lemon")), found);
+            assert_eq!(flaws(found, Some(EMPTY)), []);
+        }
+    }
+
+    #[test]
+    fn a_pad_at_its_end_is_saturated_only_while_it_is_pressed() {
+        let found = flags(&readings(4095.0), &[], &[], &good());
+        assert_eq!((found.len(), found[0].flag), (1, Flag::Saturated));
+        assert!(found[0].remark.contains("left pad") && found[0].remark.contains("75 %"), "{found:?}");
+        let mut strip = readings(1500.0);
+        strip.iter_mut().for_each(|reading| reading.counts[1] = Some(4095.0));
+        assert!(flags(&strip, &[], &[], &good())[0].remark.contains("right flex strip"));
+        let mut before = readings(1500.0);
+        before[..20].iter_mut().for_each(|reading| reading.counts[3] = Some(4095.0));
+        assert_eq!(flags(&before, &[], &[], &good()), []);
+    }
+
+    #[test]
+    fn pressure_stands_in_for_phases_that_nobody_noted() {
+        let mut readings = readings(0.0);
+        readings.iter_mut().for_each(|r| r.line_bar = Some(if (0.5..2.5).contains(&r.t_s) { 1.0 } else { 0.0 }));
+        let (board, cadence) = (Board::default(), good());
+        let mut observed = Observed {
+            board: &board,
+            readings: &readings,
+            gaps: &[],
+            interruptions: &[],
+            cadence: &cadence,
+            phases: &[],
+            calibrations: &[],
+        };
+        let (rest, pressed) = observed.split();
+        assert_eq!((rest.len(), pressed.len()), (25, 100));
+        let phases = marks();
+        observed.phases = &phases;
+        assert_eq!(observed.split().1.len(), 100);
+    }
+
+    #[test]
+    fn what_is_missing_is_told_with_its_length() {
+        let gap = |from_s, to_s, cause: &str| Gap { from_s, to_s, lost: Some(1), cause: cause.to_owned() };
+        assert_eq!(flags(&readings(1500.0), &[gap(1.0, 1.04, "lost")], &[], &good()), []);
+        let told = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &[], &good());
+        assert_eq!(told[0].flag, Flag::Interrupted);
+        assert_eq!(told[0].remark, "nothing for 1.25 s from 1.00 s on: the board was unplugged");
+        let causes = ["the board was unplugged".to_owned(), "the port is gone".to_owned()];
+        let told = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &causes, &good());
+        assert!(told[0].remark.ends_with("unplugged; the port is gone"), "{told:?}");
+    }
+
+    #[test]
+    fn a_board_that_does_not_keep_time_is_told_of_with_numbers() {
+        let cases = [
+            (Cadence { lost: 3, gaps: 1, ..good() }, "3 readings lost, 2.0 %"),
+            (Cadence { rate_hz: 48.5, ..good() }, "48.50 Hz instead of 50, -3.0 %"),
+            (Cadence { jitter_p95_ms: 11.0, ..good() }, "jitter 11.0 ms, above half a period, 10.0 ms"),
+        ];
+        for (cadence, want) in cases {
+            let told = flags(&readings(1500.0), &[], &[], &cadence);
+            assert_eq!((told.len(), told[0].flag, told[0].remark.as_str()), (1, Flag::Cadence, want));
+        }
+        let within = Cadence { rate_hz: 49.2, jitter_p95_ms: 9.9, ..good() };
+        assert_eq!(flags(&readings(1500.0), &[], &[], &within), []);
+    }
+
+    #[test]
+    fn nothing_heard_raises_nothing_that_is_not_known() {
+        assert_eq!(flags(&[], &[], &[], &Cadence::default()), []);
+        let short = &readings(0.0)[..10];
+        assert!(flags(short, &[], &[], &good())[0].remark.contains("before the hand began to close"));
+    }
+
+    #[test]
+    fn medians_of_few_values() {
+        assert_eq!(median(&mut []), None);
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        let (middle, deviation) = middle_and_deviation(vec![10.0, 12.0, 11.0, 500.0, 10.0]).expect("five");
+        assert!((middle, deviation) == (11.0, 1.4826), "{middle} {deviation}");
+    }
+}

@@ -1,0 +1,160 @@
+//! What helps to read a picture: axis gizmo, scale bar, legend of the pressure map, and a badge.
+
+use super::{PictureView, ink};
+use glam::{Vec2, Vec3};
+use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
+use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
+use palpate_geometry::units::three_digits;
+
+/// Distance of furniture from the edges (points).
+const MARGIN: f32 = 18.0;
+/// Height of its text (points).
+const TEXT: f32 = 14.0;
+/// Lengths that the scale bar may stand for (mm).
+pub const SCALE_STEPS: [f32; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
+
+/// Adds everything that fits; small pictures get less.
+pub(super) fn add(overlay: &mut Overlay, view: &PictureView) {
+    let size = view.size;
+    if size.x >= 160.0 && size.y >= 120.0 {
+        add_gizmo(overlay, &view.camera, Vec2::new(MARGIN + 26.0, size.y - MARGIN - 26.0), view.theme);
+    }
+    if size.x >= 340.0 && size.y >= 200.0 {
+        add_scale_bar(overlay, view);
+        add_legend(overlay, view);
+    }
+    if let Some(badge) = view.badge.as_ref().filter(|_| size.x >= 160.0) {
+        add_badge(overlay, badge, view.theme);
+    }
+}
+
+/// Red x, green y, blue z, as everywhere in robotics; each readable on its theme.
+fn axis_colours(theme: Theme) -> [Rgb; 3] {
+    match theme {
+        Theme::Dark => [Rgb(240, 104, 92), Rgb(122, 200, 96), Rgb(98, 160, 246)],
+        Theme::Light => [Rgb(190, 44, 36), Rgb(38, 124, 40), Rgb(30, 90, 190)],
+    }
+}
+
+fn add_gizmo(overlay: &mut Overlay, camera: &Camera, centre: Vec2, theme: Theme) {
+    const LENGTH: f32 = 24.0;
+    let [right, up, back] = camera.axes();
+    let mut axes: Vec<(Vec3, Rgb, &str)> = [Vec3::X, Vec3::Y, Vec3::Z]
+        .into_iter()
+        .zip(axis_colours(theme))
+        .zip(["x", "y", "z"])
+        .map(|((axis, colour), name)| (axis, colour, name))
+        .collect();
+    // Those that point away are drawn first.
+    axes.sort_by(|a, b| a.0.dot(back).total_cmp(&b.0.dot(back)));
+    for (axis, colour, name) in axes {
+        let flat = Vec2::new(axis.dot(right), -axis.dot(up));
+        overlay.line(centre, centre + flat * LENGTH, 2.2, colour);
+        // An axis that points at the eye has its letter at the middle.
+        overlay.text(centre + flat * (LENGTH + 9.0), Align::Centre, TEXT, colour, name);
+    }
+    overlay.shapes.push(Shape2::Disc { centre, radius: 2.2, colour: ink(theme) });
+}
+
+/// A bar of a round length at the distance of the target.
+fn add_scale_bar(overlay: &mut Overlay, view: &PictureView) {
+    let points_per_mm = view.size.y / (view.camera.height_at_target() * 1e3);
+    let wanted = 0.16 * view.size.x.min(900.0);
+    let Some(mm) = SCALE_STEPS.into_iter().rfind(|mm| mm * points_per_mm <= wanted) else {
+        return;
+    };
+    let length = mm * points_per_mm;
+    let right = Vec2::new(view.size.x - MARGIN, view.size.y - MARGIN);
+    let left = right - Vec2::new(length, 0.0);
+    let colour = ink(view.theme);
+    overlay.line(left, right, 1.6, colour);
+    for end in [left, right] {
+        overlay.line(end - Vec2::new(0.0, 4.5), end + Vec2::new(0.0, 4.5), 1.6, colour);
+    }
+    overlay.text((left + right) * 0.5 - Vec2::new(0.0, 12.0), Align::Centre, TEXT, colour, format!("{mm}\u{2009}mm"));
+}
+
+/// The pressure map with its unit, in the top right corner.
+fn add_legend(overlay: &mut Overlay, view: &PictureView) {
+    const WIDTH: f32 = 132.0;
+    const HEIGHT: f32 = 9.0;
+    let colour = ink(view.theme);
+    let left = view.size.x - MARGIN - WIDTH;
+    let top = MARGIN + 16.0;
+    overlay.text(Vec2::new(left, MARGIN + 4.0), Align::Left, TEXT, colour, "pad pressure, kPa");
+    let steps = PRESSURE_MAP.len() - 1;
+    for k in 0..steps {
+        let x = |k: usize| left + WIDTH * k as f32 / steps as f32;
+        overlay.shapes.push(Shape2::Rectangle {
+            min: Vec2::new(x(k), top),
+            max: Vec2::new(x(k + 1), top + HEIGHT),
+            colours: [PRESSURE_MAP[k], PRESSURE_MAP[k + 1]],
+            opacity: 1.0,
+        });
+    }
+    for share in [0.0, 0.5, 1.0] {
+        let at = Vec2::new(left + WIDTH * share, top + HEIGHT);
+        overlay.line(at, at + Vec2::new(0.0, 3.0), 1.2, colour);
+        let align = if share == 0.0 {
+            Align::Left
+        } else if share == 1.0 {
+            Align::Right
+        } else {
+            Align::Centre
+        };
+        let value = three_digits(f64::from(view.full_scale * share) * 1e-3);
+        let shown = value.trim_end_matches('0').trim_end_matches('.');
+        let shown = if shown.is_empty() || !value.contains('.') { &value } else { shown };
+        overlay.text(at + Vec2::new(0.0, 12.0), align, TEXT, colour, shown);
+    }
+}
+
+fn add_badge(overlay: &mut Overlay, badge: &str, theme: Theme) {
+    let colours = theme.colours();
+    // Letters of this font are half as wide as it is high.
+    let width = 7.6 * badge.chars().count() as f32 + 18.0;
+    let (min, max) = (Vec2::new(MARGIN - 4.0, MARGIN - 4.0), Vec2::new(MARGIN - 4.0 + width, MARGIN + 19.0));
+    overlay.shapes.push(Shape2::Rectangle { min, max, colours: [colours.raised; 2], opacity: 0.92 });
+    let accent = Vec2::new(min.x + 3.0, max.y);
+    overlay.shapes.push(Shape2::Rectangle { min, max: accent, colours: [colours.accent; 2], opacity: 1.0 });
+    overlay.text(Vec2::new(min.x + 11.0, 0.5 * (min.y + max.y)), Align::Left, TEXT, colours.text, badge);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(view: &PictureView) -> Vec<String> {
+        let mut overlay = Overlay::default();
+        add(&mut overlay, view);
+        let text = |shape: &Shape2| match shape {
+            Shape2::Text { text, .. } => Some(text.clone()),
+            Shape2::Line { .. } | Shape2::Rectangle { .. } | Shape2::Disc { .. } => None,
+        };
+        overlay.shapes.iter().filter_map(text).collect()
+    }
+
+    #[test]
+    fn the_scale_bar_snaps_to_round_lengths_and_fits() {
+        for distance in [0.05, 0.2, 0.46, 1.5] {
+            let mut view = PictureView::default();
+            view.camera.distance = distance;
+            let label = texts(&view).into_iter().find(|t| t.contains("mm")).expect("a scale bar");
+            let mm: f32 = label.split('\u{2009}').next().and_then(|n| n.parse().ok()).expect("a number");
+            assert!(SCALE_STEPS.contains(&mm));
+            let points = mm * view.size.y / (view.camera.height_at_target() * 1e3);
+            assert!((40.0..160.0).contains(&points), "{points} points at {distance} m");
+        }
+    }
+
+    #[test]
+    fn everything_is_labelled_and_small_pictures_get_less() {
+        let view = PictureView { badge: Some("SIMULATED".into()), ..PictureView::default() };
+        let all = texts(&view);
+        for want in ["x", "y", "z", "pad pressure, kPa", "0", "20", "40", "SIMULATED"] {
+            assert!(all.iter().any(|t| t == want), "{want} in {all:?}");
+        }
+        let tiny = PictureView { size: Vec2::new(100.0, 80.0), ..view };
+        assert!(texts(&tiny).is_empty());
+    }
+}

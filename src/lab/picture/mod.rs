@@ -1,0 +1,171 @@
+//! From a scene and a frame to a list of things to draw. No window and no graphics card: a live simulation, a stored
+//! trial and a test all make their pictures here.
+
+mod fingers;
+mod forces;
+mod furniture;
+mod ghost;
+mod gripper_model;
+mod reconstructed;
+
+pub use furniture::SCALE_STEPS;
+
+use glam::{Mat4, Vec2, Vec3};
+use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid};
+use palpate_geometry::palette::{Rgb, Theme, Trace};
+use palpate_geometry::{Pose, SurfaceMesh};
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::Gripper;
+use palpate_sim::objects::ObjectModel;
+use palpate_sim::scene::{Scene, SupportKind};
+use std::sync::Arc;
+
+/// How a picture is to look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureView {
+    /// From where.
+    pub camera: Camera,
+    /// Dark or light.
+    pub theme: Theme,
+    /// Size of the picture in points, for what is drawn on top.
+    pub size: Vec2,
+    /// Draw force arrows.
+    pub forces: bool,
+    /// Draw the axis gizmo, scale bar and legend.
+    pub furniture: bool,
+    /// Pressure that has the brightest colour (Pa).
+    pub full_scale: f32,
+    /// Words in the top left corner: where the data come from.
+    pub badge: Option<String>,
+}
+
+impl Default for PictureView {
+    fn default() -> Self {
+        Self {
+            camera: Camera::default(),
+            theme: Theme::Dark,
+            size: Vec2::new(960.0, 600.0),
+            forces: true,
+            furniture: true,
+            full_scale: 40e3, // taxel pressures of an ordinary hold reach some 30 kPa
+            badge: None,
+        }
+    }
+}
+
+/// What does not change from frame to frame: meshes, and the gripper they belong to.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    gripper: Gripper,
+    world_from_gripper: Pose,
+    object: Option<Arc<SurfaceMesh>>,
+    /// Radius of a ball that holds the object (m); zero for an empty hand.
+    object_radius: f32,
+    pedestal: Option<Arc<SurfaceMesh>>,
+    has_table: bool,
+    palm: Arc<SurfaceMesh>,
+}
+
+/// Radius of the ball in which shadows are cast (m), and the height of its middle above the table.
+const SHADOW_RADIUS: f32 = 0.17;
+
+impl Stage {
+    /// Prepares the meshes of a scene.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>, world_from_gripper: Pose) -> Self {
+        let support = &scene.support;
+        Self {
+            gripper: scene.gripper.clone(),
+            world_from_gripper,
+            object: object.map(|o| Arc::clone(&o.surface)),
+            object_radius: object.map_or(0.0, |o| 0.5 * o.bounds.size().length() as f32),
+            pedestal: (support.kind == SupportKind::Pedestal).then(|| Arc::new(gripper_model::pedestal(support))),
+            has_table: support.kind != SupportKind::None,
+            palm: Arc::new(gripper_model::palm(&scene.gripper)),
+        }
+    }
+
+    /// Everything in one picture of a frame.
+    pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
+        let colours = view.theme.colours();
+        let mut overlay = Overlay::default();
+        if view.furniture {
+            furniture::add(&mut overlay, view);
+        }
+        let palm = self.world_from_gripper.position.as_vec3();
+        DrawList {
+            camera: view.camera,
+            backdrop: [colours.sky, colours.horizon],
+            shadow_bounds: (Vec3::new(palm.x, palm.y, palm.z - 0.06), SHADOW_RADIUS),
+            ground: self.has_table.then_some(Ground {
+                height: 0.0,
+                colour: colours.ground,
+                grid: colours.grid,
+                radius: 0.45,
+            }),
+            solids: self.solids(frame),
+            ghosts: Vec::new(),
+            fingers: fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, view.full_scale),
+            arrows: if view.forces {
+                forces::arrows(&self.gripper, &self.world_from_gripper, frame)
+            } else {
+                Vec::new()
+            },
+            overlay,
+        }
+    }
+
+    /// What a frame of another run of the same scene shows, to be laid over a picture as [`DrawList::ghosts`].
+    pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
+        let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, 1.0);
+        let colour = theme.colours().accent;
+        let solid = |mesh, world_from_mesh| Solid { mesh, world_from_mesh, gloss: 0.0 };
+        let mut ghosts: Vec<Solid> =
+            fingers.iter().map(|finger| solid(Arc::new(ghost::finger(finger, colour)), Mat4::IDENTITY)).collect();
+        if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
+            ghosts.push(solid(Arc::clone(mesh), matrix(pose)));
+        }
+        ghosts
+    }
+
+    /// The real fingers as their flex strips tell (1/m), left and right, to be laid over a picture as
+    /// [`DrawList::ghosts`]. A finger whose strip is not read is left out.
+    pub fn reconstructed(&self, curvature: [Option<f64>; 2], theme: Theme) -> Vec<Solid> {
+        let frame = reconstructed::evenly_bent(&self.gripper, curvature);
+        let colour = Trace::Curvature.colour(theme);
+        let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, &frame, 1.0);
+        let read = fingers.iter().zip(curvature).filter(|(_, kappa)| kappa.is_some());
+        let mesh = read.map(|(finger, _)| Arc::new(ghost::finger(finger, colour)));
+        mesh.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY, gloss: 0.0 }).collect()
+    }
+
+    fn solids(&self, frame: &Frame) -> Vec<Solid> {
+        let solid = |mesh: &Arc<SurfaceMesh>, pose: &Pose, gloss: f32| Solid {
+            mesh: Arc::clone(mesh),
+            world_from_mesh: matrix(pose),
+            gloss,
+        };
+        let mut solids = vec![solid(&self.palm, &self.world_from_gripper, 0.12)];
+        solids.extend(self.pedestal.as_ref().map(|mesh| solid(mesh, &Pose::IDENTITY, 0.05)));
+        if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
+            solids.push(solid(mesh, pose, 0.10));
+        }
+        solids
+    }
+
+    /// A ball around what matters, to be framed by a camera: centre and radius (m).
+    pub fn bounds(&self) -> (Vec3, f32) {
+        let palm = self.world_from_gripper.position.as_vec3();
+        let length = self.gripper.finger.length as f32;
+        // A large object is shown whole; it stands between the fingers, a little below the middle.
+        (palm - Vec3::Z * (0.42 * length), (1.12 * length).max(1.1 * self.object_radius + 0.3 * length))
+    }
+}
+
+fn matrix(pose: &Pose) -> Mat4 {
+    Mat4::from_rotation_translation(pose.rotation.as_quat(), pose.position.as_vec3())
+}
+
+/// The colour of text and marks over a picture.
+fn ink(theme: Theme) -> Rgb {
+    theme.colours().text
+}

@@ -1,0 +1,177 @@
+//! Trials of a real gripper: recorded, stored, merged, exported, and killed half-way.
+
+use super::*;
+use palpate_device::serial::{LinkEvent, LinkOptions, SerialLink};
+use palpate_device::wire::CaptureReader;
+use palpate_device::wire::Heard;
+use palpate_sim::scene::Scene;
+use palpate_store::{BOARD_RIG, Store, StoreError, write_board_csv};
+use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
+use palpate_tactile::trial::PhaseMark;
+use std::path::Path;
+use std::time::Duration;
+
+fn line(i: u32) -> String {
+    let part = if i % 50 == 7 { "nan".to_owned() } else { (2000 + i).to_string() };
+    format!("t_us:{},seq:{i},flexL:{part},flexR:2100,fsrL:12.5,fsrR:0,p_bar:0.55\n", 20_000 * u64::from(i))
+}
+
+/// Captured bytes of a board that loses its line 100 and vanishes for two seconds after line 199.
+fn capture(path: &Path) -> std::io::Result<()> {
+    let mut file = CAPTURE_MAGIC.to_vec();
+    let bytes = |t: f64, text: &str| Captured::Bytes { arrived_s: t, bytes: text.as_bytes().to_vec() };
+    bytes(0.0, "ut\n").write(&mut file)?;
+    for i in (0..400).filter(|i| *i != 100 && !(200..300).contains(i)) {
+        if i == 300 {
+            Captured::Interrupted { at_s: 4.1, cause: "the board was unplugged".to_owned() }.write(&mut file)?;
+            bytes(5.99, "half a line\n").write(&mut file)?;
+        }
+        bytes(0.02 * f64::from(i), &line(i)).write(&mut file)?;
+    }
+    std::fs::write(path, file)
+}
+
+/// Records a capture as fast as it can be played.
+fn record(store: &mut Store, path: &Path) -> Result<Recorded, Box<dyn std::error::Error>> {
+    let speed = f64::INFINITY;
+    let options = LinkOptions { path: Some(path.to_owned()), replay_speed: speed, ..LinkOptions::default() };
+    let link = SerialLink::open(&options)?;
+    let plan = BoardTrialPlan { object: "lemon".to_owned(), scene: Scene::default().to_toml(), seconds: Some(8.0) };
+    let mut recorder = BoardRecorder::begin(store, &plan, &link.status(), 0.0)?;
+    while !link.is_over() {
+        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.take(event));
+        recorder.flush(store)?;
+    }
+    Ok(recorder.finish(store, &link.status(), Vec::new())?)
+}
+
+#[test]
+fn a_trial_keeps_every_reading_every_gap_and_every_byte() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
+    capture(&bytes)?;
+    let mut store = Store::open(&path)?;
+    let recorded = record(&mut store, &bytes)?;
+    let trial = store.board_trial(recorded.id)?.ok_or("it is one of a board")?;
+    assert_eq!((trial.readings.len(), trial.about.cadence.samples, trial.about.cadence.lost), (299, 299, 101));
+    let lost: Vec<Option<u64>> = trial.gaps.iter().map(|gap| gap.lost).collect();
+    assert_eq!(lost, [Some(1), Some(100)]);
+    assert!(trial.gaps[1].cause.contains("unplugged"));
+    for reading in &trial.readings {
+        let i = reading.seq.ok_or("it counts")? as u32;
+        let first = (i % 50 != 7).then_some((2000 + i) as f32);
+        assert_eq!(reading.counts, [first, Some(2100.0), Some(12.5), Some(0.0)]);
+        assert!((reading.t_s - 0.02 * f64::from(i)).abs() < 1e-6 && reading.line_bar == Some(0.55));
+    }
+    assert!(recorded.warnings.iter().any(|warning| warning.starts_with("interrupted")), "{:?}", recorded.warnings);
+    let row = &store.list(false)?[0];
+    let told = (row.rig.as_str(), row.object.as_str(), row.state.as_str(), row.samples, row.sound);
+    assert_eq!(told, (BOARD_RIG, "lemon", "complete", 299, true));
+    // The bytes are those that came, mark by mark.
+    let stored = store.board_bytes(recorded.id)?.ok_or("it has bytes")?;
+    let pieces = |bytes: &[u8]| CaptureReader::new(bytes)?.collect::<std::io::Result<Vec<Captured>>>();
+    assert_eq!(pieces(&stored)?, pieces(&std::fs::read(&bytes)?)?);
+    Ok(())
+}
+
+#[test]
+fn trials_of_a_board_are_merged_and_exported() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    capture(&at("grasp.bytes"))?;
+    let mut here = Store::open(&at("here.sqlite"))?;
+    let id = record(&mut here, &at("grasp.bytes"))?.id;
+    let mut all = Store::open(&at("all.sqlite"))?;
+    record(&mut all, &at("grasp.bytes"))?;
+    assert_eq!(all.merge_from(&at("here.sqlite"))?.added, 1);
+    assert_eq!(all.board_trial(2)?, here.board_trial(id)?);
+    assert_eq!(all.board_bytes(2)?, here.board_bytes(id)?);
+    let mut trial = all.board_trial(2)?.ok_or("it is one of a board")?;
+    trial.about.began_s = 1.0;
+    let phase = palpate_sim::gripper::Phase::Close;
+    trial.about.phases.push(PhaseMark { from_s: 2.0, phase, line_bar: Some(0.05) });
+    write_board_csv(&at("trial.csv"), &trial)?;
+    let text = std::fs::read_to_string(at("trial.csv"))?;
+    let rows: Vec<&str> = text.lines().collect();
+    assert_eq!(rows.len(), 300);
+    assert!(rows[0].starts_with("t_s,arrived_s,seq,missing_before,flexL [counts],"), "{}", rows[0]);
+    let fields = |row: usize| rows[row].split(',').map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(fields(8)[2..], ["7", "", "", "2100", "12.5", "0", "0.55", ""]);
+    assert_eq!((fields(101)[2].as_str(), fields(101)[3].as_str(), fields(101)[9].as_str()), ("101", "1", "close"));
+    assert_eq!(fields(200)[3], "100");
+    // Deleting and purging take everything along.
+    all.delete(&[2])?;
+    assert!(all.board_trial(2)?.is_none());
+    all.purge()?;
+    let left: i64 = rusqlite::Connection::open(at("all.sqlite"))?.query_row(
+        "SELECT count(DISTINCT trial) FROM board_chunks",
+        [],
+        |r| r.get(0),
+    )?;
+    assert_eq!(left, 1);
+    Ok(())
+}
+
+#[test]
+fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
+    capture(&bytes)?;
+    let mut store = Store::open(&path)?;
+    let whole = record(&mut store, &bytes)?.id;
+    let link = SerialLink::open(&LinkOptions {
+        path: Some(bytes.clone()),
+        replay_speed: f64::INFINITY,
+        ..LinkOptions::default()
+    })?;
+    let plan = BoardTrialPlan { object: "cube".to_owned(), scene: String::new(), seconds: None };
+    let mut recorder = BoardRecorder::begin(&mut store, &plan, &link.status(), 0.0)?;
+    let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+    while !link.is_over() {
+        for event in link.take(Duration::from_millis(20)) {
+            let reading = is_reading(&event);
+            recorder.take(event);
+            if reading && recorder.samples() % 50 == 0 {
+                recorder.flush(&mut store)?;
+            }
+        }
+    }
+    // Nothing of what was not written is there, all of what was is, and the other trial is whole.
+    drop(recorder);
+    drop(store);
+    let store = Store::open(&path)?;
+    assert_eq!(store.board_trial(2)?.map(|trial| trial.readings.len()), Some(250));
+    assert_eq!(store.board_trial(whole)?.map(|trial| trial.readings.len()), Some(299));
+    assert!(store.board_bytes(2)?.is_some());
+    let states: Vec<String> = store.list(false)?.into_iter().map(|row| row.state).collect();
+    assert_eq!(states, ["complete", "recording"]);
+    Ok(())
+}
+
+#[test]
+fn a_store_that_another_program_writes_to_holds_nobody_up_and_loses_nothing() -> Result<(), Box<dyn std::error::Error>>
+{
+    let folder = tempfile::tempdir()?;
+    let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
+    capture(&bytes)?;
+    let mut store = Store::open(&path)?;
+    let speed = f64::INFINITY;
+    let options = LinkOptions { path: Some(bytes), replay_speed: speed, ..LinkOptions::default() };
+    let link = SerialLink::open(&options)?;
+    let plan = BoardTrialPlan { object: "lemon".to_owned(), scene: String::new(), seconds: Some(8.0) };
+    let mut recorder = BoardRecorder::begin(&mut store, &plan, &link.status(), 0.0)?;
+    let other = rusqlite::Connection::open(&path)?;
+    other.execute_batch("BEGIN IMMEDIATE")?;
+    while !link.is_over() {
+        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.take(event));
+    }
+    for _ in 0..11 {
+        recorder.offer(&mut store)?;
+    }
+    let refused = recorder.offer(&mut store);
+    assert!(matches!(refused, Err(StoreError::Busy)), "it does not go on like that for ever: {refused:?}");
+    other.execute_batch("COMMIT")?;
+    recorder.offer(&mut store)?;
+    assert_eq!(store.board_trial(recorder.id())?.map(|trial| trial.readings.len()), Some(299));
+    Ok(())
+}

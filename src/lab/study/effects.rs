@@ -1,0 +1,338 @@
+//! What each effect costs and what it changes: leave one out, or put one in, and compare whole trials.
+//!
+//! Every effect is flipped alone, as if somebody had switched it by hand: what is left to `auto` is decided anew, so that
+//! an object let go has its weight. Cost comes from pairs of runs, with and without, one after the other in one thread,
+//! of which the quickest of each kind count, because whatever else a machine does only adds. Differences are taken over
+//! all samples and both fingers.
+
+use crate::grasping::{ErrorNorms, GraspSummary, prepare};
+use palpate_geometry::units::three_digits;
+use palpate_sim::frame::{Plan, PlannedEffect};
+use palpate_sim::objects::ObjectModel;
+use palpate_sim::physics::effects::rule_of;
+use palpate_sim::scene::{Effect, Scene, Setting};
+use palpate_tactile::Sensors;
+use palpate_tactile::trial::Trial;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Which effects a scene calls for, what they cost and what they change.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Explanation {
+    /// Name of the object.
+    pub object: String,
+    /// CPU time of the trial as the scene has it (ms).
+    pub cpu_ms: f64,
+    /// First contact (s); null when never.
+    pub contact_onset_s: Option<f64>,
+    /// What should be known of the trial.
+    pub warnings: Vec<String>,
+    /// All effects, in the order in which they are told.
+    pub effects: Vec<ExplainedEffect>,
+}
+
+/// One effect, explained.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExplainedEffect {
+    /// What the plan says of it.
+    #[serde(flatten)]
+    pub planned: PlannedEffect,
+    /// What it is.
+    pub about: &'static str,
+    /// What its number is the ratio of.
+    pub number_is: &'static str,
+    /// What it costs where it is on, and would cost where it is off, as a share of the trial's CPU time.
+    pub cost_share: f64,
+    /// What the trial would be with the effect left out where it is on, put in where it is off.
+    pub change: EffectChange,
+}
+
+/// Differences between two trials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct EffectChange {
+    /// Of what the sensors read.
+    #[serde(flatten)]
+    pub norms: ErrorNorms,
+    /// First contact in the other trial (s); null when never.
+    pub contact_onset_s: Option<f64>,
+    /// How much later first contact is in the other trial (ms), in whole samples; null unless both touch.
+    pub onset_ms: Option<f64>,
+}
+
+impl ExplainedEffect {
+    /// What it costs, in words.
+    pub fn cost_in_words(&self) -> String {
+        let (costs, saves) = if self.planned.on { ("costs", "saves") } else { ("would cost", "would save") };
+        let percent = 100.0 * self.cost_share;
+        if self.cost_share.abs() < NOISE {
+            format!("{costs} next to nothing: less than {:.0} % of the CPU time", 100.0 * NOISE)
+        } else if percent > 0.0 {
+            format!("{costs} {percent:.0} % of the CPU time")
+        } else {
+            // Without friction, say, an object rolls about and takes more steps of the solver.
+            format!("{saves} {:.0} % of the CPU time", -percent)
+        }
+    }
+
+    /// What the other trial is like, in words, given when this one has its first contact (s).
+    pub fn change_in_words(&self, onset_here: Option<f64>) -> String {
+        let change = &self.change;
+        let how = if self.planned.on { "without it" } else { "with it" };
+        if change.norms.curvature_per_m == 0.0 && change.norms.force_n == 0.0 && change.contact_onset_s == onset_here {
+            return format!("{how} nothing changes");
+        }
+        let part = |name: &str, value: f64, unit: &str, share: f64| {
+            format!("{name} {} {unit} ({} %)", three_digits(value), three_digits(100.0 * share))
+        };
+        let onset = match (change.onset_ms, change.contact_onset_s) {
+            (Some(ms), _) => format!("onset {ms:+.0} ms"),
+            (None, Some(t)) => format!("onset at {t:.2} s"),
+            (None, None) if onset_here.is_some() => "no contact".to_owned(),
+            (None, None) => "no contact either way".to_owned(),
+        };
+        let curvature = part("curvature", change.norms.curvature_per_m, "1/m", change.norms.curvature_share);
+        let pressure = part("pressure", change.norms.pressure_pa * 1e-3, "kPa", change.norms.pressure_share);
+        let force = part("force", change.norms.force_n, "N", change.norms.force_share);
+        format!("{how}: {curvature}, {pressure}, {force}, {onset}")
+    }
+}
+
+/// Pairs of runs that are timed. Long trials are timed once: they average over much already.
+const PAIRS: usize = 5;
+/// Shares of CPU time below this differ from run to run on a busy machine.
+const NOISE: f64 = 0.03;
+/// What counts as long (s).
+const LONG: f64 = 10.0;
+
+/// How to measure.
+pub struct Measuring<'a> {
+    /// Threads to work in.
+    pub threads: usize,
+    /// Set to give up.
+    pub cancelled: &'a AtomicBool,
+    /// Hears how many of how many effects are done.
+    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+/// Explains every effect of a scene; `None` when cancelled.
+pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measuring<'_>) -> Option<Explanation> {
+    let (base, cpu_s) = run(scene, object, how.cancelled)?;
+    let base = Felt::new(scene, base);
+    let done = AtomicUsize::new(0);
+    (how.progress)(0, Effect::ALL.len());
+    let one = |effect: &Effect| {
+        let explained = explain_one(scene, object, &base, *effect, how.cancelled)?;
+        (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, Effect::ALL.len());
+        Some(explained)
+    };
+    let all = || Effect::ALL.par_iter().map(one).collect::<Option<Vec<ExplainedEffect>>>();
+    // Where the system has no threads to give, those that rayon has will do.
+    let effects = match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
+        Ok(pool) => pool.install(all),
+        Err(_none) => all(),
+    }?;
+    Some(Explanation {
+        object: base.trial.info.object.clone(),
+        cpu_ms: cpu_s * 1e3,
+        contact_onset_s: base.onset_s,
+        warnings: base.trial.info.warnings.clone(),
+        effects,
+    })
+}
+
+fn explain_one(
+    scene: &Scene,
+    object: Option<&ObjectModel>,
+    base: &Felt,
+    effect: Effect,
+    cancelled: &AtomicBool,
+) -> Option<ExplainedEffect> {
+    let plan = &base.trial.info.plan;
+    let planned = plan.effects.iter().find(|planned| planned.name == effect.name())?.clone();
+    let other_scene = flipped(scene, plan, effect);
+    let pairs = if scene.timing.duration_s > LONG { 1 } else { PAIRS };
+    let (mut here, mut there) = (f64::INFINITY, f64::INFINITY);
+    let mut other = None;
+    for _ in 0..pairs {
+        here = here.min(run(scene, object, cancelled)?.1);
+        let (trial, seconds) = run(&other_scene, object, cancelled)?;
+        there = there.min(seconds);
+        other = Some(trial);
+    }
+    let sign = if planned.on { 1.0 } else { -1.0 };
+    let rule = rule_of(effect);
+    Some(ExplainedEffect {
+        about: rule.about,
+        number_is: rule.number,
+        cost_share: sign * (here - there) / here,
+        change: base.change_to(&Felt::new(&other_scene, other?), scene),
+        planned,
+    })
+}
+
+/// The scene with one effect the other way round, as if somebody had switched it by hand.
+fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
+    let mut scene = scene.clone();
+    scene.effects.set(effect, if plan.is_on(effect.name()) { Setting::Off } else { Setting::On });
+    scene
+}
+
+/// A whole trial and its CPU time (s); `None` when cancelled.
+fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> Option<(Trial, f64)> {
+    let start = cpu_time::ThreadTime::now();
+    let mut run = prepare(scene, object, 0);
+    while run.next_frame().is_some() {
+        if cancelled.load(Ordering::Relaxed) {
+            return None;
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    Some((run.finish(scene), seconds))
+}
+
+/// A trial, and when its first contact was (s).
+struct Felt {
+    trial: Trial,
+    onset_s: Option<f64>,
+}
+
+impl Felt {
+    fn new(scene: &Scene, trial: Trial) -> Self {
+        Self { onset_s: GraspSummary::new(&trial, scene).contact_onset_s, trial }
+    }
+
+    /// From this trial to another; the sensors of `scene` read both.
+    fn change_to(&self, other: &Self, scene: &Scene) -> EffectChange {
+        let sensors = Sensors::whole_fingers(&scene.gripper);
+        let both = self.onset_s.zip(other.onset_s);
+        EffectChange {
+            norms: ErrorNorms::between(&other.trial, &self.trial, &sensors),
+            contact_onset_s: other.onset_s,
+            onset_ms: both.map(|(here, there)| (there - here) * 1e3),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_geometry::Primitive;
+    use palpate_sim::scene::Accuracy;
+
+    fn explained(scene: &Scene, object: Option<&ObjectModel>) -> Explanation {
+        let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| {} };
+        let explanation = explain_effects(scene, object, &how).expect("not cancelled");
+        assert_eq!(explanation.effects.len(), Effect::ALL.len());
+        explanation
+    }
+
+    fn ball(radius: f64, density: f64) -> ObjectModel {
+        ObjectModel::from_primitive("ball", Primitive::Sphere { radius }, density, 0.6)
+    }
+
+    fn draft() -> Scene {
+        let mut scene = Scene::default();
+        scene.solver.accuracy = Accuracy::Draft;
+        scene
+    }
+
+    impl Explanation {
+        fn of(&self, effect: Effect) -> &ExplainedEffect {
+            self.effects.iter().find(|e| e.planned.name == effect.name()).expect("all are explained")
+        }
+
+        fn names_on(&self) -> Vec<&str> {
+            self.effects.iter().filter(|e| e.planned.on).map(|e| e.planned.name.as_str()).collect()
+        }
+    }
+
+    #[test]
+    fn a_fixed_sphere_calls_for_fingers_and_friction_alone() {
+        let mut scene = draft();
+        scene.object.fixed = true;
+        let told = explained(&scene, Some(&ball(0.025, 400.0)));
+        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
+        assert!(told.of(Effect::FreeObject).planned.reason.contains("fixed"));
+        for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
+            assert!(told.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
+        }
+        // What was left out is not missed: no finger comes near the pedestal or the other finger.
+        for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
+            assert_eq!(told.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
+            assert_eq!(told.of(effect).change.norms.force_n, 0.0, "{effect:?}");
+        }
+    }
+
+    #[test]
+    fn a_light_free_ball_feels_support_and_friction_but_hardly_its_weight() {
+        let told = explained(&draft(), Some(&ball(0.020, 2.0)));
+        let on = ["free-object", "finger-gravity", "support", "friction", "finger-inertia"];
+        assert_eq!(told.names_on(), on, "{:#?}", told.effects);
+        let weight = told.of(Effect::ObjectGravity);
+        assert!(
+            weight.planned.number < weight.planned.threshold && weight.change.norms.curvature_share < 0.01,
+            "{weight:?}"
+        );
+        assert!(told.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
+        // A heavy one does feel it.
+        let heavy = explained(&draft(), Some(&ball(0.020, 4000.0)));
+        assert!(
+            heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.norms.force_n > 1e-3
+        );
+    }
+
+    #[test]
+    fn an_empty_hand_calls_for_its_fingers_to_meet() {
+        let told = explained(&draft(), None);
+        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
+        let contact = told.of(Effect::FingerContact);
+        assert!(
+            contact.change.norms.curvature_per_m > 1.0 && contact.change.norms.force_n > 0.05,
+            "{:?}",
+            contact.change
+        );
+        assert!(told.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
+        assert_eq!(told.of(Effect::FreeObject).change.norms.curvature_per_m, 0.0);
+    }
+
+    #[test]
+    fn a_long_hold_calls_for_creep() {
+        let mut scene = draft();
+        scene.object.fixed = true;
+        (scene.programme.hold_ticks, scene.timing.duration_s) = (200, 23.0);
+        scene.gripper.finger.creep_time = 5.0;
+        let told = explained(&scene, Some(&ball(0.025, 400.0)));
+        let creep = told.of(Effect::Creep);
+        assert!(creep.planned.on && creep.planned.number == 4.0, "{:?}", creep.planned);
+        assert!(
+            creep.change.norms.force_share > 0.01 && creep.change.norms.curvature_share > 0.005,
+            "{:?}",
+            creep.change
+        );
+        let mut short = draft();
+        short.object.fixed = true;
+        let short = explained(&short, Some(&ball(0.025, 400.0)));
+        let unnoticed = short.of(Effect::Creep);
+        assert!(!unnoticed.planned.on && unnoticed.change.norms.force_share < 0.2 * creep.change.norms.force_share);
+    }
+
+    #[test]
+    fn putting_an_effect_in_is_what_switching_it_does() {
+        let (mut scene, ball) = (draft(), ball(0.020, 400.0));
+        scene.object.fixed = true;
+        let told = explained(&scene, Some(&ball));
+        let free = Felt::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
+        let held = Felt::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
+        // An object let go has its weight, and rests.
+        let expected = held.change_to(&free, &scene);
+        assert_eq!(told.of(Effect::FreeObject).change, expected);
+        assert!(expected.norms.force_n > 1e-3);
+    }
+
+    #[test]
+    fn whoever_cancels_gets_nothing() {
+        let how = Measuring { threads: 1, cancelled: &AtomicBool::new(true), progress: &|_, _| {} };
+        assert_eq!(explain_effects(&draft(), None, &how), None);
+    }
+}

@@ -1,0 +1,40 @@
+//! What was recorded and what the fit makes of it, to be drawn over each other.
+
+use super::observation::Observation;
+use super::twin::Twin;
+use palpate_sim::gripper::Side;
+
+/// Curvature of one finger over a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Course {
+    /// The recording.
+    pub name: String,
+    /// Which finger.
+    pub side: Side,
+    /// Times since the first command (s).
+    pub t_s: Vec<f64>,
+    /// As recorded (1/m).
+    pub recorded: Vec<f64>,
+    /// As the fitted twin shows it through the strip (1/m).
+    pub fitted: Vec<f64>,
+}
+
+/// The courses that belong to residuals in the order of the twin's places.
+pub(super) fn courses(observations: &[Observation], twin: &Twin<'_>, residuals: &[f64]) -> Vec<Course> {
+    let mut courses: Vec<Course> = Vec::new();
+    let mut last = None;
+    for ((number, track, k), residual) in twin.places().zip(residuals).filter(|((_, track, _), _)| !track.is_force) {
+        let Observation { name, signals, .. } = &observations[number];
+        if last.replace((number, track.side)) != Some((number, track.side)) {
+            let (name, side) = (name.clone(), track.side);
+            courses.push(Course { name, side, t_s: Vec::new(), recorded: Vec::new(), fitted: Vec::new() });
+        }
+        let recorded = f64::from(signals.row(k)[track.column]);
+        if let Some(course) = courses.last_mut() {
+            course.t_s.push(signals.t_s[k]);
+            course.recorded.push(recorded);
+            course.fitted.push(recorded + residual * track.deviation(recorded).unwrap_or(0.0));
+        }
+    }
+    courses
+}

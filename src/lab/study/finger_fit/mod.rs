@@ -1,0 +1,389 @@
+//! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so that the
+//! simulated finger lies on the real one.
+//!
+//! The twin is simulated with what the control box did, and its curvature and force laid over what was recorded; see
+//! `least_squares` for how the difference is made least. Fitted in logarithms: bending stiffness EI, damping time, the torques at
+//! points of the curve every 0.2 bar; and the time in which a chamber fills. Beside them, and only as far as their
+//! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and when
+//! each recording began.
+//!
+//! **What the data can tell.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
+//! stiffness bends alike. What gives a scale is the finger's weight and inertia, which resist with k/m and g/k: with
+//! closes alone, EI and torques are known as well as the mass is, and less well the stiffer the finger. A press on a
+//! calibrated pad measures a force, and so the scale itself. The intervals say how much of this was in the data.
+
+mod course;
+mod least_squares;
+mod observation;
+mod recorded;
+#[cfg(test)]
+mod tests;
+mod twin;
+mod watched;
+
+pub use course::Course;
+pub use least_squares::MOST_STEPS;
+pub use observation::Observation;
+pub use recorded::{RecordedGraspError, RecordedGrasps};
+pub use watched::FitWatch;
+
+use least_squares::{Minimum, Prior, minimise};
+use palpate_geometry::units::three_digits;
+use palpate_sim::gripper::Gripper;
+use serde::Serialize;
+use std::sync::atomic::AtomicBool;
+use twin::{DAMPING, LAG, PAD_BENDING, PAD_GAIN, SHIFT, STIFFNESS, STRIP_GAIN, STRIP_OFFSET, TORQUES, Twin};
+use watched::Watched;
+
+/// How well the sensors are known: one deviation each, left and right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trust {
+    /// Gain of the strips, as a share.
+    pub strip_gain: [f64; 2],
+    /// Gain of the pads, as a share.
+    pub pad_gain: [f64; 2],
+}
+
+impl Default for Trust {
+    /// What a careful calibration comes to: strips within one part in a hundred, pads within five.
+    fn default() -> Self {
+        Self { strip_gain: [0.01; 2], pad_gain: [0.05; 2] }
+    }
+}
+
+/// How well a parameter is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Known {
+    /// Within a tenth of itself.
+    Well,
+    /// Within a half.
+    Roughly,
+    /// The data do not tell.
+    Hardly,
+}
+
+/// One parameter with its 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// What it is: a key of the scene, or a ratio.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its most likely value.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+    /// How well it is known.
+    pub known: Known,
+}
+
+/// What is left between twin and recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Remainder {
+    /// The recording.
+    pub name: String,
+    /// Root mean square over both strips (1/m).
+    pub curvature_per_m: f64,
+    /// Root mean square over both pads as a share of the force; null where no force was usable.
+    pub force_share: Option<f64>,
+    /// By how much it began later than it says (s).
+    pub shift_s: f64,
+}
+
+/// What a fit came to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FingerFit {
+    /// The gripper of the first recording's scene, with the fitted finger.
+    pub gripper: Gripper,
+    /// What was fitted, with intervals.
+    pub estimates: Vec<Estimate>,
+    /// Each recording against its twin.
+    pub remainders: Vec<Remainder>,
+    /// By which factor intervals are wider than noise alone would make them: what the model does not explain.
+    pub widened: f64,
+    /// Steps that the fit took.
+    pub steps: u32,
+    /// What should be known, in sentences.
+    pub remarks: Vec<String>,
+    /// Curvature over time, recorded and fitted, of each finger of each recording.
+    #[serde(skip)]
+    pub courses: Vec<Course>,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// No recording.
+    #[error("nothing to fit: name a few recorded empty closes, and presses against something held in place")]
+    Nothing,
+    /// A recording without curvature.
+    #[error("{name} has no curvature of either finger: is its flex strip calibrated? `palpate calibrate list` shows")]
+    NoCurvature {
+        /// The recording.
+        name: String,
+    },
+    /// A recording in which nothing was done.
+    #[error("{name} hardly moves the fingers ({} 1/m at {} bar): record closes to half a bar and more", three_digits(*curvature), three_digits(*bar))]
+    NoMotion {
+        /// The recording.
+        name: String,
+        /// Most curvature (1/m).
+        curvature: f64,
+        /// Highest pressure (bar).
+        bar: f64,
+    },
+    /// A recording that is too long or too short.
+    #[error("{name} lasts {} s: recordings of 0.5 to 60 s can be fitted", three_digits(*duration_s))]
+    Length {
+        /// The recording.
+        name: String,
+        /// Its length (s).
+        duration_s: f64,
+    },
+    /// It was given up from outside.
+    #[error("the fit was stopped; nothing was changed")]
+    Stopped,
+    /// The twin cannot be computed.
+    #[error("the fit failed: {0}")]
+    Failed(String),
+}
+
+/// Pressure between points of the torque curve (bar), at most. A curve that bends between them is not met: what is left
+/// over then shows in the widening of the intervals.
+const KNOT_BAR: f64 = 0.2;
+
+/// Points of the torque curve besides zero, fewest and most; each costs a simulation of every recording a step.
+const KNOTS: [f64; 2] = [2.0, 8.0];
+
+/// How far the finger's parameters are from where the fit begins, one deviation in logarithms: a factor of four and a
+/// half, so that it hardly counts.
+const OPEN: f64 = 1.5;
+
+/// What is usual of a filling time (s).
+const USUAL_LAG: Prior = Prior { mean: 0.05, deviation: 0.3 };
+
+/// Deviation of a strip's zero after it was taken anew (1/m): 0.3 degrees.
+const OFFSET: f64 = 0.1;
+
+/// Deviation of what bending adds to a pad besides its known zero, per curvature (N m). Below its threshold an empty close
+/// shows nothing of it: 0.15 N at 15 1/m.
+const PRELOAD: f64 = 0.01;
+
+/// Deviation of the instant at which a recording begins (s): half an actuation tick.
+const START: f64 = 0.03;
+
+/// Half an interval of 95 % in deviations.
+const HALF: f64 = 1.96;
+
+/// Least curvature that a recording must reach (1/m).
+const LEAST_CURVATURE: f64 = 2.0;
+
+/// Fits the finger to recordings; it begins at the gripper of the first one's scene.
+pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FitError> {
+    fit_finger_watched(observations, trust, &FitWatch { progress: &|_| (), stop: &AtomicBool::new(false) })
+}
+
+/// The same while somebody watches.
+pub fn fit_finger_watched(
+    observations: &[Observation],
+    trust: &Trust,
+    watch: &FitWatch<'_>,
+) -> Result<FingerFit, FitError> {
+    let first = observations.first().ok_or(FitError::Nothing)?;
+    observations.iter().try_for_each(usable)?;
+    let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
+    let count = (peak / KNOT_BAR - 1e-6).ceil().clamp(KNOTS[0], KNOTS[1]);
+    let knots: Vec<f64> = (1..=count as u32).map(|k| peak * f64::from(k) / count).collect();
+    let mut twin = Twin::new(observations, knots.clone());
+    let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
+    let minimum = minimise(&mut Watched::new(&mut twin, watch), &start, &priors)
+        .map_err(|cause| if watch.is_over() { FitError::Stopped } else { FitError::Failed(cause) })?;
+    let gripper = twin.gripper(&first.scene.gripper, &minimum.x);
+    let estimates = estimates(&minimum, &knots);
+    let remainders = remainders(observations, &twin, &minimum);
+    let remarks = remarks(first, &twin, &minimum, &estimates, &remainders);
+    let courses = course::courses(observations, &twin, &minimum.residuals);
+    let Minimum { widened, steps, .. } = minimum;
+    Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks, courses })
+}
+
+fn usable(seen: &Observation) -> Result<(), FitError> {
+    let name = seen.name.clone();
+    let tracks = seen.tracks();
+    if !tracks.iter().any(|track| !track.is_force) {
+        return Err(FitError::NoCurvature { name });
+    }
+    let duration_s = seen.duration();
+    if !(0.5..=60.0).contains(&duration_s) {
+        return Err(FitError::Length { name, duration_s });
+    }
+    let bends = tracks.iter().filter(|track| !track.is_force);
+    let all = bends.flat_map(|track| (0..seen.signals.len()).map(|k| f64::from(seen.signals.row(k)[track.column])));
+    let (curvature, bar) = (all.fold(0.0, f64::max), seen.peak_bar());
+    if curvature < LEAST_CURVATURE || bar <= 0.0 {
+        return Err(FitError::NoMotion { name, curvature, bar });
+    }
+    Ok(())
+}
+
+/// Where the fit begins, and what is known of each parameter.
+fn beginning(gripper: &Gripper, knots: &[f64], recordings: usize, trust: &Trust) -> (Vec<f64>, Vec<Prior>) {
+    let open = |value: f64| Prior { mean: value.max(1e-6).ln(), deviation: OPEN };
+    let mut priors = vec![open(gripper.finger.bending_stiffness), open(gripper.finger.damping_time), USUAL_LAG];
+    let stiffness = gripper.finger.bending_stiffness;
+    priors.extend(knots.iter().map(|bar| open(gripper.actuation.torque(*bar) / stiffness)));
+    let known = |deviation: f64| Prior { mean: 0.0, deviation: deviation.max(1e-4) };
+    priors.extend(trust.strip_gain.map(known));
+    priors.extend([OFFSET; 2].map(known));
+    priors.extend(trust.pad_gain.map(known));
+    priors.extend([PRELOAD; 2].map(known));
+    priors.extend(std::iter::repeat_n(known(START), recordings));
+    let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+    start[LAG] = gripper.actuation.filling_time.max(0.02);
+    (start, priors)
+}
+
+fn estimates(minimum: &Minimum, knots: &[f64]) -> Vec<Estimate> {
+    let deviation = |j: usize| minimum.covariance[j][j].max(0.0).sqrt();
+    let in_logarithms = |name: String, unit: &'static str, x: f64, deviation: f64| {
+        let half = HALF * deviation;
+        Estimate {
+            name,
+            unit,
+            value: x.exp(),
+            low: (x - half).exp(),
+            high: (x + half).exp(),
+            known: Known::within(half),
+        }
+    };
+    let of =
+        |name: &str, unit: &'static str, j: usize| in_logarithms(name.to_owned(), unit, minimum.x[j], deviation(j));
+    let mut estimates = vec![
+        of("gripper.finger.bending_stiffness", "N m²", STIFFNESS),
+        of("gripper.finger.damping_time", "s", DAMPING),
+    ];
+    let (lag, half) = (minimum.x[LAG], HALF * deviation(LAG));
+    estimates.push(Estimate {
+        name: "gripper.actuation.filling_time".to_owned(),
+        unit: "s",
+        value: lag,
+        low: (lag - half).max(0.0),
+        high: lag + half,
+        // A lag near zero is known well when it is known to be near zero: against a sample of the real gripper.
+        known: Known::within(half / lag.max(0.1)),
+    });
+    let covariance = &minimum.covariance;
+    for (k, bar) in knots.iter().enumerate() {
+        let ratio = TORQUES + k;
+        let variance = covariance[ratio][ratio] + covariance[STIFFNESS][STIFFNESS] + 2.0 * covariance[ratio][STIFFNESS];
+        let torque = minimum.x[ratio] + minimum.x[STIFFNESS];
+        estimates.push(in_logarithms(format!("torque at {bar:.2} bar"), "N m", torque, variance.max(0.0).sqrt()));
+    }
+    let peak = knots.last().copied().unwrap_or(0.0);
+    estimates.push(of(&format!("torque at {peak:.2} bar / bending stiffness"), "1/m", TORQUES + knots.len() - 1));
+    estimates
+}
+
+impl Known {
+    /// From half the width of an interval as a share.
+    fn within(share: f64) -> Self {
+        match share {
+            share if share <= 0.1 => Self::Well,
+            share if share <= 0.5 => Self::Roughly,
+            _ => Self::Hardly,
+        }
+    }
+}
+
+fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) -> Vec<Remainder> {
+    let mut sums = vec![[(0.0, 0u32); 2]; observations.len()];
+    for ((number, track, k), residual) in twin.places().zip(&minimum.residuals) {
+        let value = f64::from(observations[number].signals.row(k)[track.column]);
+        let off = residual * track.deviation(value).unwrap_or(0.0);
+        let off = if track.is_force { off / value } else { off };
+        let (sum, count) = &mut sums[number][usize::from(track.is_force)];
+        (*sum, *count) = (*sum + off * off, *count + 1);
+    }
+    let mean = |(sum, count): (f64, u32)| (count > 0).then(|| (sum / f64::from(count)).sqrt());
+    let shift = |number: usize| minimum.x[twin.of_finger() + SHIFT + number];
+    let each = observations.iter().zip(sums).enumerate();
+    each.map(|(number, (seen, [curvature, force]))| Remainder {
+        name: seen.name.clone(),
+        curvature_per_m: mean(curvature).unwrap_or(0.0),
+        force_share: mean(force),
+        shift_s: shift(number),
+    })
+    .collect()
+}
+
+fn remarks(
+    first: &Observation,
+    twin: &Twin<'_>,
+    minimum: &Minimum,
+    estimates: &[Estimate],
+    remainders: &[Remainder],
+) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if !minimum.settled {
+        remarks.push("the fit had not settled: the numbers are where it stopped; begin nearer with --scene".to_owned());
+    }
+    if remainders.iter().all(|remainder| remainder.force_share.is_none()) {
+        let grams = 1e3 * first.scene.gripper.finger.mass;
+        remarks.push(format!(
+            "no force was measured, so that stiffness and torques rest on the weight of the finger, {} g: one per cent more \
+             weight makes both one per cent more. Weigh it, or add presses with calibrated pads against something held in place",
+            three_digits(grams)
+        ));
+    }
+    for estimate in estimates.iter().filter(|estimate| estimate.known == Known::Hardly) {
+        let (name, low, high) = (&estimate.name, three_digits(estimate.low), three_digits(estimate.high));
+        remarks
+            .push(format!("the recordings do not tell {name}: anything from {low} to {high} {} fits", estimate.unit));
+    }
+    if estimates[STIFFNESS].known != Known::Well && estimates.last().is_some_and(|ratio| ratio.known == Known::Well) {
+        remarks.push(
+            "torque over stiffness is known well, each of them is not: they may only be changed together".to_owned(),
+        );
+    }
+    remarks.extend(corrected_sensors(twin, minimum));
+    if minimum.widened > 5.0 {
+        let factor = minimum.widened;
+        remarks.push(format!(
+            "the twin explains the recordings only in part: intervals are {factor:.0} times as wide as the noise would make \
+             them. Look at the residuals: contact in an empty close, a strip that creeps, another pressure than commanded?"
+        ));
+    }
+    remarks
+}
+
+/// Sensors that the fit had to correct by more than their calibration allows.
+fn corrected_sensors(twin: &Twin<'_>, minimum: &Minimum) -> Vec<String> {
+    let sensor = |j: usize| minimum.x[twin.of_finger() + j];
+    let mut words = Vec::new();
+    for (side, name) in ["left", "right"].into_iter().enumerate() {
+        let strip = sensor(STRIP_GAIN + side).exp_m1();
+        if strip.abs() > 0.03 {
+            let percent = 100.0 * strip;
+            words.push(format!("the {name} strip seems to read {percent:+.0} %: calibrate it again on its finger"));
+        }
+        let offset = sensor(STRIP_OFFSET + side);
+        if offset.abs() > 3.0 * OFFSET {
+            words.push(format!("the {name} strip seems to be {offset:+.2} 1/m off at rest: tare it"));
+        }
+        let bending = sensor(PAD_BENDING + side);
+        if bending.abs() > 2.0 * PRELOAD {
+            words.push(format!(
+                "bending seems to load the {name} pad by {bending:.3} N for each 1/m: record an empty close for it"
+            ));
+        }
+        let pad = sensor(PAD_GAIN + side).exp_m1();
+        if pad.abs() > 0.15 {
+            let percent = 100.0 * pad;
+            words.push(format!("the {name} pad seems to read {percent:+.0} %: calibrate it again"));
+        }
+    }
+    words
+}

@@ -1,0 +1,112 @@
+//! Stored trials as the fit takes them: what the board sent, through its calibrations, which also say how far their gains
+//! can be relied on.
+
+use super::{Observation, Trust};
+use palpate_sim::gripper::Gripper;
+use palpate_sim::objects::{EMPTY, ObjectError};
+use palpate_sim::scene::{Scene, SceneError};
+use palpate_store::{CalibrationId, Serving, Store, StoreError};
+use palpate_tactile::Sensors;
+use palpate_tactile::trial::TrialId;
+
+/// How well a strip's gain repeats once it is calibrated, as a share. Assumed: half a degree in 90.
+const STRIP_REPEATS: f64 = 0.005;
+
+/// How well a pad's gain repeats (data sheet, one deviation).
+const PAD_REPEATS: f64 = 0.02;
+
+/// RecordedGrasps grasps to fit a finger to.
+#[derive(Clone, Debug, Default)]
+pub struct RecordedGrasps {
+    /// The grasps.
+    pub observations: Vec<Observation>,
+    /// How well their sensors are known.
+    pub trust: Trust,
+    /// What should be known of them, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// Why a stored trial cannot be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordedGraspError {
+    /// The store.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Its scene cannot be read.
+    #[error("the scene stored with trial {id} cannot be read: {cause}")]
+    Scene {
+        /// The trial.
+        id: TrialId,
+        /// What is wrong.
+        cause: SceneError,
+    },
+    /// Its object cannot be loaded.
+    #[error("the object of trial {id} cannot be loaded: {cause}")]
+    Object {
+        /// The trial.
+        id: TrialId,
+        /// What is wrong.
+        cause: ObjectError,
+    },
+}
+
+impl RecordedGrasps {
+    /// Reads a trial. The fit begins at `gripper`, or else at the trial's own; `calibrations` are used instead of the newest of
+    /// each part.
+    pub fn add(
+        &mut self,
+        store: &Store,
+        id: TrialId,
+        gripper: Option<&Gripper>,
+        calibrations: &[CalibrationId],
+    ) -> Result<(), RecordedGraspError> {
+        let trial = store.load(id)?;
+        // What was recorded elsewhere has no scene of its own.
+        let own = match trial.info.scene.is_empty() {
+            true => Scene::default(),
+            false => Scene::from_toml(&trial.info.scene).map_err(|cause| RecordedGraspError::Scene { id, cause })?,
+        };
+        let mut scene = own.clone();
+        if let Some(gripper) = gripper {
+            // What was grasped and how is the trial's.
+            scene.gripper = gripper.clone();
+        }
+        let empty = trial.info.object == EMPTY;
+        let object =
+            if empty { None } else { own.load_object().map_err(|cause| RecordedGraspError::Object { id, cause })? };
+        if object.is_some() && !own.holds_object() {
+            self.warnings.push(format!(
+                "trial {id} grasps something that can move: presses against what is held in place tell more"
+            ));
+        }
+        let programme = Observation::line_of(&own);
+        let (signals, line) = if let Some(read) = store.board_signals(id, calibrations)? {
+            self.warnings.extend(read.derived.warnings.iter().map(|warning| format!("trial {id}: {warning}")));
+            self.trust.take(&read.serving);
+            (read.derived.signals, read.line)
+        } else if let Some(signals) = store.readings(id)? {
+            (signals, programme.clone())
+        } else {
+            (Sensors::whole_fingers(&own.gripper).signals(&trial), programme.clone())
+        };
+        let line = if line.is_empty() { programme } else { line };
+        self.observations.push(Observation { name: format!("trial {id}"), signals, line, scene, object });
+        Ok(())
+    }
+}
+
+impl Trust {
+    /// How well calibrations know the gain of their parts: what their points say, and no better than parts of these kinds
+    /// repeat.
+    fn take(&mut self, serving: &Serving) {
+        const HALF: f64 = 1.96;
+        for (sensor, calibration) in &serving.calibrations {
+            let (gains, usual) = match sensor.is_flex() {
+                true => (&mut self.strip_gain, STRIP_REPEATS),
+                false => (&mut self.pad_gain, PAD_REPEATS),
+            };
+            let told = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
+            gains[*sensor as usize % 2] = told.max(usual);
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Training on what was labelled: a recogniser is fitted to some of the trials of the real gripper and judged by the others,
+//! and what was judged is what is kept.
+
+use super::comparison::{Comparison, ComparisonError};
+use crate::datasets::{DatasetError, Source, View};
+use palpate_learn::evaluation::Evaluation;
+use palpate_learn::{Dataset, FitError, Fitting, Method, Model, StopRule};
+use palpate_store::{BOARD_RIG, Store, StoreError};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Share of each object's trials that is held back to judge by.
+pub const HELD_BACK: f64 = 0.2;
+
+/// Trials of an object from which on it is learned: four to learn from, of which the dual-stage networks take one half for
+/// each stage, and one to judge by.
+pub const LEAST_TRIALS: usize = 5;
+
+/// Labelled trials of an object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelledClass {
+    /// Its label.
+    pub name: String,
+    /// How many trials there are.
+    pub trials: usize,
+}
+
+impl LabelledClass {
+    /// Whether that is enough to learn it.
+    pub fn is_enough(&self) -> bool {
+        self.trials >= LEAST_TRIALS
+    }
+}
+
+/// How many labelled trials of the real gripper there are of each object, by name.
+pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError> {
+    let mut counts = BTreeMap::<String, usize>::new();
+    let labelled = |row: &palpate_store::TrialRow| {
+        row.rig == BOARD_RIG && row.state == "complete" && row.sound && !row.object.is_empty()
+    };
+    for row in store.list(false)?.into_iter().filter(labelled) {
+        *counts.entry(row.object).or_default() += 1;
+    }
+    Ok(counts.into_iter().map(|(name, trials)| LabelledClass { name, trials }).collect())
+}
+
+/// Where a training stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TrainingStage {
+    /// Trials read, of so many.
+    Reading(usize, usize),
+    /// Share of the fit that is done.
+    Fitting(f64),
+    /// It is judged by the trials that were held back.
+    Judging,
+}
+
+/// How to train.
+pub struct LabelledTraining<'a> {
+    /// The method.
+    pub method: &'static Method,
+    /// Seed of the fit, and of which trials are held back.
+    pub seed: u64,
+    /// A quick fit with worse results.
+    pub quick: bool,
+    /// Hears where it stands.
+    pub tell: &'a (dyn Fn(TrainingStage) + Sync),
+    /// Set from outside to end the work.
+    pub stop: &'a AtomicBool,
+}
+
+/// What a training came to.
+#[derive(Clone, Debug)]
+pub struct JudgedModel {
+    /// The model; its card tells how it did.
+    pub model: Model,
+    /// How it did on the trials that were held back.
+    pub evaluation: Evaluation,
+    /// Trials to learn from, and to judge by.
+    pub trials: [usize; 2],
+    /// Objects left out because there are too few trials of them.
+    pub too_few: Vec<LabelledClass>,
+    /// Trials that could not be used: without calibration, or not sound.
+    pub left_out: usize,
+}
+
+/// Why there is no model.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainingError {
+    /// Not two objects to tell apart.
+    #[error(
+        "{found} of the objects have {LEAST_TRIALS} labelled trials or more, and two are needed: record and label more \
+         trials of the real gripper"
+    )]
+    TooFew {
+        /// How many have enough.
+        found: usize,
+    },
+    /// After what could not be read was left out, too little is there.
+    #[error(
+        "{usable} of {all} trials can be used, and only {found} of the objects have {LEAST_TRIALS} of them or more: see \
+         which parts are calibrated by `palpate calibrate list`"
+    )]
+    TooFewUsable {
+        /// Trials that can be used.
+        usable: usize,
+        /// All of them.
+        all: usize,
+        /// Objects with enough.
+        found: usize,
+    },
+    /// The store.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The trials make no data set.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The fit.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The model could not be judged.
+    #[error(transparent)]
+    Judge(#[from] ComparisonError),
+}
+
+impl LabelledTraining<'_> {
+    /// Reads the labelled trials of the real gripper, fits and judges.
+    pub fn train(&self, store: &Store) -> Result<JudgedModel, TrainingError> {
+        let (enough, mut too_few): (Vec<LabelledClass>, Vec<LabelledClass>) =
+            labelled_classes(store)?.into_iter().partition(LabelledClass::is_enough);
+        if enough.len() < 2 {
+            return Err(TrainingError::TooFew { found: enough.len() });
+        }
+        let objects = enough.iter().map(|class| class.name.clone()).collect();
+        let source = Source { rig: Some(BOARD_RIG.to_owned()), objects, ..Source::default() };
+        let data = source.read(store, &View::default(), &mut |done, of| {
+            (self.tell)(TrainingStage::Reading(done, of));
+        })?;
+        let all = enough.iter().map(|class| class.trials).sum();
+        let data = without_small_classes(&data, all, &mut too_few)?;
+        let shares = data.shares(&[1.0 - HELD_BACK, HELD_BACK], self.seed);
+        let [learned, held_back] = shares.as_slice() else { return Err(FitError::NoData.into()) };
+        let mut model = self.fitted(learned)?;
+        let evaluation = self.judged(&model, learned, held_back)?;
+        let trials = [learned.examples.len(), held_back.examples.len()];
+        model.card.metrics = serde_json::json!({
+            "test": format!("{} trials held back of {}", trials[1], trials[0] + trials[1]),
+            "f1_macro": evaluation.f1_macro,
+            "ci95": evaluation.ci95,
+            "f1_by_grasps": evaluation.f1_by_grasps,
+            "stage_one": evaluation.stage_one,
+            "ece": evaluation.ece,
+            "confusion": evaluation.confusion,
+        });
+        Ok(JudgedModel { model, evaluation, trials, too_few, left_out: all - data.examples.len() })
+    }
+
+    fn fitted(&self, data: &Dataset) -> Result<Model, FitError> {
+        let fitting = Fitting {
+            seed: self.seed,
+            quick: self.quick,
+            settings: serde_json::Map::new(),
+            progress: &|share| (self.tell)(TrainingStage::Fitting(share)),
+            stop: self.stop,
+        };
+        fitting.check()?;
+        self.method.train(data, &fitting)
+    }
+
+    fn judged(&self, model: &Model, train: &Dataset, test: &Dataset) -> Result<Evaluation, TrainingError> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(FitError::Stopped.into());
+        }
+        (self.tell)(TrainingStage::Judging);
+        let (seed, quick, stop) = (self.seed, self.quick, StopRule::default());
+        let comparison = Comparison { train, test, seed, quick, stop, interrupted: self.stop };
+        Ok(comparison.of_fitted(self.method.key, model)?.evaluation)
+    }
+}
+
+/// What could be read may be less than what is there: objects of which too little is left are no classes.
+fn without_small_classes(
+    data: &Dataset,
+    all: usize,
+    too_few: &mut Vec<LabelledClass>,
+) -> Result<Dataset, TrainingError> {
+    let by_class = data.by_class();
+    let small = |class: usize| by_class[class].len() < LEAST_TRIALS;
+    let names = data.labels.classes.iter().zip(&by_class);
+    let names = names.filter(|(_, members)| members.len() < LEAST_TRIALS);
+    too_few.extend(names.map(|(class, own)| LabelledClass { name: class.name.clone(), trials: own.len() }));
+    let kept: Vec<usize> = (0..data.examples.len()).filter(|k| !small(data.examples[*k].class)).collect();
+    let found = (0..by_class.len()).filter(|class| !small(*class)).count();
+    if found < 2 {
+        return Err(TrainingError::TooFewUsable { usable: data.examples.len(), all, found });
+    }
+    let kept = data.part(&kept);
+    let mut labels = kept.labels.clone();
+    labels.classes.retain(|class| !too_few.iter().any(|small| small.name == class.name));
+    // Those that remain know their classes.
+    Ok(kept.relabelled(&labels).unwrap_or(kept))
+}

@@ -1,0 +1,126 @@
+//! What a grasp costs: CPU time of one whole trial on one thread, and its error against a far finer one, for scenes from a
+//! fixed ball to a baked mesh.
+//!
+//! Times are those of the thread, not of the wall clock, and the median of several runs, so that a busy machine
+//! disturbs them little. Numbers to compare on one machine, not to assert in a test.
+
+use crate::grasping::{ErrorNorms, grasp, prepare};
+use glam::DVec3;
+use palpate_geometry::Primitive;
+use palpate_sim::objects::{ObjectError, ObjectModel};
+use palpate_sim::scene::{Accuracy, Scene};
+use palpate_tactile::Sensors;
+use palpate_tactile::trial::Trial;
+use serde::Serialize;
+
+/// One of the scenes that are timed.
+#[derive(Clone, Debug)]
+pub struct BenchScene {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// What is grasped.
+    pub object: ObjectModel,
+    /// Held in place, or free.
+    pub fixed: bool,
+}
+
+/// One row of the table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CostRow {
+    /// Which scene.
+    pub scene: &'static str,
+    /// Which accuracy.
+    pub accuracy: String,
+    /// Step length (s); under a tolerance the mean.
+    pub step_s: f64,
+    /// CPU time of one trial (ms): the median over the runs.
+    pub cpu_ms_median: f64,
+    /// CPU time of one step (µs).
+    pub us_per_step: f64,
+    /// Mean Newton iterations per step.
+    pub newton_mean: f64,
+    /// Most Newton iterations in one step.
+    pub newton_max: u32,
+    /// Steps that missed the solver's tolerance.
+    pub unconverged_steps: u64,
+    /// Simulated time over CPU time.
+    pub times_real_time: f64,
+    /// How far it is from the truth.
+    pub error: Option<ErrorNorms>,
+}
+
+/// A tolerance that is far below what is compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth of
+/// that of steps of 1/300 s.
+const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
+
+/// The grasp of a scene that errors are measured against.
+pub fn physics_truth(bench: &BenchScene) -> Trial {
+    let mut scene = bench.scene();
+    scene.solver.accuracy = TRUTH;
+    grasp(&scene, Some(&bench.object), 0)
+}
+
+impl BenchScene {
+    fn scene(&self) -> Scene {
+        let mut scene = Scene::default();
+        scene.object.fixed = self.fixed;
+        scene
+    }
+}
+
+/// The scenes: closed-form distances fixed and free, a union of primitives, and a baked mesh.
+pub fn bench_scenes() -> Result<Vec<BenchScene>, ObjectError> {
+    let primitive =
+        |name, shape, fixed| BenchScene { name, object: ObjectModel::from_primitive(name, shape, 400.0, 0.6), fixed };
+    let sphere = Primitive::Sphere { radius: 0.025 };
+    let cuboid = Primitive::Cuboid { half: DVec3::splat(0.020) };
+    let cylinder = Primitive::Cylinder { radius: 0.0175, half_length: 0.030 };
+    let mut scenes = vec![
+        primitive("sphere_fixed", sphere, true),
+        primitive("sphere_free", sphere, false),
+        primitive("box_fixed", cuboid, true),
+        primitive("box_free", cuboid, false),
+        primitive("cylinder_free", cylinder, false),
+    ];
+    for (name, source) in [("mesh_free", "lemon"), ("union_free", "syringe")] {
+        let mut scene = Scene::default();
+        source.clone_into(&mut scene.object.source);
+        if let Some(object) = scene.load_object()? {
+            scenes.push(BenchScene { name, object, fixed: false });
+        }
+    }
+    Ok(scenes)
+}
+
+/// Times `runs` trials of a scene, and holds the last against the truth where that is given.
+pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: Option<&Trial>) -> CostRow {
+    let mut scene = bench.scene();
+    scene.solver.accuracy = accuracy;
+    let mut times = Vec::new();
+    let mut last = None;
+    for _ in 0..runs.max(1) {
+        let mut run = prepare(&scene, Some(&bench.object), 0);
+        let start = cpu_time::ThreadTime::now();
+        while run.next_frame().is_some() {}
+        times.push(start.elapsed().as_secs_f64());
+        last = Some(run.finish(&scene));
+    }
+    times.sort_by(f64::total_cmp);
+    let median = times[times.len() / 2];
+    let quality = last.as_ref().map(|trial| trial.info.quality.clone()).unwrap_or_default();
+    let sensors = Sensors::whole_fingers(&scene.gripper);
+    let error = last.zip(truth).map(|(trial, truth)| ErrorNorms::between(&trial, truth, &sensors));
+    let steps = quality.steps.max(1) as f64;
+    CostRow {
+        scene: bench.name,
+        accuracy: accuracy.to_string(),
+        step_s: scene.timing.duration_s / steps,
+        cpu_ms_median: median * 1e3,
+        us_per_step: median * 1e6 / steps,
+        newton_mean: quality.newton_mean,
+        newton_max: quality.newton_max,
+        unconverged_steps: quality.unconverged_steps,
+        times_real_time: scene.timing.duration_s / median,
+        error,
+    }
+}

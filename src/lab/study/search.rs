@@ -1,0 +1,70 @@
+//! A small, stated search for the settings of a network: every point of a grid is judged by cross-validation on
+//! training data alone.
+
+use palpate_learn::evaluation::answer;
+use palpate_learn::metrics::Confusion;
+use palpate_learn::{Dataset, FitError, Fitting, Method};
+use serde::Serialize;
+use std::sync::atomic::AtomicBool;
+
+/// Settings that were tried, and how well they did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SearchRow {
+    /// What was changed.
+    pub settings: serde_json::Map<String, serde_json::Value>,
+    /// Macro F1 on parts of the training data that were left out.
+    pub f1_macro: f64,
+}
+
+/// The grid: units, dropout and weight decay, the three that mattered when networks were built.
+const GRID: [(&str, &[f64]); 3] = [("units", &[64.0, 128.0]), ("dropout", &[0.3, 0.5]), ("weight_decay", &[0.1, 0.4])];
+/// Parts of the data; each is left out once.
+const FOLDS: usize = 2;
+
+/// Tries all points of the grid; the best comes first. Settings that are given are kept.
+pub fn search(
+    method: &'static Method,
+    data: &Dataset,
+    seed: u64,
+    quick: bool,
+    given: &serde_json::Map<String, serde_json::Value>,
+    tell: &dyn Fn(usize, usize),
+) -> Result<Vec<SearchRow>, FitError> {
+    if method.recipe.is_none() {
+        let cause = "only networks have settings to search for".to_owned();
+        return Err(FitError::Setting { name: "of the search".to_owned(), cause });
+    }
+    let mut points = vec![given.clone()];
+    for (name, values) in GRID.iter().filter(|(name, _)| !given.contains_key(*name)) {
+        let with = |point: &serde_json::Map<String, serde_json::Value>, value: f64| {
+            let mut point = point.clone();
+            let whole = value.fract() == 0.0;
+            let value = if whole { serde_json::json!(value as u64) } else { serde_json::json!(value) };
+            point.insert((*name).to_owned(), value);
+            point
+        };
+        points = points.iter().flat_map(|point| values.iter().map(move |v| with(point, *v))).collect();
+    }
+    let fold_of = data.folds(FOLDS, seed ^ 0x5ea7c4);
+    let classes = data.labels.classes.len();
+    let stop = AtomicBool::new(false);
+    let mut rows = Vec::new();
+    for (n, settings) in points.iter().enumerate() {
+        let mut pairs = Vec::new();
+        for fold in 0..FOLDS {
+            tell(n * FOLDS + fold, points.len() * FOLDS);
+            let of = |inside: bool| -> Vec<usize> {
+                (0..fold_of.len()).filter(|k| (fold_of[*k] == fold) == inside).collect()
+            };
+            let (train, left_out) = (data.part(&of(false)), data.part(&of(true)));
+            let fitting = Fitting { seed, quick, settings: settings.clone(), progress: &|_| (), stop: &stop };
+            let recogniser = (method.fit)(&train, &fitting)?;
+            let answers = answer(recogniser.as_ref(), &left_out);
+            pairs.extend(answers.truth.iter().zip(&answers.verdicts).map(|(t, v)| (*t, Some(v.pmf.top().0))));
+        }
+        let f1_macro = Confusion::from_pairs(classes, pairs).and_then(|c| c.macro_f1()).unwrap_or(0.0);
+        rows.push(SearchRow { settings: settings.clone(), f1_macro });
+    }
+    rows.sort_by(|a, b| b.f1_macro.total_cmp(&a.f1_macro));
+    Ok(rows)
+}

@@ -1,0 +1,110 @@
+//! Hard cases of the fingers by themselves.
+
+use super::super::{Conditions, Finding, Findings};
+use super::{FULL_TORQUE, bare, stepped, torque};
+use palpate_geometry::Primitive;
+use palpate_sim::objects::ObjectModel;
+use palpate_sim::physics::{Drive, SteppedScene, Stepping};
+use palpate_sim::scene::Scene;
+
+pub(super) fn stiff_joints(conditions: &Conditions) -> Findings {
+    let mut findings = Vec::new();
+    for factor in [1e3, 1e4, 1e6] {
+        let mut scene = bare(10);
+        scene.gripper.finger.bending_stiffness *= factor;
+        scene.gripper.finger.damping_time = 0.0;
+        let mut run = stepped(&scene, None, conditions);
+        for _ in 0..2000 {
+            run.step(&torque(0.05))?;
+        }
+        let want = 0.05 / run.joint_stiffness();
+        let error = run.state.q.iter().map(|q| (q / want - 1.0).abs()).fold(0.0, f64::max);
+        findings.push(Finding::at_most(format!("error of the bend at k x {factor:e}"), error, 1e-3));
+        findings.push(missed(&run));
+    }
+    Ok(findings)
+}
+
+pub(super) fn twentyfold_actuation(conditions: &Conditions) -> Findings {
+    let mut run = stepped(&bare(10), None, conditions);
+    let limit = run.angle_limit();
+    let largest_of = |run: &SteppedScene| run.state.q.iter().map(|q| q.abs()).fold(0.0, f64::max) / limit;
+    let (mut swing, mut settled) = (0.0f64, 0.0f64);
+    for direction in [20.0, -20.0] {
+        for _ in 0..(2.0 / conditions.h()) as usize {
+            run.step(&torque(direction * FULL_TORQUE))?;
+            swing = swing.max(largest_of(&run));
+        }
+        settled = settled.max(largest_of(&run));
+    }
+    // Bellows a hundred times as stiff as the joint give way by 4 % under this torque.
+    Ok(vec![
+        Finding::at_most("largest joint angle at rest, over its limit", settled, 1.05),
+        Finding::at_most("largest joint angle on the way, over its limit", swing, 1.5),
+        missed(&run),
+    ])
+}
+
+pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
+    let mut scene = Scene::default();
+    scene.gripper.finger.damping_time = 0.0;
+    scene.gripper.pad.dissipation = 0.0;
+    scene.gripper.pad.shear_damping_time = 0.0;
+    let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+    let mut run = stepped(&scene, Some(&ball), conditions);
+    run.state.q[..10].fill(-0.06);
+    run.state.q[10..].fill(-0.05);
+    let start = run.energy();
+    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows what an error of it in every joint
+    // is worth when the springs are at their tightest.
+    let tightest: f64 = run.state.q.iter().map(|q| q.abs()).sum();
+    let allowed = 1e-6 + conditions.setting.tolerance() * scene.gripper.finger.joint_stiffness() * tightest;
+    let (mut before, mut largest) = (start, 0.0f64);
+    for _ in 0..(conditions.span(2.0) / conditions.h()) as usize {
+        run.step(&Drive::default())?;
+        let now = run.energy();
+        largest = largest.max(now - before);
+        before = now;
+    }
+    Ok(vec![
+        Finding::at_most("largest gain in one tick [J]", largest, allowed),
+        Finding::at_most("net gain [J]", before - start, 0.0),
+        missed(&run),
+    ])
+}
+
+pub(super) fn explicit_step(_conditions: &Conditions) -> Findings {
+    let mut scene = bare(10);
+    scene.gripper.finger.damping_time = 0.0;
+    let critical = 2.0 / SteppedScene::new(&scene, None, 1.0).fastest_mode();
+    let start = 1e-4;
+    let swing = |stepping: Stepping, share: f64| {
+        let mut run = SteppedScene::new(&scene, None, share * critical);
+        run.stepping = stepping;
+        for (i, q) in run.state.q.iter_mut().enumerate() {
+            *q = if i % 2 == 0 { start } else { -start };
+        }
+        let mut largest = 0.0f64;
+        for _ in 0..4000 {
+            if run.step(&Drive::default()).is_err() {
+                return (run.steps, f64::INFINITY);
+            }
+            largest = run.state.q.iter().fold(largest, |largest, q| largest.max(q.abs()));
+        }
+        (run.steps, largest / start)
+    };
+    let (_, below) = swing(Stepping::Explicit, 0.95);
+    let (reported_after, beyond) = swing(Stepping::Explicit, 1.05);
+    let (_, convex) = swing(Stepping::Convex, 20.0);
+    Ok(vec![
+        Finding::at_most("explicit at 0.95 x 2/omega_max: largest angle over the first", below, 20.0),
+        Finding::at_least("explicit at 1.05 x 2/omega_max: largest angle over the first", beyond, f64::INFINITY),
+        Finding::at_most("explicit at 1.05 x 2/omega_max: steps until reported", reported_after as f64, 3999.0),
+        Finding::at_most("convex at 20 x 2/omega_max: largest angle over the first", convex, 1.0),
+    ])
+}
+
+/// Steps that missed the solver's tolerance: never, in any hard case.
+pub(super) fn missed(run: &SteppedScene) -> Finding {
+    Finding::at_most("steps that missed the tolerance", run.missed as f64, 0.0)
+}

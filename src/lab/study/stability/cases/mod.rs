@@ -1,0 +1,140 @@
+//! The hard cases: one line each, and a function that measures in one of the files beside.
+
+mod contact;
+mod fingers;
+mod motion;
+mod program;
+
+use super::{Case, Setting, Settings};
+use palpate_sim::objects::ObjectModel;
+use palpate_sim::physics::{Drive, SteppedScene};
+use palpate_sim::scene::{Scene, SupportKind};
+
+/// At every accuracy and no step besides.
+const EVERY: Settings = Settings::EveryAccuracyAnd(&[]);
+/// What hard contact must bear beyond the accuracies (s).
+const WIDE: Settings = Settings::EveryAccuracyAnd(&[0.02, 2e-5]);
+
+/// All hard cases.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "stiff joints",
+        claim: "k x 1e3 .. 1e6 without damping: every joint bends by tau / k within 0.1 %",
+        settings: Settings::EveryAccuracyAnd(&[0.1]),
+        measure: fingers::stiff_joints,
+    },
+    Case {
+        name: "twentyfold actuation",
+        claim: "a step to 20 times the torque and back: joint limits hold",
+        settings: Settings::EveryAccuracyAnd(&[0.05]),
+        measure: fingers::twentyfold_actuation,
+    },
+    Case {
+        name: "passive swing",
+        claim: "bent, let go without damping, a ball in the way: no energy is gained",
+        settings: EVERY,
+        measure: fingers::passive_swing,
+    },
+    Case {
+        name: "explicit step",
+        claim: "for comparison: diverges beyond 2 / omega_max, which is reported; the convex step does not",
+        settings: Settings::Once,
+        measure: fingers::explicit_step,
+    },
+    Case {
+        name: "squeezed masses",
+        claim: "0.1 g .. 100 kg squeezed and pulled at: no creep, no ejection, the pad keeps its bottom",
+        settings: EVERY,
+        measure: contact::squeezed_masses,
+    },
+    Case {
+        name: "light, stiff and sticky",
+        claim: "E x 1000, 1 g, mu = 5, one-step actuation: the same resting place at every step",
+        settings: WIDE,
+        measure: contact::light_stiff_sticky,
+    },
+    Case {
+        name: "born inside",
+        claim: "an object that starts 10 mm inside a finger leaves no faster than the stored energy allows",
+        settings: WIDE,
+        measure: contact::born_inside,
+    },
+    Case {
+        name: "thrown object",
+        claim: "a ball thrown at a finger, up to 60 mm per step: it is not passed through, and no energy is gained",
+        settings: Settings::EveryAccuracyAnd(&[0.02]),
+        measure: contact::thrown_object,
+    },
+    Case {
+        name: "friction extremes",
+        claim: "mu = 0: no friction; mu = 0.5 and 5: friction stays in its cone",
+        settings: EVERY,
+        measure: contact::friction_extremes,
+    },
+    Case {
+        name: "thin things",
+        claim: "a 1 mm plate, a card edge-on and needles are felt and not crossed",
+        settings: Settings::EveryAccuracyAnd(&[0.02]),
+        measure: contact::thin_things,
+    },
+    Case {
+        name: "crushing torque",
+        claim: "k and tau x 1000 against a fixed ball: the pad is not pushed through",
+        settings: EVERY,
+        measure: contact::crushing_torque,
+    },
+    Case {
+        name: "resting masses",
+        claim: "0.1 g .. 100 kg on the pedestal, pulled at as on a slope, sink as far as the scene says and do not creep",
+        settings: EVERY,
+        measure: motion::resting_masses,
+    },
+    Case {
+        name: "long hold",
+        claim: "ten minutes of hold: no drift, energy bounded",
+        settings: EVERY,
+        measure: motion::long_hold,
+    },
+    Case {
+        name: "free flight",
+        claim: "ten minutes of flight, spinning up to half a turn per step: momentum kept, spin bounded",
+        settings: EVERY,
+        measure: motion::free_flight,
+    },
+    Case {
+        name: "same bytes",
+        claim: "the same scene in one thread and in two, in either order: identical frames",
+        settings: EVERY,
+        measure: program::same_bytes,
+    },
+    Case {
+        name: "numbers that are none",
+        claim: "NaN and infinity are refused under every key of a scene, by its name",
+        settings: Settings::Once,
+        measure: program::numbers_that_are_none,
+    },
+];
+
+/// No gravity, no support.
+fn bare(joints: usize) -> Scene {
+    let mut scene = Scene::default();
+    scene.world.gravity = 0.0;
+    scene.support.kind = SupportKind::None;
+    scene.gripper.finger.joints = joints;
+    scene
+}
+
+fn torque(torque: f64) -> Drive {
+    Drive { torque, ..Drive::default() }
+}
+
+/// Torque of the default finger at 1 bar (N m).
+const FULL_TORQUE: f64 = 0.06;
+
+/// A scene about to be stepped under the conditions of a case.
+fn stepped(scene: &Scene, object: Option<&ObjectModel>, conditions: &super::Conditions) -> SteppedScene {
+    match conditions.setting {
+        Setting::Accuracy(accuracy) => SteppedScene::at(scene, object, conditions.h(), accuracy),
+        Setting::Step(h) => SteppedScene::new(scene, object, h),
+    }
+}

@@ -1,0 +1,242 @@
+//! Do hard cases stay numerically stable? A table of named cases, each with what must hold of it, run at every accuracy;
+//! and random scenes over wide ranges, each computed a second time with a quarter of the step, to count the answers that
+//! are wrong without a word.
+//!
+//! A case is one line in [`CASES`] and one function that measures. What it asserts is data: a measured value and its
+//! limit, so that the table can be printed, stored and tested alike.
+
+mod cases;
+mod random;
+
+pub use cases::CASES;
+pub use random::{FlagRow, Flags, RandomReport, RandomScene, StepRow, random_scenes};
+
+use palpate_sim::physics::NotFinite;
+use palpate_sim::scene::{Accuracy, Timing};
+use serde::Serialize;
+
+/// How finely a case is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setting {
+    /// One of the settings a user has.
+    Accuracy(Accuracy),
+    /// A step of its own (s).
+    Step(f64),
+}
+
+impl Setting {
+    /// Its name in tables.
+    pub fn name(self) -> String {
+        match self {
+            Self::Accuracy(accuracy) => accuracy.to_string(),
+            Self::Step(h) => format!("{} ms", h * 1e3),
+        }
+    }
+
+    /// The error that a step may have; zero where its length is given.
+    pub fn tolerance(self) -> f64 {
+        match self {
+            Self::Accuracy(accuracy) => accuracy.tolerance().unwrap_or(0.0),
+            Self::Step(_) => 0.0,
+        }
+    }
+
+    /// Length of a step (s).
+    pub fn step(self) -> f64 {
+        match self {
+            Self::Accuracy(accuracy) => Timing::default().clock(accuracy).step(),
+            Self::Step(h) => h,
+        }
+    }
+}
+
+/// Under what a case is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// How finely.
+    pub setting: Setting,
+    /// Every variant and the whole duration, rather than what a few seconds allow.
+    pub thorough: bool,
+}
+
+/// Steps that one run may take, thorough or not: ten minutes at draft.
+const MOST_STEPS: [f64; 2] = [9e4, 3e3];
+
+impl Conditions {
+    fn h(&self) -> f64 {
+        self.setting.step()
+    }
+
+    /// A duration (s), cut to what may be computed.
+    fn span(&self, seconds: f64) -> f64 {
+        seconds.min(MOST_STEPS[usize::from(!self.thorough)] * self.h())
+    }
+
+    /// All variants, or the first few of them.
+    fn some_of<'a, T>(&self, all: &'a [T], quick: usize) -> &'a [T] {
+        if self.thorough { all } else { &all[..quick.min(all.len())] }
+    }
+}
+
+/// The settings a user has: the named steps, a tolerance that shows and one that hardly does. Coarsest first.
+pub const ACCURACIES: [Accuracy; 5] =
+    [Accuracy::Draft, Accuracy::Standard, Accuracy::Tolerance(1e-3), Accuracy::Tolerance(1e-5), Accuracy::Reference];
+
+/// Of these, as many as a few seconds allow.
+pub const QUICK_ACCURACIES: &[Accuracy] = ACCURACIES.split_at(2).0;
+
+/// What a measured value must be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// No larger than this.
+    AtMost(f64),
+    /// No smaller than this.
+    AtLeast(f64),
+}
+
+impl Limit {
+    /// True when a value keeps to it; nothing that is no number does.
+    pub fn holds(self, value: f64) -> bool {
+        match self {
+            Self::AtMost(limit) => value <= limit,
+            Self::AtLeast(limit) => value >= limit,
+        }
+    }
+
+    /// How much of the limit a value uses up: one is all of it.
+    fn used(self, value: f64) -> f64 {
+        match self {
+            Self::AtMost(limit) if limit > 0.0 => value / limit,
+            Self::AtLeast(limit) if value > 0.0 => limit / value,
+            _ => f64::from(u8::from(!self.holds(value))) * 2.0,
+        }
+    }
+}
+
+impl std::fmt::Display for Limit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::AtMost(limit) => write!(f, "<= {limit}"),
+            Self::AtLeast(limit) => write!(f, ">= {limit}"),
+        }
+    }
+}
+
+/// One thing that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What, with its unit in brackets.
+    pub what: String,
+    /// How much.
+    pub measured: f64,
+    /// What it must be.
+    pub limit: Limit,
+}
+
+impl Finding {
+    fn at_most(what: impl Into<String>, measured: f64, limit: f64) -> Self {
+        Self { what: what.into(), measured, limit: Limit::AtMost(limit) }
+    }
+
+    fn at_least(what: impl Into<String>, measured: f64, limit: f64) -> Self {
+        Self { what: what.into(), measured, limit: Limit::AtLeast(limit) }
+    }
+
+    /// True when it is as it must be.
+    pub fn holds(&self) -> bool {
+        self.limit.holds(self.measured)
+    }
+}
+
+/// Where a case is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Settings {
+    /// At every accuracy, and at further steps of its own (s).
+    EveryAccuracyAnd(&'static [f64]),
+    /// Once: it does not depend on how finely anything is computed.
+    Once,
+}
+
+/// What a case finds, or the number that left the range.
+pub type Findings = Result<Vec<Finding>, NotFinite>;
+
+/// A hard case.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// What must hold, in a sentence.
+    pub claim: &'static str,
+    /// Where it is run.
+    pub settings: Settings,
+    /// Measures.
+    pub measure: fn(&Conditions) -> Findings,
+}
+
+/// One row of the table: a case at one setting.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CaseRow {
+    /// The case.
+    pub case: &'static str,
+    /// What must hold.
+    pub claim: &'static str,
+    /// The setting.
+    pub setting: String,
+    /// All that was measured; the one that comes closest to its limit, or fails, is the first.
+    pub findings: Vec<Finding>,
+    /// What left the range of numbers, if anything did.
+    pub not_finite: Option<String>,
+    /// True when everything is as it must be.
+    pub holds: bool,
+}
+
+impl Case {
+    /// The settings it is run at, out of the accuracies asked for.
+    pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<Setting> {
+        /// Steps below this are for thorough runs (s).
+        const FINE: f64 = 1e-3;
+        match self.settings {
+            Settings::EveryAccuracyAnd(further) => {
+                let further = further.iter().filter(|h| thorough || **h >= FINE);
+                let accuracies = accuracies.iter().map(|accuracy| Setting::Accuracy(*accuracy));
+                accuracies.chain(further.map(|h| Setting::Step(*h))).collect()
+            }
+            Settings::Once => accuracies.first().map(|accuracy| Setting::Accuracy(*accuracy)).into_iter().collect(),
+        }
+    }
+
+    /// Runs it at one setting.
+    pub fn run(&self, setting: Setting, thorough: bool) -> CaseRow {
+        let name = if self.settings == Settings::Once { "any".to_owned() } else { setting.name() };
+        let outcome = (self.measure)(&Conditions { setting, thorough });
+        let (mut findings, not_finite) = match outcome {
+            Ok(findings) => (findings, None),
+            Err(NotFinite { body }) => (Vec::new(), Some(body)),
+        };
+        findings.sort_by(|a, b| b.limit.used(b.measured).total_cmp(&a.limit.used(a.measured)));
+        let holds = not_finite.is_none() && findings.iter().all(Finding::holds);
+        CaseRow { case: self.name, claim: self.claim, setting: name, findings, not_finite, holds }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_refuse_what_is_no_number() {
+        assert!(Limit::AtMost(1.0).holds(1.0) && !Limit::AtMost(1.0).holds(1.1) && !Limit::AtMost(1.0).holds(f64::NAN));
+        assert!(Limit::AtLeast(1.0).holds(2.0) && !Limit::AtLeast(1.0).holds(f64::NAN));
+    }
+
+    #[test]
+    fn every_hard_case_holds() {
+        for case in CASES {
+            for setting in case.settings(QUICK_ACCURACIES, false) {
+                let row = case.run(setting, false);
+                assert!(row.holds, "{row:#?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! The grasp that is going on in the simulation's thread.
+
+use super::companion::Companion;
+use crate::grasping::GraspRun;
+use crate::picture::Stage;
+use glam::DVec3;
+use palpate_sim::frame::{Frame, Plan};
+use palpate_sim::run::SimRun;
+use palpate_sim::scene::Scene;
+use palpate_tactile::Sensors;
+use std::sync::Arc;
+
+/// The grasp that is going on.
+pub(super) struct Current {
+    pub(super) run: GraspRun<SimRun>,
+    /// Runs along for the error band, where one is wanted.
+    pub(super) companion: Option<Companion>,
+    pub(super) plan: Arc<Plan>,
+    pub(super) scene: Arc<Scene>,
+    pub(super) stage: Arc<Stage>,
+    pub(super) sensors: Sensors,
+    pub(super) frame: Arc<Frame>,
+    /// Warnings at its beginning; those that come later are told at its end.
+    pub(super) told: usize,
+    /// The user has pulled at the object.
+    pub(super) pulled: bool,
+    pub(super) ended: bool,
+}
+
+impl Current {
+    /// Pulls at the object; a trial that was meddled with says so.
+    pub(super) fn pull(&mut self, force: DVec3) {
+        if force != DVec3::ZERO && !self.pulled {
+            self.pulled = true;
+            let t = self.frame.t;
+            self.run
+                .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
+        }
+        self.run.rig_mut().pull_object(force);
+        if let Some(companion) = &mut self.companion {
+            companion.pull(force);
+        }
+    }
+}

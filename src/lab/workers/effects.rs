@@ -1,0 +1,241 @@
+//! Measuring what effects cost and change, beside the simulation: the newest wish replaces older ones, and what has been
+//! measured is kept for when the scene comes back.
+
+use super::latest::Latest;
+use super::messages::Wake;
+use crate::study::{Explanation, Measuring, explain_effects};
+use palpate_sim::scene::Scene;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// A scene has to stay this long before it is measured: sliders pass many on their way.
+const SETTLE: Duration = Duration::from_millis(300);
+/// Scenes whose measurements are kept.
+const KEPT: usize = 32;
+
+/// How far the measurement of a scene has come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EffectsState {
+    /// Effects done, and of how many.
+    Measuring(usize, usize),
+    /// All is known.
+    Ready(Arc<Explanation>),
+    /// It cannot be measured; a sentence for the user.
+    Failed(String),
+}
+
+/// The newest state of affairs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectsView {
+    /// The scene it is about.
+    pub scene: Arc<Scene>,
+    /// How far it has come.
+    pub state: EffectsState,
+}
+
+/// What measures a scene: its explanation, nothing when cancelled, or why it cannot be had.
+pub type Explain = Arc<dyn Fn(&Scene, &Measuring<'_>) -> Result<Option<Explanation>, String> + Send + Sync>;
+
+/// Loads a scene's object and explains the scene.
+pub fn explain_scene(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, String> {
+    let object = scene.load_object().map_err(|error| error.to_string())?;
+    Ok(explain_effects(scene, object.as_ref(), how))
+}
+
+/// A scene to be measured, and the flag by which that is given up.
+struct Wish {
+    scene: Arc<Scene>,
+    cancelled: Arc<AtomicBool>,
+}
+
+/// A handle on the thread. Dropping it gives up what is under way and ends the thread.
+#[derive(Debug)]
+pub struct EffectsWorker {
+    /// Absent once the thread is being ended.
+    wishes: Option<Sender<Wish>>,
+    asked: Option<(Arc<Scene>, Arc<AtomicBool>)>,
+    view: Arc<Latest<EffectsView>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl EffectsWorker {
+    /// Starts the thread.
+    pub fn start(explain: Explain, wake: Wake) -> std::io::Result<Self> {
+        let (wishes, inbox) = channel();
+        let view = Arc::new(Latest::default());
+        let desk = Desk { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
+        let thread = std::thread::Builder::new().name("effects".to_owned()).spawn(move || desk.work(&inbox))?;
+        Ok(Self { wishes: Some(wishes), asked: None, view, thread: Some(thread) })
+    }
+
+    /// Asks for a scene to be measured instead of whatever was asked for before.
+    pub fn ask(&mut self, scene: &Scene) {
+        if self.asked().is_some_and(|asked| asked == scene) {
+            return;
+        }
+        self.give_up();
+        let wish = Wish { scene: Arc::new(scene.clone()), cancelled: Arc::new(AtomicBool::new(false)) };
+        self.asked = Some((Arc::clone(&wish.scene), Arc::clone(&wish.cancelled)));
+        if let Some(wishes) = &self.wishes {
+            // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
+            let _heard = wishes.send(wish);
+        }
+    }
+
+    /// Gives up what is under way; to be asked for again.
+    pub fn give_up(&mut self) {
+        if let Some((_, cancelled)) = self.asked.take() {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// The scene that was asked for last.
+    pub fn asked(&self) -> Option<&Scene> {
+        self.asked.as_ref().map(|(scene, _)| scene.as_ref())
+    }
+
+    /// The newest state of affairs.
+    pub fn view(&self) -> Option<Arc<EffectsView>> {
+        self.view.get()
+    }
+}
+
+impl Drop for EffectsWorker {
+    fn drop(&mut self) {
+        self.give_up();
+        self.wishes = None;
+        if let Some(thread) = self.thread.take() {
+            let _ended = thread.join();
+        }
+    }
+}
+
+/// What the thread owns.
+struct Desk {
+    explain: Explain,
+    view: Arc<Latest<EffectsView>>,
+    wake: Wake,
+    kept: VecDeque<(Arc<Scene>, Arc<Explanation>)>,
+}
+
+impl Desk {
+    fn work(mut self, inbox: &Receiver<Wish>) {
+        let mut next = inbox.recv().ok();
+        while let Some(wish) = next.take() {
+            if let Some((_, known)) = self.kept.iter().find(|(scene, _)| *scene == wish.scene) {
+                self.publish(&wish.scene, EffectsState::Ready(Arc::clone(known)));
+            } else {
+                self.publish(&wish.scene, EffectsState::Measuring(0, 0));
+                match inbox.recv_timeout(SETTLE) {
+                    Ok(newer) => {
+                        next = Some(newer);
+                        continue;
+                    }
+                    Err(RecvTimeoutError::Disconnected) => return,
+                    Err(RecvTimeoutError::Timeout) => self.measure(&wish),
+                }
+            }
+            next = inbox.recv().ok();
+        }
+    }
+
+    fn measure(&mut self, wish: &Wish) {
+        let progress = |done: usize, of: usize| self.publish(&wish.scene, EffectsState::Measuring(done, of));
+        // One core is left to the simulation that is being watched.
+        let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
+        let how = Measuring { threads, cancelled: &wish.cancelled, progress: &progress };
+        let explanation = match (self.explain)(&wish.scene, &how) {
+            Ok(Some(explanation)) => Arc::new(explanation),
+            Ok(None) => return,
+            Err(cause) => return self.publish(&wish.scene, EffectsState::Failed(cause)),
+        };
+        self.publish(&wish.scene, EffectsState::Ready(Arc::clone(&explanation)));
+        self.kept.push_back((Arc::clone(&wish.scene), explanation));
+        if self.kept.len() > KEPT {
+            self.kept.pop_front();
+        }
+    }
+
+    fn publish(&self, scene: &Arc<Scene>, state: EffectsState) {
+        self.view.publish(Arc::new(EffectsView { scene: Arc::clone(scene), state }));
+        (self.wake)();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sim::objects::EMPTY;
+    use palpate_sim::scene::Accuracy;
+
+    fn empty_hand(peak_bar: f64) -> Scene {
+        let mut scene = Scene::default();
+        EMPTY.clone_into(&mut scene.object.source);
+        scene.solver.accuracy = Accuracy::Draft;
+        scene.programme.peak_bar = peak_bar;
+        scene
+    }
+
+    fn start() -> (EffectsWorker, Receiver<()>) {
+        let (wake, woken) = channel();
+        let wake: Wake = Arc::new(move || {
+            // The test may have stopped listening.
+            let _heard = wake.send(());
+        });
+        (EffectsWorker::start(Arc::new(explain_scene), wake).expect("a thread"), woken)
+    }
+
+    fn measured(worker: &EffectsWorker, woken: &Receiver<()>, scene: &Scene) -> Arc<Explanation> {
+        loop {
+            woken.recv_timeout(Duration::from_secs(60)).expect("something happens");
+            let view = worker.view().expect("published");
+            match &view.state {
+                EffectsState::Ready(explanation) if *view.scene == *scene => return Arc::clone(explanation),
+                EffectsState::Failed(cause) => panic!("{cause}"),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn the_newest_wish_is_met_and_what_is_known_is_kept() {
+        let (mut worker, woken) = start();
+        let [given_up, wanted] = [0.9, 1.0].map(empty_hand);
+        worker.ask(&given_up);
+        worker.ask(&wanted);
+        let first = measured(&worker, &woken, &wanted);
+        assert!(first.effects.iter().any(|effect| effect.planned.on && effect.change.norms.curvature_per_m > 0.0));
+        worker.ask(&empty_hand(0.5));
+        worker.ask(&wanted);
+        assert!(Arc::ptr_eq(&first, &measured(&worker, &woken, &wanted)), "measured twice");
+    }
+
+    #[test]
+    fn a_scene_that_cannot_be_loaded_is_explained() {
+        let (mut worker, woken) = start();
+        let mut scene = Scene::default();
+        "/nowhere/at/all.obj".clone_into(&mut scene.object.source);
+        worker.ask(&scene);
+        let cause = loop {
+            woken.recv_timeout(Duration::from_secs(60)).expect("something happens");
+            if let Some(EffectsState::Failed(cause)) = worker.view().map(|view| view.state.clone()) {
+                break cause;
+            }
+        };
+        assert!(cause.contains("/nowhere/at/all.obj"), "{cause}");
+    }
+
+    #[test]
+    fn dropping_it_does_not_wait_for_the_measurement() {
+        let (mut worker, woken) = start();
+        let mut scene = empty_hand(1.0);
+        scene.timing.duration_s = 3600.0;
+        worker.ask(&scene);
+        woken.recv_timeout(Duration::from_secs(60)).expect("it has begun");
+        drop(worker);
+    }
+}

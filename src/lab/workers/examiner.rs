@@ -1,0 +1,154 @@
+//! The doctor beside a window: a thread "examine" that looks at the gripper's port when asked to, says how far it is, and
+//! hands over its findings.
+
+use super::desk::{Desk, Outlet};
+use super::messages::Wake;
+use palpate_device::doctor::{Finding, Observations, examine, findings};
+use palpate_device::serial::LinkOptions;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// What is to be examined.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExamineRequest {
+    /// The port, or a file of captured bytes; the only likely port where nothing is named.
+    pub port: Option<PathBuf>,
+    /// How long to listen (s).
+    pub seconds: f64,
+}
+
+/// What looks at the port: [`examine_port`], or whoever holds the link already. The function it is given wants to hear again
+/// and again how long it has listened (s), and ends the look by saying no.
+pub type Examine = Arc<dyn Fn(&ExamineRequest, &mut dyn FnMut(f64) -> bool) -> Observations + Send + Sync>;
+
+/// Opens the port and listens to it.
+pub fn examine_port(request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bool) -> Observations {
+    let options = LinkOptions { path: request.port.clone(), ..LinkOptions::default() };
+    let seconds = request.seconds.clamp(0.0, 600.0);
+    examine(&options, Duration::from_secs_f64(seconds), goes_on)
+}
+
+/// Where the doctor stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ExaminerView {
+    /// What is being examined, and for how long already (s).
+    pub running: Option<(ExamineRequest, f64)>,
+    /// What came out of the last examination.
+    pub last: Option<Arc<Examination>>,
+}
+
+/// What came out of an examination.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Examination {
+    /// The port that was listened to, in words; none where none could be opened.
+    pub port: Option<String>,
+    /// For how long (s).
+    pub listened_s: f64,
+    /// It was ended before its time.
+    pub cut_short: bool,
+    /// What was found.
+    pub findings: Vec<Finding>,
+}
+
+/// A handle on the thread.
+pub type Examiner = Desk<ExamineRequest, ExaminerView>;
+
+impl Examiner {
+    /// Starts the thread.
+    pub fn start(look: Examine, wake: Wake) -> std::io::Result<Self> {
+        let mut last = None;
+        Self::spawn("examine", wake, move |request, stop, outlet| {
+            let examination = Arc::new(examined(&look, &request, stop, outlet, last.as_ref()));
+            last = Some(Arc::clone(&examination));
+            outlet.publish(ExaminerView { running: None, last: Some(examination) });
+        })
+    }
+}
+
+fn examined(
+    look: &Examine,
+    request: &ExamineRequest,
+    stop: &AtomicBool,
+    outlet: &Outlet<ExaminerView>,
+    last: Option<&Arc<Examination>>,
+) -> Examination {
+    let tell = |listened_s: f64| {
+        outlet.publish(ExaminerView { running: Some((request.clone(), listened_s)), last: last.cloned() });
+    };
+    tell(0.0);
+    let seen = look(request, &mut |listened_s| {
+        tell(listened_s);
+        !stop.load(Ordering::Relaxed)
+    });
+    let port = seen.link.as_ref().map(|link| format!("{} ({})", link.port.path.display(), link.port.title));
+    Examination {
+        port,
+        listened_s: seen.listened_s,
+        cut_short: stop.load(Ordering::Relaxed),
+        findings: findings(&seen),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::desk::watch::{until, waker};
+    use super::*;
+    use palpate_device::doctor::{Verdict, is_sound};
+    use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
+
+    fn request(port: PathBuf, seconds: f64) -> ExamineRequest {
+        ExamineRequest { port: Some(port), seconds }
+    }
+
+    #[test]
+    fn a_port_is_looked_at_and_one_that_is_not_there_is_told() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let bytes = folder.path().join("board.bytes");
+        let mut file = CAPTURE_MAGIC.to_vec();
+        for i in 0..10 {
+            let line = format!("t_us:{},seq:{i},flexL:1400,flexR:1500,fsrL:0,fsrR:0\n", 20_000 * i);
+            Captured::Bytes { arrived_s: 0.02 * f64::from(i), bytes: line.into_bytes() }.write(&mut file)?;
+        }
+        std::fs::write(&bytes, file)?;
+        let (wake, woken) = waker();
+        let doctor = Examiner::start(Arc::new(examine_port), wake)?;
+        assert!(doctor.view().is_none(), "nobody asked");
+        doctor.ask(request(bytes, 5.0));
+        until(&doctor, &woken, |view| view.running.is_some() && view.last.is_none());
+        let view = until(&doctor, &woken, |view| view.running.is_none());
+        let told = view.last.as_ref().ok_or("it has looked")?;
+        assert!(told.port.as_ref().is_some_and(|port| port.contains("board.bytes")), "{told:?}");
+        let verdict = |check: &str| told.findings.iter().find(|f| f.check == check).map(|f| f.verdict);
+        assert_eq!((verdict("lines"), verdict("firmware")), (Some(Verdict::Good), Some(Verdict::Note)));
+        assert!(!told.cut_short && told.listened_s < 5.0, "a file ends when it ends");
+        doctor.ask(request(folder.path().join("gone"), 5.0));
+        let view = until(&doctor, &woken, |view| view.running.is_none() && view.last != Some(Arc::clone(told)));
+        let told = view.last.as_ref().ok_or("it has looked")?;
+        assert!(told.port.is_none() && !is_sound(&told.findings));
+        Ok(())
+    }
+
+    #[test]
+    fn a_look_that_is_given_up_ends_with_what_was_seen() -> Result<(), Box<dyn std::error::Error>> {
+        let look: Examine = Arc::new(|_, goes_on| {
+            let mut listened_s = 0.0;
+            while goes_on(listened_s) {
+                listened_s += 0.05;
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let nothing = request(PathBuf::from("/nowhere/at/all"), 0.0);
+            Observations { listened_s, ..examine_port(&nothing, &mut |_| true) }
+        });
+        let (wake, woken) = waker();
+        let mut doctor = Examiner::start(look, wake)?;
+        doctor.ask(request(PathBuf::new(), 8.0));
+        until(&doctor, &woken, |view| view.running.as_ref().is_some_and(|(_, listened_s)| *listened_s > 0.1));
+        doctor.give_up();
+        let view = until(&doctor, &woken, |view| view.running.is_none());
+        let told = view.last.as_ref().ok_or("it has looked")?;
+        assert!(told.cut_short && told.listened_s > 0.1, "{told:?}");
+        Ok(())
+    }
+}

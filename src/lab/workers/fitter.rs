@@ -1,0 +1,168 @@
+//! Fitting the simulated finger beside a window: a thread "fit" that lists the recorded trials of the real gripper, and fits
+//! the finger to some of them.
+
+use super::desk::{Desk, Outlet};
+use super::messages::Wake;
+use crate::study::{FingerFit, FitWatch, RecordedGrasps, fit_finger_watched};
+use palpate_sim::scene::Scene;
+use palpate_store::{BOARD_RIG, Store, TrialRow};
+use palpate_tactile::trial::TrialId;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What the user wants of a fit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FitWish {
+    /// Look which trials there are.
+    List,
+    /// Fit the finger to these.
+    Fit(Vec<TrialId>),
+}
+
+/// A finger that was fitted.
+#[derive(Clone, Debug)]
+pub struct FittedFinger {
+    /// The trials it was fitted to.
+    pub trials: Vec<TrialId>,
+    /// What came out.
+    pub fit: FingerFit,
+    /// Scene of the first trial, with the fitted gripper.
+    pub scene: Scene,
+    /// What should be known of the trials, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// What fits the finger to trials of a store: [`fit_trials`]. The text says why it cannot.
+pub type FitTrials = Arc<dyn Fn(&Path, &[TrialId], &FitWatch<'_>) -> Result<FittedFinger, String> + Send + Sync>;
+
+/// Reads the trials through the newest calibrations of their parts and fits the finger to them.
+pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Result<FittedFinger, String> {
+    let store = Store::open(store).map_err(|error| error.to_string())?;
+    let mut recorded = RecordedGrasps::default();
+    for id in trials {
+        recorded.add(&store, *id, None, &[]).map_err(|error| error.to_string())?;
+    }
+    let RecordedGrasps { observations, trust, warnings } = recorded;
+    let fit = fit_finger_watched(&observations, &trust, watch).map_err(|error| error.to_string())?;
+    let first = observations.first().map(|seen| seen.scene.clone()).unwrap_or_default();
+    let scene = Scene { gripper: fit.gripper.clone(), ..first };
+    Ok(FittedFinger { trials: trials.to_vec(), fit, scene, warnings })
+}
+
+/// Where the fit stands.
+#[derive(Clone, Debug, Default)]
+pub struct FitterView {
+    /// Whole trials of the real gripper, newest first, or why they cannot be listed; none before they were looked for.
+    pub trials: Option<Result<Arc<[TrialRow]>, String>>,
+    /// Steps done of the fit that goes on; none while none does.
+    pub running: Option<f64>,
+    /// How the last fit ended that was not given up.
+    pub ended: Option<Result<Arc<FittedFinger>, String>>,
+}
+
+/// A handle on the thread.
+pub type Fitter = Desk<FitWish, FitterView>;
+
+impl Fitter {
+    /// Starts the thread; trials come from the store at `store`.
+    pub fn start(store: PathBuf, fit: FitTrials, wake: Wake) -> std::io::Result<Self> {
+        let mut view = FitterView::default();
+        Self::spawn("fit", wake, move |wish, stop, outlet| {
+            match wish {
+                FitWish::List => view.trials = Some(listed(&store)),
+                FitWish::Fit(trials) => {
+                    let ended = fitted(&fit, &store, &trials, stop, outlet, &view);
+                    if !stop.load(Ordering::Relaxed) {
+                        view.ended = Some(ended.map(Arc::new));
+                    }
+                }
+            }
+            outlet.publish(view.clone());
+        })
+    }
+}
+
+fn fitted(
+    fit: &FitTrials,
+    store: &Path,
+    trials: &[TrialId],
+    stop: &AtomicBool,
+    outlet: &Outlet<FitterView>,
+    view: &FitterView,
+) -> Result<FittedFinger, String> {
+    let tell = |steps: f64| outlet.publish(FitterView { running: Some(steps), ..view.clone() });
+    tell(0.0);
+    fit(store, trials, &FitWatch { progress: &tell, stop })
+}
+
+fn listed(store: &Path) -> Result<Arc<[TrialRow]>, String> {
+    let mut rows = Store::open(store).and_then(|store| store.list(false)).map_err(|error| error.to_string())?;
+    rows.retain(|row| row.rig == BOARD_RIG && row.state == "complete");
+    rows.reverse();
+    Ok(rows.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::desk::watch::{until, waker};
+    use super::*;
+    use crate::grasping::{grasp, prepare};
+    use palpate_store::BoardInfo;
+
+    /// A quick close of an empty hand.
+    fn close() -> Scene {
+        let mut scene = Scene::default();
+        palpate_sim::objects::EMPTY.clone_into(&mut scene.object.source);
+        scene.programme.peak_bar = 0.5;
+        scene.programme.close_bar_per_tick = 0.25;
+        scene.programme.release_bar_per_tick = 0.5;
+        scene.programme.hold_ticks = 5;
+        (scene.timing.duration_s, scene.timing.sample_hz) = (1.2, 50);
+        scene
+    }
+
+    #[test]
+    fn trials_are_listed_fitted_and_given_up() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("trials.sqlite");
+        let mut store = Store::open(&path)?;
+        let simulated = store.insert(&grasp(&close(), None, 0))?;
+        let mut info = prepare(&close(), None, 0).info().clone();
+        info.rig = BOARD_RIG.to_owned();
+        for object in ["lemon", "empty", "ball"] {
+            object.clone_into(&mut info.object);
+            let id = store.begin_board(&info, &BoardInfo::default())?;
+            if object != "ball" {
+                store.finish_board(id, &BoardInfo::default(), &[])?;
+            }
+        }
+        let (wake, woken) = waker();
+        let mut desk = Fitter::start(path, Arc::new(fit_trials), wake)?;
+        desk.ask(FitWish::List);
+        let view = until(&desk, &woken, |view| view.trials.is_some());
+        let rows = view.trials.clone().ok_or("looked for")??;
+        let listed: Vec<&str> = rows.iter().map(|row| row.object.as_str()).collect();
+        assert_eq!(listed, ["empty", "lemon"], "whole trials of the board, newest first");
+
+        // Any trial can be fitted; this one's finger is known.
+        desk.ask(FitWish::Fit(vec![simulated]));
+        until(&desk, &woken, |view| view.running.is_some_and(|steps| steps > 1.0));
+        let view = until(&desk, &woken, |view| view.running.is_none() && view.ended.is_some());
+        let fitted = view.ended.clone().ok_or("it has ended")??;
+        let truth = close().gripper.finger.bending_stiffness;
+        let found = fitted.scene.gripper.finger.bending_stiffness;
+        assert!((found / truth - 1.0).abs() < 0.03 && found != truth, "{found} instead of {truth}");
+        assert_eq!(fitted.scene.object, close().object);
+
+        desk.ask(FitWish::Fit(vec![simulated]));
+        until(&desk, &woken, |view| view.running.is_some_and(|steps| steps > 0.0));
+        desk.give_up();
+        let view = until(&desk, &woken, |view| view.running.is_none());
+        assert!(matches!(&view.ended, Some(Ok(kept)) if Arc::ptr_eq(kept, &fitted)), "what was there stays");
+        desk.ask(FitWish::Fit(vec![77]));
+        let view = until(&desk, &woken, |view| matches!(view.ended, Some(Err(_))));
+        assert!(matches!(&view.ended, Some(Err(cause)) if cause.contains("77")), "{:?}", view.ended);
+        Ok(())
+    }
+}

@@ -1,0 +1,421 @@
+//! The gripper's thread: it owns the link, hands what it hears to everybody who wants it, and does what it is told.
+
+mod recognising;
+mod sensors;
+mod trials;
+
+use super::calibrating::{Calibrating, CalibrationView};
+use super::crosstalk::{Crossing, CrosstalkView};
+use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialRequest};
+use super::observing::Observing;
+use super::plotted::{Plotted, Row};
+use super::recent::Recent;
+use super::running::Running;
+use super::stream::{BoardStream, Listen, NotOpened};
+use super::worker::GripperSetup;
+use crate::labelling::Segmenter;
+use crate::workers::listener::Listener;
+use crate::workers::{Latest, Notice, TraceRow, Wake};
+use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
+use palpate_device::wire::Heard;
+use palpate_sim::scene::Scene;
+use palpate_store::Store;
+use palpate_tactile::Channel;
+use palpate_tactile::board::{Board, Reading};
+use palpate_tactile::calibration::{Drift, Readout};
+use palpate_tactile::whole_fingers;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError};
+use std::time::{Duration, Instant};
+
+/// How long the thread waits for readings before it looks for wishes again: also how punctual the control box is told.
+const PATIENCE: Duration = Duration::from_millis(10);
+/// How often a port is tried that another program has.
+const RETRY: Duration = Duration::from_secs(1);
+/// Views are published no more often than this.
+const CALM: Duration = Duration::from_millis(33);
+
+/// Where results go.
+pub(super) struct Outlets {
+    pub(super) view: Arc<Latest<GripperView>>,
+    pub(super) rows: SyncSender<TraceRow>,
+    pub(super) rows_lost: Arc<AtomicBool>,
+    pub(super) notices: Sender<Notice>,
+    pub(super) wake: Wake,
+}
+
+impl Outlets {
+    fn tell(&self, notice: Notice) {
+        // The window may have gone; then there is nobody to tell.
+        let _heard = self.notices.send(notice);
+        (self.wake)();
+    }
+}
+
+/// What is known while something is listened to.
+struct Connection {
+    stream: Box<dyn BoardStream>,
+    board: Board,
+    recent: Recent,
+    /// The board's readings by the calibrations of its parts, with the zeros taken last.
+    readout: Readout,
+    remarks: Vec<String>,
+    drift: Vec<Drift>,
+    latest: Option<LatestReading>,
+    plotted: Plotted,
+    /// It was opened for a calibration or a test, and is given back when the last of them is done.
+    borrowed: bool,
+    /// Tells when a grasp begins and ends by itself.
+    segmenter: Segmenter,
+}
+
+/// Everything the thread owns.
+pub(super) struct Desk {
+    outlets: Outlets,
+    listen: Listen,
+    path: PathBuf,
+    store: Option<Store>,
+    scene: Scene,
+    listener: Option<Listener>,
+    model: Option<String>,
+    grasps: u32,
+    ports: Vec<PortInfo>,
+    refused: Option<NotOpened>,
+    /// The port that another program has, where it is to be opened as soon as that lets it go.
+    retried: Option<Option<PathBuf>>,
+    connection: Option<Connection>,
+    running: Option<Running>,
+    /// Trials that were begun so far.
+    begun: u64,
+    watching: Option<TrialRequest>,
+    ended: Option<Arc<EndedTrial>>,
+    calibrating: Option<Calibrating>,
+    observing: Vec<Observing>,
+    calibrated: Option<Result<String, String>>,
+    crossing: Option<Crossing>,
+    crossed: CrosstalkView,
+    /// Which stretch of rows is being sent, and the time that counts as its zero (s).
+    stretch: (u64, f64),
+    channels: Arc<[Channel]>,
+    revision: u64,
+    granted: u64,
+    published: Instant,
+}
+
+impl Desk {
+    pub(super) fn new(setup: GripperSetup, outlets: Outlets) -> Self {
+        let GripperSetup { scene, store, model, grasps, listen, wake: _ } = setup;
+        let mut desk = Self {
+            outlets,
+            listen,
+            path: store,
+            store: None,
+            scene,
+            listener: None,
+            model: None,
+            grasps,
+            ports: Vec::new(),
+            refused: None,
+            retried: None,
+            connection: None,
+            running: None,
+            begun: 0,
+            watching: None,
+            ended: None,
+            calibrating: None,
+            observing: Vec::new(),
+            calibrated: None,
+            crossing: None,
+            crossed: CrosstalkView::default(),
+            stretch: (0, 0.0),
+            channels: whole_fingers().into(),
+            revision: 0,
+            granted: 0,
+            published: Instant::now(),
+        };
+        desk.set_model(model);
+        desk
+    }
+
+    /// Works until it is told to quit.
+    pub(super) fn run(mut self, inbox: &Receiver<GripperWish>) {
+        self.publish();
+        loop {
+            let wish = match &self.connection {
+                Some(_) => match inbox.try_recv() {
+                    Ok(wish) => Some(wish),
+                    Err(TryRecvError::Empty) => None,
+                    Err(TryRecvError::Disconnected) => break,
+                },
+                None if self.retried.is_some() => match inbox.recv_timeout(RETRY) {
+                    Ok(wish) => Some(wish),
+                    Err(RecvTimeoutError::Timeout) => None,
+                    Err(RecvTimeoutError::Disconnected) => break,
+                },
+                None => match inbox.recv() {
+                    Ok(wish) => Some(wish),
+                    Err(_closed) => break,
+                },
+            };
+            match wish {
+                Some(GripperWish::Quit) => break,
+                Some(wish) => {
+                    // The doctor asks by himself.
+                    self.granted += u64::from(!matches!(wish, GripperWish::Observe(_)));
+                    self.obey(wish);
+                    self.publish();
+                }
+                None if self.connection.is_none() => self.try_again(),
+                None => self.listen_on(),
+            }
+        }
+        self.disconnect("the window was closed");
+    }
+
+    fn obey(&mut self, wish: GripperWish) {
+        match wish {
+            GripperWish::ListPorts => self.ports = list_ports(),
+            GripperWish::Connect(port) => {
+                self.disconnect("another port was chosen");
+                self.connect(port.as_deref());
+            }
+            GripperWish::Disconnect => self.disconnect("the port was given back"),
+            GripperWish::Vent => self.vent(),
+            GripperWish::Tare => self.tare(),
+            GripperWish::SetScene(scene) => self.scene = *scene,
+            GripperWish::SetModel(model) => self.set_model(model),
+            GripperWish::SetThreshold(threshold) => {
+                if let Some(listener) = &mut self.listener {
+                    listener.set_threshold(threshold);
+                }
+            }
+            GripperWish::SetGrasps(grasps) => {
+                self.grasps = grasps.max(1);
+                if let Some(listener) = &mut self.listener {
+                    listener.set_most_grasps(self.grasps);
+                }
+            }
+            GripperWish::AnotherObject => self.start_over(),
+            GripperWish::Begin(request) => self.begin(request, None),
+            GripperWish::Watch(request) => self.watching = request,
+            GripperWish::End => self.end(false, None),
+            GripperWish::Discard => self.end(true, None),
+            GripperWish::Observe(request) if self.connection.is_some() => {
+                self.observing.push(Observing::new(request));
+            }
+            // Whoever asked learns of it by the end of the request, and looks alone.
+            GripperWish::Observe(_) => {}
+            GripperWish::Calibrate(wish) => self.calibrate(&wish),
+            GripperWish::Crosstalk(wish) => self.look_for_crosstalk(wish),
+            GripperWish::Quit => {}
+        }
+    }
+
+    fn connect(&mut self, port: Option<&Path>) {
+        self.refused = None;
+        if let Err(mut refused) = self.open_stream(port) {
+            if refused.may_pass {
+                self.retried = Some(port.map(Path::to_owned));
+                refused.text.push_str("; until then it is tried each second");
+            }
+            self.outlets.tell(Notice::Failed(refused.text.clone()));
+            self.refused = Some(refused);
+            self.ports = list_ports();
+        }
+    }
+
+    /// Whether the program that had the port has let it go. That it has not is no news.
+    fn try_again(&mut self) {
+        let Some(port) = self.retried.take() else { return };
+        match self.open_stream(port.as_deref()) {
+            Ok(()) => self.refused = None,
+            Err(NotOpened { may_pass: true, .. }) => return self.retried = Some(port),
+            Err(refused) => self.refused = Some(refused),
+        }
+        self.publish();
+    }
+
+    fn open_stream(&mut self, port: Option<&Path>) -> Result<(), NotOpened> {
+        let mut stream = (self.listen)(port)?;
+        // A board that speaks our language says who it is; to others it is a line they do not know.
+        let _told = stream.send("?");
+        self.connection = Some(Connection {
+            board: stream.status().board,
+            stream,
+            recent: Recent::default(),
+            readout: Readout::default(),
+            remarks: Vec::new(),
+            drift: Vec::new(),
+            latest: None,
+            plotted: Plotted::new(Vec::new(), 0),
+            borrowed: false,
+            segmenter: Segmenter::new(&Board::default()),
+        });
+        self.read_calibrations();
+        self.another_stretch(0.0);
+        self.start_over();
+        Ok(())
+    }
+
+    fn disconnect(&mut self, why: &str) {
+        self.end(false, Some(format!("ended early: {why}")));
+        if self.calibrating.take().is_some() {
+            self.calibrated = Some(Err(format!("nothing was stored: {why}")));
+        }
+        if let Some(crossing) = self.crossing.take() {
+            self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(crossing.summary()) };
+        }
+        self.observing.clear();
+        self.connection = None;
+        self.retried = None;
+    }
+
+    /// Takes in what the link has heard, and does what is due.
+    fn listen_on(&mut self) {
+        let Some(connection) = &mut self.connection else { return };
+        let events = connection.stream.take(PATIENCE);
+        for event in events {
+            self.hear(event);
+        }
+        self.conduct();
+        self.end_looks();
+        let over = self.connection.as_ref().is_some_and(|connection| connection.stream.is_over());
+        if over {
+            let why = self.connection.as_ref().map(|c| c.stream.status().state.sentence()).unwrap_or_default();
+            self.disconnect(&why);
+            self.outlets.tell(Notice::Warning(why.clone()));
+            self.refused = Some(why.into());
+            self.publish();
+        } else if self.published.elapsed() >= CALM || self.connection.is_none() {
+            // Without a board nothing else comes that would be published with it.
+            self.publish();
+        }
+    }
+
+    /// Hands over what the doctor has seen enough of.
+    fn end_looks(&mut self) {
+        let Some(connection) = &self.connection else { return };
+        for observing in self.observing.extract_if(.., |observing| observing.is_over()) {
+            observing.finish(connection.stream.status());
+        }
+    }
+
+    fn hear(&mut self, event: LinkEvent) {
+        let Some(connection) = &mut self.connection else { return };
+        let begun = self.begun;
+        connection.recent.push(&event);
+        match &event {
+            LinkEvent::Heard(Heard::Reading(reading)) => {
+                let reading = reading.clone();
+                self.hear_reading(&reading);
+            }
+            LinkEvent::Heard(Heard::Board(board)) if connection.board != *board => {
+                connection.board = board.clone();
+                self.read_calibrations();
+            }
+            LinkEvent::Heard(Heard::Gap(gap)) => {
+                let rows = connection.plotted.gap(gap.from_s);
+                self.plot(rows);
+            }
+            LinkEvent::Heard(Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => {}
+        }
+        // What began a trial just now is among what it was begun with.
+        if begun == self.begun
+            && let Some(running) = &mut self.running
+        {
+            running.take(event);
+            self.end_what_is_cut();
+            self.write();
+        }
+    }
+
+    fn hear_reading(&mut self, reading: &Reading) {
+        let Some(connection) = &mut self.connection else { return };
+        let felt = connection.readout.felt(reading);
+        let commanded = self.running.as_ref().and_then(Running::line_bar);
+        // A board that tells its pressure knows better than whoever commands it.
+        let line_bar = reading.line_bar.or(commanded);
+        self.observing.iter_mut().for_each(|observing| observing.add(reading));
+        let rows = connection.plotted.push(reading, &felt, line_bar);
+        let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&felt));
+        connection.latest = Some(LatestReading { counts, felt, beyond, line_bar });
+        self.plot(rows);
+        self.watch(reading);
+        self.recognise(reading.t_s, &felt);
+        if let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection)
+            && let Err(cause) = calibrating.feed(reading, &connection.board)
+        {
+            self.end_calibration(Some(Err(cause)));
+        }
+        self.cross(reading);
+    }
+
+    fn plot(&self, rows: Vec<Row>) {
+        let (grasp, from_s) = self.stretch;
+        let rolling = self.running.is_none();
+        for row in rows {
+            if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row.placed(grasp, from_s, rolling)) {
+                self.outlets.rows_lost.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// From now on rows belong to another stretch of time, which counts from `from_s`.
+    fn another_stretch(&mut self, from_s: f64) {
+        let rows = self.connection.as_mut().map(|connection| connection.plotted.flush()).unwrap_or_default();
+        self.plot(rows);
+        self.stretch = (self.stretch.0 + 1, from_s);
+    }
+
+    fn publish(&mut self) {
+        self.published = Instant::now();
+        self.revision += 1;
+        let connection = self.connection.as_ref();
+        let link = connection.map(|connection| connection.stream.status());
+        let calibration = self
+            .calibrating
+            .as_ref()
+            .map(|calibrating| calibrating.view(link.as_ref().map(|link| link.state.sentence()).unwrap_or_default()));
+        let calibration = CalibrationView { running: calibration, ended: self.calibrated.clone() };
+        let crosstalk = match &self.crossing {
+            Some(crossing) => {
+                let state = link.as_ref().map(|link| link.state.sentence()).unwrap_or_default();
+                CrosstalkView { running: Some(crossing.view(state)), found: crossing.found(), ended: None }
+            }
+            None => self.crossed.clone(),
+        };
+        let trial = self.running.as_ref().zip(connection).map(|(running, c)| running.view(c.stream.now_s()));
+        self.outlets.view.publish(Arc::new(GripperView {
+            revision: self.revision,
+            granted: self.granted,
+            link,
+            refused: self.refused.clone(),
+            ports: self.ports.clone(),
+            latest: connection.and_then(|connection| connection.latest.clone()),
+            channels: Arc::clone(&self.channels),
+            drift: connection.map(|connection| connection.drift.clone()).unwrap_or_default(),
+            remarks: connection.map(|connection| connection.remarks.clone()).unwrap_or_default(),
+            trial,
+            watching: self.watching.clone(),
+            ended: self.ended.clone(),
+            grasp: self.stretch.0,
+            identification: self.listener.as_ref().and_then(Listener::view),
+            recognition_off: self.listener.as_ref().and_then(Listener::why_off),
+            model: self.model.clone(),
+            calibration: Some(Arc::new(calibration)),
+            crosstalk: Some(Arc::new(crosstalk)),
+            console: connection.map(|c| c.stream.console()).unwrap_or_default().into(),
+        }));
+        (self.outlets.wake)();
+    }
+}
+
+/// The store, opened when it is first needed.
+fn open<'a>(store: &'a mut Option<Store>, path: &Path) -> Result<&'a mut Store, String> {
+    match store {
+        Some(store) => Ok(store),
+        empty @ None => Ok(empty.insert(Store::open(path).map_err(|error| error.to_string())?)),
+    }
+}

@@ -1,0 +1,231 @@
+//! What the sensors mean: calibrations of the parts, those that are being made, and zeros.
+
+use super::{Connection, Desk, open};
+use crate::workers::Notice;
+use crate::workers::gripper::calibrating::{Calibrating, CalibrationPlan, CalibrationWish};
+use crate::workers::gripper::crosstalk::{Crossing, CrosstalkView, CrosstalkWish};
+use crate::workers::gripper::plotted::Plotted;
+use palpate_tactile::board::Reading;
+use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
+use std::path::Path;
+
+/// Readings before the closing from which the zeros are taken (s).
+const REST_S: f64 = 0.6;
+/// Readings older than this say nothing of now (s).
+const STALE_S: f64 = 2.0;
+
+impl Desk {
+    /// Reads the board through the newest calibrations of its parts.
+    pub(super) fn read_calibrations(&mut self) {
+        let Some(connection) = &self.connection else { return };
+        let board = connection.board.clone();
+        let read = open(&mut self.store, &self.path).and_then(|store| {
+            let tare = store.tare().map_err(|error| error.to_string())?;
+            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
+            Ok((serving, tare.map(|tare| tare.zero)))
+        });
+        let (read, zero) = match read {
+            Ok((serving, zero)) => (Ok(serving), zero),
+            Err(cause) => (Err(cause), None),
+        };
+        let (readout, remarks) = match read {
+            Ok(serving) => match Readout::new(&board, &serving.calibrations) {
+                Ok(readout) => {
+                    let remarks = serving.warnings.into_iter().chain(readout.warnings().iter().cloned()).collect();
+                    (readout, remarks)
+                }
+                Err(fault) => (Readout::default(), vec![fault.to_string()]),
+            },
+            Err(cause) => (Readout::default(), vec![cause]),
+        };
+        if let Some(connection) = &mut self.connection {
+            connection.plotted = Plotted::new(self.channels.to_vec(), board.channels.len());
+            connection.segmenter.set_board(&board);
+            connection.readout = readout;
+            connection.remarks = remarks;
+            connection.drift.clear();
+            if let Some(zero) = zero {
+                connection.set_zero(zero);
+            }
+        }
+    }
+
+    // Zeros.
+
+    /// The zeros of a trial are what the sensors show just before its closing.
+    pub(super) fn zero_from_rest(&mut self, closing_s: f64) {
+        let Some(connection) = &mut self.connection else { return };
+        let zero = connection.readout.zero_from(&connection.recent.between(closing_s - REST_S, closing_s));
+        connection.set_zero(zero);
+    }
+
+    /// Takes the zeros of now, where the hand is open and left alone.
+    pub(super) fn tare(&mut self) {
+        if self.running.is_some() {
+            let text = "nothing was tared: a trial goes on; its zeros are taken before it closes";
+            return self.outlets.tell(Notice::Warning(text.to_owned()));
+        }
+        // The zero is kept for the parts that serve in the store now, so it is measured through them.
+        self.read_calibrations();
+        let Some(connection) = &mut self.connection else { return };
+        let mut readings = connection.recent.last(2.0 * REST_S);
+        // What was heard before the board fell silent says nothing of now; captured bytes keep their own time.
+        let since_s = if connection.stream.status().baud.is_some() { connection.stream.now_s() - STALE_S } else { 0.0 };
+        readings.retain(|reading| reading.t_s > since_s);
+        let zero = match connection.readout.tare(&readings) {
+            Ok(zero) if zero != Zero::default() => zero,
+            Ok(_) => {
+                let text = "nothing was tared: no calibrated sensor has been read yet";
+                return self.outlets.tell(Notice::Warning(text.to_owned()));
+            }
+            Err(unrest) => return self.outlets.tell(Notice::Warning(format!("nothing was tared: {unrest}"))),
+        };
+        connection.set_zero(zero);
+        let far: Vec<String> = connection
+            .drift
+            .iter()
+            .filter(|drift| drift.level == DriftLevel::TooFar)
+            .filter_map(Drift::remark)
+            .collect();
+        for text in far {
+            self.outlets.tell(Notice::Warning(text));
+        }
+        let stored = open(&mut self.store, &self.path)
+            .and_then(|store| store.add_tare(&zero).map_err(|error| error.to_string()));
+        match stored {
+            Ok(_) => {
+                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()));
+            }
+            Err(cause) => {
+                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")));
+            }
+        }
+    }
+
+    // Calibration.
+
+    pub(super) fn calibrate(&mut self, wish: &CalibrationWish) {
+        match wish {
+            CalibrationWish::Begin(plan) => self.begin_calibration(plan),
+            CalibrationWish::Stop => self.end_calibration(None),
+            CalibrationWish::Keep => {
+                let kept = match (&self.calibrating, open(&mut self.store, &self.path)) {
+                    (None, _) => return,
+                    (Some(calibrating), Ok(store)) => calibrating.keep(store),
+                    (Some(_), Err(cause)) => Some(Err(cause)),
+                };
+                if let Some(kept) = kept {
+                    self.end_calibration(Some(kept));
+                    self.read_calibrations();
+                }
+            }
+            CalibrationWish::EmptyClose => {
+                let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection) else { return };
+                match open(&mut self.store, &self.path) {
+                    Ok(store) => calibrating.close_empty(&connection.board, store),
+                    Err(cause) => self.outlets.tell(Notice::Warning(cause)),
+                }
+            }
+            CalibrationWish::Take(_) | CalibrationWish::Skip | CalibrationWish::Undo => {
+                if let Some(calibrating) = &mut self.calibrating {
+                    calibrating.grant(wish);
+                }
+            }
+        }
+    }
+
+    fn begin_calibration(&mut self, plan: &CalibrationPlan) {
+        match self.borrow_port(plan.port.as_deref()) {
+            Err(cause) => self.calibrated = Some(Err(cause)),
+            Ok(()) => self.calibrating = Some(Calibrating::new(plan.clone())),
+        }
+    }
+
+    /// What has the fingers at present, where something has, in a sentence.
+    pub(super) fn occupied(&self) -> Option<&'static str> {
+        match (&self.running, &self.calibrating, &self.crossing) {
+            (Some(_), _, _) => Some("a trial goes on: end it first"),
+            (None, Some(_), _) => Some("a calibration goes on: end it first, in the panel Calibration"),
+            (None, None, Some(_)) => Some("a crosstalk test goes on: end it first, in the panel Doctor"),
+            (None, None, None) => None,
+        }
+    }
+
+    /// Sees to it that something is listened to and nothing else has the fingers; or says why not.
+    fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), String> {
+        if let Some(occupied) = self.occupied() {
+            return Err(occupied.to_owned());
+        }
+        if self.connection.is_some() {
+            return Ok(());
+        }
+        self.refused = None;
+        if let Err(refused) = self.open_stream(port) {
+            let cause = refused.text.clone();
+            self.outlets.tell(Notice::Failed(cause.clone()));
+            self.refused = Some(refused);
+            return Err(cause);
+        }
+        // One that was waited for stays.
+        let borrowed = self.retried.take().is_none();
+        self.connection.iter_mut().for_each(|connection| connection.borrowed = borrowed);
+        Ok(())
+    }
+
+    /// Gives a port back that was opened for what has ended now.
+    fn return_port(&mut self, why: &str) {
+        let unused = self.occupied().is_none();
+        if unused && self.connection.as_ref().is_some_and(|connection| connection.borrowed) {
+            self.disconnect(why);
+        }
+    }
+
+    pub(super) fn end_calibration(&mut self, ended: Option<Result<String, String>>) {
+        self.calibrating = None;
+        self.calibrated = ended;
+        self.return_port("the calibration has ended");
+    }
+
+    // The doctor's crosstalk test.
+
+    pub(super) fn look_for_crosstalk(&mut self, wish: CrosstalkWish) {
+        match wish {
+            CrosstalkWish::Begin(port) => match self.borrow_port(port.as_deref()) {
+                Err(cause) => self.crossed = CrosstalkView { ended: Some(Err(cause)), ..CrosstalkView::default() },
+                Ok(()) => self.crossing = Some(Crossing::default()),
+            },
+            CrosstalkWish::Skip => {
+                self.crossing.iter_mut().for_each(Crossing::skip);
+                if self.crossing.as_ref().is_some_and(Crossing::is_over) {
+                    self.end_crosstalk(None);
+                }
+            }
+            CrosstalkWish::Stop => self.end_crosstalk(None),
+        }
+    }
+
+    /// Takes a reading into the test that goes on, and ends it when it is over.
+    pub(super) fn cross(&mut self, reading: &Reading) {
+        let (Some(crossing), Some(connection)) = (&mut self.crossing, &self.connection) else { return };
+        match crossing.feed(reading, &connection.board) {
+            Ok(false) => {}
+            Ok(true) => self.end_crosstalk(None),
+            Err(cause) => self.end_crosstalk(Some(cause)),
+        }
+    }
+
+    fn end_crosstalk(&mut self, cause: Option<String>) {
+        let Some(crossing) = self.crossing.take() else { return };
+        let ended = cause.map_or_else(|| crossing.summary(), Err);
+        self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(ended) };
+        self.return_port("the crosstalk test has ended");
+    }
+}
+
+impl Connection {
+    /// Subtracts a zero from now on, and judges how far it is from the calibrations.
+    fn set_zero(&mut self, zero: Zero) {
+        self.drift = self.readout.drift(&zero);
+        self.readout = self.readout.clone().with_zero(zero);
+    }
+}

@@ -1,0 +1,147 @@
+//! Readings as plots need them: at most a hundred rows a second, however fast the board is, without losing an extreme.
+
+use crate::workers::TraceRow;
+use palpate_tactile::Channel;
+use palpate_tactile::board::Reading;
+use palpate_tactile::calibration::Felt;
+
+/// Above this rate readings are gathered (1/s).
+const MOST_HZ: f64 = 110.0;
+/// Length of what is gathered (s): two rows of it are kept, the least and the largest values.
+const BIN_S: f64 = 0.02;
+
+/// Makes trace rows of readings.
+#[derive(Debug)]
+pub(super) struct Plotted {
+    channels: Vec<Channel>,
+    counts: usize,
+    bin: Option<Bin>,
+    last_s: Option<f64>,
+}
+
+/// What is gathered.
+#[derive(Debug)]
+struct Bin {
+    from_s: f64,
+    last_s: f64,
+    line_bar: f64,
+    least: Vec<f32>,
+    largest: Vec<f32>,
+    /// Readings in it.
+    many: u32,
+}
+
+/// A row without its place in a grasp.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Row {
+    pub(super) t_s: f64,
+    pub(super) line_bar: f64,
+    pub(super) values: Vec<f32>,
+}
+
+impl Row {
+    /// As a window takes it; time counts from `from_s`.
+    pub(super) fn placed(self, grasp: u64, from_s: f64, rolling: bool) -> TraceRow {
+        TraceRow {
+            grasp,
+            rolling,
+            t: self.t_s - from_s,
+            line_bar: self.line_bar,
+            values: self.values.into(),
+            errors: Box::default(),
+        }
+    }
+}
+
+impl Plotted {
+    /// Rows have the derived channels first, then the counts of so many channels of the board.
+    pub(super) fn new(channels: Vec<Channel>, counts: usize) -> Self {
+        Self { channels, counts, bin: None, last_s: None }
+    }
+
+    /// Takes in a reading; what it completes.
+    pub(super) fn push(&mut self, reading: &Reading, felt: &Felt, line_bar: Option<f64>) -> Vec<Row> {
+        let derived = self.channels.iter().map(|channel| felt.of(channel).map_or(f32::NAN, |value| value as f32));
+        let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
+        let values: Vec<f32> = derived.chain((0..self.counts).map(count)).collect();
+        let (t_s, line_bar) = (reading.t_s, line_bar.unwrap_or(f64::NAN));
+        let fast = self.last_s.is_some_and(|last| t_s - last < 1.0 / MOST_HZ);
+        self.last_s = Some(t_s);
+        let done = self.bin.as_ref().is_some_and(|bin| !fast || !(bin.from_s..bin.from_s + BIN_S).contains(&t_s));
+        let mut rows = if done { self.flush() } else { Vec::new() };
+        match &mut self.bin {
+            Some(bin) => bin.add(t_s, &values),
+            None if fast => {
+                self.bin =
+                    Some(Bin { from_s: t_s, last_s: t_s, line_bar, least: values.clone(), largest: values, many: 1 });
+            }
+            None => rows.push(Row { t_s, line_bar, values }),
+        }
+        rows
+    }
+
+    /// Readings are missing here: curves break.
+    pub(super) fn gap(&mut self, from_s: f64) -> Vec<Row> {
+        let mut rows = self.flush();
+        let values = vec![f32::NAN; self.channels.len() + self.counts];
+        rows.push(Row { t_s: from_s + 1e-6, line_bar: f64::NAN, values });
+        rows
+    }
+
+    /// What is gathered so far.
+    pub(super) fn flush(&mut self) -> Vec<Row> {
+        let Some(Bin { from_s, last_s, line_bar, least, largest, many }) = self.bin.take() else { return Vec::new() };
+        let mut rows = vec![Row { t_s: from_s, line_bar, values: least }];
+        if many > 1 {
+            rows.push(Row { t_s: 0.5 * (from_s + last_s), line_bar, values: largest });
+        }
+        rows
+    }
+}
+
+impl Bin {
+    fn add(&mut self, t_s: f64, values: &[f32]) {
+        self.last_s = t_s;
+        self.many += 1;
+        for ((least, largest), value) in self.least.iter_mut().zip(&mut self.largest).zip(values) {
+            // `min` and `max` pass over what is no number.
+            *least = least.min(*value);
+            *largest = largest.max(*value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reading(t_s: f64, count: f32) -> Reading {
+        Reading { t_s, arrived_s: t_s, seq: None, counts: vec![Some(count)], line_bar: None }
+    }
+
+    #[test]
+    fn slow_boards_are_plotted_reading_by_reading() {
+        let mut plotted = Plotted::new(Vec::new(), 2);
+        for k in 0..10u8 {
+            let rows = plotted.push(&reading(0.02 * f64::from(k), f32::from(k)), &Felt::default(), Some(0.5));
+            assert_eq!(rows.len(), 1);
+            assert_eq!((rows[0].values[0], rows[0].line_bar), (f32::from(k), 0.5));
+            assert!(rows[0].values[1].is_nan());
+        }
+    }
+
+    #[test]
+    fn fast_boards_keep_their_extremes() {
+        let mut plotted = Plotted::new(Vec::new(), 1);
+        let mut rows = Vec::new();
+        for k in 0..10_000u32 {
+            let spike = if k == 5003 { 4095.0 } else { 100.0 };
+            rows.extend(plotted.push(&reading(1e-3 * f64::from(k), spike), &Felt::default(), None));
+        }
+        assert!((980..=1010).contains(&rows.len()), "{}", rows.len());
+        assert!(rows.windows(2).all(|pair| pair[0].t_s < pair[1].t_s));
+        assert_eq!(rows.iter().map(|row| row.values[0]).fold(0.0, f32::max), 4095.0);
+        let broken = plotted.gap(10.0);
+        assert!(broken.last().is_some_and(|row| row.values[0].is_nan() && row.t_s > 10.0));
+    }
+}

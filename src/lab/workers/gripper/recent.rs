@@ -1,0 +1,97 @@
+//! The last moments of a stream: what came before a trial began belongs to it, because the zeros are taken there.
+
+use palpate_device::serial::LinkEvent;
+use palpate_device::wire::Heard;
+use palpate_tactile::board::Reading;
+use std::collections::VecDeque;
+
+/// Length of what is remembered (s).
+const REMEMBERED_S: f64 = 2.0;
+/// Events that are remembered at most: 2 s at 1 kHz, bytes and readings.
+const MOST: usize = 6000;
+
+/// The newest events, oldest first.
+#[derive(Debug, Default)]
+pub(super) struct Recent {
+    events: VecDeque<LinkEvent>,
+}
+
+impl Recent {
+    pub(super) fn push(&mut self, event: &LinkEvent) {
+        self.events.push_back(event.clone());
+        let Some(now_s) = time_of(event) else { return };
+        while self.events.len() > MOST || self.events.front().is_some_and(|e| is_before(e, now_s - REMEMBERED_S)) {
+            self.events.pop_front();
+        }
+    }
+
+    /// Everything from a time on, with the bytes of its first reading.
+    pub(super) fn since(&self, from_s: f64) -> Vec<LinkEvent> {
+        let Some(first) = self.readings().position(|reading| reading.t_s >= from_s) else { return Vec::new() };
+        let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+        let mut places = self.events.iter().enumerate().filter(|(_, event)| is_reading(event)).map(|(place, _)| place);
+        let place = places.nth(first).unwrap_or(0);
+        // The bytes of a reading stand before it.
+        let bytes = |event: &LinkEvent| matches!(event, LinkEvent::Captured(_));
+        let begins = self.events.iter().take(place).rposition(bytes).unwrap_or(place);
+        // Readings of the same piece from before the time stay out.
+        let early = |event: &LinkEvent| is_reading(event) && is_before(event, from_s);
+        self.events.iter().skip(begins).filter(|event| !early(event)).cloned().collect()
+    }
+
+    /// Readings of the last so many seconds.
+    pub(super) fn last(&self, seconds: f64) -> Vec<Reading> {
+        let now_s = self.readings().last().map_or(0.0, |last| last.t_s);
+        self.between(now_s - seconds, f64::INFINITY)
+    }
+
+    /// Readings after one time and before another (s).
+    pub(super) fn between(&self, from_s: f64, to_s: f64) -> Vec<Reading> {
+        self.readings().filter(|reading| reading.t_s > from_s && reading.t_s < to_s).cloned().collect()
+    }
+
+    fn readings(&self) -> impl Iterator<Item = &Reading> {
+        self.events.iter().filter_map(|event| match event {
+            LinkEvent::Heard(Heard::Reading(reading)) => Some(reading),
+            LinkEvent::Heard(Heard::Gap(_) | Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => None,
+        })
+    }
+}
+
+/// When an event happened, on the clock of the readings (s); none for what has no time.
+fn time_of(event: &LinkEvent) -> Option<f64> {
+    match event {
+        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Captured(piece) => Some(piece.arrived_s()),
+        LinkEvent::Heard(Heard::Gap(_) | Heard::Board(_) | Heard::Said(_)) => None,
+    }
+}
+
+fn is_before(event: &LinkEvent, t_s: f64) -> bool {
+    time_of(event).is_none_or(|own| own < t_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_tactile::capture::Captured;
+
+    #[test]
+    fn what_came_before_is_given_with_its_bytes_and_is_bounded() {
+        let mut recent = Recent::default();
+        for k in 0..100_000u32 {
+            let t_s = 1e-3 * f64::from(k);
+            if k % 10 == 0 {
+                recent.push(&LinkEvent::Captured(Captured::Bytes { arrived_s: t_s, bytes: vec![0; 8] }));
+            }
+            let reading = Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None };
+            recent.push(&LinkEvent::Heard(Heard::Reading(reading)));
+        }
+        assert!(recent.events.len() < 2300, "{}", recent.events.len());
+        let since = recent.since(99.5055);
+        assert!(matches!(&since[0], LinkEvent::Captured(piece) if (piece.arrived_s() - 99.5).abs() < 1e-9));
+        assert!(matches!(&since[1], LinkEvent::Heard(Heard::Reading(reading)) if (reading.t_s - 99.506).abs() < 1e-9));
+        assert_eq!(recent.last(0.1).len(), 100);
+        assert!(recent.since(200.0).is_empty());
+    }
+}

@@ -1,0 +1,86 @@
+//! What is listened to: a port, a file of captured bytes, or what a test makes up.
+
+use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
+use palpate_device::wire::ConsoleLine;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A board that is listened to.
+pub trait BoardStream {
+    /// What has come since the last call; if nothing has, waits for it up to a time.
+    fn take(&mut self, patience: Duration) -> Vec<LinkEvent>;
+
+    /// Everything that can be shown of it.
+    fn status(&self) -> LinkStatus;
+
+    /// The clock of its readings, now (s).
+    fn now_s(&self) -> f64;
+
+    /// Sends a line to the board.
+    fn send(&mut self, line: &str) -> Result<(), SendError>;
+
+    /// The newest lines as they came, oldest first.
+    fn console(&self) -> Vec<ConsoleLine>;
+
+    /// True when everything was taken and nothing more will come.
+    fn is_over(&self) -> bool;
+}
+
+impl BoardStream for SerialLink {
+    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
+        Self::take(self, patience)
+    }
+
+    fn status(&self) -> LinkStatus {
+        Self::status(self)
+    }
+
+    fn now_s(&self) -> f64 {
+        Self::now_s(self)
+    }
+
+    fn send(&mut self, line: &str) -> Result<(), SendError> {
+        Self::send(self, line)
+    }
+
+    fn console(&self) -> Vec<ConsoleLine> {
+        Self::console(self)
+    }
+
+    fn is_over(&self) -> bool {
+        Self::is_over(self)
+    }
+}
+
+/// Why nothing can be listened to.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text}")]
+pub struct NotOpened {
+    /// Cause and fix, in a sentence.
+    pub text: String,
+    /// A command that mends it, where there is one.
+    pub command: Option<String>,
+    /// Another program has it, which may let it go.
+    pub may_pass: bool,
+}
+
+impl From<String> for NotOpened {
+    fn from(text: String) -> Self {
+        Self { text, command: None, may_pass: false }
+    }
+}
+
+/// Opens what is to be listened to: a port, a file of captured bytes, or the only likely port; or says why it cannot.
+pub type Listen = Arc<dyn Fn(Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> + Send + Sync>;
+
+/// Listens to a serial port.
+pub fn listen_to_port(port: Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> {
+    let options = LinkOptions { path: port.map(Path::to_owned), ..LinkOptions::default() };
+    let link = SerialLink::open(&options).map_err(|error| NotOpened {
+        text: error.to_string(),
+        may_pass: error.trouble == PortTrouble::Busy,
+        command: error.command,
+    })?;
+    Ok(Box::new(link))
+}

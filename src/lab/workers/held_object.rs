@@ -1,0 +1,35 @@
+//! The object in the hand, as the simulation's thread keeps it and as it is told.
+
+use super::messages::ObjectCard;
+use palpate_sim::objects::{LoadOptions, ObjectModel, catalogue};
+use palpate_sim::scene::Scene;
+use std::sync::Arc;
+use std::time::SystemTime;
+
+/// Which object is loaded, and from what: loading again is skipped when nothing about it changed.
+pub(super) struct LoadedObject {
+    pub(super) source: String,
+    pub(super) options: LoadOptions,
+    /// When its file was written, and how long it is: a file that was exported anew is loaded anew.
+    pub(super) stamp: Option<(SystemTime, u64)>,
+    pub(super) model: Option<Arc<ObjectModel>>,
+}
+
+/// When a file was written, and how long it is; nothing for a built-in object.
+pub(super) fn stamp_of(source: &str) -> Option<(SystemTime, u64)> {
+    let metadata = std::fs::metadata(source).ok()?;
+    Some((metadata.modified().ok()?, metadata.len()))
+}
+
+/// What can be told of an object in a scene.
+pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
+    let built_in = catalogue().iter().find(|b| b.name == model.name);
+    ObjectCard {
+        name: model.name.clone(),
+        title: built_in.map_or_else(|| model.name.clone(), |b| b.title.clone()),
+        class: model.class,
+        mass: model.mass.mass,
+        friction: scene.object.friction.value().unwrap_or(model.friction),
+        size: model.bounds.size(),
+    }
+}

@@ -1,0 +1,512 @@
+//! The simulation's thread: it owns the rig, keeps pace with the clock on the wall, and publishes what it sees.
+
+use super::companion::Companion;
+use super::current::Current;
+use super::gauge::Gauge;
+use super::ghost::{GhostGrasp, GhostMaker};
+use super::held_object::{LoadedObject, card_of, stamp_of};
+use super::latest::Latest;
+use super::listener::Listener;
+use super::messages::{
+    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
+};
+use super::pace::Pace;
+use super::recorder::{Recorder, RecorderNotice};
+use super::sim::SimWorkerSetup;
+use crate::grasping::{GraspSummary, prepare};
+use crate::picture::Stage;
+use palpate_sim::objects::EMPTY;
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::Scene;
+use palpate_tactile::{Channel, PressureArea, SensorLayout, Sensors};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError};
+use std::time::{Duration, Instant};
+
+/// Pause between two grasps of a round.
+const BETWEEN_GRASPS: Duration = Duration::from_millis(600);
+/// Longest time spent stepping before something is published.
+const BUDGET: Duration = Duration::from_millis(12);
+/// Being later than this counts as unable to keep up: the clock is set anew instead of being chased.
+const LATEST: f64 = 0.25;
+
+/// Where results go.
+pub(super) struct Outlets {
+    pub(super) snapshots: Arc<Latest<Snapshot>>,
+    pub(super) accuracy: Arc<Latest<MeasuredAccuracy>>,
+    pub(super) rows: SyncSender<TraceRow>,
+    pub(super) rows_lost: Arc<AtomicBool>,
+    pub(super) loading: Arc<AtomicBool>,
+    pub(super) notices: Sender<Notice>,
+    pub(super) ghost: Arc<Latest<GhostGrasp>>,
+    pub(super) wake: Wake,
+}
+
+impl Outlets {
+    fn tell(&self, notice: Notice) {
+        // The window may have gone; then there is nobody to tell.
+        let _heard = self.notices.send(notice);
+        (self.wake)();
+    }
+}
+
+/// Everything the thread owns.
+pub(super) struct Session {
+    outlets: Outlets,
+    recorder: Option<Recorder>,
+    /// Absent where its thread could not be started.
+    gauge: Option<Gauge>,
+    listener: Option<Listener>,
+    layout: SensorLayout,
+    nominal: Scene,
+    object: Option<LoadedObject>,
+    current: Option<Current>,
+    card: Option<Arc<ObjectCard>>,
+    channels: Arc<[Channel]>,
+    status: Status,
+    last: Option<Arc<FinishedGrasp>>,
+    revision: u64,
+    grasp: u64,
+    /// The scene has been grasped as it is written; what follows comes from random poses.
+    own_pose_done: bool,
+    /// Random poses drawn for this scene so far; the next one's seed is one more.
+    poses_drawn: u64,
+    /// Draws them; made when the first one is wanted.
+    sampler: Option<PoseSampler>,
+    pace: Pace,
+    next_grasp_at: Option<Instant>,
+    recorder_busy: bool,
+    ghost: GhostMaker,
+}
+
+impl Session {
+    /// Runs until it is told to quit.
+    pub(super) fn run(setup: SimWorkerSetup, outlets: Outlets, inbox: &Receiver<Command>) {
+        let recorder_outlets = (outlets.notices.clone(), Arc::clone(&outlets.wake));
+        let recorder = Recorder::start(setup.store, move |notice| {
+            let notice = match notice {
+                RecorderNotice::Stored(id) => Notice::Stored(id),
+                RecorderNotice::Failed(text) => Notice::Failed(text),
+            };
+            let _heard = recorder_outlets.0.send(notice);
+            (recorder_outlets.1)();
+        });
+        let recorder = match recorder {
+            Ok(recorder) => Some(recorder),
+            Err(error) => {
+                outlets.tell(Notice::Failed(format!("trials cannot be stored: {error}")));
+                None
+            }
+        };
+        let gauge = Gauge::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
+        let grasps = setup.grasps.max(1);
+        let mut session = Self {
+            recorder,
+            gauge,
+            listener: setup.model.map(|model| Listener::new(model, grasps)),
+            layout: setup.layout,
+            nominal: setup.scene,
+            object: None,
+            current: None,
+            card: None,
+            channels: Arc::from([]),
+            status: Status {
+                playing: setup.playing,
+                target_speed: 1.0,
+                grasps,
+                recording: setup.recording,
+                ..Status::default()
+            },
+            last: None,
+            revision: 0,
+            grasp: 0,
+            own_pose_done: false,
+            poses_drawn: 0,
+            sampler: None,
+            pace: Pace::starting_at(0.0),
+            next_grasp_at: None,
+            recorder_busy: false,
+            ghost: GhostMaker::new(Arc::clone(&outlets.ghost), Arc::clone(&outlets.wake)),
+            outlets,
+        };
+        session.begin_somehow();
+        while session.wait_and_obey(inbox) {
+            session.advance();
+        }
+        session.drop_recording();
+    }
+
+    /// Waits until something is due or a command comes; false at the end.
+    fn wait_and_obey(&mut self, inbox: &Receiver<Command>) -> bool {
+        let first = match self.time_to_wait() {
+            Some(wait) => match inbox.recv_timeout(wait) {
+                Ok(command) => Some(command),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => return false,
+            },
+            None => match inbox.recv() {
+                Ok(command) => Some(command),
+                Err(_closed) => return false,
+            },
+        };
+        let waiting: Vec<Command> = first.into_iter().chain(inbox.try_iter()).collect();
+        // Of several scenes in a row only the last matters: sliders send many.
+        let last_scene = waiting.iter().rposition(|c| matches!(c, Command::SetScene(_)));
+        for (k, command) in waiting.into_iter().enumerate() {
+            match command {
+                Command::Quit => return false,
+                Command::SetScene(_) if Some(k) != last_scene => {}
+                other => self.obey(other),
+            }
+        }
+        true
+    }
+
+    /// How long nothing is due; `None` for until a command comes.
+    fn time_to_wait(&self) -> Option<Duration> {
+        if !self.status.playing {
+            return None;
+        }
+        if let Some(at) = self.next_grasp_at {
+            return Some(at.saturating_duration_since(Instant::now()));
+        }
+        let current = self.current.as_ref().filter(|current| !current.ended)?;
+        let sample = 1.0 / f64::from(current.scene.timing.sample_hz.max(1));
+        let late = self.pace.due(self.status.target_speed) - (current.frame.t + sample);
+        Some(Duration::from_secs_f64((-late / self.status.target_speed).clamp(0.0, 0.1)))
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::SetScene(scene) => self.set_scene(*scene),
+            Command::Play => {
+                self.status.playing = true;
+                if self.status.finished {
+                    // More of the same, not the same once more: the next poses are new ones.
+                    self.begin_round();
+                } else {
+                    self.set_pace();
+                }
+            }
+            Command::Pause => {
+                self.status.playing = false;
+                self.status.actual_speed = 0.0;
+            }
+            Command::Step => {
+                self.status.playing = false;
+                self.status.actual_speed = 0.0;
+                self.take_frame();
+            }
+            Command::Reset => {
+                self.own_pose_done = false;
+                self.begin_round();
+            }
+            Command::SetSpeed(speed) => {
+                self.status.target_speed = speed.clamp(1.0 / 64.0, 64.0);
+                self.set_pace();
+            }
+            Command::SetGrasps(grasps) => {
+                self.status.grasps = grasps.max(1);
+                if let Some(listener) = &mut self.listener {
+                    listener.set_most_grasps(self.status.grasps);
+                }
+                self.reconsider();
+            }
+            Command::SetThreshold(threshold) => {
+                if let Some(listener) = &mut self.listener {
+                    listener.set_threshold(threshold);
+                }
+                self.reconsider();
+            }
+            Command::SetRecording(recording) => {
+                self.status.recording = recording;
+                if !recording {
+                    self.drop_recording();
+                }
+            }
+            Command::SetErrorBand(shown) => {
+                if std::mem::replace(&mut self.status.error_band, shown) != shown {
+                    self.own_pose_done = false;
+                    self.begin_round();
+                }
+            }
+            Command::Pull(force) => {
+                if let Some(current) = self.current.as_mut().filter(|c| force.is_finite() && !c.ended) {
+                    current.pull(force);
+                }
+            }
+            Command::SetGhost(wanted) => {
+                self.ghost.set_wanted(wanted);
+                self.begin_ghost();
+            }
+            Command::Quit => {}
+        }
+        self.publish();
+    }
+
+    fn set_pace(&mut self) {
+        self.pace = Pace::starting_at(self.current.as_ref().map_or(0.0, |current| current.frame.t));
+    }
+
+    /// Begins with the scene that was asked for or, where that cannot be had, with an empty hand.
+    fn begin_somehow(&mut self) {
+        if let Err(cause) = self.load_object(&self.nominal.clone()) {
+            let refused = self.nominal.clone();
+            EMPTY.clone_into(&mut self.nominal.object.source);
+            self.refuse(refused, cause);
+        }
+        self.begin_round();
+    }
+
+    /// Grasps another scene; where it cannot be had, the current grasp goes on as if nothing had been asked.
+    fn set_scene(&mut self, scene: Scene) {
+        if let Err(cause) = self.load_object(&scene) {
+            return self.refuse(scene, cause);
+        }
+        self.nominal = scene;
+        if let Some(listener) = &mut self.listener {
+            listener.another_scene();
+        }
+        self.sampler = None;
+        self.own_pose_done = false;
+        self.poses_drawn = 0;
+        // Whoever chooses an object after the last grasp wants to see it grasped.
+        self.status.playing |= self.status.finished;
+        self.begin_round();
+    }
+
+    fn refuse(&self, refused: Scene, cause: String) {
+        let refusal = Refusal { refused, kept: self.nominal.clone(), cause };
+        self.outlets.tell(Notice::SceneRefused(Box::new(refusal)));
+    }
+
+    /// The first grasp of a round.
+    fn begin_round(&mut self) {
+        self.status.grasp_of_round = 0;
+        if let Some(listener) = &mut self.listener {
+            listener.start_over();
+        }
+        self.begin_grasp();
+    }
+
+    fn begin_grasp(&mut self) {
+        self.drop_recording();
+        self.next_grasp_at = None;
+        if let Err(cause) = self.load_object(&self.nominal.clone()) {
+            // The file has changed for the worse since; the object as it was will do.
+            self.outlets.tell(Notice::Failed(cause));
+        }
+        let model = self.object.as_ref().and_then(|object| object.model.clone());
+        self.status.finished = false;
+        self.status.grasp_of_round += 1;
+        let again = self.own_pose_done;
+        self.own_pose_done = true;
+        // The first grasp is the scene as written; the following ones come from random poses, on the object as it was
+        // released where the scene says so.
+        let (scene, seed) = if again {
+            self.poses_drawn += 1;
+            let sampler = self.sampler.get_or_insert_with(|| PoseSampler::new(&self.nominal, model.as_deref()));
+            let before = self.current.as_ref().filter(|current| current.ended && self.status.grasp_of_round > 1);
+            let released = before.map(|current| current.frame.as_ref());
+            (sampler.draw_after(model.as_deref(), self.poses_drawn, released).0, self.poses_drawn)
+        } else {
+            (self.nominal.clone(), 0)
+        };
+        let sensors = match Sensors::new(&self.layout, &scene.gripper, PressureArea::Participation) {
+            Ok(sensors) => sensors,
+            Err(error) => return self.outlets.tell(Notice::Failed(error.to_string())),
+        };
+        if let Some(gauge) = self.gauge.as_mut().filter(|_| !again) {
+            gauge.measure(&scene, model.clone());
+        }
+        let mut run = prepare(&scene, model.as_deref(), seed);
+        if !again {
+            for warning in &run.info().warnings {
+                self.outlets.tell(Notice::Warning(warning.clone()));
+            }
+        }
+        if self.status.recording
+            && let Some(recorder) = &self.recorder
+        {
+            recorder.begin(run.info());
+            self.recorder_busy = true;
+        }
+        if let Some(warning) = self.listener.as_mut().and_then(|listener| listener.begin_grasp(&scene)) {
+            self.outlets.tell(Notice::Warning(warning));
+        }
+        self.grasp += 1;
+        self.status.duration = scene.timing.duration_s;
+        self.channels = sensors.channels().into();
+        let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
+        let frame = Arc::new(run.rig_mut().first_look());
+        self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
+        let (told, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
+        let channels = sensors.channels().len();
+        let companion = self.status.error_band.then(|| Companion::new(&scene, model.as_deref(), seed, channels));
+        self.current =
+            Some(Current { run, companion, plan, scene, stage, sensors, frame, told, pulled: false, ended: false });
+        self.pace = Pace::starting_at(0.0);
+        self.begin_ghost();
+        self.publish();
+    }
+
+    /// The other engine computes the same grasp, where a ghost is wanted.
+    fn begin_ghost(&mut self) {
+        if let Some(current) = &self.current {
+            let model = self.object.as_ref().and_then(|object| object.model.clone());
+            self.ghost.begin(self.grasp, &current.scene, model);
+        }
+    }
+
+    /// Loads a scene's object, unless it is the one at hand. On failure, which comes as a sentence, that one stays.
+    fn load_object(&mut self, scene: &Scene) -> Result<(), String> {
+        let (source, options) = (scene.object.source.clone(), scene.load_options());
+        let stamp = stamp_of(&source);
+        let is_known = |o: &LoadedObject| o.source == source && o.options == options && o.stamp == stamp;
+        if self.object.as_ref().is_some_and(is_known) {
+            return Ok(());
+        }
+        self.status.loading = Some(source.clone());
+        self.publish();
+        self.outlets.loading.store(true, Ordering::Relaxed);
+        let loaded = scene.load_object();
+        self.outlets.loading.store(false, Ordering::Relaxed);
+        self.status.loading = None;
+        self.publish();
+        let model = loaded.map_err(|error| error.to_string())?.map(Arc::new);
+        self.object = Some(LoadedObject { source, options, stamp, model });
+        self.sampler = None;
+        Ok(())
+    }
+
+    /// Takes all samples that are due, within the budget.
+    fn advance(&mut self) {
+        if !self.status.playing {
+            return;
+        }
+        if let Some(at) = self.next_grasp_at {
+            if Instant::now() >= at {
+                self.begin_grasp();
+            }
+            return;
+        }
+        let started = Instant::now();
+        let mut any = false;
+        while let Some(current) = self.current.as_ref().filter(|current| !current.ended) {
+            let sample = 1.0 / f64::from(current.scene.timing.sample_hz.max(1));
+            let due = self.pace.due(self.status.target_speed);
+            if current.frame.t + sample > due {
+                break;
+            }
+            if started.elapsed() > BUDGET {
+                if due - current.frame.t > LATEST * self.status.target_speed {
+                    self.pace.give_way(current.frame.t);
+                }
+                break;
+            }
+            self.take_frame();
+            any = true;
+        }
+        if any {
+            if let Some(current) = &self.current {
+                self.status.actual_speed = self.pace.measured(current.frame.t).unwrap_or(self.status.actual_speed);
+            }
+            self.publish();
+        }
+    }
+
+    /// Runs on to the next sample and hands it to everybody.
+    fn take_frame(&mut self) {
+        let Some(current) = self.current.as_mut().filter(|current| !current.ended) else { return };
+        let Some(frame) = current.run.next_frame().cloned() else { return self.end_grasp() };
+        if self.recorder_busy
+            && let Some(recorder) = &self.recorder
+        {
+            recorder.frame(&frame);
+        }
+        if let Some(listener) = &mut self.listener {
+            listener.push(&frame);
+        }
+        let read = current.sensors.read(&frame);
+        let errors = current.companion.as_mut().map(|c| c.errors(frame.t, &read, &current.sensors)).unwrap_or_default();
+        let values = read.into_iter().map(|v| v.map_or(f32::NAN, |v| v as f32)).collect();
+        let row = TraceRow { grasp: self.grasp, rolling: false, t: frame.t, line_bar: frame.line_bar, values, errors };
+        current.frame = Arc::new(frame);
+        if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
+            self.outlets.rows_lost.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn end_grasp(&mut self) {
+        let Some(current) = self.current.as_mut() else { return };
+        current.ended = true;
+        let trial = current.run.clone().finish(&current.scene);
+        for warning in trial.info.warnings.iter().skip(current.told) {
+            self.outlets.tell(Notice::Warning(warning.clone()));
+        }
+        if self.recorder_busy
+            && let Some(recorder) = &self.recorder
+        {
+            recorder.finish(&trial.info.quality, &trial.info.warnings);
+            self.recorder_busy = false;
+        }
+        let summary = GraspSummary::new(&trial, &current.scene);
+        self.last = Some(Arc::new(FinishedGrasp { grasp: self.grasp, summary }));
+        self.status.actual_speed = 0.0;
+        if trial.info.quality.finite {
+            if let Some(listener) = &mut self.listener {
+                listener.end_grasp();
+            }
+            self.next_grasp_at = Some(Instant::now() + BETWEEN_GRASPS);
+            self.reconsider();
+        } else {
+            self.end_round();
+        }
+        self.publish();
+    }
+
+    /// Between two grasps: is another one needed?
+    fn reconsider(&mut self) {
+        let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
+        if self.next_grasp_at.is_some() && (decided || self.status.grasp_of_round >= self.status.grasps) {
+            self.end_round();
+        }
+    }
+
+    fn end_round(&mut self) {
+        self.next_grasp_at = None;
+        self.status.finished = true;
+        self.status.playing = false;
+    }
+
+    /// Gives up a trial that has not reached its end.
+    fn drop_recording(&mut self) {
+        if self.recorder_busy
+            && let Some(recorder) = &self.recorder
+        {
+            recorder.discard();
+        }
+        self.recorder_busy = false;
+    }
+
+    fn publish(&mut self) {
+        let Some(current) = &self.current else { return (self.outlets.wake)() };
+        self.revision += 1;
+        self.outlets.snapshots.publish(Arc::new(Snapshot {
+            revision: self.revision,
+            grasp: self.grasp,
+            scene: Arc::clone(&current.scene),
+            plan: Arc::clone(&current.plan),
+            stage: Arc::clone(&current.stage),
+            object: self.card.clone(),
+            channels: Arc::clone(&self.channels),
+            frame: Arc::clone(&current.frame),
+            status: self.status.clone(),
+            last: self.last.clone(),
+            identification: self.listener.as_ref().and_then(Listener::view),
+            recognition_off: self.listener.as_ref().and_then(Listener::why_off),
+        }));
+        (self.outlets.wake)();
+    }
+}

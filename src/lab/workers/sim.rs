@@ -1,0 +1,149 @@
+//! The handle on the simulation's thread: commands go in, snapshots, trace rows and notices come out.
+
+use super::ghost::GhostGrasp;
+use super::latest::Latest;
+use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, Snapshot, TraceRow, Wake};
+use super::session::{Outlets, Session};
+use palpate_learn::Model;
+use palpate_sim::scene::Scene;
+use palpate_tactile::SensorLayout;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, channel, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// What a simulation worker starts from.
+pub struct SimWorkerSetup {
+    /// The first scene.
+    pub scene: Scene,
+    /// Sensor layout of the traces.
+    pub layout: SensorLayout,
+    /// Where trials are stored.
+    pub store: PathBuf,
+    /// Whether trials are stored from the start.
+    pub recording: bool,
+    /// Grasps in a round; with a model the most, because a round ends once it is clear what is in the hand.
+    pub grasps: u32,
+    /// Recognises what is in the hand; without one nothing is recognised.
+    pub model: Option<Arc<Model>>,
+    /// Whether time passes from the start.
+    pub playing: bool,
+    /// Called when there is something new.
+    pub wake: Wake,
+}
+
+/// Commands that wait at most; more are refused rather than queued without end.
+const MOST_COMMANDS: usize = 256;
+/// Trace rows that wait at most: two minutes at 75 Hz. A reader that sleeps longer finds a gap.
+const MOST_ROWS: usize = 9000;
+
+/// A handle on the simulation's thread. Dropping it ends the thread and waits for what it still has to store.
+#[derive(Debug)]
+pub struct SimWorker {
+    commands: SyncSender<Command>,
+    snapshots: Arc<Latest<Snapshot>>,
+    accuracy: Arc<Latest<MeasuredAccuracy>>,
+    rows: Receiver<TraceRow>,
+    rows_lost: Arc<AtomicBool>,
+    loading: Arc<AtomicBool>,
+    notices: Receiver<Notice>,
+    ghost: Arc<Latest<GhostGrasp>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SimWorker {
+    /// Starts the thread.
+    pub fn start(setup: SimWorkerSetup) -> std::io::Result<Self> {
+        let (commands, inbox) = sync_channel(MOST_COMMANDS);
+        let (row_sender, rows) = sync_channel(MOST_ROWS);
+        let (notice_sender, notices) = channel();
+        let snapshots = Arc::new(Latest::default());
+        let accuracy = Arc::new(Latest::default());
+        let ghost = Arc::new(Latest::default());
+        let [rows_lost, loading] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let outlets = Outlets {
+            snapshots: Arc::clone(&snapshots),
+            accuracy: Arc::clone(&accuracy),
+            rows: row_sender,
+            rows_lost: Arc::clone(&rows_lost),
+            loading: Arc::clone(&loading),
+            notices: notice_sender,
+            ghost: Arc::clone(&ghost),
+            wake: Arc::clone(&setup.wake),
+        };
+        let thread = std::thread::Builder::new().name("sim".to_owned()).spawn(move || {
+            let last_words = (outlets.notices.clone(), Arc::clone(&outlets.wake));
+            // A panic becomes a message; the window stays.
+            let outcome =
+                std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| Session::run(setup, outlets, &inbox)));
+            if outcome.is_err() {
+                let text =
+                    "the simulation stopped through a fault of the program; restart Palpate and report what you did";
+                // If nobody listens any more, nobody needs to know.
+                let _heard = last_words.0.send(Notice::Failed(text.to_owned()));
+                last_words.1();
+            }
+        })?;
+        Ok(Self { commands, snapshots, accuracy, rows, rows_lost, loading, notices, ghost, thread: Some(thread) })
+    }
+
+    /// Sends a command.
+    pub fn send(&self, command: Command) -> Result<(), NotSent> {
+        self.commands.try_send(command).map_err(|error| match error {
+            TrySendError::Full(_) => NotSent::Busy,
+            TrySendError::Disconnected(_) => NotSent::Gone,
+        })
+    }
+
+    /// The newest snapshot; absent until the first scene has been loaded.
+    pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
+        self.snapshots.get()
+    }
+
+    /// What the accuracy of the last scene that was measured costs and leaves.
+    pub fn accuracy(&self) -> Option<Arc<MeasuredAccuracy>> {
+        self.accuracy.get()
+    }
+
+    /// Trace rows since the last call, in order.
+    pub fn rows(&self) -> impl Iterator<Item = TraceRow> + '_ {
+        self.rows.try_iter()
+    }
+
+    /// The newest grasp that the other engine has computed; compare its number with the snapshot's.
+    pub fn ghost(&self) -> Option<Arc<GhostGrasp>> {
+        self.ghost.get()
+    }
+
+    /// True once after rows had to be dropped because nobody read them.
+    pub fn take_rows_lost(&self) -> bool {
+        self.rows_lost.swap(false, Ordering::Relaxed)
+    }
+
+    /// Notices since the last call, in order.
+    pub fn notices(&self) -> impl Iterator<Item = Notice> + '_ {
+        self.notices.try_iter()
+    }
+}
+
+impl Drop for SimWorker {
+    fn drop(&mut self) {
+        let wait = || std::thread::sleep(Duration::from_millis(1));
+        // Loading a large file cannot be interrupted; a window that closes does not wait for it.
+        let loading = || self.loading.load(Ordering::Relaxed);
+        while self.send(Command::Quit) == Err(NotSent::Busy) && !loading() {
+            wait();
+        }
+        if let Some(thread) = self.thread.take() {
+            while !thread.is_finished() && !loading() {
+                wait();
+            }
+            if thread.is_finished() {
+                // A panic in the thread has been told already.
+                let _ended = thread.join();
+            }
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Training beside a window: a thread "train" that counts the labelled trials of the real gripper, trains a recogniser on
+//! them, keeps it as a file, and loads such files.
+
+use super::desk::{Desk, Outlet};
+use super::messages::Wake;
+use crate::datasets::{SavedModel, new_model_path, saved_models};
+use crate::study::{JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingStage, labelled_classes};
+use palpate_learn::{Model, ModelError, method};
+use palpate_sim::gripper::Gripper;
+use palpate_store::Store;
+use palpate_tactile::{Channel, SensorLayout};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What the user wants of training.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TrainWish {
+    /// Look which trials and models there are.
+    Look,
+    /// Train.
+    Train(TrainRequest),
+    /// Load a model.
+    Load(PathBuf),
+}
+
+/// How to train.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TrainRequest {
+    /// Key of the method.
+    pub method: String,
+    /// Seed of the fit and of which trials are held back.
+    pub seed: u64,
+    /// A quick fit with worse results.
+    pub quick: bool,
+}
+
+/// A model with the file it is kept in.
+#[derive(Clone, Debug)]
+pub struct TrainedModel {
+    /// The model.
+    pub model: Arc<Model>,
+    /// Its file.
+    pub path: PathBuf,
+    /// What it is, in a line.
+    pub about: String,
+}
+
+/// A model that has just been trained, and how it did.
+#[derive(Clone, Debug)]
+pub struct FinishedTraining {
+    /// The model.
+    pub trained: TrainedModel,
+    /// How it did on the trials that were held back.
+    pub judged: JudgedModel,
+}
+
+/// Where training stands.
+#[derive(Clone, Debug, Default)]
+pub struct TrainerView {
+    /// Labelled trials of each object, or why they cannot be counted; none before they were looked for.
+    pub classes: Option<Result<Arc<[LabelledClass]>, String>>,
+    /// Models that were saved, newest first.
+    pub models: Arc<[SavedModel]>,
+    /// What is being trained, and how far it is.
+    pub running: Option<(TrainRequest, TrainingStage)>,
+    /// How the last training ended that was not given up.
+    pub finished: Option<Result<Arc<FinishedTraining>, String>>,
+    /// How often a model was asked for, and what came of it last.
+    pub loaded: (u64, Option<Result<Arc<TrainedModel>, String>>),
+}
+
+/// A handle on the thread.
+pub type Trainer = Desk<TrainWish, TrainerView>;
+
+impl Trainer {
+    /// Starts the thread; trials come from the store at `store`, models go into the folder `models`.
+    pub fn start(store: PathBuf, models: PathBuf, wake: Wake) -> std::io::Result<Self> {
+        let mut room = Room { store, models, view: TrainerView::default() };
+        Self::spawn("train", wake, move |wish, stop, outlet| {
+            room.grant(wish, stop, outlet);
+            outlet.publish(room.view.clone());
+        })
+    }
+}
+
+/// What the thread owns.
+struct Room {
+    store: PathBuf,
+    models: PathBuf,
+    view: TrainerView,
+}
+
+impl Room {
+    fn grant(&mut self, wish: TrainWish, stop: &AtomicBool, outlet: &Outlet<TrainerView>) {
+        match wish {
+            TrainWish::Look => {
+                let counted = Store::open(&self.store).and_then(|store| labelled_classes(&store));
+                self.view.classes = Some(counted.map(Arc::from).map_err(|error| error.to_string()));
+                self.view.models = saved_models(&self.models).into();
+            }
+            TrainWish::Train(request) => {
+                let finished = self.trained(&request, stop, outlet).map(Arc::new);
+                if !stop.load(Ordering::Relaxed) {
+                    self.view.finished = Some(finished);
+                }
+                self.view.models = saved_models(&self.models).into();
+            }
+            TrainWish::Load(path) => {
+                let loaded = loaded(&path).map(Arc::new).map_err(|error| error.to_string());
+                self.view.loaded = (self.view.loaded.0 + 1, Some(loaded));
+            }
+        }
+    }
+
+    fn trained(
+        &self,
+        request: &TrainRequest,
+        stop: &AtomicBool,
+        outlet: &Outlet<TrainerView>,
+    ) -> Result<FinishedTraining, String> {
+        let tell = |stage| {
+            outlet.publish(TrainerView { running: Some((request.clone(), stage)), ..self.view.clone() });
+        };
+        tell(TrainingStage::Reading(0, 0));
+        let method = method(&request.method).ok_or_else(|| format!("there is no method \"{}\"", request.method))?;
+        let store = Store::open(&self.store).map_err(|error| error.to_string())?;
+        let (seed, quick) = (request.seed, request.quick);
+        let training = LabelledTraining { method, seed, quick, tell: &tell, stop };
+        let judged = training.train(&store).map_err(|error| error.to_string())?;
+        let now = store.now().map_err(|error| error.to_string())?;
+        let path = new_model_path(&self.models, method.key, &now);
+        judged.model.save(&path).map_err(|error| error.to_string())?;
+        let (model, about) = (Arc::new(judged.model.clone()), judged.model.card.described());
+        Ok(FinishedTraining { trained: TrainedModel { model, path, about }, judged })
+    }
+}
+
+/// Reads a model that can listen to the real gripper.
+fn loaded(path: &Path) -> Result<TrainedModel, ModelError> {
+    let model = Model::load(path)?;
+    check_listens(&model)?;
+    let about = model.card.described();
+    Ok(TrainedModel { model: Arc::new(model), path: path.to_owned(), about })
+}
+
+/// Refuses a model that wants channels which the real gripper does not have.
+fn check_listens(model: &Model) -> Result<(), ModelError> {
+    let channels = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&Gripper::default()));
+    let names: Vec<String> = channels.unwrap_or_default().iter().map(Channel::name).collect();
+    if model.card.channels.iter().all(|channel| names.contains(channel)) {
+        Ok(())
+    } else {
+        model.check_channels(&names)
+    }
+}
+
+impl TrainerView {
+    /// Why nothing can be trained yet, in a sentence.
+    pub fn too_little(&self) -> Option<String> {
+        let Some(Ok(classes)) = &self.classes else { return None };
+        let enough = classes.iter().filter(|class| class.is_enough()).count();
+        let so_far = match classes.len() {
+            0 => String::new(),
+            of => format!(", and {enough} of {of} have as many"),
+        };
+        (enough < 2).then(|| {
+            format!(
+                "Two objects with {LEAST_TRIALS} labelled trials each are needed{so_far}: record and label more. The paper \
+                 has 40 to 55 of each."
+            )
+        })
+    }
+}

@@ -1,0 +1,198 @@
+//! What a simulation samples, and how far it can be trusted: plain records, raw quantities only.
+
+use crate::gripper::{Phase, Side};
+use palpate_geometry::Pose;
+use serde::{Deserialize, Serialize};
+
+/// Load on one taxel at one sample, in the axes of its segment: what the finger feels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TaxelLoad {
+    /// Left pad's taxels first, then the right pad's; see [`crate::gripper::TaxelGrid`].
+    pub taxel: u16,
+    /// Force into the pad (N).
+    pub normal: f32,
+    /// Shear force towards the tip (N).
+    pub along: f32,
+    /// Shear force across the finger, along the gripper's y (N).
+    pub across: f32,
+}
+
+/// Everything sampled at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Which sample of the trial, from 0.
+    pub sample: u32,
+    /// Time since the start of the trial (s).
+    pub t: f64,
+    /// Commanded line pressure (bar).
+    pub line_bar: f64,
+    /// What the programme was doing.
+    pub phase: Phase,
+    /// Joint angles, left finger then right, from palm to tip (rad).
+    pub q: Vec<f64>,
+    /// The object's frame in the world; absent for an empty hand.
+    pub world_from_object: Option<Pose>,
+    /// Loaded taxels, in rising order; those not listed carry nothing.
+    pub taxels: Vec<TaxelLoad>,
+}
+
+impl Frame {
+    /// Joint angles of one finger (rad).
+    pub fn joints(&self, side: Side) -> &[f64] {
+        let n = self.q.len() / 2;
+        &self.q[side.index() * n..(side.index() + 1) * n]
+    }
+
+    /// Loads on one pad that has `count` taxels, with indices counted from that pad's first taxel.
+    pub fn loads(&self, side: Side, count: usize) -> impl Iterator<Item = (usize, TaxelLoad)> + '_ {
+        let from = side.index() * count;
+        self.taxels
+            .iter()
+            .map(move |load| (usize::from(load.taxel).wrapping_sub(from), *load))
+            .filter(move |(index, _)| *index < count)
+    }
+
+    /// Sum of the normal forces on one pad (N).
+    pub fn normal_force(&self, side: Side, count: usize) -> f64 {
+        self.loads(side, count).map(|(_, load)| f64::from(load.normal)).sum()
+    }
+}
+
+/// How far a simulated trial can be trusted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Quality {
+    /// False when a number became infinite or NaN; the trial ends before that step.
+    pub finite: bool,
+    /// False when any step missed the solver's tolerance.
+    pub converged: bool,
+    /// Solver steps taken.
+    pub steps: u64,
+    /// Steps taken again, shorter, because their estimated error was above the scene's tolerance.
+    pub rejected_steps: u64,
+    /// Steps of the least length whose estimated error was above it nevertheless.
+    pub missed_steps: u64,
+    /// The shortest step (s); zero in trials from before it was recorded.
+    pub least_step_s: f64,
+    /// Convex minimisations, those of rejected steps included; zero in trials from before it was recorded.
+    pub solves: u64,
+    /// Steps that missed the solver's tolerance.
+    pub unconverged_steps: u64,
+    /// Mean Newton iterations per minimisation; at fixed Euler steps that is per step.
+    pub newton_mean: f64,
+    /// Most Newton iterations in one step.
+    pub newton_max: u32,
+    /// Largest outer friction residual of any step; see [`crate::physics::StepReport`].
+    pub friction_residual: f64,
+    /// Largest torque at any joint that neither springs nor contacts account for at the end of the hold, as a share
+    /// of the actuation torque. Far from zero means the grasp had not come to rest.
+    pub static_residual: f64,
+    /// Where and when forces did not balance; absent where every step reached its tolerance.
+    pub imbalance: Option<Imbalance>,
+}
+
+/// Steps whose forces did not balance to the solver's tolerance: the first of them, and the worst.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Imbalance {
+    /// Tick at which the first such step began.
+    pub first_tick: u64,
+    /// Its time (s).
+    pub first_s: f64,
+    /// What was farthest from balance in the worst such step: `joint 4 of the left finger`, `the object`.
+    pub worst_at: String,
+    /// What was left there, as a multiple of what the tolerance allows.
+    pub worst_excess: f64,
+}
+
+impl Quality {
+    /// True when the trial may be learned from: every number was finite and every step reached its tolerance.
+    pub fn is_sound(&self) -> bool {
+        self.finite && self.converged
+    }
+
+    /// What is wrong with a trial that did not converge, in a sentence.
+    pub fn misses(&self) -> Option<String> {
+        let (missed, steps) = (self.unconverged_steps, self.steps);
+        let place = |imbalance: &Imbalance| {
+            let Imbalance { first_tick, first_s, worst_at, .. } = imbalance;
+            format!(", the first at {first_s:.3} s (tick {first_tick}), worst at {worst_at}")
+        };
+        let place = self.imbalance.as_ref().map(place).unwrap_or_default();
+        (!self.converged).then(|| format!("{missed} of {steps} steps missed the solver's tolerance{place}"))
+    }
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            finite: true,
+            converged: true,
+            steps: 0,
+            rejected_steps: 0,
+            missed_steps: 0,
+            least_step_s: 0.0,
+            solves: 0,
+            unconverged_steps: 0,
+            newton_mean: 0.0,
+            newton_max: 0,
+            friction_residual: 0.0,
+            static_residual: 0.0,
+            imbalance: None,
+        }
+    }
+}
+
+/// One effect as a simulation took it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedEffect {
+    /// Its name in the scene's `[effects]`.
+    pub name: String,
+    /// What the scene says: `off`, `auto` or `on`.
+    pub setting: String,
+    /// Whether it was simulated.
+    pub on: bool,
+    /// How much the scene calls for it, without dimension; never infinite.
+    pub number: f64,
+    /// `auto` means on where the number is above this.
+    pub threshold: f64,
+    /// Why, in words.
+    pub reason: String,
+}
+
+/// Which effects a simulation takes into account and why; made once, when the scene is built.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Plan {
+    /// In the order in which effects are told; empty for trials from before there were effects.
+    pub effects: Vec<PlannedEffect>,
+}
+
+impl Plan {
+    /// Whether an effect is simulated. One that the plan does not have is not.
+    pub fn is_on(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name && effect.on)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loads_are_told_apart_by_side() {
+        let load = |taxel, normal| TaxelLoad { taxel, normal, along: 0.0, across: 0.0 };
+        let frame = Frame {
+            sample: 0,
+            t: 0.0,
+            line_bar: 0.0,
+            phase: Phase::Close,
+            q: vec![1.0, 2.0, 3.0, 4.0],
+            world_from_object: None,
+            taxels: vec![load(3, 1.0), load(9, 2.0), load(10, 4.0), load(19, 8.0)],
+        };
+        assert_eq!(frame.joints(Side::Right), [3.0, 4.0]);
+        let indices: Vec<usize> = frame.loads(Side::Right, 10).map(|(i, _)| i).collect();
+        assert_eq!(indices, [0, 9]);
+        assert_eq!((frame.normal_force(Side::Left, 10), frame.normal_force(Side::Right, 10)), (3.0, 12.0));
+    }
+}

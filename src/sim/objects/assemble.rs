@@ -1,0 +1,364 @@
+//! From the shapes and masses that a file declares to an object ready for simulation and drawing.
+
+use super::{CollisionShape, LoadOptions, ObjectError, ObjectModel, Resting};
+use palpate_geometry::palette::Rgb;
+use palpate_geometry::units::three_digits;
+use palpate_geometry::{
+    Bounds, ColouredPart, DistanceField, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh, TriMesh, bake,
+    choose_cell, mass_properties, repair, support_points,
+};
+use std::sync::Arc;
+
+/// A shape as a file declares it, in its own frame.
+pub(super) enum ShapeSource {
+    /// A primitive solid.
+    Primitive(Primitive),
+    /// A mesh file's parts, scaled.
+    Mesh(Vec<ColouredPart>),
+}
+
+/// What the file says of one link's mass.
+pub(super) struct Inertial {
+    pub(super) link: String,
+    /// In the object's frame; absent where the file says nothing usable.
+    pub(super) declared: Option<MassProperties>,
+}
+
+/// Everything gathered from a file, in its own units and in the frame of its root.
+pub(super) struct Blueprint {
+    pub(super) name: String,
+    pub(super) visual: Vec<ColouredPart>,
+    pub(super) visual_solids: Vec<SolidPart>,
+    pub(super) collision: Vec<SolidPart>,
+    pub(super) inertials: Vec<Inertial>,
+    /// Triangles of all meshes, seen and touched.
+    triangles: usize,
+    pub(super) warnings: Vec<String>,
+}
+
+/// An object larger than this is taken to be in millimetres when that makes sense of it (m).
+const LARGEST_PLAUSIBLE: f64 = 3.0;
+/// An object smaller than this is taken to be given in units of a thousand metres (m).
+const SMALLEST_PLAUSIBLE: f64 = 5e-4;
+/// Beyond this, baking and drawing make no sense (m).
+const LARGEST_POSSIBLE: f64 = 10.0;
+/// Larger than the gripper's world: loaded, with a warning (m).
+const LARGEST_GRASPABLE: f64 = 0.5;
+/// Triangles of one object beyond this are refused, however many meshes they come in.
+const MOST_TRIANGLES: usize = 4_000_000;
+/// Friction coefficient where nothing is known of the surface: plastic and varnished wood.
+const DEFAULT_FRICTION: f64 = 0.6;
+/// Colour where the file gives none.
+const DEFAULT_COLOUR: Rgb = Rgb(196, 190, 180);
+
+impl Blueprint {
+    pub(super) fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            visual: Vec::new(),
+            visual_solids: Vec::new(),
+            collision: Vec::new(),
+            inertials: Vec::new(),
+            triangles: 0,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Counts the triangles of a mesh; false when the object would have too many of them in all.
+    fn makes_room_for(&mut self, shape: &ShapeSource) -> bool {
+        if let ShapeSource::Mesh(parts) = shape {
+            self.triangles += parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+        }
+        self.triangles <= MOST_TRIANGLES
+    }
+
+    /// Adds what is seen. A colour given here overrides those of the mesh file, as in every URDF viewer.
+    pub(super) fn add_visual(&mut self, shape: &ShapeSource, place: &Pose, colour: Option<Rgb>) {
+        if !self.makes_room_for(shape) {
+            return;
+        }
+        match shape {
+            ShapeSource::Primitive(primitive) => {
+                let mut mesh = primitive.tessellate();
+                mesh.transform(place);
+                self.visual.push(ColouredPart { mesh, colour });
+                self.visual_solids.push(SolidPart::Primitive(*primitive, *place));
+            }
+            ShapeSource::Mesh(parts) => {
+                for part in parts {
+                    let mut mesh = part.mesh.clone();
+                    mesh.transform(place);
+                    self.visual.push(ColouredPart { mesh, colour: colour.or(part.colour) });
+                }
+                self.visual_solids.push(SolidPart::Mesh(joined(parts, place)));
+            }
+        }
+    }
+
+    /// Adds what is touched.
+    pub(super) fn add_collision(&mut self, shape: &ShapeSource, place: &Pose) {
+        if !self.makes_room_for(shape) {
+            return;
+        }
+        self.collision.push(match shape {
+            ShapeSource::Primitive(primitive) => SolidPart::Primitive(*primitive, *place),
+            ShapeSource::Mesh(parts) => SolidPart::Mesh(joined(parts, place)),
+        });
+    }
+
+    /// Builds the object as the scene wants it.
+    pub(super) fn build(mut self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+        if self.triangles > MOST_TRIANGLES {
+            let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
+            return Err(ObjectError::Malformed { name: self.name, cause });
+        }
+        let mut solids = match options.collision {
+            CollisionShape::File if !self.collision.is_empty() => std::mem::take(&mut self.collision),
+            CollisionShape::File | CollisionShape::Visual => std::mem::take(&mut self.visual_solids),
+            CollisionShape::Hull => {
+                let all = if self.collision.is_empty() { &self.visual_solids } else { &self.collision };
+                vec![SolidPart::Mesh(hull_of(all, &self.name)?)]
+            }
+        };
+        if solids.is_empty() {
+            return Err(ObjectError::NoShape { name: self.name });
+        }
+        self.check_numbers(&solids)?;
+        let scale = self.scale(options, &solids);
+        scale_solids(&mut solids, scale);
+        for part in &mut self.visual {
+            part.mesh.scale(glam::DVec3::splat(scale));
+        }
+        self.repair_meshes(&mut solids)?;
+        let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
+        self.check_size(&bounds)?;
+        let mass = self.mass(options, &solids, scale);
+        let field = match solids.as_slice() {
+            [SolidPart::Primitive(shape, place)] => DistanceField::primitive(*shape, place),
+            _ => {
+                let grid = bake(&solids, options.cell.unwrap_or_else(|| choose_cell(&bounds)));
+                DistanceField::Grid(Arc::new(
+                    grid.map_err(|cause| ObjectError::Bake { name: self.name.clone(), cause })?,
+                ))
+            }
+        };
+        let surface = if self.visual.is_empty() {
+            surface_of(&solids)
+        } else {
+            SurfaceMesh::from_parts(&self.visual, DEFAULT_COLOUR)
+        };
+        Ok(ObjectModel {
+            name: self.name,
+            class: None,
+            surface: Arc::new(surface),
+            field,
+            resting: resting_of(&solids),
+            parts: solids.into(),
+            mass,
+            friction: DEFAULT_FRICTION,
+            bounds,
+            warnings: self.warnings,
+        })
+    }
+
+    fn check_numbers(&self, solids: &[SolidPart]) -> Result<(), ObjectError> {
+        let finite = |mesh: &TriMesh| mesh.points.iter().all(|p| p.is_finite());
+        let sound = solids.iter().all(|solid| match solid {
+            SolidPart::Mesh(mesh) => finite(mesh),
+            SolidPart::Primitive(..) => true,
+        });
+        if sound && self.visual.iter().all(|part| finite(&part.mesh)) {
+            Ok(())
+        } else {
+            let cause = "a mesh holds numbers that are not finite".to_owned();
+            Err(ObjectError::Malformed { name: self.name.clone(), cause })
+        }
+    }
+
+    /// The factor on lengths: what the scene says, or a guess with a warning.
+    fn scale(&mut self, options: &LoadOptions, solids: &[SolidPart]) -> f64 {
+        if let Some(scale) = options.scale {
+            return scale;
+        }
+        let size = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union).size().max_element();
+        let (scale, guess) = if size > LARGEST_PLAUSIBLE {
+            (1e-3, "millimetres taken for metres")
+        } else if size > 0.0 && size < SMALLEST_PLAUSIBLE {
+            (1e3, "metres scaled to millimetres twice")
+        } else {
+            return 1.0;
+        };
+        let after = size * scale * 1e3;
+        self.warnings.push(format!(
+            "as given, \"{}\" is {} m across: {guess}? It is used at {} mm; set object.scale to decide",
+            self.name,
+            three_digits(size),
+            three_digits(after),
+        ));
+        scale
+    }
+
+    fn check_size(&mut self, bounds: &Bounds) -> Result<(), ObjectError> {
+        let size = bounds.size();
+        if size.max_element() > LARGEST_POSSIBLE || size.max_element() < 1e-5 || !size.is_finite() {
+            return Err(ObjectError::Size { name: self.name.clone(), metres: size.max_element() });
+        }
+        if size.max_element() > LARGEST_GRASPABLE {
+            let cm = size.max_element() * 100.0;
+            self.warnings.push(format!("\"{}\" is {cm:.0} cm across, far larger than the gripper", self.name));
+        }
+        Ok(())
+    }
+
+    fn repair_meshes(&mut self, solids: &mut [SolidPart]) -> Result<(), ObjectError> {
+        for solid in solids {
+            if let SolidPart::Mesh(mesh) = solid {
+                let repaired = repair(mesh).map_err(|cause| ObjectError::Unsound { name: self.name.clone(), cause })?;
+                *mesh = repaired.mesh;
+                self.warnings
+                    .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{}\": {note}", self.name)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Mass from the scene, the file, or volume and density, in this order.
+    fn mass(&mut self, options: &LoadOptions, solids: &[SolidPart], scale: f64) -> MassProperties {
+        let from_shape = solids
+            .iter()
+            .map(|solid| match solid {
+                SolidPart::Primitive(shape, place) => {
+                    let unit = shape.mass_properties();
+                    unit.with_mass(unit.mass * options.density).seen_from(place)
+                }
+                SolidPart::Mesh(mesh) => mass_properties(mesh, options.density),
+            })
+            .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
+        let from_shape = self.sound_or_boxed(from_shape, solids);
+        let declared = self
+            .inertials
+            .iter()
+            .filter_map(|inertial| inertial.declared)
+            .map(|m| MassProperties { mass: m.mass, centre: m.centre * scale, inertia: m.inertia * (scale * scale) })
+            .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
+        let missing: Vec<&str> =
+            self.inertials.iter().filter(|i| i.declared.is_none()).map(|i| i.link.as_str()).collect();
+        let mut chosen = if declared.mass > 0.0 && !missing.is_empty() {
+            let links = missing.join("\", \"");
+            self.warnings.push(format!("link \"{links}\" has no usable mass; it is counted as weightless"));
+            declared
+        } else if declared.mass > 0.0 {
+            declared
+        } else {
+            if options.mass.is_none() {
+                let (density, grams) = (options.density, three_digits(from_shape.mass * 1e3));
+                self.warnings.push(format!(
+                    "\"{}\" gives no usable mass; {grams} g follow from its volume at {density} kg/m³",
+                    self.name
+                ));
+            }
+            from_shape
+        };
+        let reach = |m: &MassProperties| {
+            let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
+            bounds.grown(0.5 * bounds.size().max_element()).distance(m.centre) == 0.0
+        };
+        if !chosen.is_physical() || !reach(&chosen) || !inertia_fits(&chosen, &from_shape) {
+            self.warnings.push(format!(
+                "the inertia that \"{}\" declares is impossible for its shape; it was computed from the shape",
+                self.name
+            ));
+            chosen = from_shape.with_mass(chosen.mass);
+        }
+        match options.mass {
+            Some(mass) => chosen.with_mass(mass),
+            None => chosen,
+        }
+    }
+}
+
+impl Blueprint {
+    /// Mass properties that a body can have: those computed, or where a tangled mesh gives impossible ones, those of a
+    /// box around it.
+    fn sound_or_boxed(&mut self, computed: MassProperties, solids: &[SolidPart]) -> MassProperties {
+        if computed.is_physical() {
+            return computed;
+        }
+        let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
+        let half = (0.5 * bounds.size()).max(glam::DVec3::splat(1e-5));
+        let cuboid = Primitive::Cuboid { half };
+        self.warnings.push(format!("the mesh of \"{}\" is tangled: its inertia is that of a box around it", self.name));
+        let mass = if computed.mass.is_finite() && computed.mass > 0.0 {
+            computed.mass
+        } else {
+            cuboid.mass_properties().mass
+        };
+        cuboid.mass_properties().with_mass(mass).seen_from(&Pose::from_position(bounds.centre()))
+    }
+}
+
+/// Declared inertias off by more than this factor per kilogram are unit errors or placeholders, not hollow bodies.
+const INERTIA_SLACK: f64 = 30.0;
+
+fn inertia_fits(declared: &MassProperties, from_shape: &MassProperties) -> bool {
+    let per_mass = |m: &MassProperties| (m.inertia.x_axis.x + m.inertia.y_axis.y + m.inertia.z_axis.z) / m.mass;
+    let ratio = per_mass(declared) / per_mass(from_shape);
+    from_shape.mass <= 0.0 || (1.0 / INERTIA_SLACK..=INERTIA_SLACK).contains(&ratio)
+}
+
+fn joined(parts: &[ColouredPart], place: &Pose) -> TriMesh {
+    let mut whole = TriMesh::default();
+    for part in parts {
+        whole.append(&part.mesh);
+    }
+    whole.transform(place);
+    whole
+}
+
+fn scale_solids(solids: &mut [SolidPart], scale: f64) {
+    for solid in solids {
+        match solid {
+            SolidPart::Mesh(mesh) => mesh.scale(glam::DVec3::splat(scale)),
+            SolidPart::Primitive(shape, place) => {
+                place.position *= scale;
+                *shape = shape.scaled(scale);
+            }
+        }
+    }
+}
+
+fn surface_of(solids: &[SolidPart]) -> SurfaceMesh {
+    let mut surface = SurfaceMesh::default();
+    for solid in solids {
+        surface.add(&mesh_of(solid), DEFAULT_COLOUR);
+    }
+    surface
+}
+
+fn mesh_of(solid: &SolidPart) -> TriMesh {
+    match solid {
+        SolidPart::Mesh(mesh) => mesh.clone(),
+        SolidPart::Primitive(shape, place) => {
+            let mut mesh = shape.tessellate();
+            mesh.transform(place);
+            mesh
+        }
+    }
+}
+
+fn resting_of(solids: &[SolidPart]) -> Resting {
+    let mut resting = Resting::default();
+    for solid in solids {
+        let part = match solid {
+            SolidPart::Primitive(shape, place) => Resting::on_primitive(shape, place),
+            SolidPart::Mesh(mesh) => Resting::on_corners(&support_points(mesh)),
+        };
+        resting.0.extend(part.0);
+    }
+    resting
+}
+
+fn hull_of(solids: &[SolidPart], name: &str) -> Result<TriMesh, ObjectError> {
+    let points: Vec<glam::DVec3> = solids.iter().flat_map(|solid| mesh_of(solid).points).collect();
+    palpate_geometry::convex_hull(&points).map_err(|cause| ObjectError::Unsound { name: name.to_owned(), cause })
+}

@@ -1,0 +1,150 @@
+//! Finding an object by what the user wrote: a built-in name, or a URDF, OBJ or STL file.
+
+use super::assemble::{Blueprint, ShapeSource};
+use super::catalogue::{catalogue, read_embedded};
+use super::files::{candidates, read_file, read_referenced};
+use super::{ObjectError, ObjectModel, urdf};
+use palpate_geometry::{MeshFileError, Pose, read_mesh};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The name that stands for an empty hand.
+pub const EMPTY: &str = "empty";
+
+/// Which shape the physics sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CollisionShape {
+    /// What the file declares for collision; where it declares none, what it shows.
+    #[default]
+    File,
+    /// What the file shows.
+    Visual,
+    /// The convex hull, for meshes that cannot be repaired.
+    Hull,
+}
+
+/// How a file is to be read. `None` leaves a choice to Palpate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadOptions {
+    /// Factor on all lengths; guessed with a warning where the size is implausible.
+    pub scale: Option<f64>,
+    /// Mass (kg); taken from the file, or from volume and density.
+    pub mass: Option<f64>,
+    /// Density where the file gives no usable mass (kg/m³).
+    pub density: f64,
+    /// Which shape the physics sees.
+    pub collision: CollisionShape,
+    /// Lattice spacing of baked distances (m); chosen by size.
+    pub cell: Option<f64>,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            scale: None,
+            mass: None,
+            density: 500.0, // wood and half-full containers; most graspable things float
+            collision: CollisionShape::File,
+            cell: None,
+        }
+    }
+}
+
+/// A source that names the same object from any folder: files that exist get their whole path, names stay names.
+pub fn anchored(source: &str) -> String {
+    let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);
+    let whole = std::path::absolute(source).ok().filter(|path| !named && path.exists());
+    whole.and_then(|path| path.to_str().map(str::to_owned)).unwrap_or_else(|| source.to_owned())
+}
+
+/// Loads a built-in object by name, or a URDF, OBJ or STL file by path; `None` for an empty hand.
+pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, ObjectError> {
+    if source == EMPTY {
+        return Ok(None);
+    }
+    if let Some(built_in) = catalogue().iter().find(|b| b.name == source) {
+        let mut object = load_built_in(&built_in.name, options)?;
+        object.class = Some(built_in.class());
+        object.friction = built_in.friction;
+        return Ok(Some(object));
+    }
+    let path = Path::new(source);
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match extension.as_str() {
+        "urdf" | "xml" => load_urdf(path, options).map(Some),
+        "obj" | "stl" => load_mesh(path, options).map(Some),
+        _ => Err(unknown(source, path, &extension)),
+    }
+}
+
+fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
+    if path.exists() || !extension.is_empty() {
+        let kind = if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") };
+        return ObjectError::Unsupported { name: source.to_owned(), kind };
+    }
+    let names = || catalogue().iter().map(|b| b.name.as_str());
+    let nearest = names()
+        .map(|name| (strsim::jaro_winkler(&source.to_ascii_lowercase(), name), name))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    ObjectError::Unknown {
+        name: source.to_owned(),
+        hint: match nearest {
+            Some((_, name)) => format!("did you mean \"{name}\"?"),
+            None => format!(
+                "there are {}, {EMPTY}, or any .urdf, .obj or .stl file",
+                names().collect::<Vec<_>>().join(", ")
+            ),
+        },
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "object".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+    let folder = Path::new(name);
+    let file = folder.join(format!("{name}.urdf"));
+    let bytes = read_embedded(&file).map_err(|cause| unreadable(&file, &cause))?;
+    let read = |path: &str| read_embedded(Path::new(path));
+    let mesh = |reference: &str| read_mesh(&folder.join(reference).to_string_lossy(), &read);
+    urdf::parse(name, &bytes, &mesh)?.build(options)
+}
+
+fn load_urdf(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+    let bytes = read_file(path).map_err(|cause| unreadable(path, &cause))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let read = |path: &str| read_referenced(Path::new(path));
+    let mesh = |reference: &str| {
+        let places = candidates(reference, folder);
+        match places.iter().find(|place| place.is_file()) {
+            Some(place) => read_mesh(&place.to_string_lossy(), &read),
+            None if reference.to_ascii_lowercase().ends_with(".dae") => read_mesh(reference, &read),
+            None => Err(MeshFileError::Unreadable {
+                name: reference.to_owned(),
+                cause: match places.first() {
+                    Some(first) if places.len() == 1 => format!("there is no file {}", first.display()),
+                    Some(first) => {
+                        format!("it is neither at {} nor at {} other places", first.display(), places.len() - 1)
+                    }
+                    None => "the reference is empty".to_owned(),
+                },
+            }),
+        }
+    };
+    urdf::parse(&stem(path), &bytes, &mesh)?.build(options)
+}
+
+fn load_mesh(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+    let read = |path: &str| read_referenced(Path::new(path));
+    let parts = read_mesh(&path.to_string_lossy(), &read).map_err(|cause| ObjectError::Mesh { cause })?;
+    let mut blueprint = Blueprint::new(&stem(path));
+    blueprint.add_visual(&ShapeSource::Mesh(parts), &Pose::IDENTITY, None);
+    blueprint.build(options)
+}
+
+fn unreadable(path: &Path, cause: &std::io::Error) -> ObjectError {
+    ObjectError::Unreadable { path: path.to_owned(), cause: cause.to_string() }
+}

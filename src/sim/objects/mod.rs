@@ -1,0 +1,97 @@
+//! Objects to grasp: the sixteen built-in ones, and whatever a URDF, OBJ or STL file holds.
+
+mod assemble;
+mod catalogue;
+mod files;
+mod load;
+mod model;
+mod urdf;
+mod urdf_text;
+
+pub use catalogue::{BuiltIn, catalogue, thumbnail};
+pub use load::{CollisionShape, EMPTY, LoadOptions, anchored, load};
+pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
+
+use palpate_geometry::{BakeError, MeshError, MeshFileError};
+use std::path::PathBuf;
+
+/// Why an object cannot be grasped.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjectError {
+    /// Neither a built-in name nor a file.
+    #[error("there is no object \"{name}\": {hint}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The nearest name, or all of them.
+        hint: String,
+    },
+    /// A file of a type we do not read.
+    #[error("\"{name}\" is a {kind} file; Palpate reads objects from .urdf, .obj and .stl")]
+    Unsupported {
+        /// The file.
+        name: String,
+        /// Its extension.
+        kind: String,
+    },
+    /// The file could not be opened.
+    #[error("cannot read \"{path}\": {cause}", path = path.display())]
+    Unreadable {
+        /// The path.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// The file is not what it claims to be.
+    #[error("\"{name}\" is malformed: {cause}")]
+    Malformed {
+        /// The object.
+        name: String,
+        /// What is wrong.
+        cause: String,
+    },
+    /// A shape of impossible size.
+    #[error("link \"{link}\": {cause}")]
+    BadShape {
+        /// The link.
+        link: String,
+        /// What is wrong.
+        cause: String,
+    },
+    /// A mesh file that cannot be used.
+    #[error("{cause}")]
+    Mesh {
+        /// What is wrong with it.
+        cause: MeshFileError,
+    },
+    /// Nothing to touch.
+    #[error("\"{name}\" has no shape: no link has a visual or collision that can be used")]
+    NoShape {
+        /// The object.
+        name: String,
+    },
+    /// A mesh that is no solid.
+    #[error("\"{name}\" cannot be grasped: {cause}")]
+    Unsound {
+        /// The object.
+        name: String,
+        /// What is wrong with the mesh.
+        cause: MeshError,
+    },
+    /// An absurd size.
+    #[error("\"{name}\" is {metres:.3e} m across; set object.scale so that it fits a hand")]
+    Size {
+        /// The object.
+        name: String,
+        /// Its largest extent (m).
+        metres: f64,
+    },
+    /// Distances could not be baked.
+    #[error("\"{name}\": {cause}")]
+    Bake {
+        /// The object.
+        name: String,
+        /// Why.
+        cause: BakeError,
+    },
+}

@@ -1,0 +1,43 @@
+//! What a simulated gripper asks of whatever computes its motion. Two engines answer: [`super::Simulation`], which is
+//! Palpate's own convex step, and [`super::RapierSimulation`], which is rapier3d.
+
+use super::simulation::SimulationError;
+use crate::frame::{Frame, Plan, Quality};
+use crate::gripper::Phase;
+use crate::scene::Clock;
+use glam::DVec3;
+
+/// A gripper and an object in motion, on a clock of whole ticks.
+pub trait Engine {
+    /// The clock that ticks count.
+    fn clock(&self) -> Clock;
+
+    /// Ticks passed.
+    fn tick(&self) -> u64;
+
+    /// Which effects are simulated, and why.
+    fn plan(&self) -> &Plan;
+
+    /// Sets the line pressure (bar) from now on.
+    fn command(&mut self, bar: f64, phase: Phase);
+
+    /// Pulls at the object's centre of mass (N, world axes) from now on.
+    fn pull_object(&mut self, force: DVec3);
+
+    /// Lets some ticks pass, within which nothing is sampled or commanded.
+    fn advance_by(&mut self, ticks: u64) -> Result<(), SimulationError>;
+
+    /// When, if ever, finger contact that the plan had left out was turned on (s).
+    fn finger_contact_turned_on(&self) -> Option<f64> {
+        None
+    }
+
+    /// What a rig would sample now.
+    fn frame(&self) -> Frame;
+
+    /// Deepest compression of the pads in the state as it is, before any step (m).
+    fn starting_overlap(&mut self) -> f64;
+
+    /// How far the steps so far can be trusted; the static residual is that of this moment.
+    fn quality(&self) -> Quality;
+}

@@ -1,0 +1,207 @@
+//! What changes during a simulation. All of it can be saved and restored; scratch memory is elsewhere.
+
+use super::effects::went_on;
+use super::model::Model;
+use super::placement::Placement;
+use crate::gripper::SegmentPose;
+use glam::{DQuat, DVec3};
+use palpate_geometry::Pose;
+
+/// State of both fingers, the object, and the skin at every place of contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Joint angles, left finger then right, from palm to tip (rad).
+    pub q: Vec<f64>,
+    /// Joint rates (rad/s), then for a free object its velocity (m/s) and angular velocity (rad/s) in the gripper
+    /// frame.
+    pub velocity: Vec<f64>,
+    /// The object's centre of mass and the axes of its frame, in the gripper frame.
+    pub(super) body: Pose,
+    /// Shear of the skin (m), in the axes of the segment (or of the gripper, for the object on its support).
+    pub(super) shear: Vec<DVec3>,
+    /// Normal impulse in the last step (N s).
+    pub(super) lag: Vec<f64>,
+    /// Length of that step (s); zero before the first.
+    pub(super) lag_h: f64,
+    /// Pressure in the chambers, and in the line that filled them last (bar), where chambers lag behind the line.
+    pub(super) chamber_bar: f64,
+    pub(super) filled_from_bar: f64,
+    /// Angle by which each joint has crept (rad); empty where joints do not.
+    pub(super) crept: Vec<f64>,
+}
+
+impl State {
+    /// Fingers straight, everything at rest.
+    pub fn new(model: &Model, placement: &Placement) -> Self {
+        let body = match (&model.body, placement.world_from_object) {
+            (Some(body), Some(world_from_object)) => {
+                let gripper_from_object = model.world_from_gripper.inverse() * world_from_object;
+                Pose { position: gripper_from_object.point(body.centre), rotation: gripper_from_object.rotation }
+            }
+            _ => Pose::IDENTITY,
+        };
+        Self {
+            q: vec![0.0; model.joint_count()],
+            velocity: vec![0.0; model.unknowns()],
+            body,
+            shear: vec![DVec3::ZERO; model.sites()],
+            lag: vec![0.0; model.sites()],
+            lag_h: 0.0,
+            chamber_bar: 0.0,
+            filled_from_bar: 0.0,
+            crept: vec![0.0; if model.relaxation.is_some() { model.joint_count() } else { 0 }],
+        }
+    }
+
+    /// The object's frame in the world; absent for an empty hand.
+    pub fn world_from_object(&self, model: &Model) -> Option<Pose> {
+        let body = model.body.as_ref()?;
+        let gripper_from_object =
+            Pose { position: self.body.position - self.body.rotation * body.centre, rotation: self.body.rotation };
+        Some(model.world_from_gripper * gripper_from_object)
+    }
+
+    /// Becomes another state of the same model, without allocating.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        let Self { q, velocity, body, shear, lag, lag_h, chamber_bar, filled_from_bar, crept } = other;
+        self.q.copy_from_slice(q);
+        self.velocity.copy_from_slice(velocity);
+        self.body = *body;
+        self.shear.copy_from_slice(shear);
+        self.lag.copy_from_slice(lag);
+        self.lag_h = *lag_h;
+        self.chamber_bar = *chamber_bar;
+        self.filled_from_bar = *filled_from_bar;
+        self.crept.copy_from_slice(crept);
+    }
+
+    /// Goes on in a straight line, by `share` of the way from `start` to here. Normal impulses are no path and stay.
+    ///
+    /// A turning object goes on in angular momentum rather than in angular velocity: what flies freely keeps it.
+    pub(super) fn go_on_from(&mut self, start: &Self, share: f64, model: &Model) {
+        let momentum = self.angular_momentum(model);
+        let momentum = momentum + (momentum - start.angular_momentum(model)) * share;
+        for (now, before) in self.q.iter_mut().zip(&start.q).chain(self.velocity.iter_mut().zip(&start.velocity)) {
+            *now += share * (*now - before);
+        }
+        for (now, before) in self.crept.iter_mut().zip(&start.crept) {
+            *now += share * (*now - before);
+        }
+        self.chamber_bar = went_on(start.chamber_bar, self.chamber_bar, self.filled_from_bar, share);
+        self.body.position += (self.body.position - start.body.position) * share;
+        let turn = rotation_vector(self.body.rotation * start.body.rotation.inverse());
+        self.body.rotation = (DQuat::from_scaled_axis(turn * share) * self.body.rotation).normalize();
+        if let Some(body) = model.free_body() {
+            let axes = self.body.matrix();
+            let spin = axes * (body.inverse_inertia * (axes.transpose() * momentum));
+            self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
+        }
+        for (site, (now, before)) in self.shear.iter_mut().zip(&start.shear).enumerate() {
+            // Skin that has just been touched has no shear to go on from.
+            if self.lag[site] > 0.0 && start.lag[site] > 0.0 {
+                *now += (*now - *before) * share;
+            }
+        }
+    }
+
+    /// How far apart two states are: the largest difference of joint angles and of the object's orientation (rad), of
+    /// fingertips and of the object's position as shares of a finger's length. The segments are scratch memory.
+    pub(super) fn distance(
+        &self,
+        other: &Self,
+        model: &Model,
+        own_segments: &mut [SegmentPose],
+        other_segments: &mut [SegmentPose],
+    ) -> f64 {
+        let n = model.chain.joints;
+        let length: f64 = model.chain.lengths.iter().sum();
+        let mut largest = self.q.iter().zip(&other.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        for finger in 0..2 {
+            let joints = finger * n..(finger + 1) * n;
+            let own = model.chain.bend(&self.q[joints.clone()], own_segments);
+            let tip = model.chain.bend(&other.q[joints], other_segments);
+            largest = largest.max((own - tip).length() / length);
+        }
+        if model.free_body().is_some() {
+            let turn = rotation_vector(self.body.rotation * other.body.rotation.inverse());
+            let way = self.body.position - other.body.position;
+            largest = largest.max(way.length() / length).max(turn.length());
+        }
+        largest
+    }
+
+    /// Normal impulse to expect at a place of contact in a step of `h` (s): that of the last step, at the same force.
+    pub(super) fn expected_impulse(&self, site: usize, h: f64) -> f64 {
+        // Steps of equal length give a factor of exactly one.
+        if self.lag_h > 0.0 { self.lag[site] * (h / self.lag_h) } else { 0.0 }
+    }
+
+    /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.
+    pub(super) fn body_velocity(&self, model: &Model) -> (DVec3, DVec3) {
+        match self.velocity.get(model.joint_count()..) {
+            Some([x, y, z, a, b, c]) => (DVec3::new(*x, *y, *z), DVec3::new(*a, *b, *c)),
+            _ => (DVec3::ZERO, DVec3::ZERO),
+        }
+    }
+
+    /// Angular momentum of a free object about its centre of mass, in the gripper frame (kg m²/s); zero otherwise.
+    pub(super) fn angular_momentum(&self, model: &Model) -> DVec3 {
+        let Some(body) = model.free_body() else { return DVec3::ZERO };
+        let axes = self.body.matrix();
+        axes * (body.inertia * (axes.transpose() * self.body_velocity(model).1))
+    }
+
+    /// Moves joints and object by one step of `h` (s) at the current velocities.
+    ///
+    /// A turning object keeps its angular momentum L = I w while I turns with it: w+ = I+^-1 I w. To first order in h
+    /// that is the gyroscopic torque, but the spin can never exceed |L| over the least moment of inertia, however
+    /// long the step: an explicit torque flung light splinters out of the range of numbers.
+    pub(super) fn integrate(&mut self, model: &Model, h: f64) {
+        if let Some(relaxation) = &model.relaxation {
+            for ((crept, q), rate) in self.crept.iter_mut().zip(&self.q).zip(&self.velocity) {
+                *crept = relaxation.crept(h, *q, *rate, *crept);
+            }
+        }
+        for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
+            *q += h * rate;
+        }
+        if let Some(body) = model.free_body() {
+            let (linear, angular) = self.body_velocity(model);
+            self.body.position += linear * h;
+            let before = self.body.matrix();
+            self.body.rotation = (DQuat::from_scaled_axis(angular * h) * self.body.rotation).normalize();
+            let after = self.body.matrix();
+            let momentum = before * (body.inertia * (before.transpose() * angular));
+            let spin = after * (body.inverse_inertia * (after.transpose() * momentum));
+            self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
+        }
+    }
+
+    /// The first number that is not finite, named for people; `None` when all is well.
+    pub(super) fn not_finite(&self, model: &Model) -> Option<String> {
+        let n = model.chain.joints;
+        let bad = |values: &[f64]| values.iter().position(|x| !x.is_finite());
+        if let Some(i) = bad(&self.q).or_else(|| bad(&self.velocity[..2 * n])) {
+            return Some(Self::place_of(model, i));
+        }
+        let (linear, angular) = self.body_velocity(model);
+        let sound = self.body.is_finite() && linear.is_finite() && angular.is_finite();
+        (!sound).then(|| Self::place_of(model, 2 * n))
+    }
+
+    /// What an unknown of the step belongs to, named for people.
+    pub fn place_of(model: &Model, unknown: usize) -> String {
+        let n = model.chain.joints;
+        match unknown / n {
+            0 => format!("joint {} of the left finger", unknown + 1),
+            1 => format!("joint {} of the right finger", unknown - n + 1),
+            _ => "the object".to_owned(),
+        }
+    }
+}
+
+/// Axis times angle of a rotation (rad), the short way round.
+fn rotation_vector(rotation: DQuat) -> DVec3 {
+    let short = if rotation.w < 0.0 { -rotation } else { rotation };
+    short.to_scaled_axis()
+}

@@ -1,0 +1,207 @@
+//! Random poses: the gripper is shifted and turned over the resting object, which may lie on another face. Seeded, so
+//! that a seed names a pose.
+
+use crate::frame::Frame;
+use crate::objects::ObjectModel;
+use crate::physics::{natural_rotations, random_rotation};
+use crate::run::SimRun;
+use crate::scene::{Between, Faces, ObjectSetup, Scene, SupportKind};
+use glam::{DQuat, DVec2, EulerRot};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Draws before a scene that leaves no room is accepted as it is.
+const MOST_DRAWS: u32 = 100;
+
+/// Draws poses for one object in one scene, as the scene's `pose` says.
+#[derive(Clone, Debug)]
+pub struct PoseSampler {
+    scene: Scene,
+    /// Where natural faces are wanted: orientations to draw from.
+    natural: Vec<DQuat>,
+}
+
+impl PoseSampler {
+    /// Prepares to draw; finding the natural faces takes some tenths of a second.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> Self {
+        // A free object cannot lie anyhow: it would fall off its pedestal before the fingers come.
+        let lies_naturally = match scene.pose.faces {
+            Faces::Nominal => false,
+            Faces::Natural => true,
+            Faces::Any => !scene.holds_object(),
+        };
+        let natural = object.filter(|_| lies_naturally).map(natural_rotations).unwrap_or_default();
+        Self { scene: scene.clone(), natural }
+    }
+
+    /// The scene in the pose that `seed` names, and how many draws were thrown away because the open fingers would
+    /// have stood inside the object.
+    pub fn draw(&self, object: Option<&ObjectModel>, seed: u64) -> (Scene, u32) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut drawn = self.scene.clone();
+        for rejected in 0..MOST_DRAWS {
+            self.draw_once(&mut drawn, &mut random);
+            if drawn.check().is_ok() && SimRun::new(&drawn, object).0.starting_overlap() <= 0.0 {
+                return (drawn, rejected);
+            }
+        }
+        (drawn, MOST_DRAWS)
+    }
+
+    /// The scene of a grasp that follows another of the same object, which the fingers have left as it is in
+    /// `released`. It stays there where the scene says so and it still lies on its support; in all other cases this is
+    /// [`PoseSampler::draw`].
+    pub fn draw_after(&self, object: Option<&ObjectModel>, seed: u64, released: Option<&Frame>) -> (Scene, u32) {
+        let left = released.and_then(|frame| self.left_behind(object?, frame));
+        let Some(object_setup) = left else { return self.draw(object, seed) };
+        let lying = Self { scene: Scene { object: object_setup, ..self.scene.clone() }, natural: Vec::new() };
+        lying.draw(object, seed)
+    }
+
+    /// The object's setup in the pose in which it was left; `None` where it is to be put down anew.
+    fn left_behind(&self, object: &ObjectModel, frame: &Frame) -> Option<ObjectSetup> {
+        let pose = frame.world_from_object?;
+        if self.scene.pose.between != Between::AsReleased || self.scene.holds_object() {
+            return None;
+        }
+        let centre = pose.point(object.mass.centre);
+        let support = &self.scene.support;
+        let (top, reach) = match support.kind {
+            SupportKind::Pedestal => (support.height, support.radius),
+            SupportKind::Table => (0.0, f64::INFINITY),
+            SupportKind::None => return None,
+        };
+        let offset = centre.truncate() - DVec2::from_array(self.scene.object.shift);
+        if centre.z < top || offset.length() > reach || !centre.is_finite() {
+            return None;
+        }
+        let mut scene = self.scene.clone();
+        lay(&mut scene, pose.rotation);
+        scene.object.shift = centre.truncate().to_array();
+        scene.check().is_ok().then_some(scene.object)
+    }
+
+    fn draw_once(&self, drawn: &mut Scene, random: &mut ChaCha8Rng) {
+        let (nominal, spread) = (&self.scene.gripper.mount, &self.scene.pose);
+        let mut within = |most: f64| most * (2.0 * random.random::<f64>() - 1.0);
+        let mount = &mut drawn.gripper.mount;
+        for axis in 0..3 {
+            mount.offset[axis] = nominal.offset[axis] + within(spread.shift[axis]);
+        }
+        // A whole turn more or less is the same pose, and keeps to the range of scene files.
+        let yaw = nominal.yaw_deg + within(spread.yaw_deg);
+        mount.yaw_deg = if yaw.abs() > 180.0 { (yaw + 180.0).rem_euclid(360.0) - 180.0 } else { yaw };
+        match spread.faces {
+            Faces::Natural | Faces::Any if !self.natural.is_empty() => {
+                lay(drawn, self.natural[random.random_range(0..self.natural.len())]);
+            }
+            Faces::Any if self.scene.holds_object() => lay(drawn, random_rotation(random)),
+            Faces::Any | Faces::Nominal | Faces::Natural => {}
+        }
+    }
+}
+
+/// Lays the object as a rotation says.
+fn lay(scene: &mut Scene, rotation: DQuat) {
+    let (yaw, pitch, roll) = rotation.to_euler(EulerRot::ZYX);
+    scene.object.rotation_deg = [roll, pitch, yaw].map(f64::to_degrees);
+}
+
+/// One pose of an object in a scene; whoever wants many keeps a [`PoseSampler`].
+pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scene, u32) {
+    PoseSampler::new(scene, object).draw(object, seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{PRESETS, PosePreset};
+    use glam::DVec3;
+    use palpate_geometry::Primitive;
+
+    fn brick() -> ObjectModel {
+        ObjectModel::from_primitive("brick", Primitive::Cuboid { half: DVec3::new(0.015, 0.03, 0.006) }, 500.0, 0.5)
+    }
+
+    #[test]
+    fn a_seed_names_a_pose_within_its_range() {
+        for preset in PRESETS {
+            let scene = Scene { pose: preset.poses(), ..Scene::default() };
+            let sampler = PoseSampler::new(&scene, Some(&brick()));
+            let (first, _) = sampler.draw(Some(&brick()), 7);
+            assert_eq!(jittered(&scene, Some(&brick()), 7).0, first, "{}", preset.name);
+            assert_ne!(sampler.draw(Some(&brick()), 8).0, first);
+            for (offset, most) in first.gripper.mount.offset.iter().zip(scene.pose.shift) {
+                assert!(offset.abs() <= most);
+            }
+            assert!(first.gripper.mount.yaw_deg.abs() <= scene.pose.yaw_deg && first.gripper.mount.yaw_deg != 0.0);
+            assert_eq!(first.object.rotation_deg == [0.0; 3], scene.pose.faces == Faces::Nominal, "{}", preset.name);
+        }
+    }
+
+    #[test]
+    fn natural_faces_are_flat_ones() {
+        let poses = PosePreset::named("B").expect("in the list").poses();
+        let sampler = PoseSampler::new(&Scene { pose: poses, ..Scene::default() }, Some(&brick()));
+        for seed in 1..20 {
+            let [roll, pitch, yaw] = sampler.draw(Some(&brick()), seed).0.object.rotation_deg.map(f64::to_radians);
+            let up = palpate_geometry::Pose::from_xyz_rpy(DVec3::ZERO, DVec3::new(roll, pitch, yaw))
+                .inverse()
+                .direction(DVec3::Z);
+            assert!(up.abs().max_element() > 0.99, "seed {seed}: {up}");
+        }
+    }
+
+    #[test]
+    fn poses_stay_within_what_a_scene_file_may_say() {
+        let mut scene = Scene::default();
+        scene.gripper.mount.yaw_deg = 179.0;
+        for seed in 0..20 {
+            assert!(jittered(&scene, None, seed).0.check().is_ok());
+        }
+    }
+
+    #[test]
+    fn an_object_stays_as_it_was_left_unless_it_fell() {
+        let mut scene = Scene::default();
+        scene.pose.between = Between::AsReleased;
+        let sampler = PoseSampler::new(&scene, Some(&brick()));
+        // Many a brick falls off the slim pedestal when it is released; some do not.
+        let after = |seed: u64| {
+            let (first, _) = sampler.draw(Some(&brick()), seed);
+            let released = SimRun::new(&first, Some(&brick()))
+                .0
+                .run_programme(&first.programme)
+                .expect("finite")
+                .pop()
+                .expect("has frames");
+            let (next, _) = sampler.draw_after(Some(&brick()), 4, Some(&released));
+            (first, released, next)
+        };
+        let kept = (1..40).map(after).find(|(_, _, next)| next.object.shift != [0.0; 2]);
+        let (first, mut released, next) = kept.expect("one of forty stays");
+        let placed = crate::physics::Placement::new(&next, Some(&brick())).world_from_object.expect("an object");
+        let left = released.world_from_object.expect("an object");
+        assert!((placed.position - left.position).length() < 3e-4, "{placed:?} instead of {left:?}");
+        assert!(placed.rotation.dot(left.rotation).abs() > 0.999_999);
+        assert_ne!(next.gripper.mount, first.gripper.mount, "the gripper comes from elsewhere");
+
+        let again = sampler.draw(Some(&brick()), 4);
+        released.world_from_object = Some(palpate_geometry::Pose { position: DVec3::Z * 0.005, ..left });
+        assert_eq!(sampler.draw_after(Some(&brick()), 4, Some(&released)), again, "it fell off its pedestal");
+        assert_eq!(sampler.draw_after(Some(&brick()), 4, None), again);
+    }
+
+    #[test]
+    fn colliding_poses_are_drawn_again() {
+        // 80 mm between pads that are 84 mm apart: most shifts collide.
+        let slab = Primitive::Cuboid { half: DVec3::new(0.040, 0.02, 0.02) };
+        let object = ObjectModel::from_primitive("slab", slab, 500.0, 0.5);
+        let mut wide = Scene::default();
+        (wide.pose.shift, wide.pose.yaw_deg) = ([0.008; 3], 0.0);
+        let (scene, rejected) = jittered(&wide, Some(&object), 3);
+        assert!(scene.gripper.mount.offset[0].abs() < 0.0021 + 1e-9, "{:?}", scene.gripper.mount.offset);
+        let total: u32 = (0..20).map(|seed| jittered(&wide, Some(&object), seed).1).sum();
+        assert!(total > 20 && rejected < MOST_DRAWS, "{total}");
+    }
+}

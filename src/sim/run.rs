@@ -1,0 +1,193 @@
+//! A simulation on its clock: actuation ticks and samples in order. Identical scenes give identical frames.
+
+use crate::frame::{Frame, Plan, Quality};
+use crate::gripper::{Phase, Programme};
+use crate::objects::ObjectModel;
+use crate::physics::{Engine, Placement, RapierSimulation, Refinement, Simulation, SimulationError};
+use crate::scene::{EngineKind, Scene};
+use glam::DVec3;
+
+/// The next event of a simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SimEvent {
+    /// Actuation tick `tick` begins: the line pressure for it is due.
+    ActuationDue {
+        /// Number of the tick, from 0.
+        tick: u32,
+    },
+    /// A sample.
+    Sampled(Frame),
+    /// The end of the trial.
+    Finished,
+}
+
+/// A simulation on its clock.
+#[derive(Clone, Debug)]
+pub struct SimRun {
+    engine: EngineRun,
+    /// The actuation tick that has been asked for, so that it is asked for once.
+    asked: Option<u32>,
+    phase: Phase,
+    static_residual: Option<f64>,
+}
+
+/// The engine that the scene asks for.
+#[derive(Clone, Debug)]
+enum EngineRun {
+    Palpate(Box<Simulation>),
+    Rapier(Box<RapierSimulation>),
+}
+
+impl EngineRun {
+    fn new(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
+        match scene.solver.engine {
+            EngineKind::Palpate => {
+                let (simulation, placement) = Simulation::refined(scene, object, refinement);
+                (Self::Palpate(Box::new(simulation)), placement)
+            }
+            EngineKind::Rapier => {
+                let (simulation, placement) = RapierSimulation::refined(scene, object, refinement);
+                (Self::Rapier(Box::new(simulation)), placement)
+            }
+        }
+    }
+
+    fn get(&self) -> &dyn Engine {
+        match self {
+            Self::Palpate(simulation) => simulation.as_ref(),
+            Self::Rapier(simulation) => simulation.as_ref(),
+        }
+    }
+
+    fn get_mut(&mut self) -> &mut dyn Engine {
+        match self {
+            Self::Palpate(simulation) => simulation.as_mut(),
+            Self::Rapier(simulation) => simulation.as_mut(),
+        }
+    }
+}
+
+impl SimRun {
+    /// A scene at rest, and where everything was put.
+    pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> (Self, Placement) {
+        Self::refined(scene, object, Refinement::None)
+    }
+
+    /// The same, computed more finely than the scene asks for.
+    pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
+        let (engine, placement) = EngineRun::new(scene, object, refinement);
+        let rig = Self { engine, asked: None, phase: Phase::Close, static_residual: None };
+        (rig, placement)
+    }
+
+    /// Runs a programme from here to the end of the trial and returns the samples.
+    pub fn run_programme(&mut self, programme: &Programme) -> Result<Vec<Frame>, SimulationError> {
+        let mut frames = Vec::new();
+        loop {
+            match self.next_event()? {
+                SimEvent::ActuationDue { tick } => {
+                    let (bar, phase) = programme.command(tick);
+                    self.command(bar, phase);
+                }
+                SimEvent::Sampled(frame) => frames.push(frame),
+                SimEvent::Finished => return Ok(frames),
+            }
+        }
+    }
+
+    /// The state before the first step, as a frame: what a picture of the start shows.
+    pub fn first_look(&self) -> Frame {
+        self.engine.get().frame()
+    }
+
+    /// How deep the open fingers stand inside the object or its support before the first step (m).
+    pub fn starting_overlap(&mut self) -> f64 {
+        self.engine.get_mut().starting_overlap()
+    }
+
+    /// Which effects are simulated, and why.
+    pub fn plan(&self) -> &Plan {
+        self.engine.get().plan()
+    }
+
+    /// Pulls at the object (N, world axes) from now on.
+    pub fn pull_object(&mut self, force: DVec3) {
+        self.engine.get_mut().pull_object(force);
+    }
+
+    /// Simulates up to the next event.
+    pub fn next_event(&mut self) -> Result<SimEvent, SimulationError> {
+        let clock = self.engine.get().clock();
+        loop {
+            let tick = self.engine.get().tick();
+            if tick >= clock.total_ticks() {
+                return Ok(SimEvent::Finished);
+            }
+            let actuation_tick = (tick / u64::from(clock.ticks_per_actuation)) as u32;
+            if tick.is_multiple_of(u64::from(clock.ticks_per_actuation)) && self.asked != Some(actuation_tick) {
+                self.asked = Some(actuation_tick);
+                return Ok(SimEvent::ActuationDue { tick: actuation_tick });
+            }
+            // Nothing happens before the nearer of the next sample and the next change of pressure.
+            let until = |period: u32| u64::from(period) - tick % u64::from(period);
+            let ticks = until(clock.ticks_per_sample).min(until(clock.ticks_per_actuation));
+            self.engine.get_mut().advance_by(ticks)?;
+            if self.engine.get().tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
+                return Ok(SimEvent::Sampled(self.engine.get().frame()));
+            }
+        }
+    }
+
+    /// Sets the line pressure (bar) from now on.
+    pub fn command(&mut self, bar: f64, phase: Phase) {
+        if self.phase == Phase::Hold && phase == Phase::Release {
+            self.static_residual = Some(self.engine.get().quality().static_residual);
+        }
+        self.phase = phase;
+        self.engine.get_mut().command(bar, phase);
+    }
+
+    /// How far the frames so far can be trusted.
+    pub fn quality(&self) -> Quality {
+        let mut quality = self.engine.get().quality();
+        if let Some(at_hold) = self.static_residual {
+            quality.static_residual = at_hold;
+        }
+        quality
+    }
+
+    /// Remarks on the frames so far, in sentences.
+    pub fn notes(&self) -> Vec<String> {
+        let turned_on = self.engine.get().finger_contact_turned_on();
+        let note = |t| format!("finger-contact was turned on at {t:.2} s: the fingers came near each other after all");
+        turned_on.map(note).into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_and_actuation_interleave_on_the_clock() {
+        let mut scene = Scene::default();
+        scene.timing.duration_s = 0.4;
+        let (mut rig, _) = SimRun::new(&scene, None);
+        let (mut ticks, mut samples) = (Vec::new(), Vec::new());
+        loop {
+            match rig.next_event().expect("finite") {
+                SimEvent::ActuationDue { tick } => {
+                    ticks.push(tick);
+                    let (bar, phase) = scene.programme.command(tick);
+                    rig.command(bar, phase);
+                }
+                SimEvent::Sampled(frame) => samples.push((frame.sample, frame.t)),
+                SimEvent::Finished => break,
+            }
+        }
+        assert_eq!(ticks, [0, 1, 2, 3]);
+        assert_eq!(samples.len(), 30);
+        assert_eq!(samples[0].0, 0);
+        assert!((samples[0].1 - 1.0 / 75.0).abs() < 1e-15 && (samples[29].1 - 0.4).abs() < 1e-15);
+    }
+}

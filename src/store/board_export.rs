@@ -1,0 +1,44 @@
+//! Trials of a real gripper as CSV: counts as they came, one row per reading. A file of the bytes beside it can be heard
+//! again as if it were a port.
+//!
+//! Columns: `t_s` and `arrived_s` since the trial began, `seq`, `missing_before`, the channels (counts), `line_pressure
+//! (bar)`, `phase`. A field without a number had none; `missing_before` says how many readings are missing between the
+//! row before and this one, `?` where that is not known.
+
+use super::board_trials::BoardTrial;
+use super::csv_export::{CsvError, number, write_file};
+use palpate_tactile::board::Reading;
+use palpate_tactile::trial::PhaseMark;
+use std::path::Path;
+
+/// Writes one row per reading.
+pub fn write_board_csv(path: &Path, trial: &BoardTrial) -> Result<(), CsvError> {
+    let channels = &trial.about.board.channels;
+    write_file(path, |out| {
+        let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();
+        let after = ["line_pressure [bar]", "phase"].map(str::to_owned);
+        out.write_record(before.chain(channels.iter().map(|name| format!("{name} [counts]"))).chain(after))?;
+        let mut gaps = trial.gaps.iter().peekable();
+        for reading in &trial.readings {
+            let mut missing = String::new();
+            while let Some(gap) = gaps.next_if(|gap| gap.to_s <= reading.t_s) {
+                missing = gap.lost.map_or_else(|| "?".to_owned(), |lost| lost.to_string());
+            }
+            out.write_record(row(reading, missing, trial))?;
+        }
+        Ok(())
+    })
+}
+
+fn row(reading: &Reading, missing: String, trial: &BoardTrial) -> Vec<String> {
+    let since = |t: f64| number(t - trial.about.began_s);
+    let mut fields = vec![since(reading.t_s), since(reading.arrived_s)];
+    fields.push(reading.seq.map(|seq| seq.to_string()).unwrap_or_default());
+    fields.push(missing);
+    fields.extend(reading.counts.iter().map(|count| count.map(|count| count.to_string()).unwrap_or_default()));
+    let mark = trial.about.phases.iter().rev().find(|mark| mark.from_s <= reading.t_s);
+    let bar = reading.line_bar.or_else(|| mark?.line_bar);
+    fields.push(bar.map(number).unwrap_or_default());
+    fields.push(mark.map(|PhaseMark { phase, .. }| phase.name().to_owned()).unwrap_or_default());
+    fields
+}

@@ -1,0 +1,413 @@
+//! Calibrations in the store, and which part sits where.
+//!
+//! ```text
+//! calibrations  what was measured of a part, as JSON; versions count up within a part, none is ever changed
+//! mountings     which part has been put where, since when
+//! parts         which parts a trial was recorded with, by their places
+//! ```
+//!
+//! The newest calibration of a part serves all its trials, older ones too, unless it was withdrawn or another one is
+//! asked for. Curves are fitted when they are needed: a record that a later program refuses is told, and the one
+//! before it serves.
+
+use super::store::Store;
+use super::store_error::{StoreError, fault};
+use palpate_tactile::board::Sensor;
+use palpate_tactile::calibration::{Calibration, Kind, Record};
+use palpate_tactile::trial::TrialId;
+use rusqlite::{OptionalExtension, Row, Transaction, params};
+use serde::{Deserialize, Serialize};
+
+/// Names a calibration within its store.
+pub type CalibrationId = i64;
+
+/// The tables above.
+pub(super) const CALIBRATION_TABLES: &str = "
+    CREATE TABLE calibrations (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
+        part TEXT NOT NULL,
+        version INTEGER NOT NULL,
+        created TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
+        withdrawn TEXT,
+        record TEXT NOT NULL
+    );
+    CREATE INDEX calibrations_by_part ON calibrations (part);
+    CREATE TABLE mountings (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        since TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
+        sensor TEXT NOT NULL,
+        part TEXT NOT NULL
+    );
+    CREATE TABLE parts (
+        trial INTEGER NOT NULL REFERENCES trials (id) ON DELETE CASCADE,
+        sensor TEXT NOT NULL,
+        part TEXT NOT NULL,
+        PRIMARY KEY (trial, sensor)
+    ) WITHOUT ROWID;
+";
+
+/// A calibration with its place in the store: also the form in which calibrations are exchanged as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoredCalibration {
+    /// Its number in this store; another store gives it another one.
+    #[serde(default)]
+    pub id: CalibrationId,
+    /// Its identity in every store.
+    pub uid: String,
+    /// Which of its part's calibrations it is, from 1.
+    #[serde(default)]
+    pub version: i64,
+    /// When it was made, UTC.
+    pub created: String,
+    /// When it was withdrawn, if it was.
+    #[serde(default)]
+    pub withdrawn: Option<String>,
+    /// What was measured.
+    #[serde(flatten)]
+    pub record: Record,
+}
+
+/// The calibrations that serve a trial, or whatever is recorded now.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Serving {
+    /// A calibration for each place that has one, in the order of [`Sensor::ALL`].
+    pub calibrations: Vec<(Sensor, Calibration)>,
+    /// Their numbers in the store, in the same order.
+    pub ids: Vec<CalibrationId>,
+    /// What is missing or was passed over, in sentences.
+    pub warnings: Vec<String>,
+}
+
+const COLUMNS: &str = "id, uid, version, created, withdrawn, record";
+
+fn of_row(row: &Row<'_>) -> rusqlite::Result<(StoredRow, String)> {
+    let stored = StoredRow {
+        id: row.get(0)?,
+        uid: row.get(1)?,
+        version: row.get(2)?,
+        created: row.get(3)?,
+        withdrawn: row.get(4)?,
+    };
+    Ok((stored, row.get(5)?))
+}
+
+struct StoredRow {
+    id: CalibrationId,
+    uid: String,
+    version: i64,
+    created: String,
+    withdrawn: Option<String>,
+}
+
+fn read((row, record): (StoredRow, String)) -> Result<StoredCalibration, StoreError> {
+    let StoredRow { id, uid, version, created, withdrawn } = row;
+    let record = serde_json::from_str(&record).map_err(|e| StoreError::BadCalibration { id, cause: e.to_string() })?;
+    Ok(StoredCalibration { id, uid, version, created, withdrawn, record })
+}
+
+impl Store {
+    /// Stores what was measured of a part as its newest calibration.
+    pub fn add_calibration(&mut self, record: &Record) -> Result<StoredCalibration, StoreError> {
+        let path = self.path().to_owned();
+        let transaction = self.write()?;
+        let id = insert(&transaction, record, None).map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        self.calibration(id)
+    }
+
+    /// Takes in calibrations from elsewhere, all or none; those that are here already stay as they are. Returns how many
+    /// were added.
+    pub fn import_calibrations(&mut self, others: &[StoredCalibration]) -> Result<usize, StoreError> {
+        let path = self.path().to_owned();
+        let fault = |e: rusqlite::Error| fault(&path, &e);
+        let transaction = self.write()?;
+        let mut added = 0;
+        for other in others {
+            let known = "SELECT EXISTS (SELECT 1 FROM calibrations WHERE uid = ?1)";
+            if !transaction.query_row(known, [&other.uid], |row| row.get::<_, bool>(0)).map_err(fault)? {
+                insert(&transaction, &other.record, Some(other)).map_err(fault)?;
+                added += 1;
+            }
+        }
+        transaction.commit().map_err(fault)?;
+        Ok(added)
+    }
+
+    /// One calibration.
+    pub fn calibration(&self, id: CalibrationId) -> Result<StoredCalibration, StoreError> {
+        let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE id = ?1");
+        let found = self.connection.query_row(&sql, [id], of_row).optional().map_err(|e| fault(self.path(), &e))?;
+        read(found.ok_or(StoreError::NoCalibration { id })?)
+    }
+
+    /// All calibrations, or those of one part, oldest first.
+    pub fn calibrations(&self, part: Option<&str>) -> Result<Vec<StoredCalibration>, StoreError> {
+        let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE ?1 IS NULL OR part = ?1 ORDER BY created, id");
+        let rows: rusqlite::Result<Vec<_>> =
+            self.connection.prepare(&sql).and_then(|mut statement| statement.query_map([part], of_row)?.collect());
+        rows.map_err(|e| fault(self.path(), &e))?.into_iter().map(read).collect()
+    }
+
+    /// Withdraws a calibration, so that it serves no trial that does not ask for it, or takes that back.
+    pub fn withdraw_calibration(&mut self, id: CalibrationId, withdrawn: bool) -> Result<(), StoreError> {
+        let path = self.path().to_owned();
+        let sql = "UPDATE calibrations SET withdrawn =
+                   CASE WHEN ?2 THEN strftime('%Y-%m-%dT%H:%M:%fZ', 'now') ELSE NULL END WHERE id = ?1";
+        let transaction = self.write()?;
+        let changed = transaction.execute(sql, params![id, withdrawn]).map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        if changed == 0 { Err(StoreError::NoCalibration { id }) } else { Ok(()) }
+    }
+
+    /// Notes that a part sits in a place from now on.
+    pub fn mount_part(&mut self, sensor: Sensor, part: &str) -> Result<(), StoreError> {
+        let path = self.path().to_owned();
+        let transaction = self.write()?;
+        let sql = "INSERT INTO mountings (sensor, part) VALUES (?1, ?2)";
+        transaction.execute(sql, params![sensor.channel(), part.trim()]).map_err(|e| fault(&path, &e))?;
+        transaction.commit().map_err(|e| fault(&path, &e))
+    }
+
+    /// Which part sits in each place now, in the order of [`Sensor::ALL`].
+    pub fn mounted_parts(&self) -> Result<[Option<String>; 4], StoreError> {
+        self.mounted_at(None)
+    }
+
+    /// Which part sat in each place at a time; the first that was ever put there, where nothing is known of that time.
+    fn mounted_at(&self, at: Option<&str>) -> Result<[Option<String>; 4], StoreError> {
+        let sql = "SELECT part FROM mountings WHERE sensor = ?1
+                   ORDER BY ?2 IS NULL OR since <= ?2 DESC, CASE WHEN ?2 IS NULL OR since <= ?2 THEN -id ELSE id END LIMIT 1";
+        let mut parts = [const { None }; 4];
+        for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
+            let found = self.connection.query_row(sql, params![sensor.channel(), at], |row| row.get(0)).optional();
+            *part = found.map_err(|e| fault(self.path(), &e))?;
+        }
+        Ok(parts)
+    }
+
+    /// Notes with which parts a trial is recorded: those that sit in their places now. To be called when it begins.
+    pub fn note_parts(&mut self, trial: TrialId) -> Result<(), StoreError> {
+        let parts = self.mounted_parts()?;
+        let path = self.path().to_owned();
+        let fault = |e: rusqlite::Error| fault(&path, &e);
+        let transaction = self.write()?;
+        for (sensor, part) in Sensor::ALL.into_iter().zip(parts) {
+            let Some(part) = part else { continue };
+            let sql = "INSERT OR REPLACE INTO parts (trial, sensor, part) VALUES (?1, ?2, ?3)";
+            transaction.execute(sql, params![trial, sensor.channel(), part]).map_err(fault)?;
+        }
+        transaction.commit().map_err(fault)
+    }
+
+    /// With which parts a trial was recorded; where it says nothing, what sat in each place at its time.
+    pub fn parts_of(&self, trial: TrialId) -> Result<[Option<String>; 4], StoreError> {
+        let fault = |e: rusqlite::Error| fault(self.path(), &e);
+        let sql = "SELECT created FROM trials WHERE id = ?1";
+        let created: Option<String> =
+            self.connection.query_row(sql, [trial], |row| row.get(0)).optional().map_err(fault)?;
+        let mut parts = self.mounted_at(created.as_deref())?;
+        for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
+            let sql = "SELECT part FROM parts WHERE trial = ?1 AND sensor = ?2";
+            let noted = self.connection.query_row(sql, params![trial, sensor.channel()], |row| row.get(0)).optional();
+            *part = noted.map_err(fault)?.or(part.take());
+        }
+        Ok(parts)
+    }
+
+    /// The calibrations that serve a trial, or without one what is recorded now: of each part the newest that is not
+    /// withdrawn, or the one that is asked for by its number.
+    pub fn serving(&self, trial: Option<TrialId>, asked: &[CalibrationId]) -> Result<Serving, StoreError> {
+        let parts = match trial {
+            Some(trial) => self.parts_of(trial)?,
+            None => self.mounted_parts()?,
+        };
+        let asked = asked.iter().map(|id| self.calibration(*id)).collect::<Result<Vec<_>, _>>()?;
+        let mut serving = Serving::default();
+        for (sensor, part) in Sensor::ALL.into_iter().zip(parts) {
+            let Some(part) = part else {
+                let (place, channel) = (sensor.label(), sensor.channel());
+                let text =
+                    format!("it is not known which part is the {place}: `palpate calibrate mount {channel} NAME`");
+                serving.warnings.push(text);
+                continue;
+            };
+            let fits = |c: &&StoredCalibration| c.record.kind == Kind::of(sensor) && c.record.part == part;
+            let wanted: Vec<StoredCalibration> = match asked.iter().find(fits) {
+                Some(one) => vec![one.clone()],
+                None => {
+                    let all = self.calibrations(Some(&part))?.into_iter().rev();
+                    all.filter(|c| c.withdrawn.is_none() && fits(&c)).collect()
+                }
+            };
+            serving.take_first_sound(sensor, &part, wanted);
+        }
+        Ok(serving)
+    }
+}
+
+impl Serving {
+    fn take_first_sound(&mut self, sensor: Sensor, part: &str, wanted: Vec<StoredCalibration>) {
+        let mut wanted = wanted.into_iter();
+        while let Some(stored) = wanted.next() {
+            match Calibration::fit(stored.record) {
+                Ok(calibration) => {
+                    let knew = |older: &StoredCalibration| older.record.bending.is_some();
+                    if calibration.record.bending.is_none()
+                        && let Some(older) = wanted.find(knew)
+                    {
+                        let (id, channel) = (stored.id, sensor.channel());
+                        self.warnings.push(format!(
+                            "calibration {id} (\"{part}\", version {}) does not know what bending does to it, as version {} \
+                             did: `palpate calibrate {channel} --part \"{part}\" --empty-close 5` learns it anew",
+                            stored.version, older.version
+                        ));
+                    }
+                    self.calibrations.push((sensor, calibration));
+                    self.ids.push(stored.id);
+                    return;
+                }
+                Err(cause) => {
+                    let (id, version) = (stored.id, stored.version);
+                    self.warnings
+                        .push(format!("calibration {id} (\"{part}\", version {version}) is passed over: {cause}"));
+                }
+            }
+        }
+        let (place, channel) = (sensor.label(), sensor.channel());
+        self.warnings.push(format!(
+            "the {place}, \"{part}\", has no calibration: `palpate calibrate {channel} --part \"{part}\"` makes one"
+        ));
+    }
+}
+
+/// Adds a record as the newest version of its part; an imported one keeps its identity and date.
+fn insert(
+    transaction: &Transaction<'_>,
+    record: &Record,
+    imported: Option<&StoredCalibration>,
+) -> rusqlite::Result<CalibrationId> {
+    let text = serde_json::to_string(record).map_err(|e| rusqlite::Error::ToSqlConversionFailure(Box::new(e)))?;
+    transaction.execute(
+        "INSERT INTO calibrations (part, version, record, uid, created, withdrawn)
+         VALUES (?1, (SELECT coalesce(max(version), 0) + 1 FROM calibrations WHERE part = ?1), ?2,
+            coalesce(?3, lower(hex(randomblob(16)))), coalesce(?4, strftime('%Y-%m-%dT%H:%M:%fZ', 'now')), ?5)",
+        params![
+            record.part,
+            text,
+            imported.map(|other| &other.uid),
+            imported.map(|other| &other.created),
+            imported.and_then(|other| other.withdrawn.as_ref()),
+        ],
+    )?;
+    Ok(transaction.last_insert_rowid())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use palpate_tactile::board::{Board, Reading};
+    use palpate_tactile::calibration::{Input, Point, Readout};
+
+    /// A strip's record with some resistance flat, twice that at a right angle.
+    pub(crate) fn strip(part: &str, flat_ohm: f64) -> Record {
+        let input = Input::on(&Board::default(), Sensor::FlexLeft);
+        let point = |degrees: f64| Point {
+            stimulus: degrees.to_radians(),
+            counts: input.counts(flat_ohm * (1.0 + degrees / 90.0)),
+            spread: 1.0,
+            readings: 50,
+        };
+        let points = [0.0, 45.0, 90.0].map(point).to_vec();
+        Record { part: part.to_owned(), kind: Kind::Flex, input, points, bending: None, note: String::new() }
+    }
+
+    fn store(folder: &tempfile::TempDir, name: &str) -> Store {
+        Store::open(&folder.path().join(name)).expect("opens")
+    }
+
+    fn folder() -> tempfile::TempDir {
+        tempfile::tempdir().expect("a temporary folder")
+    }
+
+    #[test]
+    fn versions_count_up_within_a_part_and_survive_an_exchange() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = folder();
+        let mut here = store(&folder, "here");
+        let versions =
+            [("A", 20e3), ("B", 25e3), ("A", 21e3)].map(|(part, flat)| here.add_calibration(&strip(part, flat)));
+        let versions: Vec<i64> =
+            versions.into_iter().map(|stored| stored.map(|s| s.version)).collect::<Result<_, _>>()?;
+        assert_eq!(versions, [1, 1, 2]);
+        here.withdraw_calibration(1, true)?;
+        let text = serde_json::to_string(&here.calibrations(None)?)?;
+        let mut there = store(&folder, "there");
+        there.add_calibration(&strip("A", 30e3))?;
+        let others: Vec<StoredCalibration> = serde_json::from_str(&text)?;
+        assert_eq!((there.import_calibrations(&others)?, there.import_calibrations(&others)?), (3, 0));
+        let of_a = there.calibrations(Some("A"))?;
+        assert_eq!(of_a.len(), 3);
+        // Older ones come first, whatever their version here.
+        assert_eq!(of_a[0].record, strip("A", 20e3));
+        assert!(of_a[0].withdrawn.is_some() && of_a[0].version == 2 && of_a[2].version == 1);
+        assert!(matches!(there.withdraw_calibration(99, true), Err(StoreError::NoCalibration { id: 99 })));
+        Ok(())
+    }
+
+    #[test]
+    fn parts_get_swapped_and_trials_know_theirs() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = folder();
+        let mut store = store(&folder, "s");
+        assert_eq!(store.mounted_parts()?, [const { None }; 4]);
+        let info = crate::test_trials::grasp(&palpate_sim::scene::Scene::default(), None, 0).info;
+        let untold = store.begin(&info)?;
+        // Times are stored to the millisecond.
+        std::thread::sleep(std::time::Duration::from_millis(3));
+        store.mount_part(Sensor::FlexLeft, "A")?;
+        let first = store.begin(&info)?;
+        store.note_parts(first)?;
+        store.mount_part(Sensor::FlexLeft, "B")?;
+        let second = store.begin(&info)?;
+        store.note_parts(second)?;
+        let left = |trial| store.parts_of(trial).map(|parts| parts[0].clone());
+        assert_eq!((left(first)?.as_deref(), left(second)?.as_deref()), (Some("A"), Some("B")));
+        assert_eq!(left(untold)?.as_deref(), Some("A"), "the first that is known");
+        assert_eq!(store.mounted_parts()?[0].as_deref(), Some("B"));
+        Ok(())
+    }
+
+    #[test]
+    fn the_newest_sound_calibration_serves_old_trials_too() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = folder();
+        let mut store = store(&folder, "s");
+        store.mount_part(Sensor::FlexLeft, "A")?;
+        let info = crate::test_trials::grasp(&palpate_sim::scene::Scene::default(), None, 0).info;
+        let trial = store.begin(&info)?;
+        store.note_parts(trial)?;
+        assert!(store.serving(Some(trial), &[])?.warnings[0].contains("has no calibration"));
+        let reading = {
+            let counts = strip("A", 24e3).input.counts(36e3) as f32;
+            Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts: vec![Some(counts); 4], line_bar: None }
+        };
+        let degrees = |store: &Store, asked: &[CalibrationId]| -> Result<f64, Box<dyn std::error::Error>> {
+            let serving = store.serving(Some(trial), asked)?;
+            let felt = Readout::new(&Board::default(), &serving.calibrations)?.felt(&reading);
+            Ok(felt.angle[0].ok_or("calibrated")?.to_degrees())
+        };
+        // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.
+        let old = store.add_calibration(&strip("A", 18e3))?.id;
+        assert!((degrees(&store, &[])? - 90.0).abs() < 1e-2);
+        let new = store.add_calibration(&strip("A", 24e3))?.id;
+        assert!((degrees(&store, &[])? - 45.0).abs() < 1e-2);
+        assert!((degrees(&store, &[old])? - 90.0).abs() < 1e-2);
+        store.withdraw_calibration(new, true)?;
+        assert!((degrees(&store, &[])? - 90.0).abs() < 1e-2);
+        store.withdraw_calibration(new, false)?;
+        // One that no program of today would make is passed over with a word.
+        store.add_calibration(&strip("A", 90e3))?;
+        let serving = store.serving(Some(trial), &[])?;
+        assert_eq!(serving.ids, [new]);
+        assert!(serving.warnings.iter().any(|w| w.contains("passed over") && w.contains("90.0 kOhm")), "{serving:?}");
+        Ok(())
+    }
+}

@@ -1,0 +1,197 @@
+//! CSV for spreadsheets, pandas and plotting tools: one row per sample, units in the header, time first, no byte-order
+//! mark. A second file lists every loaded taxel with its place in the world.
+//!
+//! Columns: `t_s`, `line_pressure (bar)`, `phase`, the channels of a sensor layout, joint angles, joint positions in the
+//! world frame (as the paper stores them, section IV-A), the object's pose. Joints are numbered from 1 at the palm.
+
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{BentFinger, Side};
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::Trial;
+use palpate_tactile::{Sensors, Signals};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Why a CSV file could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvError {
+    /// The file or its folder.
+    #[error("cannot write \"{path}\": {cause}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+}
+
+/// The name of the file with the contacts beside a trial's file: `trial.csv` has `trial.contacts.csv`.
+pub fn contacts_path(path: &Path) -> PathBuf {
+    path.with_extension("contacts.csv")
+}
+
+/// Writes one row per sample.
+pub fn write_trial_csv(path: &Path, trial: &Trial, scene: &Scene, sensors: &Sensors) -> Result<(), CsvError> {
+    write_file(path, |out| {
+        out.write_record(header(scene, sensors, trial))?;
+        for frame in &trial.frames {
+            out.write_record(row(frame, trial, scene, sensors))?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes a trial that was recorded elsewhere: time, then its channels as they came.
+pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError> {
+    write_file(path, |out| {
+        out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
+        for (sample, t) in signals.t_s.iter().enumerate() {
+            let values = signals.row(sample).iter().map(ToString::to_string);
+            out.write_record(std::iter::once(number(*t)).chain(values))?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes one row per loaded taxel and sample: where it is in the world, and the force on it.
+///
+/// The place is that of the taxel's undeformed skin; the skin is pushed in by at most the pad's thickness.
+pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(), CsvError> {
+    let header = [
+        "t_s",
+        "finger",
+        "segment",
+        "taxel",
+        "x [m]",
+        "y [m]",
+        "z [m]",
+        "normal_force [N]",
+        "shear_along [N]",
+        "shear_across [N]",
+    ];
+    let grid = scene.gripper.taxels();
+    write_file(path, |out| {
+        out.write_record(header)?;
+        for frame in &trial.frames {
+            for side in Side::BOTH {
+                let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
+                for (taxel, load) in frame.loads(side, grid.count()) {
+                    let (segment, along) = grid.place(taxel, &scene.gripper.finger);
+                    let in_plane = bent.segments[segment].point(along, grid.height(taxel));
+                    let in_gripper = scene.gripper.plane(side).point(in_plane, grid.across(taxel));
+                    let place = trial.info.world_from_gripper.point(in_gripper);
+                    let mut record = vec![number(frame.t), side.name().to_owned()];
+                    record.extend([segment, taxel].map(|n| n.to_string()));
+                    record.extend(place.to_array().map(number));
+                    record.extend([load.normal, load.along, load.across].map(|f| f.to_string()));
+                    out.write_record(record)?;
+                }
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Writes to a temporary neighbour first, so that a kill leaves either the old file or the whole new one.
+pub(super) fn write_file(
+    path: &Path,
+    fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<std::fs::File>>) -> csv::Result<()>,
+) -> Result<(), CsvError> {
+    let unfinished = path.with_extension("csv.unfinished");
+    let written = (|| -> std::io::Result<()> {
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder)?;
+        }
+        let file = std::io::BufWriter::new(std::fs::File::create(&unfinished)?);
+        let mut out = csv::Writer::from_writer(file);
+        fill(&mut out)?;
+        out.flush()?;
+        out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.flush()?;
+        std::fs::rename(&unfinished, path)
+    })();
+    written.map_err(|cause| {
+        // The remains are of no use; that they may not be removable either adds nothing to the message.
+        let _gone = std::fs::remove_file(&unfinished);
+        CsvError::Write { path: path.to_owned(), cause: cause.to_string() }
+    })
+}
+
+/// Shortest text that reads back as the same number.
+pub(super) fn number(x: f64) -> String {
+    x.to_string()
+}
+
+fn header(scene: &Scene, sensors: &Sensors, trial: &Trial) -> Vec<String> {
+    let mut names = vec!["t_s".to_owned(), "line_pressure [bar]".to_owned(), "phase".to_owned()];
+    names.extend(sensors.channels().iter().map(|c| format!("{} [{}]", c.name(), c.quantity.unit())));
+    let joints = || Side::BOTH.into_iter().flat_map(|side| (1..=scene.gripper.finger.joints).map(move |j| (side, j)));
+    names.extend(joints().map(|(side, j)| format!("q_{}_{j} [rad]", side.name())));
+    for (side, j) in joints() {
+        names.extend(["x", "y", "z"].map(|axis| format!("joint_{}_{j}_{axis} [m]", side.name())));
+    }
+    if trial.frames.first().is_some_and(|f| f.world_from_object.is_some()) {
+        names.extend(["x", "y", "z"].map(|axis| format!("object_{axis} [m]")));
+        names.extend(["qx", "qy", "qz", "qw"].map(|part| format!("object_{part}")));
+    }
+    names
+}
+
+fn row(frame: &Frame, trial: &Trial, scene: &Scene, sensors: &Sensors) -> Vec<String> {
+    let mut fields = vec![number(frame.t), number(frame.line_bar), frame.phase.name().to_owned()];
+    // An undefined pressure is an empty field.
+    fields.extend(sensors.read(frame).into_iter().map(|v| v.map(number).unwrap_or_default()));
+    fields.extend(frame.q.iter().copied().map(number));
+    for side in Side::BOTH {
+        let plane = scene.gripper.plane(side);
+        let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
+        let places = bent.joints().map(|p| trial.info.world_from_gripper.point(plane.point(p, 0.0)));
+        fields.extend(places.flat_map(|p| p.to_array().map(number)));
+    }
+    if let Some(pose) = frame.world_from_object {
+        fields.extend(pose.position.to_array().map(number));
+        fields.extend(pose.rotation.to_array().map(number));
+    }
+    fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_trials::grasp;
+    use palpate_geometry::Primitive;
+    use palpate_sim::objects::ObjectModel;
+    use palpate_tactile::{PressureArea, SensorLayout};
+
+    #[test]
+    fn rows_match_their_header_and_joints_lie_in_the_world() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("deep/trial.csv");
+        let mut scene = Scene::default();
+        scene.timing.duration_s = 2.0;
+        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+        let trial = grasp(&scene, Some(&ball), 0);
+        let layout = SensorLayout::named("C5+F").expect("known");
+        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
+        write_trial_csv(&path, &trial, &scene, &sensors).expect("writes");
+        write_contacts_csv(&contacts_path(&path), &trial, &scene).expect("writes");
+
+        let mut reader = csv::Reader::from_path(&path).expect("opens");
+        let header = reader.headers().expect("has one").clone();
+        assert_eq!(&header[0], "t_s");
+        let column = |name: &str| header.iter().position(|h| h == name).unwrap_or_else(|| panic!("no {name}"));
+        let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().expect("even rows");
+        assert_eq!(rows.len(), 150);
+        // The first joint of the left finger never moves: 5 mm below the palm, half the opening and the pad away.
+        let at = |name: &str| rows[100][column(name)].parse::<f64>().expect("a number");
+        let palm = trial.info.world_from_gripper.position.z;
+        assert!((at("joint_left_1_x [m]") + scene.gripper.half_gap()).abs() < 1e-12);
+        assert!((at("joint_left_1_z [m]") - (palm - 0.005)).abs() < 1e-12);
+        assert!(at("curvature_left_distal [1/m]") > 0.0);
+        assert!((at("object_z [m]") - 0.07).abs() < 0.02);
+
+        let mut contacts = csv::Reader::from_path(contacts_path(&path)).expect("opens");
+        let first = contacts.records().next().expect("the ball was touched").expect("even rows");
+        let height: f64 = first[6].parse().expect("a number");
+        assert!((height - 0.07).abs() < 0.02, "contact at the height of the ball: {height}");
+    }
+}

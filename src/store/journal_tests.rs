@@ -1,0 +1,340 @@
+//! Labels, notes and discarded trials in the store: every change is told, and what was done can be undone.
+
+use super::*;
+use crate::labels::{LabelPlan, LabelledTrial};
+use palpate_geometry::Pose;
+use palpate_sim::frame::{Plan, Quality};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::TrialInfo;
+use proptest::prelude::*;
+use std::path::Path;
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+fn info(rig: &str, object: &str) -> TrialInfo {
+    TrialInfo {
+        rig: rig.to_owned(),
+        object: object.to_owned(),
+        seed: 0,
+        collection: None,
+        scene: String::new(),
+        world_from_gripper: Pose::IDENTITY,
+        plan: Plan::default(),
+        quality: Quality::default(),
+        warnings: Vec::new(),
+        version: "0".to_owned(),
+    }
+}
+
+/// Adds a finished trial of the real gripper.
+fn add(store: &mut Store, object: &str) -> Result<TrialId, StoreError> {
+    let about = BoardInfo::default();
+    let id = store.begin_board(&info(BOARD_RIG, object), &about)?;
+    store.finish_board(id, &about, &[])?;
+    Ok(id)
+}
+
+fn store_with(path: &Path, objects: &[&str]) -> Result<Store, StoreError> {
+    let mut store = Store::open(path)?;
+    for object in objects {
+        add(&mut store, object)?;
+    }
+    Ok(store)
+}
+
+fn labels(store: &Store) -> Result<Vec<Option<String>>, StoreError> {
+    Ok(store.labelled_trials()?.into_iter().map(|row| row.object).collect())
+}
+
+#[test]
+fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("trials.sqlite");
+    let mut store = store_with(&path, &[""])?;
+    assert_eq!(labels(&store)?, [None]);
+    store.label_trial(1, " lemon ")?;
+    store.label_trial(1, "cube")?;
+    drop(store);
+    let mut store = Store::open(&path)?;
+    let undone = store.undo()?.ok_or("something was done")?;
+    assert_eq!(undone.sentence(), "trial 1: label lemon -> cube");
+    assert_eq!(labels(&store)?, [Some("lemon".to_owned())]);
+    drop(store);
+    let mut store = Store::open(&path)?;
+    store.undo()?.ok_or("one more")?;
+    assert_eq!((labels(&store)?, store.undo()?), (vec![None], None));
+    store.redo()?.ok_or("it can be done again")?;
+    drop(store);
+    let mut store = Store::open(&path)?;
+    store.redo()?.ok_or("and the other too")?;
+    assert_eq!((labels(&store)?, store.redo()?), (vec![Some("cube".to_owned())], None));
+    let told: Vec<String> = store.journal(100)?.iter().map(JournalEntry::sentence).collect();
+    assert_eq!(told.len(), 6);
+    assert_eq!(told[5], "trial 1: label unlabelled -> lemon");
+    assert_eq!(told[3], "trial 1: label cube -> lemon (takes back 2)");
+    assert_eq!(store.journal(2)?.len(), 2);
+    Ok(())
+}
+
+#[test]
+fn something_new_leaves_nothing_to_be_done_again() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
+    store.set_note(1, "slipped")?;
+    store.undo()?.ok_or("the note")?;
+    // What a model says, and looking at a trial, is nothing to undo and in nobody's way.
+    store.set_guess(1, "m", &[("lemon".to_owned(), 0.75), ("ball".to_owned(), 0.25)])?;
+    store.mark_reviewed(1)?;
+    assert!(store.redo()?.is_some() && store.undo()?.is_some());
+    store.set_unsure(1, true)?;
+    assert_eq!(store.redo()?, None);
+    Ok(())
+}
+
+#[test]
+fn the_journal_is_only_added_to() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = store_with(&folder.path().join("trials.sqlite"), &[""])?;
+    store.label_trial(1, "lemon")?;
+    for sql in ["UPDATE journal SET entry = '{}'", "DELETE FROM journal", "UPDATE journal SET number = 7"] {
+        let refused = store.connection.execute(sql, []).expect_err("triggers refuse it").to_string();
+        assert!(refused.contains("only added to"), "{refused}");
+    }
+    // Removing a trial for good leaves what is told of it.
+    store.discard_trial(1)?;
+    assert_eq!(store.purge()?, 1);
+    let told = store.journal(9)?;
+    assert_eq!((told.len(), told[1].trial), (2, None));
+    assert!(told[1].sentence().ends_with("(removed): label unlabelled -> lemon"), "{}", told[1].sentence());
+    assert_eq!(store.undo()?, None, "there is nothing left to put it back on");
+    Ok(())
+}
+
+#[test]
+fn a_change_and_its_entry_are_one() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon", "cube"])?;
+    // As if the disk were full at the worst moment: after the change, while it is told.
+    store
+        .connection
+        .execute_batch("CREATE TRIGGER full BEFORE INSERT ON journal BEGIN SELECT raise(ABORT, 'no room'); END;")?;
+    assert!(store.label_trial(1, "ball").is_err() && store.discard_trial(2).is_err());
+    assert!(store.set_label_plan(&LabelPlan { objects: Vec::new() }).is_err());
+    store.connection.execute_batch("DROP TRIGGER full")?;
+    let rows = store.labelled_trials()?;
+    assert_eq!((rows[0].object.as_deref(), rows[1].discarded), (Some("lemon"), false));
+    assert_eq!((store.label_plan()?, store.journal(9)?.len()), (LabelPlan::default(), 0));
+    Ok(())
+}
+
+#[test]
+fn what_another_program_has_changed_is_not_undone() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("trials.sqlite");
+    let mut ours = store_with(&path, &["lemon", "cube"])?;
+    let mut theirs = Store::open(&path)?;
+    theirs.journal.writer = "another program".to_owned();
+    ours.set_note(2, "first")?;
+    ours.label_trial(1, "ball")?;
+    theirs.label_trial(1, "bigball")?;
+    theirs.set_note(1, "theirs")?;
+    let told = ours.undo().expect_err("it was changed").to_string();
+    assert!(told.contains("label lemon -> ball") && told.contains("another program"), "{told}");
+    assert_eq!(labels(&ours)?[0].as_deref(), Some("bigball"), "nothing is overwritten");
+    // What was done before that is not in its way.
+    assert_eq!(ours.undo()?.ok_or("the note")?.sentence(), "trial 2: note \"first\"");
+    assert_eq!(ours.undo()?, None, "theirs is theirs");
+    theirs.undo()?.ok_or("their note")?;
+    theirs.undo()?.ok_or("their label")?;
+    assert_eq!(labels(&ours)?[0].as_deref(), Some("ball"));
+    // A program that comes later undoes what it finds.
+    let mut later = Store::open(&path)?;
+    later.journal.writer = "one more".to_owned();
+    assert_eq!(later.undo()?.ok_or("found")?.sentence(), "trial 1: label lemon -> ball");
+    assert_eq!(ours.undo()?, None, "what they have taken back is not taken back again");
+    Ok(())
+}
+
+#[test]
+fn nonsense_is_refused_and_changes_nothing() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
+    let simulated = store.begin(&info("sim", "cube"))?;
+    let told = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
+    assert!(told(store.label_trial(1, "  ")).contains("cannot be empty"));
+    assert!(told(store.label_trial(simulated, "ball")).contains("only trials of the real gripper"));
+    assert!(told(store.label_trial(9, "ball")).contains("no trial 9"));
+    assert!(told(store.set_note(1, &"x".repeat(4001))).contains("4000"));
+    assert!(told(store.set_tags(1, &["a\u{7}".to_owned()])).contains("control"));
+    assert!(told(store.set_guess(1, "m", &[("a".to_owned(), 0.4)])).contains("sum to 0.4"));
+    assert!(told(store.set_guess(1, "m", &[("a".to_owned(), f64::NAN)])).contains("not kept"));
+    store.discard_trial(1)?;
+    assert!(told(store.label_trial(1, "ball")).contains("restore"));
+    assert!(told(store.discard_trial(1)).contains("restore"));
+    store.restore_trial(1)?;
+    assert!(told(store.restore_trial(1)).contains("not deleted"));
+    assert_eq!(store.journal(9)?.len(), 2, "only what was done is told");
+    // A simulated trial takes notes all the same.
+    store.set_note(simulated, "odd")?;
+    store.label_trial(1, "lemon")?;
+    assert_eq!(store.journal(9)?.len(), 3, "the same label again is no change");
+    Ok(())
+}
+
+#[test]
+fn the_plan_is_kept_and_told() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("trials.sqlite");
+    let mut store = store_with(&path, &[])?;
+    let mut plan = store.label_plan()?;
+    assert_eq!(plan, LabelPlan::default());
+    plan.set("mug", 40)?;
+    store.set_label_plan(&plan)?;
+    store.set_label_plan(&plan)?;
+    drop(store);
+    let store = Store::open(&path)?;
+    assert_eq!((store.label_plan()?, store.journal(9)?.len()), (plan, 1));
+    assert_eq!(store.journal(9)?[0].sentence(), "plan changed to 840 trials of 17 objects");
+    Ok(())
+}
+
+#[test]
+fn all_that_goes_with_a_trial_is_merged_and_only_once() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let (here, there) = (folder.path().join("here.sqlite"), folder.path().join("there.sqlite"));
+    let mut ours = store_with(&here, &["box"])?;
+    ours.label_trial(1, "case")?;
+    let mut theirs = store_with(&there, &["", "cube"])?;
+    theirs.label_trial(1, "lemon")?;
+    theirs.set_note(1, "slipped")?;
+    theirs.set_tags(1, &["wet".to_owned(), "late".to_owned()])?;
+    theirs.set_unsure(1, true)?;
+    theirs.set_guess(1, "m", &[("lemon".to_owned(), 0.25), ("ball".to_owned(), 0.75)])?;
+    theirs.mark_reviewed(1)?;
+    theirs.set_note(2, "x")?;
+    theirs.undo()?.ok_or("the note")?;
+    theirs.set_label_plan(&LabelPlan { objects: Vec::new() })?;
+    assert_eq!(ours.merge_from(&there)?.added, 2);
+    let numbered = |id: TrialId, row: &LabelledTrial| LabelledTrial { id, ..row.clone() };
+    let (all, before) = (ours.labelled_trials()?, theirs.labelled_trials()?);
+    assert_eq!(all[1..], [numbered(2, &before[0]), numbered(3, &before[1])]);
+    assert_eq!(ours.guess(2)?, theirs.guess(1)?);
+    let told = ours.journal(99)?;
+    assert_eq!((told.len(), told[0].merged, told[0].undoes), (9, true, Some(told[1].number)));
+    assert_eq!(told[1].sentence(), "trial 3: note \"x\"");
+    assert_eq!(ours.label_plan()?, LabelPlan::default(), "the plan is a matter of each store");
+    assert_eq!((ours.merge_from(&there)?.added, ours.journal(99)?.len()), (0, 9));
+    assert_eq!(ours.undo()?.ok_or("our own")?.sentence(), "trial 1: label box -> case", "theirs was done elsewhere");
+    assert_eq!(ours.undo()?, None);
+    Ok(())
+}
+
+#[test]
+fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("old.sqlite");
+    let store = store_with(&path, &["lemon"])?;
+    // What version 6 did not have is taken away again.
+    store.connection.execute_batch(
+        "DROP TABLE journal; DROP TABLE tares; DROP TABLE guesses; DROP TABLE label_plan;
+         ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
+         ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
+         UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
+         PRAGMA user_version = 6;",
+    )?;
+    drop(store);
+    let mut store = Store::open(&path)?;
+    let row = &store.labelled_trials()?[0];
+    assert_eq!((row.object.as_deref(), row.cadence.as_str()), (Some("lemon"), "50.00 Hz, jitter 0.0 ms, 2 lost"));
+    assert!(row.flags.is_empty() && row.sparkline.iter().all(Vec::is_empty));
+    store.label_trial(1, "ball")?;
+    assert!(store.undo()?.is_some());
+    Ok(())
+}
+
+/// What somebody does.
+#[derive(Clone, Debug)]
+enum Deed {
+    Label(TrialId, u8),
+    Note(TrialId, u8),
+    Tags(TrialId, u8),
+    Unsure(TrialId, bool),
+    Discard(TrialId),
+    Restore(TrialId),
+    Undo,
+    Redo,
+    Reopen,
+}
+
+fn deed() -> impl Strategy<Value = Deed> {
+    let (id, n) = (1..=3i64, 0..3u8);
+    prop_oneof![
+        (id.clone(), n.clone()).prop_map(|(id, n)| Deed::Label(id, n)),
+        (id.clone(), n.clone()).prop_map(|(id, n)| Deed::Note(id, n)),
+        (id.clone(), n).prop_map(|(id, n)| Deed::Tags(id, n)),
+        (id.clone(), any::<bool>()).prop_map(|(id, unsure)| Deed::Unsure(id, unsure)),
+        id.clone().prop_map(Deed::Discard),
+        id.prop_map(Deed::Restore),
+        Just(Deed::Undo),
+        Just(Deed::Undo),
+        Just(Deed::Redo),
+        Just(Deed::Reopen),
+    ]
+}
+
+/// What a list shows, in short.
+fn seen(store: &Store) -> Result<Vec<LabelledTrial>, StoreError> {
+    store.labelled_trials()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn undoing_and_redoing_is_going_back_and_forth_in_a_list_of_states(deeds in prop::collection::vec(deed(), 1..25)) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("trials.sqlite");
+        let mut store = store_with(&path, &["", "lemon", "cube"]).expect("made");
+        // The model: all states, and which is now.
+        let (mut states, mut now) = (vec![seen(&store).expect("read")], 0_usize);
+        for deed in deeds {
+            let before = seen(&store).expect("read");
+            let outcome = match deed.clone() {
+                Deed::Label(id, n) => store.label_trial(id, &format!("class {n}")),
+                Deed::Note(id, n) => store.set_note(id, &"!".repeat(n.into())),
+                Deed::Tags(id, n) => store.set_tags(id, &(0..n).map(|k| k.to_string()).collect::<Vec<_>>()),
+                Deed::Unsure(id, unsure) => store.set_unsure(id, unsure),
+                Deed::Discard(id) => store.discard_trial(id),
+                Deed::Restore(id) => store.restore_trial(id),
+                Deed::Undo => {
+                    prop_assert_eq!(store.undo().expect("alone").is_some(), now > 0);
+                    now = now.saturating_sub(1);
+                    Ok(())
+                }
+                Deed::Redo => {
+                    prop_assert_eq!(store.redo().expect("alone").is_some(), now + 1 < states.len());
+                    now = (now + 1).min(states.len() - 1);
+                    Ok(())
+                }
+                Deed::Reopen => {
+                    drop(store);
+                    store = Store::open(&path).expect("opens");
+                    Ok(())
+                }
+            };
+            let after = seen(&store).expect("read");
+            match deed {
+                Deed::Undo | Deed::Redo | Deed::Reopen => {}
+                // What was refused changes nothing; what changes nothing is no deed.
+                _ if outcome.is_err() => prop_assert_eq!(&after, &before),
+                _ if after == before => {}
+                _ => {
+                    states.truncate(now + 1);
+                    states.push(after.clone());
+                    now += 1;
+                }
+            }
+            prop_assert_eq!(&after, &states[now]);
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! All labelled trials of the real gripper as a folder that needs no Palpate:
+//!
+//! ```text
+//! trials.csv               a row to a trial: label, note, tags, flags, guess, calibrations, cadence
+//! signals.csv              trial, label, size, shape, t_s, channels of layout C1+F, closing and hold: as `trials import` takes it
+//! raw/trial_7_lemon.csv    counts as they came, a row to a reading
+//! raw/trial_7_lemon.bytes  the bytes, which can be heard again as if they came from a port
+//! ```
+//!
+//! The folder appears whole or not at all: it is written beside its place and renamed. Unlabelled and discarded trials, and
+//! those whose recording was cut short, are no part of it.
+
+use super::board_export::write_board_csv;
+use super::csv_export::{CsvError, number};
+use super::store::Store;
+use super::store_error::StoreError;
+use crate::labels::LabelledTrial;
+use palpate_sim::gripper::Gripper;
+use palpate_sim::objects::catalogue;
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::{Channel, SensorLayout, Signals};
+use serde::Serialize;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+/// What an export came to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Exported {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Trials written.
+    pub trials: usize,
+    /// Trials whose channels are in `signals.csv`.
+    pub derived: usize,
+    /// Trials whose channels are not, and why.
+    pub left_out: Vec<(TrialId, String)>,
+}
+
+/// Why nothing was exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The store.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A file or folder.
+    #[error(transparent)]
+    File(#[from] CsvError),
+    /// Something is there already.
+    #[error("\"{folder}\" has something in it already; choose a folder that is empty or does not exist", folder = folder.display())]
+    NotEmpty {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// No trial is labelled.
+    #[error("no trial of the real gripper is labelled: `palpate trials label ID NAME` gives one its label")]
+    Nothing,
+}
+
+type Out = csv::Writer<BufWriter<File>>;
+
+/// An object's name without anything that a file name should not have.
+pub fn file_name_of(object: &str) -> String {
+    object.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect()
+}
+
+/// Writes a trial of the real gripper: counts as CSV, and the bytes beside them. False for a trial of another kind.
+pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<bool, ExportError> {
+    let Some(trial) = store.board_trial(id)? else { return Ok(false) };
+    write_board_csv(path, &trial)?;
+    let bytes = path.with_extension("bytes");
+    std::fs::write(&bytes, store.board_bytes(id)?.unwrap_or_default()).map_err(|e| cannot(&bytes, &e))?;
+    Ok(true)
+}
+
+/// Writes all labelled trials into a folder that is empty or does not exist.
+pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportError> {
+    let rows: Vec<LabelledTrial> = store.labelled_trials()?.into_iter().filter(LabelledTrial::counts).collect();
+    if rows.is_empty() {
+        return Err(ExportError::Nothing);
+    }
+    if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
+        return Err(ExportError::NotEmpty { folder: folder.to_owned() });
+    }
+    let unfinished = beside(folder);
+    let written = write_all(store, &rows, &unfinished).and_then(|left_out| {
+        // An empty folder gives way; one that is not empty any more does not, and neither does anything else.
+        if folder.is_dir() {
+            std::fs::remove_dir(folder).map_err(|e| cannot(folder, &e))?;
+        }
+        std::fs::rename(&unfinished, folder).map_err(|e| cannot(folder, &e))?;
+        Ok(left_out)
+    });
+    let left_out = written.inspect_err(|_error| {
+        // The remains are of no use; that they may not be removable either adds nothing to the message.
+        let _gone = std::fs::remove_dir_all(&unfinished);
+    })?;
+    Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived: rows.len() - left_out.len(), left_out })
+}
+
+/// Where the folder is written before it is whole: on the same disk, under a name of this program's.
+fn beside(folder: &Path) -> PathBuf {
+    let name = folder.file_name().map_or_else(|| "export".into(), |name| name.to_string_lossy().into_owned());
+    folder.with_file_name(format!(".{name}.{}.unfinished", std::process::id()))
+}
+
+fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
+    let raw = folder.join("raw");
+    std::fs::create_dir_all(&raw).map_err(|e| cannot(&raw, &e))?;
+    let layout = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&Gripper::default()));
+    let channels: Vec<Channel> = layout.unwrap_or_default();
+    let (list, signals) = (folder.join("trials.csv"), folder.join("signals.csv"));
+    let mut list_out = create(&list)?;
+    let mut signals_out = create(&signals)?;
+    list_out.write_record(LIST_COLUMNS).map_err(|e| cannot(&list, &e))?;
+    let with_units = channels.iter().map(|channel| format!("{} [{}]", channel.name(), channel.quantity.unit()));
+    let header = ["trial", "label", "size", "shape", "t_s"].into_iter().map(str::to_owned).chain(with_units);
+    signals_out.write_record(header).map_err(|e| cannot(&signals, &e))?;
+    let mut left_out = Vec::new();
+    for row in rows {
+        let label = row.object.as_deref().unwrap_or_default();
+        let name = format!("trial_{}_{}.csv", row.id, file_name_of(label));
+        export_board_trial(store, row.id, &raw.join(&name))?;
+        let read = store.board_signals(row.id, &[])?.unwrap_or_default();
+        list_out.write_record(list_row(row, &read.serving.ids, &name)).map_err(|e| cannot(&list, &e))?;
+        let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
+        match read.grasp(&wanted) {
+            Some(chosen) => write_signals(&mut signals_out, row, label, &chosen).map_err(|e| cannot(&signals, &e))?,
+            None => left_out.push((row.id, read.derived.warnings.join("; "))),
+        }
+    }
+    list_out.flush().map_err(|e| cannot(&list, &e))?;
+    signals_out.flush().map_err(|e| cannot(&signals, &e))?;
+    Ok(left_out)
+}
+
+const LIST_COLUMNS: [&str; 17] = [
+    "id",
+    "uid",
+    "recorded_utc",
+    "label",
+    "unsure",
+    "reviewed",
+    "note",
+    "tags",
+    "flags",
+    "flag_remarks",
+    "guess",
+    "guess_probability",
+    "calibrations",
+    "cadence",
+    "samples",
+    "seconds",
+    "file",
+];
+
+fn list_row(row: &LabelledTrial, calibrations: &[i64], file: &str) -> [String; 17] {
+    let guess = row.guess.as_ref();
+    let flags: Vec<&str> = row.flags.iter().map(|found| found.flag.label()).collect();
+    let remarks: Vec<&str> = row.flags.iter().map(|found| found.remark.as_str()).collect();
+    let calibrations: Vec<String> = calibrations.iter().map(ToString::to_string).collect();
+    [
+        row.id.to_string(),
+        row.uid.clone(),
+        row.created.clone(),
+        row.object.clone().unwrap_or_default(),
+        row.unsure.to_string(),
+        row.reviewed.to_string(),
+        row.note.clone(),
+        row.tags.join("; "),
+        flags.join("; "),
+        remarks.join("; "),
+        guess.map(|guess| guess.class.clone()).unwrap_or_default(),
+        guess.map(|guess| number(guess.p)).unwrap_or_default(),
+        calibrations.join("; "),
+        row.cadence.clone(),
+        row.samples.to_string(),
+        number(row.seconds),
+        format!("raw/{file}"),
+    ]
+}
+
+fn write_signals(out: &mut Out, row: &LabelledTrial, label: &str, signals: &Signals) -> csv::Result<()> {
+    let class = catalogue().iter().find(|built_in| built_in.name == label).map(|built_in| built_in.class());
+    let (size, shape) = class.map_or(("", ""), |class| (class.size.name(), class.shape.name()));
+    for (sample, t) in signals.t_s.iter().enumerate() {
+        // Numbers start anew in every store; the identity does not.
+        let before = [row.uid.clone(), label.to_owned(), size.to_owned(), shape.to_owned(), number(*t)];
+        out.write_record(before.into_iter().chain(signals.row(sample).iter().map(ToString::to_string)))?;
+    }
+    Ok(())
+}
+
+fn create(path: &Path) -> Result<Out, ExportError> {
+    Ok(csv::Writer::from_writer(BufWriter::new(File::create(path).map_err(|e| cannot(path, &e))?)))
+}
+
+fn cannot(path: &Path, error: &dyn std::fmt::Display) -> ExportError {
+    ExportError::File(CsvError::Write { path: path.to_owned(), cause: error.to_string() })
+}

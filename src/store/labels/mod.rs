@@ -1,0 +1,13 @@
+//! What a label is: names of classes, guesses, flags and the plan of a labelling session.
+
+mod class_name;
+mod flag;
+mod labelled_trial;
+mod plan;
+mod sparkline;
+
+pub use class_name::{ClassNameError, LONGEST_NAME, class_name, shown_name};
+pub use flag::{Flag, FlagRemark, cadence_line, flaws};
+pub use labelled_trial::{Guess, GuessTop, LabelledTrial};
+pub use plan::{LabelPlan, MOST_WANTED, NextTrial, ObjectProgress, PlanError, PlannedObject, PoseCue, Progress};
+pub use sparkline::{SPARKLINE_BINS, Sparkline};

@@ -1,0 +1,44 @@
+//! Trials on disk: an SQLite store that survives kills and shares itself between programs, and CSV for everyone else.
+
+mod blob;
+mod board_blob;
+mod board_export;
+mod board_signals;
+mod board_trials;
+mod calibrations;
+mod csv_export;
+mod csv_import;
+mod disk;
+mod journal;
+#[cfg(test)]
+mod journal_tests;
+mod label_repository;
+mod labelled_export;
+mod labelled_trials;
+pub mod labels;
+mod merge;
+mod points_csv;
+mod readings;
+mod store;
+mod store_error;
+#[cfg(test)]
+mod store_tests;
+mod tares;
+#[cfg(test)]
+mod test_trials;
+
+pub use blob::{BlobError, decode_frames, encode_frames};
+pub use board_export::write_board_csv;
+pub use board_signals::BoardSignals;
+pub use board_trials::{BOARD_RIG, BoardChunk, BoardInfo, BoardTrial};
+pub use calibrations::{CalibrationId, Serving, StoredCalibration};
+pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
+pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
+pub use disk::check_space;
+pub use journal::{Change, JournalEntry};
+pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};
+pub use merge::Merged;
+pub use points_csv::{PointsError, read_points_csv};
+pub use store::{Store, TrialRow};
+pub use store_error::StoreError;
+pub use tares::{PartTare, StoredTare};

@@ -1,0 +1,133 @@
+//! Points of a calibration from a CSV file: `angle_deg` of a flex strip, or `load_kg` or `load_g` of a pad, beside `counts`.
+//! Columns `spread` (counts) and `readings` may stand beside them; several rows of one angle or weight are fine.
+
+use palpate_tactile::calibration::{Kind, Point};
+use std::path::{Path, PathBuf};
+
+/// Why points cannot be read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PointsError {
+    /// The file cannot be read at all.
+    #[error("cannot read the points \"{path}\": {cause}", path = path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        cause: String,
+    },
+    /// No column says what was set.
+    #[error(
+        "\"{path}\" has no column {wanted}; its first line must name the columns, as in \"{wanted},counts\" (it has: {found})",
+        path = path.display()
+    )]
+    NoColumn {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        wanted: &'static str,
+        /// What is there.
+        found: String,
+    },
+    /// A cell without a number.
+    #[error("\"{path}\", line {line}: {column} is \"{text}\", which is not a number", path = path.display())]
+    NotANumber {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What stands there.
+        text: String,
+    },
+}
+
+/// Rows beyond which a file is no list of points.
+const MOST_ROWS: usize = 10_000;
+
+/// A column that says what was set, and the factor to degrees or kilograms.
+fn stimulus_columns(kind: Kind) -> &'static [(&'static str, f64)] {
+    match kind {
+        Kind::Flex => &[("angle_deg", 1.0)],
+        Kind::Pad => &[("load_kg", 1.0), ("load_g", 1e-3)],
+    }
+}
+
+/// Reads the points of a sensor of some kind.
+pub fn read_points_csv(path: &Path, kind: Kind) -> Result<Vec<Point>, PointsError> {
+    let unreadable = |cause: String| PointsError::Unreadable { path: path.to_owned(), cause };
+    let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+    let headers = reader.headers().map_err(|e| unreadable(e.to_string()))?.clone();
+    let column = |name: &str| headers.iter().position(|header| header.eq_ignore_ascii_case(name));
+    let missing = |wanted: &'static str| {
+        let found = headers.iter().collect::<Vec<_>>().join(", ");
+        PointsError::NoColumn { path: path.to_owned(), wanted, found }
+    };
+    let known = stimulus_columns(kind);
+    let stimulus = known.iter().find_map(|(name, factor)| Some((column(name)?, *factor)));
+    let (stimulus, factor) = stimulus.ok_or_else(|| missing(known[0].0))?;
+    let counts = column("counts").ok_or_else(|| missing("counts"))?;
+    let (spread, readings) = (column("spread"), column("readings"));
+    let mut points = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|e| unreadable(e.to_string()))?;
+        let line = row.position().map_or(0, csv::Position::line);
+        let number = |column: usize| {
+            let text = row.get(column).unwrap_or_default();
+            text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| PointsError::NotANumber {
+                path: path.to_owned(),
+                line,
+                column: headers.get(column).unwrap_or_default().to_owned(),
+                text: text.to_owned(),
+            })
+        };
+        points.push(Point {
+            stimulus: kind.stimulus(factor * number(stimulus)?),
+            counts: number(counts)?,
+            spread: spread.map_or(Ok(0.0), number)?.max(0.0),
+            readings: readings.map_or(Ok(1.0), number)?.clamp(1.0, 1e6) as u32,
+        });
+        if points.len() > MOST_ROWS {
+            return Err(unreadable(format!("more than {MOST_ROWS} rows are too many for points of a calibration")));
+        }
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, kind: Kind) -> Result<Vec<Point>, PointsError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("points.csv");
+        std::fs::write(&path, text).expect("written");
+        read_points_csv(&path, kind)
+    }
+
+    #[test]
+    fn points_are_read_in_the_units_of_their_columns() -> Result<(), PointsError> {
+        let points = read("# strip A7\nangle_deg, counts\n0, 1422\n90 , 2230.5\n", Kind::Flex)?;
+        assert_eq!(points.len(), 2);
+        assert!((points[1].stimulus - std::f64::consts::FRAC_PI_2).abs() < 1e-12 && points[1].counts == 2230.5);
+        let points = read("counts,load_g,spread,readings\n0,0,0,1\n1800,100,2.1,50\n", Kind::Pad)?;
+        assert!((points[1].stimulus - 0.980665).abs() < 1e-12);
+        assert_eq!((points[1].spread, points[1].readings), (2.1, 50));
+        assert!((read("load_kg,counts\n0.5,3000\n", Kind::Pad)?[0].stimulus - 4.903325).abs() < 1e-12);
+        Ok(())
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_told_with_its_place() {
+        let message = |text: &str, kind| read(text, kind).expect_err("refused").to_string();
+        assert!(message("load_kg,counts\n0.5,3000\n", Kind::Flex).contains("no column angle_deg"));
+        assert!(message("angle_deg,volts\n0,1\n", Kind::Flex).contains("it has: angle_deg, volts"));
+        let text = message("angle_deg,counts\n0,1422\n90,open\n", Kind::Flex);
+        assert!(text.contains("line 3") && text.contains("\"open\""), "{text}");
+        assert!(message("angle_deg,counts\n0,nan\n", Kind::Flex).contains("not a number"));
+        assert!(message("angle_deg,counts\n0\n", Kind::Flex).contains("points.csv"));
+        let gone = read_points_csv(Path::new("/nowhere/p.csv"), Kind::Flex).expect_err("gone").to_string();
+        assert!(gone.contains("/nowhere/p.csv"));
+    }
+}

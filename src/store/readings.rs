@@ -1,0 +1,152 @@
+//! Trials that were recorded elsewhere: their channels as they came, without frames of ours.
+//!
+//! ```text
+//! magic "PPS1"       4 bytes
+//! samples            u32
+//! channels           u32
+//! per sample:        f64 time (s), then f32 per channel, little-endian
+//! ```
+
+use super::csv_import::ImportedTrial;
+use super::store::Store;
+use super::store_error::{StoreError, fault};
+use palpate_tactile::Signals;
+use palpate_tactile::trial::TrialId;
+use rusqlite::{OptionalExtension, params};
+
+const MAGIC: &[u8; 4] = b"PPS1";
+const HEADER: usize = 12;
+
+fn encode(signals: &Signals) -> Vec<u8> {
+    let mut out = Vec::with_capacity(HEADER + signals.len() * 8 + signals.values.len() * 4);
+    out.extend_from_slice(MAGIC);
+    out.extend_from_slice(&(signals.len() as u32).to_le_bytes());
+    out.extend_from_slice(&(signals.channels.len() as u32).to_le_bytes());
+    for sample in 0..signals.len() {
+        out.extend_from_slice(&signals.t_s[sample].to_le_bytes());
+        for value in signals.row(sample) {
+            out.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+    out
+}
+
+fn decode(bytes: &[u8], channels: Vec<String>) -> Option<Signals> {
+    let (header, rest) = bytes.split_at_checked(HEADER)?;
+    let number = |at: usize| Some(u32::from_le_bytes(header.get(at..at + 4)?.try_into().ok()?) as usize);
+    let row = 8 + 4 * channels.len();
+    if !header.starts_with(MAGIC) || number(8)? != channels.len() || rest.len() != number(4)?.checked_mul(row)? {
+        return None;
+    }
+    let mut signals = Signals { channels, ..Signals::default() };
+    for sample in rest.chunks_exact(row) {
+        let (t, values) = sample.split_at(8);
+        signals.t_s.push(f64::from_le_bytes(t.try_into().ok()?));
+        signals.values.extend(values.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)));
+    }
+    let sound = signals.values.iter().all(|x| x.is_finite()) && signals.t_s.is_sorted_by(|a, b| a < b);
+    sound.then_some(signals)
+}
+
+impl Store {
+    /// Stores trials that were recorded elsewhere under a collection's name, all or none; those of the same collection
+    /// and name that are there already stay as they are. Returns how many were added.
+    pub fn insert_imported(&mut self, collection: &str, trials: &[ImportedTrial]) -> Result<u32, StoreError> {
+        let path = self.path().to_owned();
+        let fault = |e: rusqlite::Error| fault(&path, &e);
+        let transaction = self.write()?;
+        let mut added = 0;
+        for (number, trial) in trials.iter().enumerate() {
+            let inserted = transaction
+                .execute(
+                    "INSERT OR IGNORE INTO trials (state, rig, object, seed, scene, world_from_gripper, quality,
+                         warnings, version, samples, collection, size, shape)
+                     VALUES ('complete', 'import', ?1, ?2, '', ?3, ?4, '[]', ?5, ?6, ?7, ?8, ?9)",
+                    params![
+                        trial.label,
+                        number as i64 + 1,
+                        serde_json::to_string(&palpate_geometry::Pose::IDENTITY).unwrap_or_default(),
+                        serde_json::to_string(&palpate_sim::frame::Quality::default()).unwrap_or_default(),
+                        env!("CARGO_PKG_VERSION"),
+                        trial.signals.len() as i64,
+                        collection,
+                        trial.size,
+                        trial.shape,
+                    ],
+                )
+                .map_err(fault)?;
+            if inserted > 0 {
+                let id = transaction.last_insert_rowid();
+                let channels = serde_json::to_string(&trial.signals.channels).unwrap_or_default();
+                let sql = "INSERT INTO readings (trial, channels, samples) VALUES (?1, ?2, ?3)";
+                transaction.execute(sql, params![id, channels, encode(&trial.signals)]).map_err(fault)?;
+                added += 1;
+            }
+        }
+        transaction.commit().map_err(fault)?;
+        Ok(added)
+    }
+
+    /// The channels of a trial that was recorded elsewhere; `None` for one of our own.
+    pub fn readings(&self, id: TrialId) -> Result<Option<Signals>, StoreError> {
+        let sql = "SELECT channels, samples FROM readings WHERE trial = ?1";
+        let found: Option<(String, Vec<u8>)> = self
+            .connection
+            .query_row(sql, [id], |row| Ok((row.get(0)?, row.get(1)?)))
+            .optional()
+            .map_err(|e| fault(self.path(), &e))?;
+        let Some((channels, samples)) = found else { return Ok(None) };
+        let bad = |cause: String| StoreError::BadInfo { id, cause };
+        let channels = serde_json::from_str(&channels).map_err(|e| bad(e.to_string()))?;
+        let signals = decode(&samples, channels).ok_or_else(|| bad("its readings are cut short".to_owned()))?;
+        Ok(Some(signals))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn imported(label: &str) -> ImportedTrial {
+        let signals = Signals {
+            channels: vec!["grip".to_owned(), "bend".to_owned()],
+            t_s: vec![0.0, 0.02, 0.04],
+            values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.5],
+        };
+        let (size, shape) = (Some("tiny".to_owned()), Some("cubic".to_owned()));
+        ImportedTrial { name: "first".to_owned(), label: label.to_owned(), size, shape, signals }
+    }
+
+    #[test]
+    fn readings_survive_storing_merging_and_a_second_import() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (here, there) = (folder.path().join("here"), folder.path().join("there"));
+        let mut store = Store::open(&here)?;
+        let trials = [imported("mug"), imported("key")];
+        assert_eq!(store.insert_imported("mine", &trials)?, 2);
+        assert_eq!(store.insert_imported("mine", &trials)?, 0, "twice is once");
+        let rows = store.list(false)?;
+        assert_eq!((rows[0].object.as_str(), rows[0].rig.as_str(), rows[0].samples), ("mug", "import", 3));
+        assert_eq!(rows[0].properties, Some(("tiny".to_owned(), "cubic".to_owned())));
+        let mut other = Store::open(&there)?;
+        other.merge_from(&here)?;
+        let id = other.list(false)?[1].id;
+        assert_eq!(other.readings(id)?, Some(trials[1].signals.clone()));
+        assert_eq!(other.readings(99)?, None);
+        Ok(())
+    }
+
+    #[test]
+    fn damaged_readings_are_refused() {
+        let bytes = encode(&imported("mug").signals);
+        let channels = || vec!["grip".to_owned(), "bend".to_owned()];
+        assert!(decode(&bytes, channels()).is_some());
+        for cut in 0..bytes.len() {
+            assert!(decode(&bytes[..cut], channels()).is_none());
+        }
+        assert!(decode(&bytes, vec!["grip".to_owned()]).is_none());
+        let mut nan = bytes.clone();
+        nan[HEADER + 8..HEADER + 12].copy_from_slice(&f32::NAN.to_le_bytes());
+        assert!(decode(&nan, channels()).is_none());
+    }
+}

@@ -1,0 +1,132 @@
+//! The store itself: what goes in comes out, together with other programs, from old versions, and not from foreign files.
+
+use super::store::*;
+use super::store_error::StoreError;
+use crate::test_trials::grasp;
+use palpate_geometry::Primitive;
+use palpate_sim::objects::ObjectModel;
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::Trial;
+use rusqlite::Connection;
+
+fn trial(seed: u64) -> Trial {
+    let mut scene = Scene::default();
+    scene.timing.duration_s = 1.2;
+    let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+    grasp(&scene, Some(&ball), seed)
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+#[test]
+fn a_trial_survives_storing() -> Result<(), StoreError> {
+    let folder = folder();
+    let mut store = Store::open(&folder.path().join("new/trials.sqlite"))?;
+    let trial = trial(u64::MAX);
+    let id = store.insert(&trial)?;
+    assert!(store.load(id)? == trial);
+    let rows = store.list(false)?;
+    assert_eq!((rows.len(), rows[0].samples, rows[0].state.as_str()), (1, 90, "complete"));
+    Ok(())
+}
+
+#[test]
+fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
+    let folder = folder();
+    let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+    let trial = trial(1);
+    let id = store.begin(&trial.info)?;
+    for frames in trial.frames.chunks(7) {
+        store.append(id, frames)?;
+    }
+    assert_eq!(store.list(false)?[0].state, "recording");
+    store.finish(id, &trial.info.quality, &trial.info.warnings)?;
+    assert!(store.load(id)? == trial);
+    Ok(())
+}
+
+#[test]
+fn two_programs_share_a_store() -> Result<(), StoreError> {
+    let folder = folder();
+    let path = folder.path().join("trials.sqlite");
+    let mut first = Store::open(&path)?;
+    let mut second = Store::open(&path)?;
+    let trial = trial(2);
+    std::thread::scope(|scope| {
+        for store in [&mut first, &mut second] {
+            scope.spawn(|| {
+                for _ in 0..20 {
+                    store.insert(&trial).expect("waits for its turn");
+                }
+            });
+        }
+    });
+    assert_eq!(first.list(false)?.len(), 40);
+    assert!(second.load(40)? == trial);
+    Ok(())
+}
+
+#[test]
+fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
+    let folder = folder();
+    let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+    let (a, b) = (store.insert(&trial(3))?, store.insert(&trial(4))?);
+    assert!(matches!(store.delete(&[a, 99]), Err(StoreError::NoTrial { id: 99, .. })));
+    assert_eq!(store.list(false)?.len(), 2, "all or none");
+    store.delete(&[a])?;
+    assert_eq!(store.list(false)?.len(), 1);
+    let message = store.load(a).expect_err("deleted").to_string();
+    assert!(message.contains("restore"), "{message}");
+    store.restore(&[a])?;
+    assert_eq!(store.load(a)?.info.seed, 3);
+    store.delete(&[b])?;
+    assert_eq!(store.purge()?, 1);
+    assert_eq!(store.list(true)?.len(), 1);
+    Ok(())
+}
+
+#[test]
+fn a_store_of_version_1_is_brought_up_to_date() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("old.sqlite");
+    let old = Connection::open(&path)?;
+    old.execute_batch(TABLES)?;
+    old.pragma_update(None, "application_id", APPLICATION_ID)?;
+    old.pragma_update(None, "user_version", 1)?;
+    old.execute_batch(
+        "INSERT INTO trials (state, rig, object, seed, scene, world_from_gripper, quality, warnings, version)
+         VALUES ('complete', 'sim', 'ball', 3, '', '{\"position\":[0,0,0],\"rotation\":[0,0,0,1]}', '{}', '[]', '0')",
+    )?;
+    drop(old);
+    let store = Store::open(&path)?;
+    let trial = store.load(1)?;
+    assert_eq!((trial.info.seed, trial.info.collection), (3, None));
+    assert_eq!(Store::open(&path)?.list(false)?.len(), 1, "and stays so");
+    Ok(())
+}
+
+#[test]
+fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = folder();
+    let text = folder.path().join("notes.txt");
+    std::fs::write(&text, "no database at all, but long enough to be looked at as one would be".repeat(20))?;
+    assert!(matches!(Store::open(&text), Err(StoreError::Foreign { .. })));
+
+    let other = folder.path().join("other.sqlite");
+    Connection::open(&other)?.execute_batch("CREATE TABLE mine (x)")?;
+    assert!(matches!(Store::open(&other), Err(StoreError::Foreign { .. })));
+
+    let newer = folder.path().join("newer.sqlite");
+    Store::open(&newer)?;
+    Connection::open(&newer)?.pragma_update(None, "user_version", 99)?;
+    assert!(matches!(Store::open(&newer), Err(StoreError::Newer { found: 99, .. })));
+
+    let damaged = folder.path().join("damaged.sqlite");
+    let id = Store::open(&damaged)?.insert(&trial(5))?;
+    Connection::open(&damaged)?.execute("UPDATE chunks SET frames = x'00' WHERE number = 1", [])?;
+    let error = Store::open(&damaged)?.load(id).expect_err("damaged");
+    assert!(matches!(error, StoreError::Damaged { chunk: 1, .. }));
+    Ok(())
+}

@@ -1,0 +1,32 @@
+//! Timing of a stream of readings: rate, jitter, losses, unreadable lines.
+
+use serde::{Deserialize, Serialize};
+
+/// How well a stream keeps time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Cadence {
+    /// Readings so far.
+    pub samples: u64,
+    /// Readings that the board took and that did not arrive, as far as they can be counted.
+    pub lost: u64,
+    /// Lines that could not be read.
+    pub bad_lines: u64,
+    /// Gaps.
+    pub gaps: u64,
+    /// Readings per second, lately (1/s).
+    pub rate_hz: f64,
+    /// 95th percentile of how far the time between two readings is from the usual (ms); by the board's clock where it sends
+    /// one, else by arrival.
+    pub jitter_p95_ms: f64,
+    /// 95th percentile of how much later than the quickest readings arrive (ms).
+    pub delay_p95_ms: f64,
+    /// How fast the board's clock runs against this computer's (ppm); none where it sends no time.
+    pub drift_ppm: Option<f64>,
+    /// Share of the last second's lines that could not be read.
+    pub bad_share: f64,
+    /// Share of the last second's bytes that are text.
+    pub printable_share: f64,
+    /// More than a fifth of the lines were unreadable for a whole second.
+    pub troubled: bool,
+}

@@ -1,0 +1,163 @@
+//! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending does to
+//! it, over the curvature that its finger's strip reads.
+
+use super::Fault;
+use super::pad_curve::BendingZero;
+use super::point::Kind;
+use super::readout::Readout;
+use super::record::Calibration;
+use crate::board::{Board, Reading, Sensor};
+use palpate_sim::gripper::Side;
+
+/// Most readings that are kept: half a minute at 1 kHz.
+const MOST_READINGS: usize = 30_000;
+
+/// An empty close that is being watched.
+#[derive(Clone, Debug)]
+pub struct EmptyClose {
+    readout: Readout,
+    side: Side,
+    seconds: f64,
+    readings: Vec<Reading>,
+    /// Time of the last reading less that of the first (s).
+    watched_s: f64,
+}
+
+impl EmptyClose {
+    /// How long it is watched where nobody says (s): enough to turn a regulator up and down again.
+    pub const SECONDS: f64 = 15.0;
+
+    /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts; the
+    /// strip of the same finger must be among them.
+    pub fn begin(
+        board: &Board,
+        pad: (Sensor, Calibration),
+        serving: &[(Sensor, Calibration)],
+        seconds: f64,
+    ) -> Result<Self, Fault> {
+        let sensor = pad.0;
+        let side = match sensor {
+            Sensor::PadLeft => Side::Left,
+            Sensor::PadRight => Side::Right,
+            Sensor::FlexLeft | Sensor::FlexRight => return Err(Fault::NoBending),
+        };
+        let strip = Kind::Flex.on(side);
+        if board.channel_of(strip).is_none() || !serving.iter().any(|(own, _)| *own == strip) {
+            return Err(Fault::NoStrip { strip: strip.label() });
+        }
+        let mut calibrations: Vec<(Sensor, Calibration)> =
+            serving.iter().filter(|(own, _)| *own != sensor).cloned().collect();
+        calibrations.push(pad);
+        let readout = Readout::new(board, &calibrations)?;
+        Ok(Self { readout, side, seconds, readings: Vec::new(), watched_s: 0.0 })
+    }
+
+    /// Takes in a reading; true once it has watched for long enough.
+    pub fn feed(&mut self, reading: &Reading) -> bool {
+        // A clock that was set back begins anew.
+        if self.readings.last().is_some_and(|last| reading.t_s < last.t_s) {
+            self.readings.clear();
+        }
+        if self.readings.len() < MOST_READINGS {
+            self.readings.push(reading.clone());
+        }
+        self.watched_s = self.readings.first().map_or(0.0, |first| reading.t_s - first.t_s);
+        self.left_s() <= 0.0
+    }
+
+    /// How long it still watches (s).
+    pub fn left_s(&self) -> f64 {
+        (self.seconds - self.watched_s).max(0.0)
+    }
+
+    /// What to do, in words.
+    pub fn instruction(&self) -> String {
+        let left = self.left_s().ceil();
+        format!(
+            "take everything away and let the empty hand close to about half a bar and open again, so that the fingers do not \
+             touch: {left:.0} s left"
+        )
+    }
+
+    /// What was seen.
+    pub fn bending(&self) -> Result<BendingZero, Fault> {
+        BendingZero::from_empty_close(&self.readout.bending(self.side, &self.readings))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Input;
+    use super::super::point::Point;
+    use super::super::record::{Curve, Record};
+    use super::*;
+    use crate::electronics::StripPart;
+
+    fn calibration(sensor: Sensor, points: &[(f64, f64)]) -> Calibration {
+        let (kind, input) = (Kind::of(sensor), Input::on(&Board::default(), sensor));
+        let point = |&(shown, ohm): &(f64, f64)| Point {
+            stimulus: kind.stimulus(shown),
+            counts: input.counts(ohm),
+            spread: 1.0,
+            readings: 50,
+        };
+        let points = points.iter().map(point).collect();
+        let part = sensor.channel().to_owned();
+        let record = Record { part, kind, input, points, bending: None, note: String::new() };
+        Calibration::fit(record).expect("is such a part")
+    }
+
+    fn parts() -> [(Sensor, Calibration); 2] {
+        let ohm = |kg: f64| 6e3 / Kind::Pad.stimulus(kg).powf(0.9);
+        let loads = [0.03, 0.05, 0.1, 0.2, 0.35, 0.5].map(|kg| (kg, ohm(kg)));
+        [
+            (Sensor::FlexLeft, calibration(Sensor::FlexLeft, &[(0.0, 25e3), (45.0, 37.5e3), (90.0, 50e3)])),
+            (Sensor::PadLeft, calibration(Sensor::PadLeft, &loads)),
+        ]
+    }
+
+    #[test]
+    fn the_load_that_bending_puts_on_a_pad_is_learned() -> Result<(), Fault> {
+        let [strip, pad] = parts();
+        let board = Board::default();
+        let mut close = EmptyClose::begin(&board, pad.clone(), std::slice::from_ref(&strip), 4.0)?;
+        // At 50 Hz the finger bends to 45 degrees, and its pad shows 0.02 N for each degree.
+        let inputs = [Sensor::FlexLeft, Sensor::PadLeft].map(|sensor| Input::on(&board, sensor));
+        let mut over = false;
+        for k in 0..=200u32 {
+            let degrees = 45.0 * f64::from(k) / 200.0;
+            let force: f64 = 0.02 * degrees;
+            let counts = [inputs[0].counts(25e3 * (1.0 + degrees / 90.0)), inputs[1].counts(6e3 / force.powf(0.9))];
+            let counts = vec![Some(counts[0] as f32), None, Some(counts[1] as f32), None];
+            assert!(!over, "{k}");
+            let t_s = 0.02 * f64::from(k);
+            over = close.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None });
+        }
+        assert!(over && close.left_s() == 0.0);
+        let bending = close.bending()?;
+        let Curve::Pad(curve) = &pad.1.curve else { return Err(Fault::NoBending) };
+        let kappa = 30f64.to_radians() / StripPart::ACTIVE_LENGTH;
+        let load = bending.preload(curve, kappa);
+        assert!((load - 0.6).abs() < 0.03, "{load}");
+        Ok(())
+    }
+
+    #[test]
+    fn what_cannot_be_learned_is_said() -> Result<(), Fault> {
+        let [strip, pad] = parts();
+        let board = Board::default();
+        let begin = |sensor: &(Sensor, Calibration), serving: &[(Sensor, Calibration)]| {
+            EmptyClose::begin(&board, sensor.clone(), serving, 1.0).map(|_| ())
+        };
+        assert!(matches!(begin(&strip, &[]), Err(Fault::NoBending)));
+        assert!(matches!(begin(&pad, &[]), Err(Fault::NoStrip { strip: "left flex strip" })));
+        let mut still = EmptyClose::begin(&board, pad, &[strip], 1.0)?;
+        let counts = vec![Some(1424.0), None, Some(0.0), None];
+        for k in 0..60u32 {
+            let t_s = 0.02 * f64::from(k);
+            still.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None });
+        }
+        assert!(matches!(still.bending(), Err(Fault::BendingTooShort { .. })));
+        Ok(())
+    }
+}

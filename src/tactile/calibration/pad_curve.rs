@@ -1,0 +1,290 @@
+//! The force pad: above a threshold F0 its conductance follows a power law,
+//!
+//!   G = a F^b,
+//!
+//! a straight line in logarithms (data sheet of the FSR07CE; its threshold is below 15 g). The line is fitted with weights: a
+//! relative error of a pad is its repeatability, 2 %, and what the noise of the counts makes of it, which is much where
+//! a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is subtracted, and
+//! what bending does to it, the [`BendingZero`].
+
+use super::Fault;
+use super::input::Input;
+use super::point::{Kind, Point, check, merged};
+use super::straight_line::{StraightLine, WeightedPoint};
+use crate::electronics::PadPart;
+use palpate_geometry::units::{STANDARD_GRAVITY, three_digits};
+use serde::{Deserialize, Serialize};
+
+/// Area of the pad, a disc of 14.70 mm (m²) (data sheet).
+pub const ACTIVE_AREA: f64 = std::f64::consts::FRAC_PI_4 * 0.0147 * 0.0147;
+
+/// Error of a pad that is pressed again with the same force, as a share of its conductance (data sheet).
+const REPEATABILITY: f64 = 0.02;
+
+/// A pad conducts when it reads this much more than at rest (counts): four deviations of the usual noise.
+const CONDUCTING_COUNTS: f64 = 8.0;
+
+/// Weights that must conduct.
+const LEAST_WEIGHTS: usize = 5;
+
+/// Ratio of the largest to the smallest weight that conducts, at least.
+const LEAST_SPAN: f64 = 4.0;
+
+/// Largest force for which the law holds (N): 5 kg (data sheet).
+const MOST: f64 = 5.0 * STANDARD_GRAVITY;
+
+/// Exponents that are believed: 0.6 to 1 in tables of such pads, and what weights set by hand add.
+const EXPONENTS: [f64; 2] = [0.6, 1.2];
+
+/// Resistance under 1 N that is believed (ohm): four times less and more than the 6 kOhm of an Interlink 402 (the table
+/// of Adafruit; there is none for the FSR07).
+const OHM_AT_1_N: [f64; 2] = [1.5e3, 25e3];
+
+/// A point this far off, as a share of its force, is mentioned.
+const WORTH_A_WORD: f64 = 0.10;
+
+/// A point this far off is refused.
+const TOO_FAR: f64 = 0.40;
+
+/// A calibrated pad.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PadCurve {
+    /// Conductance at 1 N, a (S).
+    pub gain: f64,
+    /// Exponent, b.
+    pub exponent: f64,
+    /// Force below which it does not conduct, F0 (N): what the data sheet says, within what the weights showed.
+    pub threshold: f64,
+    /// Conductance at rest, when it was calibrated (S).
+    pub idle_siemens: f64,
+    /// Largest force it was calibrated with (N).
+    pub most: f64,
+    /// Residual of each point as a share of its force, read less set; none for those that did not conduct.
+    pub residuals: Vec<Option<f64>>,
+    /// The fit itself, in logarithms.
+    line: StraightLine,
+}
+
+impl PadCurve {
+    /// Fits a pad; five weights at least that make it conduct. Also says what is worth a word.
+    pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
+        check(points, Kind::Pad, input, MOST)?;
+        let idle = idle_counts(points);
+        let conducts = |p: &&Point| p.stimulus > 0.0 && p.counts > idle + CONDUCTING_COUNTS.max(4.0 * p.spread);
+        let felt: Vec<Point> = points.iter().filter(conducts).copied().collect();
+        let distinct = merged(&felt, 0.005 * STANDARD_GRAVITY);
+        enough(&distinct)?;
+        rises(&distinct, input)?;
+        let idle_siemens = input.siemens(idle);
+        let conductance = |p: &Point| input.siemens(p.counts) - idle_siemens;
+        let weighted = |p: &Point| {
+            let noise = p.error() * input.relative_step(p.counts);
+            let weight = 1.0 / (REPEATABILITY * REPEATABILITY + noise * noise);
+            WeightedPoint { x: p.stimulus.ln(), y: conductance(p).ln(), weight }
+        };
+        let line = StraightLine::through(&felt.iter().map(weighted).collect::<Vec<_>>());
+        // Five different weights are five different logarithms: its numbers left the range.
+        let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
+        let silent = points.iter().filter(|p| !conducts(p)).map(|p| p.stimulus).fold(0.0, f64::max);
+        let lightest = distinct[0].stimulus;
+        let threshold = PadPart::LEAST_FORCE.max(silent.min(lightest)).min(lightest);
+        let mut curve = Self {
+            gain: line.intercept.exp(),
+            exponent: line.slope,
+            threshold,
+            idle_siemens,
+            most: distinct[distinct.len() - 1].stimulus,
+            residuals: Vec::new(),
+            line,
+        };
+        curve.is_such_a_part(input)?;
+        let residual = |p: &Point| conducts(&p).then(|| curve.law(conductance(p)) / p.stimulus - 1.0);
+        curve.residuals = points.iter().map(residual).collect();
+        let words = curve.remarks(points, silent)?;
+        Ok((curve, words))
+    }
+
+    /// Force at a conductance beyond that at rest (N); zero below the threshold.
+    pub fn force(&self, siemens: f64) -> f64 {
+        if siemens < self.siemens(self.threshold) { 0.0 } else { self.law(siemens) }
+    }
+
+    /// Conductance under a force, beyond that at rest (S), threshold or not.
+    pub fn siemens(&self, force: f64) -> f64 {
+        self.gain * force.max(0.0).powf(self.exponent)
+    }
+
+    /// Half the width of the 95 % interval of the calibration at a force, as a share of it.
+    pub fn force_interval(&self, force: f64) -> Option<f64> {
+        Some(self.line.interval_at(force.max(self.threshold).ln())? / self.exponent)
+    }
+
+    fn law(&self, siemens: f64) -> f64 {
+        (siemens.max(0.0) / self.gain).powf(1.0 / self.exponent)
+    }
+
+    fn is_such_a_part(&self, input: &Input) -> Result<(), Fault> {
+        let within = |[least, most]: [f64; 2], value: f64| value >= least && value <= most;
+        let ohm = 1.0 / self.gain;
+        if !within(OHM_AT_1_N, ohm) {
+            let [low, high] = OHM_AT_1_N.map(|wanted| three_digits(1e-3 * input.divider.fixed_ohm * wanted / ohm));
+            let said = three_digits(1e-3 * input.divider.fixed_ohm);
+            let hint = format!(
+                "the resistor beside it is not the {said} kOhm it is said to be but {low} to {high}, or weights were given \
+                 in another unit than kg"
+            );
+            return Err(Fault::PadResistance { ohm, hint });
+        }
+        if !within(EXPONENTS, self.exponent) {
+            return Err(Fault::Exponent { exponent: self.exponent });
+        }
+        Ok(())
+    }
+
+    fn remarks(&self, points: &[Point], silent: f64) -> Result<Vec<String>, Fault> {
+        let mut words = Vec::new();
+        let told = |p: &Point| Kind::Pad.told(p.stimulus);
+        let off = |p: &Point| p.stimulus > self.threshold * 1.5 && p.stimulus < silent;
+        if let Some(point) = points.iter().find(|p| off(p)) {
+            words.push(format!(
+                "{} was felt, but {} was not: was the weight on the pad?",
+                told(point),
+                Kind::Pad.told(silent)
+            ));
+        }
+        let residuals = points.iter().zip(&self.residuals).filter_map(|(p, r)| Some((p, (*r)?)));
+        let Some((point, residual)) = residuals.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else {
+            return Ok(words);
+        };
+        let percent = format!("{:.0} %", 100.0 * residual.abs());
+        if residual.abs() > TOO_FAR {
+            return Err(Fault::Outlier { at: told(point), off: percent });
+        }
+        if residual.abs() > WORTH_A_WORD {
+            words.push(format!(
+                "{} is {percent} off the curve; take it again if the weight may have shifted",
+                told(point)
+            ));
+        }
+        if self.most < 0.45 * STANDARD_GRAVITY {
+            words.push(format!("forces above {} are read off beyond the last weight", Kind::Pad.told(self.most)));
+        }
+        Ok(words)
+    }
+}
+
+/// What the pad reads without a weight (counts); nothing where that was not tried.
+fn idle_counts(points: &[Point]) -> f64 {
+    let bare: Vec<f64> = points.iter().filter(|p| p.stimulus <= 0.0).map(|p| p.counts).collect();
+    if bare.is_empty() { 0.0 } else { bare.iter().sum::<f64>() / bare.len() as f64 }
+}
+
+fn enough(distinct: &[Point]) -> Result<(), Fault> {
+    if distinct.len() < LEAST_WEIGHTS {
+        let more = "five or more between 0.03 and 0.5 kg, such as 0.03, 0.06, 0.1, 0.2, 0.35 and 0.5; lighter ones than \
+                    0.015 kg such a pad does not feel";
+        let what = "different weights that the pad feels";
+        return Err(Fault::TooFew { have: distinct.len(), need: LEAST_WEIGHTS, what, more });
+    }
+    let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
+    if most < LEAST_SPAN * least {
+        let wanted = "the heaviest weight must be at least four times the lightest, best 0.05 to 0.5 kg";
+        let (from, to) = (Kind::Pad.told(least), Kind::Pad.told(most));
+        return Err(Fault::TooClose { kind: Kind::Pad.label(), from, to, wanted });
+    }
+    Ok(())
+}
+
+/// A pad that is pressed harder conducts better.
+fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
+    for pair in distinct.windows(2) {
+        let (before, after) = (input.siemens(pair[0].counts), input.siemens(pair[1].counts));
+        if after <= before {
+            let micro = |siemens: f64| format!("{} µS", three_digits(siemens * 1e6));
+            return Err(Fault::NotMonotone {
+                from: Kind::Pad.told(pair[0].stimulus),
+                to: Kind::Pad.told(pair[1].stimulus),
+                what: "conductance",
+                falls: format!("{} to {}", micro(before), micro(after)),
+                likely: "two weights were mixed up, one stood partly beside the pad, or the input is wired the other \
+                         way round",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// What bending does to a pad: what it reads without a load as a function of its finger's curvature, found from an empty
+/// close. Bending presses the layers of such pads together (Interlink's guide, "false triggering"), so that without this a
+/// bent finger feels a force.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BendingZero {
+    /// Curvature (1/m) and conductance (S), curvature rising.
+    knots: Vec<(f64, f64)>,
+}
+
+/// Width of the bins that readings of an empty close are averaged in (1/m).
+const BIN: f64 = 1.5;
+
+/// Readings below which a bin says nothing.
+const LEAST_READINGS: usize = 3;
+
+/// Curvature that an empty close must reach (1/m).
+const LEAST_CURVATURE: f64 = 5.0;
+
+impl BendingZero {
+    /// The zero from readings of an empty close, pairs of curvature (1/m) and conductance (S). The middle one of each bin
+    /// counts, so that a few readings in which something was touched do no harm.
+    pub fn from_empty_close(readings: &[(f64, f64)]) -> Result<Self, Fault> {
+        let mut sorted: Vec<(f64, f64)> =
+            readings.iter().copied().filter(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite()).collect();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let bins = sorted.chunk_by(|a, b| (a.0 / BIN).floor() == (b.0 / BIN).floor());
+        let middle = |bin: &[(f64, f64)]| {
+            let mut siemens: Vec<f64> = bin.iter().map(|reading| reading.1).collect();
+            siemens.sort_by(f64::total_cmp);
+            (bin.iter().map(|reading| reading.0).sum::<f64>() / bin.len() as f64, siemens[siemens.len() / 2])
+        };
+        let knots: Vec<(f64, f64)> = bins.filter(|bin| bin.len() >= LEAST_READINGS).map(middle).collect();
+        let span = knots.last().map_or(0.0, |last| last.0) - knots.first().map_or(0.0, |first| first.0);
+        if span < LEAST_CURVATURE - BIN {
+            return Err(Fault::BendingTooShort { have: sorted.len(), span });
+        }
+        Ok(Self { knots })
+    }
+
+    /// Load that bending alone puts on a pad at a curvature (1/m), as if it were a force (N). It adds to what is touched as
+    /// a load and not as a conductance. Below the threshold nothing of it shows, but it cannot have jumped to where it
+    /// first does: up to there it is taken to rise straight from none.
+    pub fn preload(&self, curve: &PadCurve, kappa: f64) -> f64 {
+        let felt = self.knots.iter().map(|(kappa, siemens)| (*kappa, curve.force(*siemens)));
+        let felt = felt.filter(|(kappa, force)| *kappa > 0.0 && *force > 0.0);
+        let mut before = (0.0, 0.0);
+        if kappa <= 0.0 {
+            return 0.0;
+        }
+        for knot in felt {
+            if kappa <= knot.0 {
+                return before.1 + (knot.1 - before.1) * (kappa - before.0) / (knot.0 - before.0);
+            }
+            before = knot;
+        }
+        before.1
+    }
+
+    /// Curvature up to which it is known (1/m).
+    pub fn reaches(&self) -> f64 {
+        self.knots.last().map_or(0.0, |last| last.0)
+    }
+
+    /// Its points: curvature (1/m) and conductance (S).
+    pub fn knots(&self) -> &[(f64, f64)] {
+        &self.knots
+    }
+
+    /// True where its numbers are possible: what comes from a file may be anything.
+    pub(super) fn is_possible(&self) -> bool {
+        let finite = self.knots.iter().all(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite());
+        finite && self.knots.is_sorted_by(|a, b| a.0 < b.0)
+    }
+}

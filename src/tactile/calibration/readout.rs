@@ -1,0 +1,378 @@
+//! Readings of a board through the calibrations of its parts, one by one or a whole trial.
+
+use super::input::{Input, Rail, stated_resistor};
+use super::pad_curve::ACTIVE_AREA;
+use super::record::{Calibration, Curve};
+use super::zero::{Drift, DriftLevel, Unrest, Zero};
+use super::{Fault, Kind};
+use crate::board::{Board, Reading, Sensor};
+use crate::electronics::StripPart;
+use crate::{Channel, Quantity, Signals, whole_fingers};
+use palpate_geometry::units::three_digits;
+use palpate_sim::gripper::Side;
+
+/// What one reading comes to; left and right. None where a sensor is missing, not calibrated, or at an end of its range.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Felt {
+    /// Angle over the active length of each strip (rad).
+    pub angle: [Option<f64>; 2],
+    /// Curvature of each finger (1/m).
+    pub curvature: [Option<f64>; 2],
+    /// Force on each pad (N).
+    pub force: [Option<f64>; 2],
+    /// Pressure on each pad (Pa): force over the area of the pad.
+    pub pressure: [Option<f64>; 2],
+}
+
+impl Felt {
+    /// The value of a channel of the layout C1+F, in its unit.
+    pub fn of(&self, channel: &Channel) -> Option<f64> {
+        let side = channel.side.index();
+        match channel.quantity {
+            Quantity::Curvature => self.curvature[side],
+            Quantity::Pressure => self.pressure[side],
+            Quantity::Force => self.force[side],
+        }
+    }
+}
+
+/// A whole trial as derived.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Derived {
+    /// The channels of layout C1+F that could be derived. Readings in which one of them is missing are left out.
+    pub signals: Signals,
+    /// How far the zeros had moved before the closing.
+    pub drift: Vec<Drift>,
+    /// Readings left out.
+    pub left_out: usize,
+    /// What should be known, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// One sensor on its channel of the board.
+#[derive(Clone, Debug, PartialEq)]
+struct Wired {
+    column: usize,
+    input: Input,
+    calibration: Calibration,
+}
+
+/// A board with calibrated parts on it; by default none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Readout {
+    /// In the order of [`Sensor::ALL`].
+    wired: [Option<Wired>; 4],
+    zero: Zero,
+    warnings: Vec<String>,
+}
+
+/// A channel that more than this share of the readings lack is left out, rather than the readings.
+const MOST_MISSING: f64 = 0.2;
+
+/// Length of the window before the closing that is taken where the line pressure is not known (s).
+const REST_WINDOW_S: f64 = 0.3;
+
+/// Angles farther out than this of those that a strip was calibrated with are told (rad): 3 degrees.
+const ANGLE_BEYOND: f64 = 0.052;
+
+/// Forces larger by this share than the largest that a pad was calibrated with are told.
+const FORCE_BEYOND: f64 = 0.1;
+
+/// Readings below which a window says nothing of a zero.
+const LEAST_READINGS: usize = 5;
+
+impl Readout {
+    /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board does
+    /// not have is left out with a word.
+    pub fn new(board: &Board, calibrations: &[(Sensor, Calibration)]) -> Result<Self, Fault> {
+        let mut wired = [const { None }; 4];
+        let mut warnings = Vec::new();
+        for (place, sensor) in wired.iter_mut().zip(Sensor::ALL) {
+            let label = sensor.label();
+            let calibration = calibrations.iter().find(|(own, _)| *own == sensor).map(|(_, calibration)| calibration);
+            let (calibration, column) = match (calibration, board.channel_of(sensor)) {
+                (Some(calibration), Some(column)) => (calibration, column),
+                (None, Some(_)) => continue,
+                (_, None) => {
+                    warnings.push(format!("the board has no channel \"{}\" for the {label}", sensor.channel()));
+                    continue;
+                }
+            };
+            calibration.check_fits(sensor)?;
+            let made_with = &calibration.record.input;
+            if let Some(ohm) =
+                stated_resistor(board, sensor).filter(|ohm| (ohm / made_with.divider.fixed_ohm - 1.0).abs() > 0.02)
+            {
+                let [was, now] = [made_with.divider.fixed_ohm, ohm].map(|ohm| three_digits(ohm * 1e-3));
+                warnings.push(format!(
+                    "the {label} was calibrated beside {was} kOhm, but the board says {now}; its word is taken"
+                ));
+            }
+            let input = made_with.seen_by(board, sensor);
+            *place = Some(Wired { column, input, calibration: calibration.clone() });
+        }
+        Ok(Self { wired, zero: Zero::default(), warnings })
+    }
+
+    /// What is missing or doubtful, in sentences.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The zero that is subtracted.
+    pub fn zero(&self) -> Zero {
+        self.zero
+    }
+
+    /// Subtracts a zero from now on; a sensor whose zero is no drift keeps that of its calibration.
+    #[must_use]
+    pub fn with_zero(mut self, zero: Zero) -> Self {
+        let drift = self.drift(&zero);
+        self.zero = zero;
+        for Drift { sensor, .. } in drift.iter().filter(|drift| drift.level == DriftLevel::TooFar) {
+            self.zero.offsets[*sensor as usize] = None;
+        }
+        self
+    }
+
+    /// What the sensors show in readings taken at rest: the middle one of each, so that a knock does no harm.
+    pub fn zero_from(&self, readings: &[Reading]) -> Zero {
+        let mut zero = Zero::default();
+        for (offset, wired) in zero.offsets.iter_mut().zip(&self.wired) {
+            let Some(wired) = wired else { continue };
+            let mut raw: Vec<f64> = readings.iter().filter_map(|reading| wired.raw(reading)).collect();
+            raw.sort_by(f64::total_cmp);
+            *offset = (raw.len() >= LEAST_READINGS).then(|| raw[raw.len() / 2]);
+        }
+        zero
+    }
+
+    /// The zero of readings taken while the hand is open and left alone: a tare. Sensors whose zero is so far away that it is
+    /// no drift are left out, as [`Readout::with_zero`] does; [`Readout::drift`] of [`Readout::zero_from`] tells of them.
+    pub fn tare(&self, readings: &[Reading]) -> Result<Zero, Unrest> {
+        if readings.len() < 2 * LEAST_READINGS {
+            return Err(Unrest::TooFew { have: readings.len() });
+        }
+        let bar = readings.iter().filter_map(|reading| reading.line_bar).fold(0.0, f64::max);
+        if bar > 0.0 {
+            return Err(Unrest::Pressed { bar });
+        }
+        let (earlier, later) = readings.split_at(readings.len() / 2);
+        let [earlier, later] = [earlier, later].map(|half| self.drift(&self.zero_from(half)));
+        let moves = |before: &&Drift| {
+            let after = later.iter().find(|after| after.sensor == before.sensor);
+            after.is_some_and(|after| Drift::of(after.sensor, after.moved - before.moved).level != DriftLevel::Steady)
+        };
+        if let Some(Drift { sensor, .. }) = earlier.iter().find(moves) {
+            return Err(Unrest::Moving { sensor: *sensor });
+        }
+        Ok(self.clone().with_zero(self.zero_from(readings)).zero)
+    }
+
+    /// How far a zero is from that of the calibrations.
+    pub fn drift(&self, zero: &Zero) -> Vec<Drift> {
+        let each = Sensor::ALL.into_iter().zip(&self.wired).zip(zero.offsets);
+        each.filter_map(|((sensor, wired), offset)| {
+            let moved = match &wired.as_ref()?.calibration.curve {
+                Curve::Flex(_) => offset?,
+                Curve::Pad(curve) => curve.force(offset?),
+            };
+            Some(Drift::of(sensor, moved))
+        })
+        .collect()
+    }
+
+    /// What one reading comes to.
+    pub fn felt(&self, reading: &Reading) -> Felt {
+        let mut felt = Felt::default();
+        for side in Side::BOTH {
+            let side = side.index();
+            let angle = self.raw(reading, side).map(|angle| angle - self.offset(side));
+            let curvature = angle.map(|angle| angle / StripPart::ACTIVE_LENGTH);
+            felt.angle[side] = angle;
+            felt.curvature[side] = curvature;
+            let force = self.raw(reading, 2 + side).and_then(|siemens| self.force(2 + side, siemens, curvature));
+            felt.force[side] = force;
+            felt.pressure[side] = force.map(|force| force / ACTIVE_AREA);
+        }
+        felt
+    }
+
+    /// Which sensors, in the order of [`Sensor::ALL`], show more than they were calibrated with, by more than what a
+    /// calibration promises: what is told of them is read off the curve's extension.
+    pub fn beyond(&self, felt: &Felt) -> [bool; 4] {
+        let values = [felt.angle[0], felt.angle[1], felt.force[0], felt.force[1]];
+        std::array::from_fn(|place| {
+            let (Some(wired), Some(value)) = (&self.wired[place], values[place]) else { return false };
+            let [least, most] = wired.calibration.range();
+            match wired.calibration.curve {
+                Curve::Flex(_) => value < least - ANGLE_BEYOND || value > most + ANGLE_BEYOND,
+                Curve::Pad(_) => value > most * (1.0 + FORCE_BEYOND),
+            }
+        })
+    }
+
+    /// What of a trial was beyond the calibrations, in sentences.
+    fn beyond_remarks(&self, felt: &[Felt]) -> Vec<String> {
+        let mut counts = [0; 4];
+        for felt in felt {
+            counts.iter_mut().zip(self.beyond(felt)).for_each(|(count, beyond)| *count += u32::from(beyond));
+        }
+        let all = felt.len();
+        let of = |((sensor, wired), count): ((Sensor, &Option<Wired>), u32)| {
+            let calibration = &wired.as_ref()?.calibration;
+            let [least, most] = calibration.range().map(|end| calibration.record.kind.told(end));
+            let label = sensor.label();
+            (count > 0).then(|| {
+                format!(
+                    "the {label} was outside of what it was calibrated with, {least} to {most}, in {count} of {all} readings: \
+                     it is read off the curve's extension there"
+                )
+            })
+        };
+        Sensor::ALL.into_iter().zip(&self.wired).zip(counts).filter_map(of).collect()
+    }
+
+    /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`] is
+    /// made from.
+    pub fn bending(&self, side: Side, readings: &[Reading]) -> Vec<(f64, f64)> {
+        let pair = |reading: &Reading| {
+            let angle = self.raw(reading, side.index())? - self.offset(side.index());
+            Some((angle / StripPart::ACTIVE_LENGTH, self.raw(reading, 2 + side.index())?))
+        };
+        readings.iter().filter_map(pair).collect()
+    }
+
+    /// A whole trial. Its zeros are taken from the window before the closing, which began at `closing_s` where that is
+    /// known, and corrected where they have drifted.
+    pub fn derive(&self, readings: &[Reading], closing_s: Option<f64>) -> Derived {
+        if readings.is_empty() {
+            return Derived { warnings: self.warnings.clone(), ..Derived::default() };
+        }
+        let window = rest_window(readings, closing_s);
+        let zero = self.zero_from(&readings[..window]);
+        let drift = self.drift(&zero);
+        let mut warnings = self.warnings.clone();
+        warnings.extend(drift.iter().filter_map(Drift::remark));
+        let felt: Vec<Felt> = {
+            let zeroed = self.clone().with_zero(zero);
+            readings.iter().map(|reading| zeroed.felt(reading)).collect()
+        };
+        warnings.extend(self.saturated(readings));
+        warnings.extend(self.beyond_remarks(&felt));
+        let mut channels = Vec::new();
+        for channel in self.channels() {
+            let missing = felt.iter().filter(|felt| felt.of(&channel).is_none()).count();
+            if missing as f64 > MOST_MISSING * felt.len() as f64 {
+                let (name, all) = (channel.name(), felt.len());
+                warnings.push(format!(
+                    "{name} is left out: {missing} of {all} readings have no number for it, or are at the end of its range"
+                ));
+            } else {
+                channels.push(channel);
+            }
+        }
+        let mut signals = Signals { channels: channels.iter().map(Channel::name).collect(), ..Signals::default() };
+        let mut left_out = 0;
+        for (reading, felt) in readings.iter().zip(&felt) {
+            let row: Option<Vec<f32>> = channels.iter().map(|channel| felt.of(channel).map(|v| v as f32)).collect();
+            // Time that does not rise comes from a clock that was set back; such a reading has no place.
+            let rises = signals.t_s.last().is_none_or(|last| reading.t_s > *last) && reading.t_s.is_finite();
+            match row.filter(|_| rises && !channels.is_empty()) {
+                Some(row) => signals.push(reading.t_s, &row),
+                None => left_out += 1,
+            }
+        }
+        Derived { signals, drift, left_out, warnings }
+    }
+
+    /// Pads that reached the end of their range: their numbers are lower bounds there.
+    fn saturated(&self, readings: &[Reading]) -> Vec<String> {
+        let at_its_end = |wired: &Wired, reading: &Reading| {
+            let counts = reading.counts.get(wired.column).copied().flatten();
+            counts.is_some_and(|counts| wired.input.rail(f64::from(counts)) == Some(Rail::Short))
+        };
+        let pads = Sensor::ALL.into_iter().zip(&self.wired).filter(|(sensor, _)| !sensor.is_flex());
+        pads.filter_map(|(sensor, wired)| {
+            let wired = wired.as_ref()?;
+            let count = readings.iter().filter(|reading| at_its_end(wired, reading)).count();
+            let (label, all) = (sensor.label(), readings.len());
+            (count > 0)
+                .then(|| format!("the {label} is saturated in {count} of {all} readings: forces are larger there"))
+        })
+        .collect()
+    }
+
+    /// The channels of layout C1+F that can be read.
+    pub fn channels(&self) -> Vec<Channel> {
+        whole_fingers().into_iter().filter(|channel| self.has(channel)).collect()
+    }
+
+    /// True when the sensor that a channel needs is there.
+    fn has(&self, channel: &Channel) -> bool {
+        let first = if channel.quantity == Quantity::Curvature { 0 } else { 2 };
+        self.wired[first + channel.side.index()].is_some()
+    }
+
+    /// Angle (rad) or conductance (S) of a sensor, before any zero.
+    fn raw(&self, reading: &Reading, sensor: usize) -> Option<f64> {
+        self.wired[sensor].as_ref()?.raw(reading)
+    }
+
+    fn offset(&self, sensor: usize) -> f64 {
+        self.zero.offsets[sensor].unwrap_or(0.0)
+    }
+
+    /// Force (N) at a conductance, less what the pad shows at rest and what bending does to it.
+    fn force(&self, sensor: usize, siemens: f64, curvature: Option<f64>) -> Option<f64> {
+        let wired = self.wired[sensor].as_ref()?;
+        let Curve::Pad(curve) = &wired.calibration.curve else { return None };
+        let bending = wired.calibration.record.bending.as_ref();
+        let preload = bending.map_or(0.0, |bending| bending.preload(curve, curvature.unwrap_or(0.0)));
+        Some((curve.force(siemens - self.offset(sensor)) - preload).max(0.0))
+    }
+}
+
+impl Wired {
+    /// Angle (rad), or conductance beyond that at rest (S).
+    fn raw(&self, reading: &Reading) -> Option<f64> {
+        let counts = f64::from((*reading.counts.get(self.column)?)?);
+        if !counts.is_finite() {
+            return None;
+        }
+        match (&self.calibration.curve, self.input.rail(counts)) {
+            (Curve::Flex(curve), None) => Some(curve.angle(self.input.ohm(counts))),
+            (Curve::Flex(_), Some(_)) => None,
+            // A pad at its end is saturated: the number is what it takes to get there, and no less.
+            (Curve::Pad(curve), None | Some(Rail::Open | Rail::Short)) => {
+                Some(self.input.siemens(counts) - curve.idle_siemens)
+            }
+        }
+    }
+}
+
+/// How many readings at the beginning were taken before the closing: until the line pressure rises, or the first 0.3 s
+/// where nothing is told.
+fn rest_window(readings: &[Reading], closing_s: Option<f64>) -> usize {
+    if let Some(closing_s) = closing_s {
+        return readings.partition_point(|reading| reading.t_s < closing_s);
+    }
+    let Some(first) = readings.first() else { return 0 };
+    if readings.iter().any(|reading| reading.line_bar.is_some()) {
+        let pressed = |reading: &Reading| reading.line_bar.is_some_and(|bar| bar > 0.0);
+        return readings.iter().position(pressed).unwrap_or(readings.len());
+    }
+    readings.partition_point(|reading| reading.t_s < first.t_s + REST_WINDOW_S)
+}
+
+impl Kind {
+    /// The sensor of this kind on a side.
+    pub fn on(self, side: Side) -> Sensor {
+        match (self, side) {
+            (Self::Flex, Side::Left) => Sensor::FlexLeft,
+            (Self::Flex, Side::Right) => Sensor::FlexRight,
+            (Self::Pad, Side::Left) => Sensor::PadLeft,
+            (Self::Pad, Side::Right) => Sensor::PadRight,
+        }
+    }
+}

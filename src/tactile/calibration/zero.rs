@@ -1,0 +1,123 @@
+//! Where zero is: tare, dynamic re-zero, and how far it has drifted.
+//!
+//! Strips creep and pads are pinched, so that what a sensor shows of a finger at rest wanders. A [`Zero`] is what each
+//! sensor showed while nothing touched the fingers and no pressure was on: pressed by the user it is a tare, taken from the
+//! window before each trial's closing it is the dynamic calibration that the paper asks for in its outlook. It is
+//! subtracted, unless it is so large that something else must be the matter.
+
+use crate::board::Sensor;
+use crate::electronics::PadPart;
+use serde::{Deserialize, Serialize};
+
+/// What a sensor shows at rest: the angle of a strip (rad) or the conductance of a pad (S), in the order of
+/// [`Sensor::ALL`]; none where it was not read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Zero {
+    /// Offset of each sensor.
+    pub offsets: [Option<f64>; 4],
+}
+
+/// Why readings give no tare.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Unrest {
+    /// Too few readings.
+    #[error("only {have} readings came: is the board sending?")]
+    TooFew {
+        /// How many.
+        have: usize,
+    },
+    /// Pressure is on.
+    #[error("{bar:.2} bar is on: vent, let the fingers come to rest, and try again")]
+    Pressed {
+        /// The line pressure (bar).
+        bar: f64,
+    },
+    /// A sensor moves.
+    #[error("the {place} moves: leave the fingers alone until they have come to rest, and try again", place = .sensor.label())]
+    Moving {
+        /// Which.
+        sensor: Sensor,
+    },
+}
+
+/// How far a zero has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DriftLevel {
+    /// Within what a calibration promises.
+    Steady,
+    /// More than that; it is corrected.
+    Moved,
+    /// So far that it is no drift: it is not corrected.
+    TooFar,
+}
+
+/// The zero of one sensor against its calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Drift {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// How far its zero has moved: an angle (rad), or the force (N) that a pad would seem to feel.
+    pub moved: f64,
+    /// What that means.
+    pub level: DriftLevel,
+}
+
+/// Beyond this a strip's zero has moved (rad): 1 degree, what a calibration should reach.
+const MOVED_RAD: f64 = std::f64::consts::PI / 180.0;
+/// Beyond this it is no drift but a bent finger (rad): 15 degrees.
+const TOO_FAR_RAD: f64 = 15.0 * MOVED_RAD;
+/// Beyond this a pad's zero has moved (N): what such a pad feels at all.
+const MOVED_N: f64 = PadPart::LEAST_FORCE;
+/// Beyond this it is no drift but something on the pad (N).
+const TOO_FAR_N: f64 = 1.0;
+
+impl Drift {
+    /// Judges how far a zero has moved.
+    pub(super) fn of(sensor: Sensor, moved: f64) -> Self {
+        let (least, most) = if sensor.is_flex() { (MOVED_RAD, TOO_FAR_RAD) } else { (MOVED_N, TOO_FAR_N) };
+        let level = match moved.abs() {
+            off if off <= least => DriftLevel::Steady,
+            off if off <= most => DriftLevel::Moved,
+            _ => DriftLevel::TooFar,
+        };
+        Self { sensor, moved, level }
+    }
+
+    /// The level in a word, as a badge.
+    pub fn badge(&self) -> &'static str {
+        match self.level {
+            DriftLevel::Steady => "steady",
+            DriftLevel::Moved => "moved",
+            DriftLevel::TooFar => "too far",
+        }
+    }
+
+    /// How far, with its unit: `+1.3°`, `0.2 N`.
+    pub fn told(&self) -> String {
+        if self.sensor.is_flex() {
+            format!("{:+.1}°", self.moved.to_degrees())
+        } else {
+            format!("{:.2} N", self.moved)
+        }
+    }
+
+    /// What should be said of it, with what to do; nothing where it is steady.
+    pub fn remark(&self) -> Option<String> {
+        let (place, moved) = (self.sensor.label(), self.told());
+        match self.level {
+            DriftLevel::Steady => None,
+            DriftLevel::Moved => {
+                Some(format!("the zero of the {place} has moved by {moved} since it was calibrated; corrected"))
+            }
+            DriftLevel::TooFar if self.sensor.is_flex() => Some(format!(
+                "the {place} shows {moved} before the closing: the finger was not at rest, or the strip has slipped; not \
+                 corrected. Vent, wait, and calibrate it again if it stays"
+            )),
+            DriftLevel::TooFar => Some(format!(
+                "the {place} shows {moved} before the closing: something touches it, or it is pinched; not corrected. \
+                 Free it, and calibrate it again if it stays"
+            )),
+        }
+    }
+}

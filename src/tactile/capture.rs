@@ -1,0 +1,141 @@
+//! Captured bytes of a board with their times of arrival, as records. Little-endian:
+//!
+//! ```text
+//! magic "PPB1"      4 bytes
+//! per record:
+//!   kind            u8      0 bytes, 1 interrupted: the text gives the cause
+//!   arrived (s)     f64     since the stream began
+//!   length          u32     at most 65536
+//!   bytes           u8 x length
+//! ```
+//!
+//! Records are only ever appended; a file cut within one, as after a kill, keeps the others.
+
+use std::io::{self, Read, Write};
+
+/// Begins a file of records.
+pub const CAPTURE_MAGIC: &[u8; 4] = b"PPB1";
+/// Longest record (bytes).
+pub const LONGEST_RECORD: usize = 65_536;
+
+/// A piece of a stream.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Captured {
+    /// Bytes that arrived together.
+    Bytes {
+        /// When (s since the stream began).
+        arrived_s: f64,
+        /// What.
+        bytes: Vec<u8>,
+    },
+    /// The stream was interrupted.
+    Interrupted {
+        /// When (s since the stream began).
+        at_s: f64,
+        /// Why.
+        cause: String,
+    },
+}
+
+impl Captured {
+    /// When it came (s since the stream began).
+    pub fn arrived_s(&self) -> f64 {
+        match self {
+            Self::Bytes { arrived_s, .. } => *arrived_s,
+            Self::Interrupted { at_s, .. } => *at_s,
+        }
+    }
+
+    /// Writes it as a record; [`CAPTURE_MAGIC`] stands before the first.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let (kind, payload) = match self {
+            Self::Bytes { bytes, .. } => (0, bytes.as_slice()),
+            Self::Interrupted { cause, .. } => (1, cause.as_bytes()),
+        };
+        // What came together may be longer than a record; it is told in several.
+        let parts: Vec<&[u8]> =
+            if payload.is_empty() { vec![payload] } else { payload.chunks(LONGEST_RECORD).collect() };
+        for part in parts {
+            out.write_all(&[kind])?;
+            out.write_all(&self.arrived_s().to_le_bytes())?;
+            out.write_all(&(part.len() as u32).to_le_bytes())?;
+            out.write_all(part)?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads the next record; `None` at the end, also where it cuts a record.
+pub fn read_record(source: &mut impl Read) -> io::Result<Option<Captured>> {
+    let mut head = [0; 13];
+    if !fill(source, &mut head)? {
+        return Ok(None);
+    }
+    let [kind, a, b, c, d, e, f, g, h, i, j, k, l] = head;
+    let at_s = f64::from_le_bytes([a, b, c, d, e, f, g, h]);
+    let length = u32::from_le_bytes([i, j, k, l]) as usize;
+    if kind > 1 || !at_s.is_finite() || length > LONGEST_RECORD {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "a record of captured bytes is damaged"));
+    }
+    let mut bytes = vec![0; length];
+    if !fill(source, &mut bytes)? {
+        return Ok(None);
+    }
+    Ok(Some(if kind == 0 {
+        Captured::Bytes { arrived_s: at_s, bytes }
+    } else {
+        Captured::Interrupted { at_s, cause: String::from_utf8_lossy(&bytes).into_owned() }
+    }))
+}
+
+/// Fills the buffer; false where the source ends before.
+fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
+    match source.read_exact(buffer) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn records() -> Vec<Captured> {
+        vec![
+            Captured::Bytes { arrived_s: 0.5, bytes: b"flexL:1,fl".to_vec() },
+            Captured::Interrupted { at_s: 0.6, cause: "unplugged".to_owned() },
+            Captured::Bytes { arrived_s: 0.7, bytes: vec![7; 100_000] },
+        ]
+    }
+
+    fn read_all(mut bytes: &[u8]) -> io::Result<Vec<Captured>> {
+        let mut magic = [0; CAPTURE_MAGIC.len()];
+        bytes.read_exact(&mut magic)?;
+        std::iter::from_fn(|| read_record(&mut bytes).transpose()).collect()
+    }
+
+    fn file(records: &[Captured]) -> io::Result<Vec<u8>> {
+        let mut out = CAPTURE_MAGIC.to_vec();
+        records.iter().try_for_each(|record| record.write(&mut out))?;
+        Ok(out)
+    }
+
+    #[test]
+    fn what_was_captured_comes_back_with_its_times() -> io::Result<()> {
+        let bytes = file(&records())?;
+        let back: Vec<Captured> = read_all(&bytes)?;
+        assert_eq!(back[..2], records()[..2]);
+        let length = |piece: &Captured| if let Captured::Bytes { bytes, .. } = piece { bytes.len() } else { 0 };
+        assert_eq!(back[2..].iter().map(length).collect::<Vec<_>>(), [LONGEST_RECORD, 100_000 - LONGEST_RECORD]);
+        // Every cut leaves the records before it.
+        for end in [5, 30, 60, bytes.len() - 1] {
+            let cut: Vec<Captured> = read_all(&bytes[..end])?;
+            assert!(cut.iter().zip(&back).all(|(a, b)| a == b) && cut.len() < back.len(), "{end}");
+        }
+        let mut damaged = bytes;
+        damaged[4] = 9;
+        assert!(read_all(&damaged).is_err());
+        Ok(())
+    }
+}

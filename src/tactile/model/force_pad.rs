@@ -1,0 +1,169 @@
+//! The force-sensing pad that reads force or pressure: Ohmite FSR07CE (paper, section IV-B).
+//!
+//! Its law stands in [`crate::electronics`]; here it saturates at last, and the divider is amplified so that the
+//! converter meets its rail where the pad saturates. Loads are counted here as shares u of the load that saturates the nominal pad:
+//! G = G_full u^b.
+//!
+//! Recordings of the real gripper know three levels: idle, touched, and saturated soon after the touch. No circuit or
+//! curve of it is published, so the load that saturates is assumed, and a setting: [`PhysicalLike::full_force`] and
+//! [`PhysicalLike::full_pressure`]. Pads of this kind saturate by pressure, small contacts first (Interlink's guide).
+//! The calibration knows the nominal a and b: two points of a straight line in logarithms.
+
+use super::input::Input;
+use super::physical_like::PhysicalLike;
+use super::sampling::SAMPLE_HZ;
+use super::streams::Streams;
+use crate::electronics::{Divider, ForcePad, PadPart};
+
+/// Least force that a pad feels, left and right (N). The right is assumed a third duller.
+const LEAST_FORCE: [f64; 2] = [PadPart::LEAST_FORCE, 0.20];
+
+/// Least pressure that a pad feels, left and right (Pa).
+const LEAST_PRESSURE: [f64; 2] = [PadPart::LEAST_PRESSURE, 1.2e3];
+
+/// From the least load that a pad feels to the one that saturates it, in the unit of its channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PadRange {
+    least: [f64; 2],
+    full: f64,
+}
+
+impl PadRange {
+    /// Of a pad that is read as force (N).
+    pub(super) fn force(settings: &PhysicalLike) -> Self {
+        Self { least: LEAST_FORCE, full: settings.full_force }
+    }
+
+    /// Of a pad that is read as pressure (Pa).
+    pub(super) fn pressure(settings: &PhysicalLike) -> Self {
+        Self { least: LEAST_PRESSURE, full: settings.full_pressure }
+    }
+}
+
+/// Share of the load that reaches the pad, left and right. Assumed: the right pad is mounted as poorly as its strip.
+const REACHING: [f64; 2] = [1.0, 0.7];
+
+/// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
+const SLIP: f64 = 0.02;
+
+/// The divider's resistor over the pad's at the load that saturates, G_full R_m. That load is assumed to make of the pad
+/// what 1 N makes of a common one.
+const FULL_RATIO: f64 = PadPart::DIVIDER_OHM * PadPart::NOMINAL_SIEMENS;
+
+/// Voltage over R_m at the load that saturates, as a share of the supply.
+const FULL_SHARE: f64 = FULL_RATIO / (1.0 + FULL_RATIO);
+
+/// One pad on its finger during one grasp, and its calibration.
+#[derive(Clone, Debug)]
+pub(super) struct ReadPad {
+    pad: ForcePad,
+    /// Counts conductances in the one at saturation.
+    divider: Divider,
+    input: Input,
+}
+
+impl ReadPad {
+    /// The pad of a channel.
+    pub(super) fn new(settings: &PhysicalLike, range: PadRange, side: usize, streams: Streams<'_>) -> Self {
+        let mounted = if settings.asymmetry { side } else { 0 };
+        let slip = if settings.slip { 1.0 + SLIP * streams.of_trial("slip").normal() } else { 1.0 };
+        let (gain, exponent) = if settings.parts {
+            let off = streams.of_gripper("gain").within(-PadPart::GAIN_TOLERANCE, PadPart::GAIN_TOLERANCE);
+            (1.0 + off, streams.of_gripper("exponent").within(PadPart::EXPONENT[0], PadPart::EXPONENT[1]))
+        } else {
+            (1.0, PadPart::NOMINAL_EXPONENT)
+        };
+        let part = PadPart {
+            full: range.full,
+            gain: gain * slip,
+            exponent,
+            threshold: settings.threshold.then_some(range.least[mounted]),
+            reaching: REACHING[mounted],
+        };
+        let mut pad = ForcePad::new(part, SAMPLE_HZ);
+        pad.hysteretic = settings.hysteresis;
+        pad.drifts = settings.drift;
+        pad.ceiling = settings.saturation.then_some(1.0);
+        let gain = if settings.saturation { 1.0 / FULL_SHARE } else { 1.0 };
+        Self { pad, divider: Divider { gain, ..Divider::of_pad(FULL_RATIO) }, input: Input::new(settings, streams) }
+    }
+
+    /// The load that is reported of a true one at the next sample, in the channel's unit. A pull counts as no load.
+    pub(super) fn read(&mut self, load: f64) -> f64 {
+        let conductance = self.pad.conductance(load);
+        self.pad.part.full * self.convert(conductance).powf(1.0 / PadPart::NOMINAL_EXPONENT)
+    }
+
+    /// A conductance through divider, amplifier and converter and back, both as shares of the one at saturation.
+    fn convert(&mut self, conductance: f64) -> f64 {
+        if self.input.is_perfect() {
+            return conductance;
+        }
+        self.divider.siemens(self.input.read(self.divider.share_of_siemens(conductance)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ranges() -> [PadRange; 2] {
+        [PadRange::force(&PhysicalLike::OFF), PadRange::pressure(&PhysicalLike::OFF)]
+    }
+
+    fn pad(settings: &PhysicalLike, range: PadRange, side: usize) -> ReadPad {
+        ReadPad::new(settings, range, side, Streams { gripper: 1, trial: 1, channel: "force_left" })
+    }
+
+    #[test]
+    fn its_characteristic_is_silent_then_rises_then_saturates() {
+        let still = PhysicalLike { noise: false, hysteresis: false, drift: false, ..PhysicalLike::default() };
+        for range in ranges() {
+            for side in 0..2 {
+                let mut pad = pad(&still, range, side);
+                let reads: Vec<f64> = (0..300).map(|i| pad.read(0.01 * f64::from(i) * range.full)).collect();
+                assert!(reads.windows(2).all(|w| w[0] <= w[1]));
+                let least = (100.0 * range.least[side] / range.full).ceil() as usize;
+                assert!(reads[..least].iter().all(|&r| r == 0.0) && reads[least + 1] > 0.02 * range.full);
+                let most = reads[299];
+                assert!((most / range.full - 1.0).abs() < 1e-3, "at the rail, {most}");
+                let saturated = reads.iter().position(|&r| r == most).unwrap();
+                assert!(saturated < [120, 170][side], "{saturated}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_ideal_pad_is_exact() {
+        for range in ranges() {
+            let mut ideal = pad(&PhysicalLike::OFF, range, 1);
+            for load in [0.0, 1e-3, 0.2, 1.0, 30.0] {
+                assert!((ideal.read(load * range.full) - load * range.full).abs() <= 1e-12 * range.full * load);
+            }
+            assert_eq!(ideal.read(-1.0), 0.0);
+        }
+    }
+
+    #[test]
+    fn unloading_reads_up_to_5_per_cent_more() {
+        let mut pad = pad(&PhysicalLike { hysteresis: true, ..PhysicalLike::OFF }, ranges()[0], 0);
+        for load in [0.1, 0.2, 0.4] {
+            assert!((pad.read(load) - load).abs() < 1e-12);
+        }
+        assert!((pad.read(0.39) - 0.40).abs() < 1e-12, "not yet");
+        assert!((pad.read(0.2) - 0.21).abs() < 1e-12);
+        assert_eq!(pad.read(0.0), 0.0);
+    }
+
+    #[test]
+    fn a_held_load_creeps_up_by_1_per_cent_a_decade_until_released() {
+        let mut pad = pad(&PhysicalLike { drift: true, ..PhysicalLike::OFF }, ranges()[0], 0);
+        let held: Vec<f64> = (0..=45).map(|_| pad.read(0.5)).collect();
+        assert!((held[0] - 0.5).abs() < 1e-12);
+        // 45 samples are 0.9 s: 1 + 0.9 / 0.1 is one decade.
+        let grown = 1.01_f64.powf(1.0 / PadPart::NOMINAL_EXPONENT);
+        assert!((held[45] / 0.5 - grown).abs() < 1e-9);
+        pad.read(0.0);
+        assert!((pad.read(0.5) - 0.5).abs() < 1e-12);
+    }
+}

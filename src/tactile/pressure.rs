@@ -1,0 +1,132 @@
+//! Pressure over a stretch of a pad: P = F / A (paper, section IV-A1).
+//!
+//! The paper takes for A the convex hull of the contact points. That area jumps by half when one more row of taxels
+//! touches, and is zero, the pressure undefined, while a single row or point touches. The participation area
+//!
+//!   A = (sum f)² / sum(f² / a)
+//!
+//! is defined whenever there is a force: it is the area of n equally loaded taxels, and grows smoothly as load
+//! spreads. Sum of taxel pressure times area is the force exactly.
+
+use super::Span;
+use glam::DVec2;
+use palpate_geometry::convex_hull_area;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{Side, TaxelGrid};
+use serde::{Deserialize, Serialize};
+
+/// Which area force is divided by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PressureArea {
+    /// Always defined.
+    #[default]
+    Participation,
+    /// As in the paper; undefined for points and rows.
+    Hull,
+}
+
+/// The loaded part of a stretch of one pad.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactPatch {
+    force: f64,
+    sum_of_squares_over_area: f64,
+    points: Vec<DVec2>,
+}
+
+impl ContactPatch {
+    /// Gathers the loads on a span of one pad. Taxels that are pulled rather than pushed count as unloaded.
+    pub fn new(frame: &Frame, side: Side, grid: &TaxelGrid, span: &Span) -> Self {
+        let length = grid.row_pitch() * grid.rows as f64;
+        let area = grid.area();
+        let mut patch = Self::default();
+        for (taxel, load) in frame.loads(side, grid.count()) {
+            let (arc, force) = (grid.arc(taxel), f64::from(load.normal));
+            if force > 0.0 && span.holds(arc / length) {
+                patch.force += force;
+                patch.sum_of_squares_over_area += force * force / area;
+                patch.points.push(DVec2::new(arc, grid.across(taxel)));
+            }
+        }
+        patch
+    }
+
+    /// Total normal force, F (N).
+    pub fn force(&self) -> f64 {
+        self.force
+    }
+
+    /// Participation area (m²); zero without load.
+    pub fn participation_area(&self) -> f64 {
+        if self.force > 0.0 { self.force * self.force / self.sum_of_squares_over_area } else { 0.0 }
+    }
+
+    /// Area of the convex hull of the loaded taxels' middles on the unrolled pad (m²).
+    pub fn hull_area(&self) -> f64 {
+        convex_hull_area(&mut self.points.clone())
+    }
+
+    /// Pressure (Pa): zero without load, `None` where load spans no area.
+    pub fn pressure(&self, area: PressureArea) -> Option<f64> {
+        if self.force == 0.0 {
+            return Some(0.0);
+        }
+        let area = match area {
+            PressureArea::Participation => self.participation_area(),
+            PressureArea::Hull => self.hull_area(),
+        };
+        (area > 0.0).then(|| self.force / area)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sim::frame::TaxelLoad;
+    use palpate_sim::gripper::{Finger, Pad, Phase};
+
+    fn patch(loads: &[(usize, f32)]) -> (ContactPatch, TaxelGrid) {
+        let grid = TaxelGrid::new(&Finger::default(), &Pad::default());
+        let frame = Frame {
+            sample: 0,
+            t: 0.0,
+            line_bar: 0.0,
+            phase: Phase::Hold,
+            q: vec![0.0; 20],
+            world_from_object: None,
+            taxels: loads
+                .iter()
+                .map(|&(taxel, normal)| TaxelLoad { taxel: taxel as u16, normal, along: 0.0, across: 0.0 })
+                .collect(),
+        };
+        (ContactPatch::new(&frame, Side::Left, &grid, &Span::WHOLE), grid)
+    }
+
+    #[test]
+    fn equal_loads_participate_with_their_whole_area() {
+        // The contact patch of a cube: six rows of four taxels, all alike.
+        let loads: Vec<(usize, f32)> = (80..104).map(|taxel| (taxel, 0.25)).collect();
+        let (patch, grid) = patch(&loads);
+        assert!((patch.force() - 6.0).abs() < 1e-12);
+        assert!((patch.participation_area() - 24.0 * grid.area()).abs() < 1e-15);
+        let pressure = patch.pressure(PressureArea::Participation).expect("loaded");
+        assert!((pressure - 0.25 / grid.area()).abs() < 1e-9);
+        // The hull runs through taxel middles: five row pitches by three column pitches.
+        let hull = 15.0 * grid.area();
+        assert!((patch.pressure(PressureArea::Hull).expect("has an area") - 6.0 / hull).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_single_row_has_no_hull_but_a_pressure() {
+        let (patch, _) = patch(&[(80, 0.1), (81, 0.2), (82, 0.2), (83, 0.1)]);
+        assert_eq!(patch.pressure(PressureArea::Hull), None);
+        assert!(patch.pressure(PressureArea::Participation).is_some_and(|p| p > 0.0));
+    }
+
+    #[test]
+    fn no_load_is_no_pressure() {
+        let (patch, _) = patch(&[(5, -0.1)]);
+        assert_eq!(patch.pressure(PressureArea::Hull), Some(0.0));
+        assert_eq!(patch.pressure(PressureArea::Participation), Some(0.0));
+    }
+}

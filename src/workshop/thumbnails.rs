@@ -1,0 +1,56 @@
+//! Small pictures of the built-in objects for the window's list: `palpate-workshop thumbnails`.
+
+use super::Failure;
+use glam::{Mat4, Vec3};
+use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid, StandardView};
+use palpate_geometry::palette::Rgb;
+use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use palpate_sim::objects::{ObjectModel, catalogue};
+use palpate_sim::scene::Scene;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Side of a thumbnail (pixels): shown at 40 points, so that it is sharp on fine screens too.
+const SIDE: u32 = 96;
+/// A backdrop that suits both themes.
+const BACKDROP: [Rgb; 2] = [Rgb(122, 131, 142), Rgb(84, 92, 102)];
+const GROUND: Rgb = Rgb(104, 112, 122);
+
+/// Draws all of them into their folders.
+pub(crate) fn draw_all(folder: &Path) -> Result<usize, Failure> {
+    // OpenGL's software rasteriser is on most machines and draws alike on all of them.
+    let gpu = Gpu::headless(DriverChoice::OpenGl)?;
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+    for built_in in catalogue() {
+        let mut scene = Scene::default();
+        scene.object.source.clone_from(&built_in.name);
+        if let Some(object) = scene.load_object()? {
+            let list = portrait(&object);
+            let path = folder.join(&built_in.name).join("thumbnail.png");
+            Picture::draw(&gpu, &mut renderer, &list, [SIDE, SIDE], 1.0)?.save(&path)?;
+        }
+    }
+    Ok(catalogue().len())
+}
+
+/// An object standing alone, filling the picture.
+fn portrait(object: &ObjectModel) -> DrawList {
+    let (centre, size) = (object.bounds.centre().as_vec3(), object.bounds.size().as_vec3());
+    let radius = 0.5 * size.length();
+    let camera = Camera { pitch: 0.45, ..Camera::default().turned_to(StandardView::Home) };
+    DrawList {
+        camera: camera.framing(centre, 0.98 * radius),
+        backdrop: BACKDROP,
+        shadow_bounds: (centre, 1.4 * radius),
+        ground: Some(Ground { height: object.bounds.min.z as f32, colour: GROUND, grid: GROUND, radius: 6.0 * radius }),
+        ghosts: Vec::new(),
+        solids: vec![Solid {
+            mesh: Arc::clone(&object.surface),
+            world_from_mesh: Mat4::from_translation(Vec3::ZERO),
+            gloss: 0.12,
+        }],
+        fingers: Vec::new(),
+        arrows: Vec::new(),
+        overlay: Overlay::default(),
+    }
+}
