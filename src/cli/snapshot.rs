@@ -119,7 +119,7 @@ fn simulated(arguments: &SnapshotArguments, which: Which) -> Result<(Stage, Fram
     let object = scene.load_object()?;
     let mut run = prepare(&scene, object.as_ref(), 0);
     let stage = Stage::new(&scene, object.as_ref(), run.info().world_from_gripper);
-    let mut frame = run.rig_mut().first_look();
+    let mut frame = run.gripper_mut().run_mut().first_look();
     while frame.t < arguments.at {
         match run.next_frame() {
             Some(next) => frame = next.clone(),

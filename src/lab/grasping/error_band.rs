@@ -13,7 +13,7 @@
 //!
 //! The band knows only the error of integration. How far the equations are from a real gripper is another question.
 
-use super::run::prepare_companion;
+use super::run::prepare_refined;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, Method, Scene};
 use palpate_tactile::trial::Trial;
@@ -144,7 +144,7 @@ pub fn band_half_width(t_s: &[f64], estimates: &[f32], sample: usize) -> Option<
 
 /// Runs the companion of a grasp that was made from this scene, and gives the band about it.
 pub fn error_band(trial: &Trial, scene: &Scene, object: Option<&ObjectModel>, sensors: &Sensors) -> ErrorBand {
-    let mut run = prepare_companion(scene, object, trial.info.seed);
+    let mut run = prepare_refined(scene, object, trial.info.seed);
     let mut band = ErrorBand::new(scene, sensors.channels().len());
     for frame in &trial.frames {
         let Some(finer) = run.next_frame() else { break };

@@ -1,18 +1,18 @@
 //! One grasp on any rig: run the programme, keep the frames, say what happened; many grasps into a data set; grasp after
 //! grasp until it is clear what is in the hand.
 
-mod board;
 mod collect;
+mod controller;
 mod deck;
 mod error_band;
 mod identify;
 mod run;
 mod summary;
 
-pub use board::{BoardGrasp, BoardGraspError, record_board};
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
+pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use deck::ObjectDeck;
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use identify::{Identification, IdentificationView, IdentifyError};
-pub use run::{GraspRun, grasp, prepare, prepare_companion};
+pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use summary::{GraspSummary, HoldSummary};

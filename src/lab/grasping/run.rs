@@ -1,54 +1,61 @@
-//! Running a grasp frame by frame, so that a window can show it while it happens and a command can run it through.
+//! Grasps sample by sample, so that a window can show them as they happen and a command can run them through.
 
-use crate::gripper::{Event, Rig};
-use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, Programme, Side};
+use super::controller::{GraspController, GraspPlan, PressureCommand};
+use crate::gripper::{Gripper, GripperError, GripperEvent, SimulatedGripper};
+use palpate_sim::frame::{Frame, Quality};
+use palpate_sim::gripper::{BentFinger, Side};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::Refinement;
 use palpate_sim::run::SimRun;
 use palpate_sim::scene::{Effect, Scene, Setting};
 use palpate_tactile::trial::{Trial, TrialInfo};
+use std::time::Duration;
 
-/// A grasp in progress on a rig.
+/// A simulated or replayed grasp in progress, sample by sample.
 #[derive(Clone, Debug)]
-pub struct GraspRun<R> {
-    rig: R,
-    programme: Programme,
+pub struct GraspRun<G> {
+    gripper: G,
+    controller: GraspController,
     info: TrialInfo,
     frames: Vec<Frame>,
     finished: bool,
 }
 
-/// Sets up a simulated grasp. `seed` is recorded; it does not change the scene (see [`super::jittered`]).
-pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRun> {
-    prepare_refined(scene, object, seed, Refinement::None)
+/// Sets up a simulated grasp. `seed` is recorded; it does not change the scene.
+pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimulatedGripper> {
+    prepare_with(scene, object, seed, Refinement::None)
 }
 
-/// The same grasp computed more finely, sampled at the same times: what the error of the other is estimated from.
-pub fn prepare_companion(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRun> {
-    prepare_refined(scene, object, seed, Refinement::Companion)
+/// Sets up the same grasp computed more finely, sampled at the same times: the error of the other is estimated from it.
+pub fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimulatedGripper> {
+    prepare_with(scene, object, seed, Refinement::Companion)
 }
 
-fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refinement: Refinement) -> GraspRun<SimRun> {
-    let (rig, placement) = SimRun::refined(scene, object, refinement);
+fn prepare_with(
+    scene: &Scene,
+    object: Option<&ObjectModel>,
+    seed: u64,
+    refinement: Refinement,
+) -> GraspRun<SimulatedGripper> {
+    let (mut simulation, placement) = SimRun::refined(scene, object, refinement);
     let mut warnings = object.map(|o| o.warnings.clone()).unwrap_or_default();
     warnings.extend(placement.warnings);
     warnings.extend(programme_warnings(scene));
+    warnings.extend(overlap_warning(&mut simulation));
     let info = TrialInfo {
-        rig: rig.name().to_owned(),
+        rig: "sim".to_owned(),
         object: object.map_or("empty", |o| &o.name).to_owned(),
         seed,
         collection: None,
         scene: scene.to_toml(),
         world_from_gripper: placement.world_from_gripper,
-        plan: rig.plan().clone(),
-        quality: rig.quality(),
+        plan: simulation.plan().clone(),
+        quality: simulation.quality(),
         warnings,
         version: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let mut run = GraspRun::new(rig, scene.programme.clone(), info);
-    run.warn_of_overlap();
-    run
+    let gripper = SimulatedGripper::new(simulation, f64::from(scene.timing.actuation_hz));
+    GraspRun::new(gripper, GraspPlan::simulated(scene), info)
 }
 
 /// Sets up and runs a simulated grasp to its end.
@@ -81,48 +88,43 @@ fn programme_warnings(scene: &Scene) -> Vec<String> {
     warnings
 }
 
-impl<R: Rig> GraspRun<R> {
+impl<G: Gripper> GraspRun<G> {
     /// A grasp about to begin.
-    pub fn new(rig: R, programme: Programme, info: TrialInfo) -> Self {
-        Self { rig, programme, info, frames: Vec::new(), finished: false }
+    pub fn new(gripper: G, plan: GraspPlan, info: TrialInfo) -> Self {
+        let controller = GraspController::new(plan, gripper.now_s());
+        Self { gripper, controller, info, frames: Vec::new(), finished: false }
     }
 
-    /// What is known of the trial so far.
+    /// Header of the trial so far.
     pub fn info(&self) -> &TrialInfo {
         &self.info
     }
 
-    /// The rig it runs on.
-    pub fn rig_mut(&mut self) -> &mut R {
-        &mut self.rig
+    /// The gripper.
+    pub fn gripper_mut(&mut self) -> &mut G {
+        &mut self.gripper
     }
 
-    /// Adds something that should be known of the trial.
+    /// Adds a warning to the trial.
     pub fn warn(&mut self, text: String) {
         self.info.warnings.push(text);
     }
 
-    /// Frames sampled so far.
+    /// Samples so far.
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// Runs on to the next sample; `None` at the end. A rig that fails ends the trial with a warning; what was
-    /// sampled before is kept.
+    /// Runs to the next sample; `None` at the end. A gripper that fails ends the trial with a warning; earlier samples
+    /// are kept.
     pub fn next_frame(&mut self) -> Option<&Frame> {
         while !self.finished {
-            match self.rig.next_event() {
-                Ok(Event::ActuationDue { tick }) => {
-                    let (bar, phase) = self.programme.command(tick);
-                    self.rig.command(bar, phase);
-                }
-                Ok(Event::Sampled(frame)) => {
+            match self.advance() {
+                Ok(Some(frame)) => {
                     self.frames.push(frame);
                     return self.frames.last();
                 }
-                // A board is recorded by `record_board`.
-                Ok(Event::Heard(_) | Event::Commanded(_)) => {}
-                Ok(Event::Finished) => self.finished = true,
+                Ok(None) => {}
                 Err(error) => {
                     self.info.warnings.push(error.to_string());
                     self.info.quality.finite = false;
@@ -133,41 +135,55 @@ impl<R: Rig> GraspRun<R> {
         None
     }
 
-    /// The trial, with its quality and what was noticed about it.
-    pub fn finish(mut self, scene: &Scene) -> Trial {
-        let finite = self.info.quality.finite;
-        self.info.quality = self.rig.quality();
-        self.info.quality.finite &= finite;
-        self.info.warnings.extend(self.info.quality.misses());
-        let quality = &self.info.quality;
-        if quality.missed_steps > 0 {
-            let (missed, steps, least) = (quality.missed_steps, quality.steps, quality.least_step_s * 1e6);
+    fn advance(&mut self) -> Result<Option<Frame>, GripperError> {
+        match self.gripper.next_event(Duration::ZERO)? {
+            GripperEvent::Tick => {
+                if let Some(PressureCommand { bar, phase, .. }) = self.controller.command(self.gripper.now_s()) {
+                    self.gripper.set_pressure(bar, phase)?;
+                }
+            }
+            GripperEvent::Sampled(frame) => return Ok(Some(frame)),
+            GripperEvent::Board(_) => {}
+            GripperEvent::Finished => self.finished = true,
+        }
+        Ok(None)
+    }
+}
+
+impl GraspRun<SimulatedGripper> {
+    /// The trial, with its quality and warnings. The samples leave the run.
+    pub fn finish(&mut self, scene: &Scene) -> Trial {
+        let simulation = self.gripper.run();
+        let mut info = self.info.clone();
+        let quality = simulation.quality();
+        info.quality = Quality { finite: quality.finite && info.quality.finite, ..quality };
+        info.warnings.extend(info.quality.misses());
+        if info.quality.missed_steps > 0 {
+            let (missed, steps, least) =
+                (info.quality.missed_steps, info.quality.steps, info.quality.least_step_s * 1e6);
             let tolerance = scene.solver.accuracy;
-            self.info.warnings.push(format!(
+            info.warnings.push(format!(
                 "{missed} of {steps} steps missed the accuracy {tolerance}, though they were as short as steps get ({least:.1} \
                  µs): try a larger tolerance"
             ));
         }
-        self.info.warnings.extend(self.rig.notes());
+        info.warnings.extend(simulation.notes());
+        let frames = std::mem::take(&mut self.frames);
         let passable = scene.effects.get(Effect::FingerContact) == Setting::Off;
-        if let Some(t) = fingers_cross(scene, &self.frames).filter(|_| passable) {
-            let text = format!("the fingers pass through each other from {t:.2} s: effects.finger-contact is off");
-            self.info.warnings.push(text);
+        if let Some(t) = fingers_cross(scene, &frames).filter(|_| passable) {
+            info.warnings
+                .push(format!("the fingers pass through each other from {t:.2} s: effects.finger-contact is off"));
         }
-        Trial { info: self.info, frames: self.frames }
+        Trial { info, frames }
     }
 }
 
-impl GraspRun<SimRun> {
-    /// Notes when the open fingers already stand inside the object or its support.
-    fn warn_of_overlap(&mut self) {
-        let depth = self.rig.starting_overlap();
-        if depth > DEEPEST_START {
-            let mm = depth * 1e3;
-            let text = format!("the open fingers start {mm:.1} mm inside something: move the gripper or the object");
-            self.info.warnings.push(text);
-        }
-    }
+/// A warning where the open fingers already stand inside the object or its support.
+fn overlap_warning(simulation: &mut SimRun) -> Option<String> {
+    let depth = simulation.starting_overlap();
+    let mm = depth * 1e3;
+    (depth > DEEPEST_START)
+        .then(|| format!("the open fingers start {mm:.1} mm inside something: move the gripper or the object"))
 }
 
 /// A start this deep inside something is mentioned (m).
@@ -196,7 +212,6 @@ fn fingers_cross(scene: &Scene, frames: &[Frame]) -> Option<f64> {
 mod tests {
     use super::*;
     use palpate_geometry::Primitive;
-    use palpate_sim::frame::Quality;
 
     fn ball() -> ObjectModel {
         ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6)

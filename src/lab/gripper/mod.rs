@@ -1,66 +1,57 @@
-//! Grippers, simulated, real or replayed, behind one interface: command a pressure, read frames. Grasping, recording and
-//! recognition are written once, against this trait.
+//! Grippers behind one interface: events out, line pressure in. Simulated, on a serial port, or replayed; the grasp
+//! controller ([`crate::grasping::GraspController`]) drives all three alike.
 
-mod conductor;
-mod replay;
+mod replayed;
 mod serial;
-mod sim;
+mod simulated;
+mod stream;
 
-pub use conductor::{Conductor, VENT};
-pub use replay::ReplayRig;
-pub use serial::{SerialPlan, SerialRig};
+pub use replayed::ReplayedGripper;
+pub use serial::SerialGripper;
+pub use simulated::SimulatedGripper;
+pub use stream::{BoardStream, Listen, NotOpened, listen_to_port};
 
-use palpate_device::serial::LinkEvent;
-use palpate_sim::frame::{Frame, Quality};
+use palpate_device::serial::{LinkEvent, SendError};
+use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_sim::physics::SimulationError;
-use palpate_tactile::trial::PhaseMark;
+use std::time::Duration;
 
-/// What happens next on a rig.
+/// The next event of a gripper.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// The control box wants the pressure for this actuation tick.
-    ActuationDue {
-        /// Which tick, from 0.
-        tick: u32,
-    },
-    /// A sample was taken.
+pub enum GripperEvent {
+    /// Time has passed; the line pressure may be due.
+    Tick,
+    /// A sample of the simulation.
     Sampled(Frame),
-    /// A board said something, or its connection changed.
-    Heard(LinkEvent),
-    /// The control box of a real gripper does something else from now on.
-    Commanded(PhaseMark),
-    /// The trial is over.
+    /// Bytes, a reading, a gap or a reply of a board.
+    Board(LinkEvent),
+    /// The end: no event follows.
     Finished,
 }
 
-/// Why a rig had to stop.
+/// A gripper that cannot go on.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RigError {
+pub enum GripperError {
     /// The simulation left the range of numbers.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The board of the real gripper; the sentence says what is wrong and what to try.
-    #[error("{0}")]
-    Board(String),
+    /// A line could not be sent to the board.
+    #[error(transparent)]
+    Board(#[from] SendError),
 }
 
 /// A two-finger gripper that runs on a clock of its own.
-pub trait Rig {
-    /// Where its frames come from, as recorded with a trial: `sim`, `serial`, `replay`.
-    fn name(&self) -> &'static str;
+pub trait Gripper {
+    /// Its clock (s): simulated time, or the clock of the board's readings.
+    fn now_s(&self) -> f64;
 
-    /// Lets time pass until the next event.
-    fn next_event(&mut self) -> Result<Event, RigError>;
+    /// The next event. A board is waited for up to `patience`; then this is a [`GripperEvent::Tick`].
+    fn next_event(&mut self, patience: Duration) -> Result<GripperEvent, GripperError>;
 
     /// Sets the line pressure (bar) from now on.
-    fn command(&mut self, bar: f64, phase: Phase);
+    fn set_pressure(&mut self, bar: f64, phase: Phase) -> Result<(), GripperError>;
 
-    /// How far its frames so far can be trusted.
-    fn quality(&self) -> Quality;
-
-    /// What else should be known of its frames so far, in sentences.
-    fn notes(&self) -> Vec<String> {
-        Vec::new()
-    }
+    /// Lets the air out at once.
+    fn vent(&mut self) -> Result<(), GripperError>;
 }

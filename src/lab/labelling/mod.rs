@@ -16,9 +16,9 @@ mod flags;
 mod segmentation;
 #[cfg(test)]
 mod segmentation_tests;
-mod thinned;
+mod sparkline;
 
 pub use disagreement::{Disagreement, disagreements};
 pub use flags::{Observed, flags_of};
 pub use segmentation::{LOOK_BACK_S, PRE_ROLL_S, SegmentEvent, Segmenter};
-pub use thinned::{Thinned, sparkline};
+pub use sparkline::{decimated, sparkline};

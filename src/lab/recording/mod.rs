@@ -1,7 +1,16 @@
-//! Recording trials into the store.
+//! Recording: one recorder thread for all trials, and the recording of a real grasp that the command line and the window
+//! share.
 
-mod board_recorder;
+mod board_trial;
+mod board_writer;
+mod recent;
+mod record;
+mod recorder;
 #[cfg(test)]
-mod board_tests;
+mod tests;
 
-pub use board_recorder::{BoardRecorder, BoardTrialPlan, Recorded};
+pub use board_trial::{BoardTrialRecording, TrialRequest};
+pub use board_writer::{BoardTrialPlan, RecordedTrial, board_trial_info};
+pub use recent::RecentEvents;
+pub use record::{RecordError, RecordProgress, Recording, record};
+pub use recorder::{BoardTrialEnd, Recorder, RecorderNotice};

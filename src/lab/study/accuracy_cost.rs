@@ -1,6 +1,6 @@
 //! What accuracy costs, and what it is worth: CPU time of one grasp, and the error that is left in it.
 
-use crate::grasping::{ErrorBand, ErrorNorms, prepare, prepare_companion};
+use crate::grasping::{ErrorBand, ErrorNorms, prepare, prepare_refined};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Sensors;
@@ -33,7 +33,7 @@ pub fn accuracy_cost(
     }
     let cpu = start.elapsed().as_secs_f64();
     let trial = run.finish(scene);
-    let mut companion = prepare_companion(scene, object, 0);
+    let mut companion = prepare_refined(scene, object, 0);
     let mut band = ErrorBand::new(scene, sensors.channels().len());
     for frame in &trial.frames {
         let finer = companion.next_frame().filter(|_| !cancelled())?;

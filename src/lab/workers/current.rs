@@ -2,17 +2,17 @@
 
 use super::companion::Companion;
 use crate::grasping::GraspRun;
+use crate::gripper::SimulatedGripper;
 use crate::picture::Stage;
 use glam::DVec3;
 use palpate_sim::frame::{Frame, Plan};
-use palpate_sim::run::SimRun;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Sensors;
 use std::sync::Arc;
 
 /// The grasp that is going on.
 pub(super) struct Current {
-    pub(super) run: GraspRun<SimRun>,
+    pub(super) run: GraspRun<SimulatedGripper>,
     /// Runs along for the error band, where one is wanted.
     pub(super) companion: Option<Companion>,
     pub(super) plan: Arc<Plan>,
@@ -36,7 +36,7 @@ impl Current {
             self.run
                 .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
         }
-        self.run.rig_mut().pull_object(force);
+        self.run.gripper_mut().run_mut().pull_object(force);
         if let Some(companion) = &mut self.companion {
             companion.pull(force);
         }

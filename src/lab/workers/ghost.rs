@@ -60,7 +60,7 @@ impl GhostMaker {
         let (newest, result, wake) = (Arc::clone(&self.newest), Arc::clone(&self.result), Arc::clone(&self.wake));
         let compute = move || {
             let mut run = prepare(&scene, object.as_deref(), 0);
-            let mut frames = vec![run.rig_mut().first_look()];
+            let mut frames = vec![run.gripper_mut().run_mut().first_look()];
             while newest.load(Ordering::Relaxed) == grasp {
                 match run.next_frame() {
                     Some(frame) => frames.push(frame.clone()),

@@ -183,11 +183,11 @@ fn change_plan<E: std::fmt::Display>(
 mod tests {
     use super::super::desk::watch::{until, waker};
     use super::*;
-    use crate::recording::BoardTrialPlan;
+    use crate::recording::board_trial_info;
     use palpate_store::BoardInfo;
 
     fn recorded(store: &mut Store) -> TrialId {
-        let info = BoardTrialPlan::default().info();
+        let info = board_trial_info("", "");
         let id = store.begin_board(&info, &BoardInfo::default()).expect("begins");
         store.finish_board(id, &BoardInfo::default(), &[]).expect("ends");
         id

@@ -37,7 +37,6 @@ mod listener;
 mod listener_tests;
 mod messages;
 mod pace;
-mod recorder;
 mod session;
 mod sim;
 #[cfg(test)]
@@ -50,9 +49,9 @@ pub use examiner::{Examination, Examine, ExamineRequest, Examiner, ExaminerView,
 pub use fitter::{FitTrials, FitWish, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{
-    BoardStream, CalibrationPlan, CalibrationView, CalibrationWish, CrosstalkView, CrosstalkWish, EndedTrial,
-    GripperSetup, GripperView, GripperWish, GripperWorker, LEAD_S, LatestReading, Listen, NotOpened, ObserveRequest,
-    RunningCalibration, RunningCrosstalk, TrialPart, TrialRequest, TrialView, listen_to_port,
+    CalibrationPlan, CalibrationView, CalibrationWish, CrosstalkView, CrosstalkWish, EndedTrial, GripperSetup,
+    GripperView, GripperWish, GripperWorker, LatestReading, ObserveRequest, RunningCalibration, RunningCrosstalk,
+    TrialView,
 };
 pub use labeller::{LabelView, LabelWish, Labeller, start_labeller};
 pub use latest::Latest;
@@ -60,6 +59,5 @@ pub use listener::THRESHOLDS;
 pub use messages::{
     Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
 };
-pub use recorder::{Recorder, RecorderNotice};
 pub use sim::{SimWorker, SimWorkerSetup};
 pub use trainer::{FinishedTraining, TrainRequest, TrainWish, TrainedModel, Trainer, TrainerView};

@@ -11,10 +11,10 @@ use super::messages::{
     Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
 };
 use super::pace::Pace;
-use super::recorder::{Recorder, RecorderNotice};
 use super::sim::SimWorkerSetup;
 use crate::grasping::{GraspSummary, prepare};
 use crate::picture::Stage;
+use crate::recording::{Recorder, RecorderNotice};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
@@ -87,7 +87,10 @@ impl Session {
         let recorder = Recorder::start(setup.store, move |notice| {
             let notice = match notice {
                 RecorderNotice::Stored(id) => Notice::Stored(id),
+                RecorderNotice::Warning(text) => Notice::Warning(text),
                 RecorderNotice::Failed(text) => Notice::Failed(text),
+                // Only the real gripper's trials say so.
+                RecorderNotice::Begun(_) | RecorderNotice::Recorded(_) | RecorderNotice::Discarded(_) => return,
             };
             let _heard = recorder_outlets.0.send(notice);
             (recorder_outlets.1)();
@@ -339,7 +342,7 @@ impl Session {
         self.status.duration = scene.timing.duration_s;
         self.channels = sensors.channels().into();
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
-        let frame = Arc::new(run.rig_mut().first_look());
+        let frame = Arc::new(run.gripper_mut().run_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
         let (told, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
         let channels = sensors.channels().len();
@@ -441,7 +444,7 @@ impl Session {
     fn end_grasp(&mut self) {
         let Some(current) = self.current.as_mut() else { return };
         current.ended = true;
-        let trial = current.run.clone().finish(&current.scene);
+        let trial = current.run.finish(&current.scene);
         for warning in trial.info.warnings.iter().skip(current.told) {
             self.outlets.tell(Notice::Warning(warning.clone()));
         }

@@ -6,14 +6,13 @@ mod trials;
 
 use super::calibrating::{Calibrating, CalibrationView};
 use super::crosstalk::{Crossing, CrosstalkView};
-use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialRequest};
+use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading};
 use super::observing::Observing;
 use super::plotted::{Plotted, Row};
-use super::recent::Recent;
-use super::running::Running;
-use super::stream::{BoardStream, Listen, NotOpened};
 use super::worker::GripperSetup;
+use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
+use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
 use crate::workers::listener::Listener;
 use crate::workers::{Latest, Notice, TraceRow, Wake};
 use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
@@ -23,11 +22,13 @@ use palpate_store::Store;
 use palpate_tactile::Channel;
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::{Drift, Readout};
+use palpate_tactile::trial::TrialId;
 use palpate_tactile::whole_fingers;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel};
 use std::time::{Duration, Instant};
 
 /// How long the thread waits for readings before it looks for wishes again: also how punctual the control box is told.
@@ -56,9 +57,9 @@ impl Outlets {
 
 /// What is known while something is listened to.
 struct Connection {
-    stream: Box<dyn BoardStream>,
+    gripper: SerialGripper,
     board: Board,
-    recent: Recent,
+    recent: RecentEvents,
     /// The board's readings by the calibrations of its parts, with the zeros taken last.
     readout: Readout,
     remarks: Vec<String>,
@@ -86,7 +87,14 @@ pub(super) struct Desk {
     /// The port that another program has, where it is to be opened as soon as that lets it go.
     retried: Option<Option<PathBuf>>,
     connection: Option<Connection>,
-    running: Option<Running>,
+    /// Absent where its thread could not be started.
+    recorder: Option<Recorder>,
+    recorded: Receiver<RecorderNotice>,
+    recording: Option<BoardTrialRecording>,
+    /// Number of the trial that is recorded, once the store has given one.
+    recording_id: Option<TrialId>,
+    /// Requests of trials whose end the recorder has not reported yet; whether they were discarded.
+    ending: VecDeque<(TrialRequest, bool)>,
     /// Trials that were begun so far.
     begun: u64,
     watching: Option<TrialRequest>,
@@ -107,6 +115,18 @@ pub(super) struct Desk {
 impl Desk {
     pub(super) fn new(setup: GripperSetup, outlets: Outlets) -> Self {
         let GripperSetup { scene, store, model, grasps, listen, wake: _ } = setup;
+        let (sender, recorded) = channel();
+        let recorder = Recorder::start(store.clone(), move |notice| {
+            // The thread may have ended; the trial is safe.
+            let _heard = sender.send(notice);
+        });
+        let recorder = match recorder {
+            Ok(recorder) => Some(recorder),
+            Err(error) => {
+                outlets.tell(Notice::Failed(format!("trials cannot be stored: {error}")));
+                None
+            }
+        };
         let mut desk = Self {
             outlets,
             listen,
@@ -120,7 +140,11 @@ impl Desk {
             refused: None,
             retried: None,
             connection: None,
-            running: None,
+            recorder,
+            recorded,
+            recording: None,
+            recording_id: None,
+            ending: VecDeque::new(),
             begun: 0,
             watching: None,
             ended: None,
@@ -172,6 +196,9 @@ impl Desk {
             }
         }
         self.disconnect("the window was closed");
+        // Dropping the recorder waits until everything is written.
+        self.recorder = None;
+        self.take_recorded();
     }
 
     fn obey(&mut self, wish: GripperWish) {
@@ -238,13 +265,13 @@ impl Desk {
     }
 
     fn open_stream(&mut self, port: Option<&Path>) -> Result<(), NotOpened> {
-        let mut stream = (self.listen)(port)?;
+        let mut gripper = SerialGripper::new((self.listen)(port)?);
         // A board that speaks our language says who it is; to others it is a line they do not know.
-        let _told = stream.send("?");
+        let _told = gripper.send("?");
         self.connection = Some(Connection {
-            board: stream.status().board,
-            stream,
-            recent: Recent::default(),
+            board: gripper.stream().status().board,
+            gripper,
+            recent: RecentEvents::default(),
             readout: Readout::default(),
             remarks: Vec::new(),
             drift: Vec::new(),
@@ -274,16 +301,28 @@ impl Desk {
 
     /// Takes in what the link has heard, and does what is due.
     fn listen_on(&mut self) {
-        let Some(connection) = &mut self.connection else { return };
-        let events = connection.stream.take(PATIENCE);
-        for event in events {
-            self.hear(event);
+        // Everything that has come is taken in before the pressure is set.
+        let mut patience = PATIENCE;
+        while let Some(connection) = &mut self.connection {
+            match connection.gripper.next_event(patience) {
+                Ok(GripperEvent::Board(event)) => self.hear(event),
+                Ok(_) => break,
+                Err(error) => {
+                    if let Some(recording) = &mut self.recording {
+                        recording.controller_mut().abort(error.to_string());
+                    }
+                    break;
+                }
+            }
+            patience = Duration::ZERO;
         }
-        self.conduct();
+        self.drive();
+        self.take_recorded();
         self.end_looks();
-        let over = self.connection.as_ref().is_some_and(|connection| connection.stream.is_over());
+        let over = self.connection.as_ref().is_some_and(|connection| connection.gripper.stream().is_over());
         if over {
-            let why = self.connection.as_ref().map(|c| c.stream.status().state.sentence()).unwrap_or_default();
+            let why =
+                self.connection.as_ref().map(|c| c.gripper.stream().status().state.sentence()).unwrap_or_default();
             self.disconnect(&why);
             self.outlets.tell(Notice::Warning(why.clone()));
             self.refused = Some(why.into());
@@ -298,7 +337,7 @@ impl Desk {
     fn end_looks(&mut self) {
         let Some(connection) = &self.connection else { return };
         for observing in self.observing.extract_if(.., |observing| observing.is_over()) {
-            observing.finish(connection.stream.status());
+            observing.finish(connection.gripper.stream().status());
         }
     }
 
@@ -323,18 +362,17 @@ impl Desk {
         }
         // What began a trial just now is among what it was begun with.
         if begun == self.begun
-            && let Some(running) = &mut self.running
+            && let (Some(recording), Some(recorder)) = (&mut self.recording, &self.recorder)
         {
-            running.take(event);
-            self.end_what_is_cut();
-            self.write();
+            recording.take(recorder, event);
+            self.end_aborted();
         }
     }
 
     fn hear_reading(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
         let felt = connection.readout.felt(reading);
-        let commanded = self.running.as_ref().and_then(Running::line_bar);
+        let commanded = self.recording.as_ref().and_then(|recording| recording.controller().line_bar());
         // A board that tells its pressure knows better than whoever commands it.
         let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
@@ -354,7 +392,7 @@ impl Desk {
 
     fn plot(&self, rows: Vec<Row>) {
         let (grasp, from_s) = self.stretch;
-        let rolling = self.running.is_none();
+        let rolling = self.recording.is_none();
         for row in rows {
             if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row.placed(grasp, from_s, rolling)) {
                 self.outlets.rows_lost.store(true, Ordering::Relaxed);
@@ -373,7 +411,7 @@ impl Desk {
         self.published = Instant::now();
         self.revision += 1;
         let connection = self.connection.as_ref();
-        let link = connection.map(|connection| connection.stream.status());
+        let link = connection.map(|connection| connection.gripper.stream().status());
         let calibration = self
             .calibrating
             .as_ref()
@@ -386,7 +424,8 @@ impl Desk {
             }
             None => self.crossed.clone(),
         };
-        let trial = self.running.as_ref().zip(connection).map(|(running, c)| running.view(c.stream.now_s()));
+        let trial =
+            self.recording.as_ref().zip(connection).map(|(recording, c)| self.trial_view(recording, c.gripper.now_s()));
         self.outlets.view.publish(Arc::new(GripperView {
             revision: self.revision,
             granted: self.granted,
@@ -406,7 +445,7 @@ impl Desk {
             model: self.model.clone(),
             calibration: Some(Arc::new(calibration)),
             crosstalk: Some(Arc::new(crosstalk)),
-            console: connection.map(|c| c.stream.console()).unwrap_or_default().into(),
+            console: connection.map(|c| c.gripper.stream().console()).unwrap_or_default().into(),
         }));
         (self.outlets.wake)();
     }

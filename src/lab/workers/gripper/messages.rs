@@ -3,22 +3,18 @@
 use super::calibrating::{CalibrationView, CalibrationWish};
 use super::crosstalk::{CrosstalkView, CrosstalkWish};
 use super::observing::ObserveRequest;
-use super::stream::NotOpened;
-use crate::grasping::IdentificationView;
+use crate::grasping::{GraspStage, IdentificationView};
+use crate::gripper::NotOpened;
+use crate::recording::TrialRequest;
 use palpate_device::serial::{LinkStatus, PortInfo};
 use palpate_device::wire::ConsoleLine;
 use palpate_learn::Model;
-use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::calibration::{Drift, Felt};
-use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Rest before the closing of a trial (s): its zeros are taken there, and whoever closes by hand gets ready.
-pub const LEAD_S: f64 = 1.5;
 
 /// What the gripper's thread can be told.
 #[derive(Clone)]
@@ -61,17 +57,6 @@ pub enum GripperWish {
     Quit,
 }
 
-/// A trial that is wanted.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrialRequest {
-    /// What is in the hand, where it is known beforehand.
-    pub object: Option<String>,
-    /// Who moves the fingers.
-    pub control: Control,
-    /// Whether it adds to what earlier grasps told of the object; else it stands by itself.
-    pub adds: bool,
-}
-
 /// The newest reading, and what it comes to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LatestReading {
@@ -85,28 +70,15 @@ pub struct LatestReading {
     pub line_bar: Option<f64>,
 }
 
-/// Where a trial stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TrialPart {
-    /// Rest before the closing.
-    Ready,
-    /// The control box does this.
-    Phase(Phase),
-    /// The programme is done; what comes to rest is still recorded.
-    Settling,
-    /// The trial began by itself, or nobody says what the control box does.
-    Free,
-}
-
 /// A trial that goes on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialView {
-    /// Its number.
-    pub id: TrialId,
-    /// What was asked for.
+    /// Its number; none before the store has given one.
+    pub id: Option<TrialId>,
+    /// The request.
     pub request: TrialRequest,
-    /// Where it stands.
-    pub part: TrialPart,
+    /// Stage of the grasp.
+    pub stage: GraspStage,
     /// How long this part will take from now (s), where it is known.
     pub left_s: Option<f64>,
     /// Time since the closing began; negative before it (s).

@@ -15,14 +15,10 @@ mod desk;
 mod messages;
 mod observing;
 mod plotted;
-mod recent;
-mod running;
-mod stream;
 mod worker;
 
 pub use calibrating::{CalibrationPlan, CalibrationView, CalibrationWish, RunningCalibration};
 pub use crosstalk::{CrosstalkView, CrosstalkWish, RunningCrosstalk};
-pub use messages::{EndedTrial, GripperView, GripperWish, LEAD_S, LatestReading, TrialPart, TrialRequest, TrialView};
+pub use messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialView};
 pub use observing::ObserveRequest;
-pub use stream::{BoardStream, Listen, NotOpened, listen_to_port};
 pub use worker::{GripperSetup, GripperWorker};

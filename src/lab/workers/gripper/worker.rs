@@ -3,7 +3,7 @@
 use super::desk::{Desk, Outlets};
 use super::messages::{GripperView, GripperWish};
 use super::observing;
-use super::stream::Listen;
+use crate::gripper::Listen;
 use crate::workers::{Examine, Latest, Notice, TraceRow, Wake};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;

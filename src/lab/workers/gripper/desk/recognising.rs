@@ -32,8 +32,10 @@ impl Desk {
 
     /// Lets the model hear a reading of the grasp that goes on.
     pub(super) fn recognise(&mut self, t_s: f64, felt: &Felt) {
-        let (Some(listener), Some(running)) = (&mut self.listener, &self.running) else { return };
-        let Some(t) = running.closing_s.map(|closing_s| t_s - closing_s).filter(|t| *t >= 0.0) else { return };
+        let (Some(listener), Some(recording)) = (&mut self.listener, &self.recording) else { return };
+        let Some(t) = recording.controller().closing_s().map(|closing_s| t_s - closing_s).filter(|t| *t >= 0.0) else {
+            return;
+        };
         let names = listener.channels();
         let value =
             |name: &String| self.channels.iter().find(|channel| channel.name() == *name).and_then(|c| felt.of(c));

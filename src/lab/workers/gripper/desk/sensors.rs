@@ -1,6 +1,7 @@
 //! What the sensors mean: calibrations of the parts, those that are being made, and zeros.
 
 use super::{Connection, Desk, open};
+use crate::gripper::Gripper;
 use crate::workers::Notice;
 use crate::workers::gripper::calibrating::{Calibrating, CalibrationPlan, CalibrationWish};
 use crate::workers::gripper::crosstalk::{Crossing, CrosstalkView, CrosstalkWish};
@@ -61,7 +62,7 @@ impl Desk {
 
     /// Takes the zeros of now, where the hand is open and left alone.
     pub(super) fn tare(&mut self) {
-        if self.running.is_some() {
+        if self.recording.is_some() {
             let text = "nothing was tared: a trial goes on; its zeros are taken before it closes";
             return self.outlets.tell(Notice::Warning(text.to_owned()));
         }
@@ -70,7 +71,11 @@ impl Desk {
         let Some(connection) = &mut self.connection else { return };
         let mut readings = connection.recent.last(2.0 * REST_S);
         // What was heard before the board fell silent says nothing of now; captured bytes keep their own time.
-        let since_s = if connection.stream.status().baud.is_some() { connection.stream.now_s() - STALE_S } else { 0.0 };
+        let since_s = if connection.gripper.stream().status().baud.is_some() {
+            connection.gripper.now_s() - STALE_S
+        } else {
+            0.0
+        };
         readings.retain(|reading| reading.t_s > since_s);
         let zero = match connection.readout.tare(&readings) {
             Ok(zero) if zero != Zero::default() => zero,
@@ -143,7 +148,7 @@ impl Desk {
 
     /// What has the fingers at present, where something has, in a sentence.
     pub(super) fn occupied(&self) -> Option<&'static str> {
-        match (&self.running, &self.calibrating, &self.crossing) {
+        match (&self.recording, &self.calibrating, &self.crossing) {
             (Some(_), _, _) => Some("a trial goes on: end it first"),
             (None, Some(_), _) => Some("a calibration goes on: end it first, in the panel Calibration"),
             (None, None, Some(_)) => Some("a crosstalk test goes on: end it first, in the panel Doctor"),

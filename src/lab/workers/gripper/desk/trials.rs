@@ -1,13 +1,14 @@
 //! Trials at the desk: they are begun by wish or by what the fingers do, conducted, written, and ended.
 
-use super::{Desk, open};
-use crate::gripper::VENT;
+use super::Desk;
+use crate::gripper::Gripper;
 use crate::labelling::SegmentEvent;
+use crate::recording::{BoardTrialRecording, RecorderNotice, TrialRequest};
 use crate::workers::Notice;
-use crate::workers::gripper::messages::TrialRequest;
-use crate::workers::gripper::running::{BEFORE_S, Running};
+use crate::workers::gripper::messages::{EndedTrial, TrialView};
 use crate::workers::listener::Listener;
 use palpate_sim::gripper::Phase;
+use palpate_store::labels::cadence_line;
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
 
@@ -20,14 +21,15 @@ impl Desk {
         let free = self.calibrating.is_none() && self.crossing.is_none();
         let Some(request) = self.watching.clone().filter(|_| free) else { return };
         // A trial that was asked for goes its own way.
-        if self.running.as_ref().is_some_and(|running| !running.is_by_itself()) {
+        if self.recording.as_ref().is_some_and(|recording| !recording.is_automatic()) {
             return;
         }
         for event in events {
             match event {
                 SegmentEvent::Began { from_s } => self.begin(request.clone(), Some(from_s)),
                 SegmentEvent::Phase(mark) => {
-                    let phase = self.running.as_mut().and_then(|running| running.mark(mark));
+                    let recording = self.recording.as_mut().zip(self.recorder.as_ref());
+                    let phase = recording.and_then(|(recording, recorder)| recording.mark(recorder, mark));
                     phase.into_iter().for_each(|phase| self.begin_phase(phase, reading.t_s));
                 }
                 SegmentEvent::Ended { .. } => self.end(false, None),
@@ -39,47 +41,43 @@ impl Desk {
         let Some(connection) = &mut self.connection else {
             return self.outlets.tell(Notice::Warning("no board is connected: vent at the control box".to_owned()));
         };
-        let sent = connection.stream.send(VENT);
+        let sent = connection.gripper.vent();
         match sent {
             Err(error) => self.outlets.tell(Notice::Failed(format!("{error}: vent at the control box"))),
             Ok(()) if connection.board.firmware.is_none() => self.outlets.tell(Notice::Warning(
-                "told to vent, but this board has not said that it drives a control box: vent by hand".to_owned(),
+                "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
-            Ok(()) => self.outlets.tell(Notice::Warning("told to vent".to_owned())),
+            Ok(()) => self.outlets.tell(Notice::Warning("Vent sent.".to_owned())),
         }
-        if let Some(running) = &mut self.running {
-            running.interrupt("vented by the user");
+        if let (Some(_), Some(recorder)) = (&self.recording, &self.recorder) {
+            recorder.interrupted("vented by the user");
         }
         self.end(false, None);
     }
 
-    /// Tells the board what is due, and ends a trial whose programme is done.
-    pub(super) fn conduct(&mut self) {
-        let (Some(connection), Some(running)) = (&mut self.connection, &mut self.running) else { return };
-        let now_s = connection.stream.now_s();
-        let (line, phase) = running.conduct(now_s);
-        if let Some(line) = line
-            && let Err(error) = connection.stream.send(&line)
-        {
-            let cause = format!("{line}: {error}");
-            running.note(cause.clone());
-            running.cut(cause);
-        }
-        let over = running.is_over(now_s);
+    /// Sets the pressure that is due, and ends a trial whose programme is over.
+    pub(super) fn drive(&mut self) {
+        let (Some(connection), Some(recording), Some(recorder)) =
+            (&mut self.connection, &mut self.recording, &self.recorder)
+        else {
+            return;
+        };
+        let phase = recording.drive(recorder, &mut connection.gripper);
+        let over = recording.is_over(&connection.gripper);
         if let Some(phase) = phase {
             self.begin_phase(phase, f64::INFINITY);
         }
-        self.end_what_is_cut();
-        self.write();
+        self.end_aborted();
         if over {
             self.end(false, None);
         }
     }
 
-    /// Ends a trial whose fingers do not do any more what they are told.
-    pub(super) fn end_what_is_cut(&mut self) {
-        let Some(cause) = self.running.as_ref().and_then(Running::why_cut) else { return };
-        self.outlets.tell(Notice::Warning(format!("the trial was ended, and the fingers vented: {cause}")));
+    /// Ends an aborted trial.
+    pub(super) fn end_aborted(&mut self) {
+        let cause = self.recording.as_ref().and_then(|recording| recording.controller().abort_cause());
+        let Some(cause) = cause else { return };
+        self.outlets.tell(Notice::Warning(format!("trial ended and fingers vented: {cause}")));
         self.end(false, None);
     }
 
@@ -87,7 +85,11 @@ impl Desk {
     fn begin_phase(&mut self, phase: Phase, until_s: f64) {
         match phase {
             Phase::Close => {
-                let closing_s = self.running.as_ref().and_then(|running| running.closing_s).unwrap_or(f64::INFINITY);
+                let closing_s = self
+                    .recording
+                    .as_ref()
+                    .and_then(|recording| recording.controller().closing_s())
+                    .unwrap_or(f64::INFINITY);
                 self.zero_from_rest(closing_s);
                 self.begin_recognition();
                 self.catch_up(closing_s, until_s);
@@ -114,95 +116,99 @@ impl Desk {
             return self.outlets.tell(Notice::Warning(text.to_owned()));
         };
         if connection.latest.is_none() {
-            let text = format!("nothing is recorded yet: {}", connection.stream.status().state.sentence());
+            let text = format!("nothing is recorded yet: {}", connection.gripper.stream().status().state.sentence());
             return self.outlets.tell(Notice::Warning(text));
         }
-        let by_itself = from_s.is_some();
-        let from_s = from_s.unwrap_or(connection.stream.now_s() - BEFORE_S);
-        let status = connection.stream.status();
-        let adds = request.adds;
-        let store = match open(&mut self.store, &self.path) {
-            Ok(store) => store,
-            Err(cause) => return self.outlets.tell(Notice::Failed(cause)),
+        let Some(recorder) = &self.recorder else {
+            return self.outlets.tell(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
-        let now_s = || connection.stream.now_s();
-        match Running::begin(store, request, &self.scene, &status, &connection.recent, from_s, now_s) {
-            Ok(running) => {
-                let running = running.began_by_itself(by_itself);
-                self.another_stretch(running.closing_s.unwrap_or(running.began_s));
-                self.running = Some(running);
-                self.begun += 1;
-                let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
-                if !adds || decided {
-                    self.start_over();
+        let adds = request.adds;
+        let recording =
+            BoardTrialRecording::begin(recorder, &connection.gripper, &connection.recent, &self.scene, request, from_s);
+        self.another_stretch(recording.controller().closing_s().unwrap_or(recording.began_s()));
+        self.recording = Some(recording);
+        self.recording_id = None;
+        self.begun += 1;
+        let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
+        if !adds || decided {
+            self.start_over();
+        }
+    }
+
+    /// Takes in the reports of the recorder.
+    pub(super) fn take_recorded(&mut self) {
+        for notice in self.recorded.try_iter().collect::<Vec<_>>() {
+            match notice {
+                RecorderNotice::Begun(id) => self.recording_id = Some(id),
+                RecorderNotice::Recorded(trial) => {
+                    let Some((request, discarded)) = self.ending.pop_front() else { continue };
+                    if !discarded {
+                        self.outlets.tell(Notice::Stored(trial.id));
+                    }
+                    let cadence = cadence_line(&trial.about.cadence);
+                    let warnings = trial.warnings;
+                    self.ended = Some(Arc::new(EndedTrial { id: trial.id, request, discarded, warnings, cadence }));
+                    self.publish();
                 }
+                RecorderNotice::Warning(text) => self.outlets.tell(Notice::Warning(text)),
+                RecorderNotice::Failed(cause) => self.stop_recording(&cause),
+                RecorderNotice::Stored(_) | RecorderNotice::Discarded(_) => {}
             }
-            Err(error) => self.outlets.tell(Notice::Failed(format!("no trial was begun: {error}"))),
         }
     }
 
-    /// Writes what waits of the trial; a store that fails ends it.
-    pub(super) fn write(&mut self) {
-        let Some(running) = &mut self.running else { return };
-        let written =
-            open(&mut self.store, &self.path).and_then(|store| running.flush(store).map_err(|error| error.to_string()));
-        if let Err(cause) = written {
-            self.break_off(&cause);
+    /// The trial cannot be recorded any further. Driven fingers are not left under pressure.
+    fn stop_recording(&mut self, cause: &str) {
+        if self.ending.pop_front().is_some() {
+            return self.outlets.tell(Notice::Failed(format!("the end of the trial was not stored: {cause}")));
         }
-    }
-
-    /// The trial cannot go on. Nobody conducts the fingers any more, so they are not left under pressure.
-    fn break_off(&mut self, cause: &str) {
-        let driven = self.running.take().is_some_and(|running| running.is_driven());
-        let vented = self.connection.as_mut().filter(|_| driven).map(|connection| connection.stream.send(VENT));
+        let driven = self.recording.take().is_some_and(|recording| recording.is_driven());
+        let vented = self.connection.as_mut().filter(|_| driven).map(|connection| connection.gripper.vent());
         if let Some(Err(error)) = vented {
-            self.outlets.tell(Notice::Failed(format!("{error}; it vents by itself within a second")));
+            self.outlets.tell(Notice::Failed(format!("{error}; the board vents by itself within a second")));
         }
         self.start_over();
         self.another_stretch(0.0);
-        self.outlets.tell(Notice::Failed(format!("the trial was broken off, what was written is safe: {cause}")));
+        self.outlets.tell(Notice::Failed(format!("recording stopped, what was written is safe: {cause}")));
     }
 
-    /// Ends the trial that goes on, if any.
+    /// Ends the trial that is recorded, if any. The recorder reports what came of it.
     pub(super) fn end(&mut self, discarded: bool, note: Option<String>) {
-        let Some(mut running) = self.running.take() else { return };
+        let Some(mut recording) = self.recording.take() else { return };
         if let Some(note) = note {
-            running.note(note);
+            recording.note(note);
         }
-        let Some(connection) = &mut self.connection else { return };
-        if running.is_driven() && connection.stream.send(VENT).is_err() {
-            running
-                .note("the board could not be told to vent at the end; it vents by itself within a second".to_owned());
-        }
-        let status = connection.stream.status();
+        let (Some(connection), Some(recorder)) = (&mut self.connection, &self.recorder) else { return };
+        let adds = recording.request().adds;
         if let Some(listener) = &mut self.listener {
-            if discarded && !running.request().adds {
+            if discarded && !adds {
                 listener.start_over();
             } else {
                 listener.end_grasp();
             }
         }
-        // What was felt before belongs to a guess that adds to it; such a guess says nothing of this trial alone.
-        let alone = !discarded && !running.request().adds;
-        let guess = self.listener.as_ref().filter(|_| alone && running.closing_s.is_some()).and_then(Listener::guess);
-        let guess = guess.zip(self.model.clone());
-        let finished = open(&mut self.store, &self.path).and_then(|store| {
-            let ended = running.finish(store, &status, discarded).map_err(|error| error.to_string())?;
-            let guessed = guess.map_or(Ok(()), |(pmf, model)| store.set_guess(ended.id, &model, &pmf));
-            Ok((ended, guessed))
-        });
-        match finished {
-            Ok((ended, guessed)) => {
-                if let Err(error) = guessed {
-                    self.outlets.tell(Notice::Warning(format!("what the model took it for was not stored: {error}")));
-                }
-                if !discarded {
-                    self.outlets.tell(Notice::Stored(ended.id));
-                }
-                self.ended = Some(Arc::new(ended));
-            }
-            Err(cause) => self.outlets.tell(Notice::Failed(format!("the trial could not be ended: {cause}"))),
-        }
+        // A guess that adds to earlier grasps says nothing of this trial alone.
+        let alone = !discarded && !adds && recording.controller().closing_s().is_some();
+        let guess = self.listener.as_ref().filter(|_| alone).and_then(Listener::guess);
+        let guess = self.model.clone().zip(guess);
+        self.ending.push_back((recording.request().clone(), discarded));
+        recording.finish(recorder, &mut connection.gripper, discarded, guess);
         self.another_stretch(0.0);
+    }
+
+    /// The view of a trial that is recorded.
+    pub(super) fn trial_view(&self, recording: &BoardTrialRecording, now_s: f64) -> TrialView {
+        let controller = recording.controller();
+        let closing_s = controller.closing_s().unwrap_or(recording.began_s());
+        let (stage, until_s) = controller.stage(now_s);
+        TrialView {
+            id: self.recording_id,
+            request: recording.request().clone(),
+            stage,
+            left_s: until_s.map(|until_s| (until_s - now_s).max(0.0)),
+            t_s: now_s - closing_s,
+            length_s: controller.end_s().map(|end_s| end_s - closing_s),
+            samples: recording.samples(),
+        }
     }
 }

@@ -1,14 +1,16 @@
 //! Trials of a real gripper: recorded, stored, merged, exported, and killed half-way.
 
+use super::board_writer::BoardWriter;
 use super::*;
-use palpate_device::serial::{LinkEvent, LinkOptions, SerialLink};
+use palpate_device::serial::{LinkEvent, LinkOptions, PortError, SerialLink};
 use palpate_device::wire::CaptureReader;
 use palpate_device::wire::Heard;
 use palpate_sim::scene::Scene;
-use palpate_store::{BOARD_RIG, Store, StoreError, write_board_csv};
+use palpate_store::{BOARD_RIG, Store, write_board_csv};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use palpate_tactile::trial::PhaseMark;
 use std::path::Path;
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
 fn line(i: u32) -> String {
@@ -31,18 +33,28 @@ fn capture(path: &Path) -> std::io::Result<()> {
     std::fs::write(path, file)
 }
 
+fn replayed(path: &Path) -> Result<SerialLink, PortError> {
+    SerialLink::open(&LinkOptions {
+        path: Some(path.to_owned()),
+        replay_speed: f64::INFINITY,
+        ..LinkOptions::default()
+    })
+}
+
+fn plan(link: &SerialLink, object: &str) -> BoardTrialPlan {
+    let scene = Scene::default().to_toml();
+    BoardTrialPlan { object: object.to_owned(), scene, seconds: Some(8.0), status: link.status(), began_s: 0.0 }
+}
+
 /// Records a capture as fast as it can be played.
-fn record(store: &mut Store, path: &Path) -> Result<Recorded, Box<dyn std::error::Error>> {
-    let speed = f64::INFINITY;
-    let options = LinkOptions { path: Some(path.to_owned()), replay_speed: speed, ..LinkOptions::default() };
-    let link = SerialLink::open(&options)?;
-    let plan = BoardTrialPlan { object: "lemon".to_owned(), scene: Scene::default().to_toml(), seconds: Some(8.0) };
-    let mut recorder = BoardRecorder::begin(store, &plan, &link.status(), 0.0)?;
+fn record(store: &mut Store, path: &Path) -> Result<RecordedTrial, Box<dyn std::error::Error>> {
+    let link = replayed(path)?;
+    let mut writer = BoardWriter::begin(store, &plan(&link, "lemon"))?;
     while !link.is_over() {
-        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.take(event));
-        recorder.flush(store)?;
+        link.take(Duration::from_millis(20)).into_iter().for_each(|event| writer.take(event));
+        writer.flush(store)?;
     }
-    Ok(recorder.finish(store, &link.status(), Vec::new())?)
+    Ok(writer.finish(store, &link.status(), &[])?)
 }
 
 #[test]
@@ -119,25 +131,22 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     capture(&bytes)?;
     let mut store = Store::open(&path)?;
     let whole = record(&mut store, &bytes)?.id;
-    let link = SerialLink::open(&LinkOptions {
-        path: Some(bytes.clone()),
-        replay_speed: f64::INFINITY,
-        ..LinkOptions::default()
-    })?;
-    let plan = BoardTrialPlan { object: "cube".to_owned(), scene: String::new(), seconds: None };
-    let mut recorder = BoardRecorder::begin(&mut store, &plan, &link.status(), 0.0)?;
+    let link = replayed(&bytes)?;
+    let mut writer = BoardWriter::begin(&mut store, &plan(&link, "cube"))?;
     let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+    let mut readings = 0;
     while !link.is_over() {
         for event in link.take(Duration::from_millis(20)) {
             let reading = is_reading(&event);
-            recorder.take(event);
-            if reading && recorder.samples() % 50 == 0 {
-                recorder.flush(&mut store)?;
+            writer.take(event);
+            readings += u32::from(reading);
+            if reading && readings % 50 == 0 {
+                writer.flush(&mut store)?;
             }
         }
     }
     // Nothing of what was not written is there, all of what was is, and the other trial is whole.
-    drop(recorder);
+    drop(writer);
     drop(store);
     let store = Store::open(&path)?;
     assert_eq!(store.board_trial(2)?.map(|trial| trial.readings.len()), Some(250));
@@ -149,29 +158,29 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
 }
 
 #[test]
-fn a_store_that_another_program_writes_to_holds_nobody_up_and_loses_nothing() -> Result<(), Box<dyn std::error::Error>>
+fn a_store_that_another_program_writes_to_holds_up_no_board_and_loses_nothing() -> Result<(), Box<dyn std::error::Error>>
 {
     let folder = tempfile::tempdir()?;
     let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
     capture(&bytes)?;
-    let mut store = Store::open(&path)?;
-    let speed = f64::INFINITY;
-    let options = LinkOptions { path: Some(bytes), replay_speed: speed, ..LinkOptions::default() };
-    let link = SerialLink::open(&options)?;
-    let plan = BoardTrialPlan { object: "lemon".to_owned(), scene: String::new(), seconds: Some(8.0) };
-    let mut recorder = BoardRecorder::begin(&mut store, &plan, &link.status(), 0.0)?;
+    drop(Store::open(&path)?);
+    let link = replayed(&bytes)?;
+    let (sender, notices) = channel();
+    let recorder = Recorder::start(path.clone(), move |notice| sender.send(notice).expect("heard"))?;
     let other = rusqlite::Connection::open(&path)?;
     other.execute_batch("BEGIN IMMEDIATE")?;
+    recorder.begin_board(plan(&link, "lemon"));
     while !link.is_over() {
-        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.take(event));
+        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.board(event));
     }
-    for _ in 0..11 {
-        recorder.offer(&mut store)?;
-    }
-    let refused = recorder.offer(&mut store);
-    assert!(matches!(refused, Err(StoreError::Busy)), "it does not go on like that for ever: {refused:?}");
+    let end = BoardTrialEnd { status: link.status(), notes: Vec::new(), guess: None, discarded: false };
+    recorder.finish_board(end);
+    // Everything was handed over while the store was locked, and nothing was written.
+    assert!(notices.try_recv().is_err());
     other.execute_batch("COMMIT")?;
-    recorder.offer(&mut store)?;
-    assert_eq!(store.board_trial(recorder.id())?.map(|trial| trial.readings.len()), Some(299));
+    drop(recorder);
+    let Some(RecorderNotice::Recorded(trial)) = notices.try_iter().last() else { panic!("recorded") };
+    let store = Store::open(&path)?;
+    assert_eq!(store.board_trial(trial.id)?.map(|trial| trial.readings.len()), Some(299));
     Ok(())
 }

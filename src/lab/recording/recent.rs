@@ -1,4 +1,4 @@
-//! The last moments of a stream: what came before a trial began belongs to it, because the zeros are taken there.
+//! The last seconds of a stream: the rest before a trial belongs to it, because the zeros are taken there.
 
 use palpate_device::serial::LinkEvent;
 use palpate_device::wire::Heard;
@@ -12,12 +12,13 @@ const MOST: usize = 6000;
 
 /// The newest events, oldest first.
 #[derive(Debug, Default)]
-pub(super) struct Recent {
+pub struct RecentEvents {
     events: VecDeque<LinkEvent>,
 }
 
-impl Recent {
-    pub(super) fn push(&mut self, event: &LinkEvent) {
+impl RecentEvents {
+    /// Remembers an event.
+    pub fn push(&mut self, event: &LinkEvent) {
         self.events.push_back(event.clone());
         let Some(now_s) = time_of(event) else { return };
         while self.events.len() > MOST || self.events.front().is_some_and(|e| is_before(e, now_s - REMEMBERED_S)) {
@@ -26,7 +27,7 @@ impl Recent {
     }
 
     /// Everything from a time on, with the bytes of its first reading.
-    pub(super) fn since(&self, from_s: f64) -> Vec<LinkEvent> {
+    pub fn since(&self, from_s: f64) -> Vec<LinkEvent> {
         let Some(first) = self.readings().position(|reading| reading.t_s >= from_s) else { return Vec::new() };
         let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
         let mut places = self.events.iter().enumerate().filter(|(_, event)| is_reading(event)).map(|(place, _)| place);
@@ -40,13 +41,13 @@ impl Recent {
     }
 
     /// Readings of the last so many seconds.
-    pub(super) fn last(&self, seconds: f64) -> Vec<Reading> {
+    pub fn last(&self, seconds: f64) -> Vec<Reading> {
         let now_s = self.readings().last().map_or(0.0, |last| last.t_s);
         self.between(now_s - seconds, f64::INFINITY)
     }
 
     /// Readings after one time and before another (s).
-    pub(super) fn between(&self, from_s: f64, to_s: f64) -> Vec<Reading> {
+    pub fn between(&self, from_s: f64, to_s: f64) -> Vec<Reading> {
         self.readings().filter(|reading| reading.t_s > from_s && reading.t_s < to_s).cloned().collect()
     }
 
@@ -78,7 +79,7 @@ mod tests {
 
     #[test]
     fn what_came_before_is_given_with_its_bytes_and_is_bounded() {
-        let mut recent = Recent::default();
+        let mut recent = RecentEvents::default();
         for k in 0..100_000u32 {
             let t_s = 1e-3 * f64::from(k);
             if k % 10 == 0 {

@@ -1,49 +1,22 @@
-//! A trial in bounded memory. Readings are kept until there are [`MOST`] of them; then every other one is let go, and from
-//! then on only every second one is taken, and so on: a grasp of some seconds is kept whole at any rate, one of an hour
-//! in steps of half a second or less.
+//! Small pictures of trials, and long trials decimated to a bounded number of readings.
 
 use palpate_sim::gripper::Side;
 use palpate_store::labels::{SPARKLINE_BINS, Sparkline};
 use palpate_tactile::board::{Board, Reading, Sensor};
 
-/// Readings that are kept, at most.
+/// Readings that flags and pictures are made from, at most.
 const MOST: usize = 8192;
 
-/// Readings of a trial, fewer of them the longer it is.
-#[derive(Clone, Debug, Default)]
-pub struct Thinned {
-    readings: Vec<Reading>,
-    /// Every how many-th reading is taken, as a power of two.
-    halvings: u32,
-    heard: u64,
+/// Every reading of a short trial; of a longer one every second, fourth, .. so that at most [`MOST`] are left.
+pub fn decimated(readings: &[Reading]) -> Vec<Reading> {
+    let mut step = 1;
+    while readings.len().div_ceil(step) > MOST {
+        step *= 2;
+    }
+    readings.iter().step_by(step).cloned().collect()
 }
 
-impl Thinned {
-    /// Takes the next reading, if it is one of those to be kept.
-    pub fn push(&mut self, reading: &Reading) {
-        let taken = self.heard.is_multiple_of(1 << self.halvings.min(63));
-        self.heard += 1;
-        if !taken {
-            return;
-        }
-        if self.readings.len() == MOST {
-            let mut even = false;
-            self.readings.retain(|_| {
-                even = !even;
-                even
-            });
-            self.halvings += 1;
-        }
-        self.readings.push(reading.clone());
-    }
-
-    /// What is kept, in order.
-    pub fn readings(&self) -> &[Reading] {
-        &self.readings
-    }
-}
-
-/// The small picture of a trial.
+/// Sparkline of a trial: the mean count of each finger in each bin of its time.
 pub fn sparkline(board: &Board, readings: &[Reading]) -> Sparkline {
     Side::BOTH.map(|side| {
         let sensors = match side {
@@ -84,19 +57,12 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_bounded_and_what_is_kept_is_evenly_spread() {
-        let mut thinned = Thinned::default();
-        let mut at_step = |to: u64| {
-            for k in thinned.heard..to {
-                thinned.push(&reading(k as f64, 0.0));
-            }
-            let times: Vec<f64> = thinned.readings().iter().map(|reading| reading.t_s).collect();
-            (times.len(), times.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>())
-        };
-        assert!(at_step(MOST as u64).1.iter().all(|step| *step == 1.0), "a grasp is kept whole");
-        let (kept, steps) = at_step(100_000);
-        assert!(kept <= MOST && kept > MOST / 2, "{kept}");
-        assert!(steps.iter().all(|step| *step == 16.0), "{steps:?}");
+    fn short_trials_stay_whole_and_long_ones_are_decimated_evenly() {
+        let readings: Vec<Reading> = (0..100_000).map(|k| reading(f64::from(k), 0.0)).collect();
+        assert_eq!(decimated(&readings[..MOST]).len(), MOST);
+        let kept = decimated(&readings);
+        assert!(kept.len() <= MOST && kept.len() > MOST / 2, "{}", kept.len());
+        assert!(kept.windows(2).all(|pair| pair[1].t_s - pair[0].t_s == 16.0));
     }
 
     #[test]

@@ -1,0 +1,195 @@
+//! A grasp of the real gripper that is being recorded: its controller and its recording side by side. The command line
+//! and the window begin, drive and end it through this.
+
+use super::board_writer::BoardTrialPlan;
+use super::recent::RecentEvents;
+use super::recorder::{BoardTrialEnd, Recorder};
+use crate::grasping::{GraspController, GraspPlan};
+use crate::gripper::{Gripper, GripperEvent, SerialGripper};
+use palpate_device::serial::LinkEvent;
+use palpate_device::wire::Heard;
+use palpate_sim::gripper::Phase;
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::{Control, PhaseMark};
+
+/// Readings from before the start that belong to the trial (s).
+pub(super) const BEFORE_S: f64 = 0.3;
+/// A board that is silent at the end is not waited for longer than this (s).
+const LATE_S: f64 = 0.5;
+
+/// A trial that is wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialRequest {
+    /// Class of the object, where it is known beforehand.
+    pub object: Option<String>,
+    /// Who moves the fingers.
+    pub control: Control,
+    /// Length (s), where it differs from that of the programme.
+    pub length_s: Option<f64>,
+    /// Whether it adds to the belief of earlier grasps of this object; else it stands alone.
+    pub adds: bool,
+}
+
+/// A grasp that is being recorded.
+pub struct BoardTrialRecording {
+    request: TrialRequest,
+    controller: GraspController,
+    began_s: f64,
+    samples: u64,
+    newest_s: f64,
+    notes: Vec<String>,
+    /// The fingers began it, and end it.
+    automatic: bool,
+    over: bool,
+}
+
+impl BoardTrialRecording {
+    /// Begins to record. Events from `from_s` on that were heard before belong to it; without it those of the last
+    /// moments do.
+    pub fn begin(
+        recorder: &Recorder,
+        gripper: &SerialGripper,
+        recent: &RecentEvents,
+        scene: &Scene,
+        request: TrialRequest,
+        from_s: Option<f64>,
+    ) -> Self {
+        let now_s = gripper.now_s();
+        let before = recent.since(from_s.unwrap_or(now_s - BEFORE_S));
+        let began_s = before.iter().find_map(reading_time).unwrap_or(now_s);
+        let plan = GraspPlan { length_s: request.length_s, ..GraspPlan::recorded(scene, request.control) };
+        let start_s = if request.control == Control::Free { began_s } else { now_s };
+        recorder.begin_board(BoardTrialPlan {
+            object: request.object.clone().unwrap_or_default(),
+            scene: scene.to_toml(),
+            seconds: plan.total_s(),
+            status: gripper.stream().status(),
+            began_s,
+        });
+        let mut recording = Self {
+            request,
+            controller: GraspController::new(plan, start_s),
+            began_s,
+            samples: 0,
+            newest_s: began_s,
+            notes: Vec::new(),
+            automatic: from_s.is_some(),
+            over: false,
+        };
+        before.into_iter().for_each(|event| recording.take(recorder, event));
+        recording
+    }
+
+    /// Records an event of the board, and lets it abort a driven grasp. Readings after the end are left out.
+    pub fn take(&mut self, recorder: &Recorder, event: LinkEvent) {
+        if let Some(t_s) = reading_time(&event) {
+            self.over |= self.controller.end_s().is_some_and(|end_s| t_s >= end_s);
+            self.newest_s = t_s;
+        }
+        if self.over {
+            return;
+        }
+        self.samples += u64::from(reading_time(&event).is_some());
+        let event = GripperEvent::Board(event);
+        let interrupted = self.controller.observe(&event);
+        let GripperEvent::Board(event) = event else { return };
+        // An interruption of the stream is recorded with the bytes.
+        if let Some(cause) = interrupted.filter(|_| !matches!(event, LinkEvent::Captured(_))) {
+            recorder.interrupted(&cause);
+        }
+        recorder.board(event);
+    }
+
+    /// Sets the line pressure that is due; the phase that begins, if any. A line that cannot be sent aborts the grasp.
+    pub fn drive(&mut self, recorder: &Recorder, gripper: &mut SerialGripper) -> Option<Phase> {
+        let command = self.controller.command(gripper.now_s())?;
+        if self.is_driven()
+            && let Err(error) = gripper.set_pressure(command.bar, command.phase)
+        {
+            self.controller.abort(error.to_string());
+        }
+        let mark = self.controller.mark(&command);
+        self.mark(recorder, mark)
+    }
+
+    /// Records a phase that began; the phase, where it is a new one.
+    pub fn mark(&mut self, recorder: &Recorder, mark: PhaseMark) -> Option<Phase> {
+        recorder.mark(mark);
+        self.controller.observe_phase(&mark)
+    }
+
+    /// Adds a remark to the trial, once.
+    pub fn note(&mut self, text: String) {
+        if !self.notes.contains(&text) {
+            self.notes.push(text);
+        }
+    }
+
+    /// True at the end of the programme or the length, and after an abort.
+    pub fn is_over(&self, gripper: &SerialGripper) -> bool {
+        // Captured bytes keep their own time.
+        let live = gripper.stream().status().baud.is_some();
+        let now_s = if live { gripper.now_s() - LATE_S } else { self.newest_s };
+        self.over || self.controller.is_over(now_s)
+    }
+
+    /// Vents driven fingers and ends the recording; the recorder reports what came of it.
+    pub fn finish(
+        mut self,
+        recorder: &Recorder,
+        gripper: &mut SerialGripper,
+        discarded: bool,
+        guess: Option<(String, Vec<(String, f64)>)>,
+    ) {
+        if self.is_driven() && gripper.vent().is_err() {
+            self.note("the last vent could not be sent; the board vents by itself within a second".to_owned());
+        }
+        if let Some(cause) = self.controller.abort_cause() {
+            self.note(format!("ended early and vented: {cause}"));
+        }
+        recorder.finish_board(BoardTrialEnd { status: gripper.stream().status(), notes: self.notes, guess, discarded });
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &GraspController {
+        &self.controller
+    }
+
+    /// The controller, for an abort.
+    pub fn controller_mut(&mut self) -> &mut GraspController {
+        &mut self.controller
+    }
+
+    /// The request.
+    pub fn request(&self) -> &TrialRequest {
+        &self.request
+    }
+
+    /// Time of the first reading (s).
+    pub fn began_s(&self) -> f64 {
+        self.began_s
+    }
+
+    /// Readings so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Whether the fingers began it, and end it.
+    pub fn is_automatic(&self) -> bool {
+        self.automatic
+    }
+
+    /// Whether this program sets the pressure.
+    pub fn is_driven(&self) -> bool {
+        self.request.control == Control::Driven
+    }
+}
+
+/// Time of a reading (s); none for other events.
+pub(super) fn reading_time(event: &LinkEvent) -> Option<f64> {
+    match event {
+        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+    }
+}

@@ -1,0 +1,235 @@
+//! The writing side of a trial of the real gripper: what waits to be written, and what its header needs at the end.
+
+use crate::labelling::{Observed, decimated, flags_of, sparkline};
+use palpate_device::serial::{LinkEvent, LinkStatus};
+use palpate_device::wire::Heard;
+use palpate_geometry::Pose;
+use palpate_sim::frame::{Plan, Quality};
+use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
+use palpate_tactile::board::{Gap, Sensor};
+use palpate_tactile::cadence::Cadence;
+use palpate_tactile::capture::Captured;
+use palpate_tactile::trial::{PhaseMark, TrialId, TrialInfo};
+
+/// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
+const BYTES_PER_S: f64 = 400e3;
+/// A board that was silent for longer than this before the end left a gap there (s).
+const SILENCE_S: f64 = 1.0;
+/// Length that is reserved for a trial of unknown length (s).
+const UNKNOWN_LENGTH_S: f64 = 600.0;
+
+/// What is known of a trial of the real gripper before it begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoardTrialPlan {
+    /// Class of the object; empty where it is labelled later.
+    pub object: String,
+    /// The scene as TOML: the gripper as modelled, and its programme.
+    pub scene: String,
+    /// Length (s), where known.
+    pub seconds: Option<f64>,
+    /// Link at the beginning.
+    pub status: LinkStatus,
+    /// First reading (s, on the clock of the readings).
+    pub began_s: f64,
+}
+
+/// Header of a trial of the real gripper.
+pub fn board_trial_info(object: &str, scene: &str) -> TrialInfo {
+    TrialInfo {
+        rig: BOARD_RIG.to_owned(),
+        object: object.to_owned(),
+        seed: 0,
+        collection: None,
+        scene: scene.to_owned(),
+        world_from_gripper: Pose::IDENTITY,
+        plan: Plan::default(),
+        quality: Quality::default(),
+        warnings: Vec::new(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}
+
+/// A recorded trial of the real gripper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedTrial {
+    /// Its number.
+    pub id: TrialId,
+    /// Its board, cadence, phases and flags.
+    pub about: BoardInfo,
+    /// Warnings, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// A trial that is being recorded.
+#[derive(Debug)]
+pub(super) struct BoardWriter {
+    id: TrialId,
+    about: BoardInfo,
+    chunk: BoardChunk,
+    samples: u64,
+    lost: u64,
+    gaps: u64,
+    interruptions: Vec<String>,
+    newest_s: Option<f64>,
+    /// The newest reading's time (s), and why none followed, where that is known.
+    last: Option<(f64, Option<String>)>,
+    /// Counts of the link when the trial began.
+    before: (Cadence, u32),
+}
+
+impl BoardWriter {
+    /// Begins a trial in the store, where there is room for it.
+    pub(super) fn begin(store: &mut Store, plan: &BoardTrialPlan) -> Result<Self, StoreError> {
+        check_space(store.path(), plan.seconds.unwrap_or(UNKNOWN_LENGTH_S) * BYTES_PER_S)?;
+        let status = &plan.status;
+        let about = BoardInfo {
+            port: format!("{}, {}", status.port.path.display(), status.port.title),
+            board: status.board.clone(),
+            detected: status.detected.clone(),
+            began_s: plan.began_s,
+            ..BoardInfo::default()
+        };
+        Ok(Self {
+            id: store.begin_board(&board_trial_info(&plan.object, &plan.scene), &about)?,
+            about,
+            chunk: BoardChunk::default(),
+            samples: 0,
+            lost: 0,
+            gaps: 0,
+            interruptions: Vec::new(),
+            newest_s: None,
+            last: None,
+            before: (status.cadence.clone(), status.reconnects),
+        })
+    }
+
+    /// Its number.
+    pub(super) fn id(&self) -> TrialId {
+        self.id
+    }
+
+    /// Takes in an event of the link.
+    pub(super) fn take(&mut self, event: LinkEvent) {
+        match event {
+            LinkEvent::Captured(piece) => {
+                if let Captured::Interrupted { cause, .. } = &piece {
+                    self.interruptions.push(cause.clone());
+                    self.last = self.last.take().map(|(t_s, _)| (t_s, Some(cause.clone())));
+                }
+                self.chunk.bytes.push(piece);
+            }
+            LinkEvent::Heard(Heard::Reading(reading)) => {
+                self.samples += 1;
+                self.last = Some((reading.t_s, None));
+                self.newest_s = Some(reading.t_s);
+                self.chunk.readings.push(reading);
+            }
+            LinkEvent::Heard(Heard::Gap(gap)) => {
+                self.lost += gap.lost.unwrap_or(0);
+                self.add_gap(gap);
+            }
+            LinkEvent::Heard(Heard::Board(board)) => self.about.board = board,
+            LinkEvent::Heard(Heard::Said(_)) => {}
+        }
+    }
+
+    /// Notes an interruption of the grasp, though the board kept sending.
+    pub(super) fn interrupt(&mut self, cause: String) {
+        self.interruptions.push(cause);
+    }
+
+    /// Notes a change of the control box.
+    pub(super) fn mark(&mut self, mark: PhaseMark) {
+        self.about.phases.push(mark);
+    }
+
+    /// Writes what waits.
+    pub(super) fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
+        store.append_board(self.id, &self.about, &self.chunk)?;
+        self.chunk = BoardChunk::default();
+        Ok(())
+    }
+
+    /// Writes the rest and closes the trial. Its flags are found in what the store then holds.
+    pub(super) fn finish(
+        &mut self,
+        store: &mut Store,
+        status: &LinkStatus,
+        notes: &[String],
+    ) -> Result<RecordedTrial, StoreError> {
+        self.close(status);
+        self.flush(store)?;
+        let (before, reconnects) = &self.before;
+        self.about.reconnects = status.reconnects - reconnects;
+        self.about.detected.clone_from(&status.detected);
+        self.about.seconds = self.newest_s.map_or(0.0, |newest| (newest - self.about.began_s).max(0.0));
+        self.about.cadence = Cadence {
+            samples: self.samples,
+            lost: self.lost,
+            gaps: self.gaps,
+            bad_lines: status.cadence.bad_lines.saturating_sub(before.bad_lines),
+            ..status.cadence.clone()
+        };
+        self.judge(store)?;
+        let mut warnings = self.warnings(status);
+        warnings.extend_from_slice(notes);
+        store.finish_board(self.id, &self.about, &warnings)?;
+        Ok(RecordedTrial { id: self.id, about: self.about.clone(), warnings })
+    }
+
+    /// A silence up to the end is a gap as well.
+    fn close(&mut self, status: &LinkStatus) {
+        let live = status.baud.is_some();
+        let Some((from_s, cause)) = self.last.take().filter(|(t_s, _)| live && status.now_s - t_s > SILENCE_S) else {
+            return;
+        };
+        let cause = cause.unwrap_or_else(|| "the board fell silent".to_owned());
+        self.add_gap(Gap { from_s, to_s: status.now_s, lost: None, cause });
+    }
+
+    fn add_gap(&mut self, gap: Gap) {
+        self.gaps += 1;
+        self.chunk.gaps.push(gap);
+    }
+
+    /// Flags and sparkline of the stored trial. Without calibrations raw counts are judged.
+    fn judge(&mut self, store: &Store) -> Result<(), StoreError> {
+        let Some(trial) = store.board_trial(self.id)? else { return Ok(()) };
+        let serving = store.serving(Some(self.id), &[]).unwrap_or_else(|error| {
+            tracing::warn!("trial {} is flagged without calibrations: {error}", self.id);
+            Serving::default()
+        });
+        let readings = decimated(&trial.readings);
+        self.about.flags = flags_of(&Observed {
+            board: &self.about.board,
+            readings: &readings,
+            gaps: &trial.gaps,
+            interruptions: &self.interruptions,
+            cadence: &self.about.cadence,
+            phases: &self.about.phases,
+            calibrations: &serving.calibrations,
+        });
+        self.about.sparkline = sparkline(&self.about.board, &readings);
+        Ok(())
+    }
+
+    fn warnings(&self, status: &LinkStatus) -> Vec<String> {
+        let cadence = &self.about.cadence;
+        let mut warnings: Vec<String> =
+            self.interruptions.iter().map(|cause| format!("interrupted: {cause}")).collect();
+        if cadence.samples == 0 {
+            warnings.push(format!("nothing was recorded: {}", status.state.sentence()));
+        }
+        let (lost, gaps) = (cadence.lost, cadence.gaps);
+        if gaps > 0 {
+            warnings.push(format!("{lost} reading(s) are missing for certain, in {gaps} gap(s)"));
+        }
+        warnings.extend(status.wiring_remarks());
+        let assumed = Sensor::ALL.iter().any(|sensor| self.about.board.channel_of(*sensor).is_none());
+        if assumed && cadence.samples > 0 {
+            let names = self.about.board.channels.join(", ");
+            warnings.push(format!("the board has not all of flexL, flexR, fsrL, fsrR, but {names}"));
+        }
+        warnings
+    }
+}

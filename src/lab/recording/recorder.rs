@@ -1,0 +1,345 @@
+//! The recorder: the thread "recorder" writes trials into the store, simulated and real ones alike. Neither a slow disk
+//! nor another program's lock holds up a grasp or the lines that keep a board from venting. Waiting data are written once a
+//! second, so that a kill loses at most the last second.
+
+use super::board_writer::{BoardTrialPlan, BoardWriter, RecordedTrial};
+use palpate_device::serial::{LinkEvent, LinkStatus};
+use palpate_sim::frame::{Frame, Quality};
+use palpate_store::{Store, StoreError};
+use palpate_tactile::trial::{PhaseMark, TrialId, TrialInfo};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Frames that are gathered before they are written.
+const CHUNK: usize = 75;
+/// Readings wait no longer than this for being written.
+const FLUSH_AFTER: Duration = Duration::from_millis(800);
+/// Attempts on a store that another program writes to; each waits for ten seconds.
+const MOST_ATTEMPTS: u32 = 6;
+
+/// Reports of the recorder.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RecorderNotice {
+    /// A trial of the real gripper has its number.
+    Begun(TrialId),
+    /// A simulated trial is complete in the store.
+    Stored(TrialId),
+    /// A trial of the real gripper is complete in the store.
+    Recorded(Box<RecordedTrial>),
+    /// A trial was discarded.
+    Discarded(TrialId),
+    /// Something about the trial was not stored; the trial itself is safe.
+    Warning(String),
+    /// A trial could not be stored, or not to its end; the sentence says why.
+    Failed(String),
+}
+
+/// The end of a trial of the real gripper.
+#[derive(Clone, Debug)]
+pub struct BoardTrialEnd {
+    /// Link at the end.
+    pub status: LinkStatus,
+    /// Remarks of the grasp, in sentences.
+    pub notes: Vec<String>,
+    /// A guess to store with it: name of the model, class probabilities.
+    pub guess: Option<(String, Vec<(String, f64)>)>,
+    /// The trial was given up.
+    pub discarded: bool,
+}
+
+enum Message {
+    Begin(Box<TrialInfo>),
+    Frame(Box<Frame>),
+    Finish(Box<Quality>, Vec<String>),
+    Discard,
+    BeginBoard(Box<BoardTrialPlan>),
+    Board(Box<LinkEvent>),
+    Mark(PhaseMark),
+    Interrupted(String),
+    FinishBoard(Box<BoardTrialEnd>),
+}
+
+/// A handle on the recorder's thread. Dropping it writes everything that was handed over and waits for that.
+#[derive(Debug)]
+pub struct Recorder {
+    messages: Option<Sender<Message>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Recorder {
+    /// Starts the thread. The store is opened when the first trial begins; `notify` is called from the thread.
+    pub fn start(store: PathBuf, notify: impl Fn(RecorderNotice) + Send + 'static) -> std::io::Result<Self> {
+        let (messages, inbox) = channel();
+        let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || {
+            let mut writer = Writer { path: store, store: None, trial: OpenTrial::None, notify: Box::new(notify) };
+            writer.work(&inbox);
+        })?;
+        Ok(Self { messages: Some(messages), thread: Some(thread) })
+    }
+
+    fn send(&self, message: Message) {
+        if let Some(messages) = &self.messages {
+            // The thread reports its own failure; later messages have nowhere to go.
+            let _gone = messages.send(message);
+        }
+    }
+
+    /// Begins a simulated trial.
+    pub fn begin(&self, info: &TrialInfo) {
+        self.send(Message::Begin(Box::new(info.clone())));
+    }
+
+    /// Records the next frame of a simulated trial.
+    pub fn frame(&self, frame: &Frame) {
+        self.send(Message::Frame(Box::new(frame.clone())));
+    }
+
+    /// Ends a simulated trial.
+    pub fn finish(&self, quality: &Quality, warnings: &[String]) {
+        self.send(Message::Finish(Box::new(quality.clone()), warnings.to_vec()));
+    }
+
+    /// Gives a simulated trial up: it is marked as deleted.
+    pub fn discard(&self) {
+        self.send(Message::Discard);
+    }
+
+    /// Begins a trial of the real gripper.
+    pub fn begin_board(&self, plan: BoardTrialPlan) {
+        self.send(Message::BeginBoard(Box::new(plan)));
+    }
+
+    /// Records an event of the board.
+    pub fn board(&self, event: LinkEvent) {
+        self.send(Message::Board(Box::new(event)));
+    }
+
+    /// Records a change of the control box.
+    pub fn mark(&self, mark: PhaseMark) {
+        self.send(Message::Mark(mark));
+    }
+
+    /// Records that the grasp was interrupted.
+    pub fn interrupted(&self, cause: &str) {
+        self.send(Message::Interrupted(cause.to_owned()));
+    }
+
+    /// Ends a trial of the real gripper; flags are found in what was stored.
+    pub fn finish_board(&self, end: BoardTrialEnd) {
+        self.send(Message::FinishBoard(Box::new(end)));
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.messages = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic in the thread has printed itself.
+            let _ended = thread.join();
+        }
+    }
+}
+
+struct Writer {
+    path: PathBuf,
+    store: Option<Store>,
+    trial: OpenTrial,
+    notify: Box<dyn Fn(RecorderNotice) + Send>,
+}
+
+/// The trial that is being recorded.
+enum OpenTrial {
+    None,
+    /// Nothing of it is in the store yet: scenes that are skipped within a second leave no trace.
+    Announced(Box<TrialInfo>, Vec<Frame>),
+    Simulated(TrialId, Vec<Frame>),
+    Board(Box<BoardWriter>, Instant),
+}
+
+impl Writer {
+    fn work(&mut self, inbox: &Receiver<Message>) {
+        loop {
+            let outcome = match inbox.recv_timeout(FLUSH_AFTER) {
+                Ok(message) => self.take(message).and_then(|()| self.flush_if_due()),
+                Err(RecvTimeoutError::Timeout) => self.flush_if_due(),
+                Err(RecvTimeoutError::Disconnected) => return,
+            };
+            if let Err(error) = outcome {
+                self.trial = OpenTrial::None;
+                (self.notify)(RecorderNotice::Failed(error.to_string()));
+            }
+        }
+    }
+
+    fn take(&mut self, message: Message) -> Result<(), StoreError> {
+        match message {
+            Message::Begin(info) => self.trial = OpenTrial::Announced(info, Vec::new()),
+            Message::Frame(frame) => {
+                if let OpenTrial::Announced(_, waiting) | OpenTrial::Simulated(_, waiting) = &mut self.trial {
+                    waiting.push(*frame);
+                    if waiting.len() >= CHUNK {
+                        self.write_frames()?;
+                    }
+                }
+            }
+            Message::Finish(quality, warnings) => {
+                if let Some(id) = self.write_frames()? {
+                    self.trial = OpenTrial::None;
+                    self.with_store(|store| store.finish(id, &quality, &warnings))?;
+                    (self.notify)(RecorderNotice::Stored(id));
+                }
+            }
+            Message::Discard => {
+                if let OpenTrial::Simulated(id, _) = std::mem::replace(&mut self.trial, OpenTrial::None) {
+                    self.with_store(|store| store.delete(&[id]))?;
+                }
+            }
+            Message::BeginBoard(plan) => {
+                let writer = self.with_store(|store| BoardWriter::begin(store, &plan))?;
+                (self.notify)(RecorderNotice::Begun(writer.id()));
+                self.trial = OpenTrial::Board(Box::new(writer), Instant::now());
+            }
+            Message::Board(event) => self.with_board(|board| board.take(*event)),
+            Message::Mark(mark) => self.with_board(|board| board.mark(mark)),
+            Message::Interrupted(cause) => self.with_board(|board| board.interrupt(cause)),
+            Message::FinishBoard(end) => self.finish_board(&end)?,
+        }
+        Ok(())
+    }
+
+    fn with_board(&mut self, change: impl FnOnce(&mut BoardWriter)) {
+        if let OpenTrial::Board(board, _) = &mut self.trial {
+            change(board);
+        }
+    }
+
+    fn flush_if_due(&mut self) -> Result<(), StoreError> {
+        let OpenTrial::Board(mut board, written) = std::mem::replace(&mut self.trial, OpenTrial::None) else {
+            return Ok(());
+        };
+        let due = written.elapsed() >= FLUSH_AFTER;
+        if due {
+            self.with_store(|store| board.flush(store))?;
+        }
+        self.trial = OpenTrial::Board(board, if due { Instant::now() } else { written });
+        Ok(())
+    }
+
+    fn finish_board(&mut self, end: &BoardTrialEnd) -> Result<(), StoreError> {
+        let OpenTrial::Board(mut board, _) = std::mem::replace(&mut self.trial, OpenTrial::None) else {
+            return Ok(());
+        };
+        let recorded = self.with_store(|store| board.finish(store, &end.status, &end.notes))?;
+        let id = recorded.id;
+        if end.discarded {
+            match self.with_store(|store| store.discard_trial(id)) {
+                Ok(()) => (self.notify)(RecorderNotice::Discarded(id)),
+                Err(error) => (self.notify)(RecorderNotice::Warning(format!("trial {id} was not discarded: {error}"))),
+            }
+        }
+        if let Some((model, pmf)) = &end.guess
+            && let Err(error) = self.with_store(|store| store.set_guess(id, model, pmf))
+        {
+            (self.notify)(RecorderNotice::Warning(format!("the model's guess was not stored: {error}")));
+        }
+        (self.notify)(RecorderNotice::Recorded(Box::new(recorded)));
+        Ok(())
+    }
+
+    /// Writes the frames that wait, beginning the trial where it has not begun; its number, where there is one.
+    fn write_frames(&mut self) -> Result<Option<TrialId>, StoreError> {
+        let (id, waiting) = match std::mem::replace(&mut self.trial, OpenTrial::None) {
+            OpenTrial::Announced(info, waiting) => (self.with_store(|store| store.begin(&info))?, waiting),
+            OpenTrial::Simulated(id, waiting) => (id, waiting),
+            other @ (OpenTrial::None | OpenTrial::Board(..)) => {
+                self.trial = other;
+                return Ok(None);
+            }
+        };
+        self.with_store(|store| store.append(id, &waiting))?;
+        self.trial = OpenTrial::Simulated(id, Vec::new());
+        Ok(Some(id))
+    }
+
+    /// Works on the store, opening it first where needed. A store that another program writes to is tried for a minute.
+    fn with_store<T>(&mut self, mut work: impl FnMut(&mut Store) -> Result<T, StoreError>) -> Result<T, StoreError> {
+        let store = match &mut self.store {
+            Some(store) => store,
+            empty @ None => empty.insert(Store::open(&self.path)?),
+        };
+        retry_while_busy(|| work(store))
+    }
+}
+
+/// Tries again while another program writes to the store, a few times.
+fn retry_while_busy<T>(mut write: impl FnMut() -> Result<T, StoreError>) -> Result<T, StoreError> {
+    for _ in 1..MOST_ATTEMPTS {
+        match write() {
+            Err(StoreError::Busy) => {}
+            outcome => return outcome,
+        }
+    }
+    write()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::grasp;
+    use palpate_sim::scene::Scene;
+
+    #[test]
+    fn finished_trials_are_stored_and_discarded_ones_vanish() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("trials.sqlite");
+        let (sender, notices) = channel();
+        let recorder =
+            Recorder::start(path.clone(), move |notice| sender.send(notice).expect("heard")).expect("starts");
+        let trial = grasp(&Scene::default(), None, 3);
+        for keep in [true, false] {
+            recorder.begin(&trial.info);
+            trial.frames.iter().for_each(|frame| recorder.frame(frame));
+            if keep {
+                recorder.finish(&trial.info.quality, &trial.info.warnings);
+            } else {
+                recorder.discard();
+            }
+        }
+        drop(recorder);
+        let RecorderNotice::Stored(id) = notices.recv().expect("a notice") else { panic!("stored") };
+        let store = Store::open(&path).expect("opens");
+        assert!(store.load(id).expect("whole") == trial);
+        assert_eq!((store.list(false).expect("lists").len(), store.list(true).expect("lists").len()), (1, 2));
+    }
+
+    #[test]
+    fn a_store_that_cannot_be_opened_is_reported_once_per_trial() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("notes.txt");
+        std::fs::write(&path, "not a store".repeat(100)).expect("writes");
+        let (sender, notices) = channel();
+        let recorder = Recorder::start(path, move |notice| sender.send(notice).expect("heard")).expect("starts");
+        let trial = grasp(&Scene::default(), None, 0);
+        recorder.begin(&trial.info);
+        trial.frames.iter().for_each(|frame| recorder.frame(frame));
+        recorder.finish(&trial.info.quality, &[]);
+        drop(recorder);
+        let all: Vec<RecorderNotice> = notices.try_iter().collect();
+        assert!(matches!(&all[..], [RecorderNotice::Failed(text)] if text.contains("not a store")), "{all:?}");
+    }
+
+    #[test]
+    fn a_busy_store_is_tried_again_but_not_for_ever() {
+        let attempts = |free_after: u32| {
+            let mut attempts = 0;
+            let outcome = retry_while_busy(|| {
+                attempts += 1;
+                if attempts > free_after { Ok(attempts) } else { Err(StoreError::Busy) }
+            });
+            (outcome.ok(), attempts)
+        };
+        assert_eq!((attempts(0), attempts(3), attempts(99)), ((Some(1), 1), (Some(4), 4), (None, 6)));
+    }
+}
