@@ -35,24 +35,24 @@ pub(super) fn run(arguments: &HelpArguments) -> Result<(), Failure> {
 fn command_help(program: clap::Command, names: &[String]) -> Result<(), Failure> {
     let mut command = program;
     for (depth, name) in names.iter().enumerate() {
-        let topics = if depth == 0 { TOPICS } else { &[] };
-        let known =
-            command.get_subcommands().filter(|c| !c.is_hide_set()).flat_map(|c| c.get_name_and_visible_aliases());
-        let known: Vec<String> = topics.iter().map(|topic| topic.name).chain(known).map(str::to_owned).collect();
-        refuse_unknown(name, known);
         match command.find_subcommand(name) {
             Some(found) => command = found.clone(),
-            None => return Ok(()),
+            None => {
+                let topics = TOPICS.iter().map(|topic| topic.name).filter(|_| depth == 0);
+                let commands = command.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);
+                refuse(name, topics.chain(commands));
+            }
         }
     }
     Ok(command.print_long_help()?)
 }
 
-/// Ends the program as wrong use, with the nearest known name, where `name` is none of them.
-fn refuse_unknown(name: &str, known: Vec<String>) {
-    let argument = clap::Arg::new("TOPIC|COMMAND").value_parser(PossibleValuesParser::new(known));
-    let matched = clap::Command::new("palpate help").arg(argument).try_get_matches_from(["palpate help", name]);
-    if let Err(error) = matched {
+/// Ends the program as wrong use; clap adds the nearest of the known names.
+fn refuse<'a>(name: &str, known: impl Iterator<Item = &'a str>) {
+    // Leaked, because clap wants names that live as long as the program, which ends here.
+    let known = PossibleValuesParser::new(known.map(|known| &*known.to_owned().leak()));
+    let argument = clap::Arg::new("TOPIC|COMMAND").value_parser(known);
+    if let Err(error) = clap::Command::new("palpate help").arg(argument).try_get_matches_from(["palpate help", name]) {
         error.exit();
     }
 }
