@@ -110,12 +110,12 @@ const SILENCE: Duration = Duration::from_secs(10);
 
 /// Runs the crosstalk test: the user moves one sensor after the other.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
-    // Captured bytes wait for nobody.
+    // Captured bytes need no real time.
     let replay_speed = if options.path.as_ref().is_some_and(|path| path.is_file()) { f64::INFINITY } else { 1.0 };
     let options = LinkOptions { replay_speed, ..options.clone() };
     let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
     let (mut test, mut shown) = (None, String::new());
-    let (mut heard, mut newest) = (0, Instant::now());
+    let (mut readings, mut newest) = (0, Instant::now());
     let keys = typed_lines()?;
     while !stop.load(Ordering::Relaxed) && !link.is_over() {
         let events = link.take(Duration::from_millis(50));
@@ -123,8 +123,8 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
         for event in events {
             let LinkEvent::Heard(Heard::Reading(reading)) = event else { continue };
             newest = Instant::now();
-            heard += 1;
-            if heard < KNOWN_AFTER {
+            readings += 1;
+            if readings < KNOWN_AFTER {
                 continue;
             }
             let test = match &mut test {

@@ -7,6 +7,8 @@ use palpate_core::objects::{anchored, catalogue};
 use palpate_core::pretended::{
     Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
 };
+#[cfg(unix)]
+use palpate_core::pretended::{Happened, Happening, Served, serve};
 use std::path::PathBuf;
 
 /// Arguments of `palpate emulate`.
@@ -141,7 +143,7 @@ pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         faults: arguments.faults.0.clone(),
         seed: arguments.seed,
     })?;
-    serve(arguments, gripper)
+    emulate(arguments, gripper)
 }
 
 /// Reads or draws the hidden parts, without the imperfections to leave out.
@@ -183,13 +185,12 @@ fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
 }
 
 #[cfg(not(unix))]
-fn serve(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
+fn emulate(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
     Err("emulate needs a pseudo-terminal: run it on Linux or macOS".into())
 }
 
 #[cfg(unix)]
-fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
-    use palpate_core::pretended::{Served, serve};
+fn emulate(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
     use std::io::Write as _;
 
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
@@ -261,8 +262,7 @@ fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure>
 
 /// Prints an event.
 #[cfg(unix)]
-fn print_event(happened: &palpate_core::pretended::Happened, json: bool) -> Result<(), Failure> {
-    use palpate_core::pretended::Happening;
+fn print_event(happened: &Happened, json: bool) -> Result<(), Failure> {
     if json {
         return say(serde_json::to_string(happened)?);
     }

@@ -3,6 +3,7 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
 use palpate_core::labelling::class_name;
+use palpate_core::objects::EMPTY;
 use palpate_core::recording::{JournalEntry, Store, TrialId, export_labelled};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -82,7 +83,7 @@ fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(),
     let known = planned || store.labelled_trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
     store.label_trial(id, &name)?;
     store.set_unsure(id, unsure)?;
-    if !known && name != palpate_core::objects::EMPTY {
+    if !known && name != EMPTY {
         warn(&format!("\"{name}\" is a new class: not in the plan, and no other trial has it (`palpate trials undo`)"));
     }
     say(format!("trial {id}: {name}{}", if unsure { ", unsure" } else { "" }))
