@@ -23,9 +23,9 @@ pub(super) fn render(markdown: &str, width: usize, bold: bool) -> String {
             _ => text.push_str("\n\n"),
         }
         text.push_str(&match block {
-            Block::Heading(title) => emphasised(title, bold),
-            Block::Paragraph(words) => wrapped(words, width).join("\n"),
-            Block::Item(words) => format!("  - {}", wrapped(words, width - 4).join("\n    ")),
+            Block::Heading(title) => emphasised(&inline(title), bold),
+            Block::Paragraph(words) => wrapped(&inline(words), width).join("\n"),
+            Block::Item(words) => format!("  - {}", wrapped(&inline(words), width - 4).join("\n    ")),
             Block::Code(lines) => indented(lines),
             Block::Table(rows) => table(rows, width, bold),
         });
@@ -62,7 +62,7 @@ fn blocks(markdown: &str) -> Vec<Block> {
         if line.starts_with("```") {
             blocks.push(Block::Code(lines.by_ref().take_while(|l| !l.starts_with("```")).map(str::to_owned).collect()));
         } else if line.starts_with('#') {
-            blocks.push(Block::Heading(inline(line.trim_start_matches('#'))));
+            blocks.push(Block::Heading(line.trim_start_matches('#').trim().to_owned()));
         } else if line.starts_with('|') {
             let mut rows = vec![cells(line)];
             while let Some(row) = lines.next_if(|l| l.starts_with('|')) {
@@ -71,16 +71,16 @@ fn blocks(markdown: &str) -> Vec<Block> {
             rows.retain(|row| !row.iter().all(|cell| cell.starts_with("---")));
             blocks.push(Block::Table(rows));
         } else if let Some(item) = line.strip_prefix("- ") {
-            blocks.push(Block::Item(inline(item)));
+            blocks.push(Block::Item(item.to_owned()));
             starts_block = false;
             continue;
         } else if !line.trim().is_empty() {
             match blocks.last_mut() {
                 Some(Block::Paragraph(text) | Block::Item(text)) if !starts_block => {
                     text.push(' ');
-                    text.push_str(&inline(line));
+                    text.push_str(line.trim());
                 }
-                _ => blocks.push(Block::Paragraph(inline(line))),
+                _ => blocks.push(Block::Paragraph(line.trim().to_owned())),
             }
             starts_block = false;
             continue;
@@ -90,9 +90,12 @@ fn blocks(markdown: &str) -> Vec<Block> {
     blocks
 }
 
-/// Text without the marks of code and emphasis.
+/// Text without the marks of emphasis and code; code of several words keeps its backticks.
 fn inline(text: &str) -> String {
-    text.trim().replace("**", "").replace('`', "")
+    let code = |(number, part): (usize, &str)| {
+        if number % 2 == 1 && part.contains(' ') { format!("`{part}`") } else { part.to_owned() }
+    };
+    text.trim().replace("**", "").split('`').enumerate().map(code).collect()
 }
 
 fn cells(row: &str) -> Vec<String> {
@@ -130,8 +133,13 @@ fn table(rows: &[Vec<String>], width: usize, bold: bool) -> String {
             _ => break,
         }
     }
+    // Where first cells wrap, rows need a gap to be told apart.
+    let spread = rows.iter().any(|row| widths.first().is_some_and(|width| cell(row, 0).chars().count() > *width));
     let mut lines = Vec::new();
     for (number, row) in rows.iter().enumerate() {
+        if spread && number > 1 {
+            lines.push(String::new());
+        }
         let parts: Vec<Vec<String>> = widths.iter().enumerate().map(|(k, w)| wrapped(&cell(row, k), *w)).collect();
         for height in 0..parts.iter().map(Vec::len).max().unwrap_or(0) {
             let padded = parts.iter().zip(&widths).map(|(part, width)| {
