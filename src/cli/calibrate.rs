@@ -50,7 +50,7 @@ pub(super) struct CalibrateArguments {
     #[arg(long, value_name = "COUNTS", default_value_t = 4095, value_parser = clap::value_parser!(u32).range(255..=16_777_215))]
     full_scale: u32,
     /// Note to store with the calibration.
-    #[arg(long, value_name = "TEXT", default_value = "")]
+    #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     note: String,
     /// Print the result without storing it.
     #[arg(long)]

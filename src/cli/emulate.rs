@@ -40,7 +40,7 @@ pub(super) struct EmulateArguments {
     #[arg(long, value_name = "STEPS|FILE|-")]
     script: Option<String>,
     /// Faults: NAME[=VALUE]@SECONDS[/DURATION], separated by commas, as in vanish@5,garbage@7/2; see below.
-    #[arg(long, value_name = "LIST", value_parser = parse_faults_once, default_value = "")]
+    #[arg(long, value_name = "LIST", value_parser = parse_faults_once, default_value = "", hide_default_value = true)]
     faults: Faults,
     /// Read the hidden values of strips, pads and dividers from this file instead of drawing them at random.
     #[arg(long, value_name = "F.json")]

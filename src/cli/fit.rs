@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
   palpate fit 12 13 --out fitted.toml
   palpate fit 12 13 14 --strip-gain 3 --pad-gain 5 --json")]
 pub(super) struct FitArguments {
-    /// Trials: a few empty closes, and presses against a fixed object.
+    /// Trial numbers: a few empty closes, and presses against a fixed object.
     #[arg(required = true)]
     trials: Vec<TrialId>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Calibrations to use instead of the newest of each part.
+    /// Calibration numbers to use instead of the newest of each part.
     #[arg(long, value_name = "ID,..", value_delimiter = ',')]
     calibrations: Vec<CalibrationId>,
     /// Standard deviation of the strips' gain (%).

@@ -5,8 +5,8 @@ mod page;
 use super::terminal::say;
 use super::{Arguments, Failure};
 use crate::manual::TOPICS;
-use clap::CommandFactory;
 use clap::builder::PossibleValuesParser;
+use clap::{CommandFactory, Parser};
 use std::io::IsTerminal as _;
 
 /// Arguments of `palpate help`.
@@ -27,16 +27,16 @@ pub(super) fn run(arguments: &HelpArguments) -> Result<(), Failure> {
     let Some(name) = arguments.names.first() else { return say(contents(&program)) };
     match TOPICS.iter().find(|topic| topic.name == name) {
         Some(topic) => say(page::render(topic.text, terminal_width(), emphasis())),
-        None => command_help(program, &arguments.names),
+        None => command_help(&program, &arguments.names),
     }
 }
 
-/// Prints the long help of a command or of one of its subcommands.
-fn command_help(program: clap::Command, names: &[String]) -> Result<(), Failure> {
+/// Prints what `palpate NAMES --help` prints.
+fn command_help(program: &clap::Command, names: &[String]) -> Result<(), Failure> {
     let mut command = program;
     for (depth, name) in names.iter().enumerate() {
         match command.find_subcommand(name) {
-            Some(found) => command = found.clone(),
+            Some(found) => command = found,
             None => {
                 let topics = TOPICS.iter().map(|topic| topic.name).filter(|_| depth == 0);
                 let commands = command.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);
@@ -44,7 +44,8 @@ fn command_help(program: clap::Command, names: &[String]) -> Result<(), Failure>
             }
         }
     }
-    Ok(command.print_long_help()?)
+    let line = std::iter::once("palpate").chain(names.iter().map(String::as_str)).chain(["--help"]);
+    Arguments::try_parse_from(line).map_or_else(|help| Ok(help.print()?), |_| Ok(()))
 }
 
 /// Ends the program as wrong use; clap adds the nearest of the known names.
@@ -92,7 +93,6 @@ fn terminal_width() -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
     use clap::error::ErrorKind;
 
     /// Commands in a text: lines that begin with `palpate`, up to a comment or a pipe.

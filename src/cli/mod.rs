@@ -40,7 +40,7 @@ type Failure = Box<dyn std::error::Error>;
 
 /// A workbench for soft grippers that recognise what they hold.
 ///
-/// Without a command it opens the window, with OBJECT or the lemon on the pedestal. The commands need no display.
+/// Without a command it opens the window, with OBJECT or the lemon on the pedestal. Commands need no display.
 #[derive(Debug, Parser)]
 #[command(name = "palpate", version, about, long_about, disable_help_subcommand = true, after_help = after_help())]
 struct Arguments {
@@ -63,13 +63,13 @@ struct Arguments {
 enum Command {
     /// Grasp an object once, print a summary, store the trial.
     Grasp(grasp::GraspArguments),
-    /// Grasp an object in random poses until it is recognised; print each grasp and write pictures.
+    /// Grasp an object in random poses until it is recognised, with a picture of each grasp.
     Demo(demo::DemoArguments),
     /// Collect a simulated data set in parallel; resumes where it stopped.
     Collect(collect::CollectArguments),
     /// Train a recogniser on stored trials and save it.
     Train(train::TrainArguments),
-    /// Evaluate recognisers on held-back trials: accuracy, calibration, stage one, successive grasps, cost.
+    /// Evaluate recognisers on held-back trials: F1, calibration, successive grasps, cost.
     Evaluate(evaluate::EvaluateArguments),
     /// Recognise the objects of stored trials.
     Recognise(recognise::RecogniseArguments),
@@ -77,19 +77,19 @@ enum Command {
     Record(record::RecordArguments),
     /// Draw a scene or a stored trial to a PNG file.
     Snapshot(snapshot::SnapshotArguments),
-    /// Explain which physical effects a scene calls for, what each costs and changes.
+    /// Explain which effects a scene calls for, and what each costs and changes.
     Scene(scene::SceneCommandArguments),
-    /// Show or change the labelling plan: trials wanted and done per object, and the next one.
+    /// Show or change the labelling plan: trials wanted and done, and the next one.
     Plan(plan::PlanArguments),
     /// List, show, label, export, import, merge, delete and restore trials; undo and redo.
     Trials(trials::TrialsArguments),
-    /// Calibrate the flex strips and force pads of the real gripper, and manage calibrations.
+    /// Calibrate the strips and pads of the real gripper, and manage calibrations.
     Calibrate(calibrate::CalibrateArguments),
     /// Fit the simulated finger to recorded grasps of the real one.
     Fit(fit::FitArguments),
     /// Diagnose the connection to the real gripper: what is wrong, why, and what to do.
     Doctor(doctor::DoctorArguments),
-    /// Emulate the gripper on a serial port, with random sensors and optional faults (Linux, macOS).
+    /// Emulate the gripper on a serial port, with random sensors and optional faults (Unix).
     Emulate(emulate::EmulateArguments),
     /// Measure CPU time on this machine.
     Bench(bench::BenchArguments),

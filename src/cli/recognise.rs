@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
   palpate recognise 1 2 3 --together
   palpate recognise 7 --model mine.safetensors --json")]
 pub(super) struct RecogniseArguments {
-    /// Trials.
+    /// Trial numbers.
     #[arg(required = true)]
     trials: Vec<TrialId>,
     /// Recognition model (default: the shipped one).

@@ -51,7 +51,7 @@ enum TrialsCommand {
     },
     /// Show one trial: summary, effects, quality, labels.
     Show {
-        /// Trial.
+        /// Trial number.
         id: TrialId,
         /// Print JSON instead of text.
         #[arg(long)]
@@ -61,7 +61,7 @@ enum TrialsCommand {
     Labels(LabelCommand),
     /// Export trials as CSV files; with --labelled, all labelled trials of the real gripper as a data set.
     Export {
-        /// Trials.
+        /// Trial numbers.
         #[arg(required_unless_present = "labelled")]
         ids: Vec<TrialId>,
         /// Export all labelled trials of the real gripper to a new folder: trials.csv (list), signals.csv (for `palpate trials
@@ -96,13 +96,13 @@ enum TrialsCommand {
     /// Mark trials as deleted: lists and data sets exclude them; `restore` or `undo` brings them back.
     #[command(visible_alias = "discard")]
     Delete {
-        /// Trials.
+        /// Trial numbers.
         #[arg(required = true)]
         ids: Vec<TrialId>,
     },
     /// Restore deleted trials.
     Restore {
-        /// Trials.
+        /// Trial numbers.
         #[arg(required = true)]
         ids: Vec<TrialId>,
     },

@@ -292,7 +292,7 @@ fn help_lists_and_prints_topics_and_commands() {
     let list = run(at, &["help"]);
     assert!(list.code == Some(0) && list.err.is_empty(), "{list:?}");
     for topic in TOPICS {
-        let summary = topic.summary().split(':').next().unwrap();
+        let summary = topic.summary().split([':', '.']).next().unwrap();
         assert!(list.out.contains(&format!("\n  {}", topic.name)) && list.out.contains(summary), "{list:?}");
         let page = run(at, &["help", topic.name]);
         assert!(page.code == Some(0) && page.out.contains(summary) && page.out.lines().count() > 10, "{page:?}");

@@ -22,7 +22,7 @@ pub(super) enum CalibrateCommand {
     },
     /// Show one calibration with its points and residuals.
     Show {
-        /// Calibration.
+        /// Calibration number.
         id: CalibrationId,
         /// Print JSON instead of text.
         #[arg(long)]
@@ -30,7 +30,7 @@ pub(super) enum CalibrateCommand {
     },
     /// Export calibrations to a JSON file.
     Export {
-        /// Calibrations (default: all).
+        /// Calibration numbers (default: all).
         ids: Vec<CalibrationId>,
         /// File to write.
         #[arg(long, value_name = "FILE")]
@@ -56,12 +56,12 @@ pub(super) enum CalibrateCommand {
     Drift(zero::DriftArguments),
     /// Withdraw a calibration; the previous version applies again.
     Withdraw {
-        /// Calibration.
+        /// Calibration number.
         id: CalibrationId,
     },
     /// Restore a withdrawn calibration.
     Restore {
-        /// Calibration.
+        /// Calibration number.
         id: CalibrationId,
     },
 }

@@ -29,7 +29,7 @@ pub(super) struct TareArguments {
 /// Arguments of `palpate calibrate drift`.
 #[derive(Debug, clap::Args)]
 pub(super) struct DriftArguments {
-    /// Trials of the real gripper (default: all).
+    /// Trial numbers (default: all trials of the real gripper).
     trials: Vec<TrialId>,
     /// Print JSON instead of a table.
     #[arg(long)]

@@ -13,7 +13,7 @@ use std::path::Path;
 pub(super) enum LabelCommand {
     /// Label a trial of the real gripper with its object.
     Label {
-        /// Trial.
+        /// Trial number.
         id: TrialId,
         /// Label; `empty` for the empty hand.
         name: String,
@@ -23,14 +23,14 @@ pub(super) enum LabelCommand {
     },
     /// Set the note of a trial; an empty text removes it.
     Note {
-        /// Trial.
+        /// Trial number.
         id: TrialId,
         /// Note.
         text: String,
     },
     /// Set the tags of a trial; no tags removes them.
     Tag {
-        /// Trial.
+        /// Trial number.
         id: TrialId,
         /// Tags, which replace the present ones.
         tags: Vec<String>,
