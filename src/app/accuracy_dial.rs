@@ -3,9 +3,9 @@
 use super::actions::Action;
 use super::panels::PanelContext;
 use egui::{RichText, Slider, Ui};
-use palpate_core::scene::{Accuracy, Integrator, Scene};
-use palpate_core::units::{three_digits, two_digits};
-use palpate_core::workers::Command;
+use palpate_sim::scene::{Accuracy, Integrator, Scene};
+use palpate_geometry::units::{three_digits, two_digits};
+use palpate_lab::workers::Command;
 
 /// Where the slider stands when a tolerance is first asked for.
 const FIRST_TOLERANCE: f64 = 1e-4;

@@ -4,12 +4,12 @@ use super::gripper_tools::ToolWish;
 use super::labelling::ShownTrials;
 use super::modes::Mode;
 use super::panels::Source;
-use palpate_core::drawing::Camera;
-use palpate_core::palette::Theme;
-use palpate_core::recording::TrialId;
-use palpate_core::rig::serial::Control;
-use palpate_core::scene::Scene;
-use palpate_core::workers::{Command, GripperWish, LabelWish};
+use palpate_geometry::drawing::Camera;
+use palpate_geometry::palette::Theme;
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::Control;
+use palpate_sim::scene::Scene;
+use palpate_lab::workers::{Command, GripperWish, LabelWish};
 use std::path::PathBuf;
 
 /// A wish of the user's.

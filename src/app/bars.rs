@@ -10,9 +10,9 @@ use super::modes::{self, Mode};
 use super::panels::{PanelContext, Source, stop_button};
 use super::theme::{colour, veil};
 use egui::{Align, Layout, RichText, Ui};
-use palpate_core::palette::Theme;
-use palpate_core::rig::serial::LinkState;
-use palpate_core::workers::{Command, GripperView, Status};
+use palpate_geometry::palette::Theme;
+use palpate_device::serial::LinkState;
+use palpate_lab::workers::{Command, GripperView, Status};
 
 /// Speeds that can be chosen, as multiples of real time.
 pub(super) const SPEEDS: [f64; 8] = [1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -211,7 +211,7 @@ fn progress(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, t: f64) {
             let y = rect.bottom() - rect.height() * (trace.line_bar[k] / top).clamp(0.0, 1.0) as f32;
             egui::pos2(x, y)
         };
-        let fill = veil(palpate_core::palette::Trace::Line.colour(context.view.theme), 0.45);
+        let fill = veil(palpate_geometry::palette::Trace::Line.colour(context.view.theme), 0.45);
         for k in 1..trace.t.len() {
             let (a, b) = (place(k - 1), place(k));
             let column = egui::Rect::from_min_max(egui::pos2(a.x, b.y.min(a.y)), egui::pos2(b.x, rect.bottom()));

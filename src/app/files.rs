@@ -2,7 +2,7 @@
 //! channel. Where a desktop has no dialog there is a field to paste a path into, and files can be dropped.
 
 use super::actions::{Answer, Message};
-use palpate_core::scene::Scene;
+use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 

@@ -1,9 +1,6 @@
 //! The threads that help with the real gripper, each behind a panel of its own.
 
-use palpate_core::workers::{
-    Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish,
-    TrainedModel, Trainer, Wake,
-};
+use palpate_lab::workers::{Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish, TrainedModel, Trainer, Wake};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

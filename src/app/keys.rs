@@ -5,8 +5,8 @@ use super::bars::SPEEDS;
 use super::modes::Mode;
 use super::panels::PanelContext;
 use egui::{Key, KeyboardShortcut, Modifiers};
-use palpate_core::drawing::{Camera, StandardView};
-use palpate_core::workers::{Command, GripperWish, LabelWish};
+use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_lab::workers::{Command, GripperWish, LabelWish};
 
 /// A key, what it does, and how.
 pub(super) struct Binding {

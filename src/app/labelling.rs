@@ -2,9 +2,9 @@
 //! drawn here.
 
 use super::panels::title_of;
-use palpate_core::labelling::LabelledTrial;
-use palpate_core::recording::TrialId;
-use palpate_core::workers::{LabelView, LabelWish};
+use palpate_store::labels::LabelledTrial;
+use palpate_tactile::trial::TrialId;
+use palpate_lab::workers::{LabelView, LabelWish};
 
 /// What the user is about to say.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -156,7 +156,7 @@ pub(super) fn tags_of(text: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_core::labelling::LabelPlan;
+    use palpate_store::labels::LabelPlan;
 
     fn trial(id: TrialId, object: Option<&str>) -> LabelledTrial {
         LabelledTrial { id, object: object.map(str::to_owned), complete: true, ..LabelledTrial::default() }

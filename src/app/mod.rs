@@ -2,7 +2,7 @@
 //! around it and puts whatever the system lacks into words.
 //!
 //! Panels are given a read-only [`PanelContext`] and push [`Action`]s; [`Workbench`] alone applies them. The
-//! simulation runs in its own thread (see [`palpate_core::workers`]); nothing here steps physics or waits for a disk.
+//! simulation runs in its own thread (see [`palpate_lab::workers`]); nothing here steps physics or waits for a disk.
 
 mod accuracy_dial;
 mod actions;
@@ -32,9 +32,10 @@ pub use view_state::ViewState;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
-use palpate_core::recognition::{models_folder, shipped_model};
-use palpate_core::scene::Scene;
-use palpate_core::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
+use palpate_lab::datasets::models_folder;
+use palpate_learn::shipped_model;
+use palpate_sim::scene::Scene;
+use palpate_lab::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -5,7 +5,7 @@ use super::panels::{self, PanelContext, PanelKind};
 use super::theme::colour;
 use egui::{Frame, Margin, Ui};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
-use palpate_core::palette::Theme;
+use palpate_geometry::palette::Theme;
 
 /// Ground and margin of a panel.
 pub(super) fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {

@@ -1,6 +1,6 @@
 //! Traces as the plots show them: the samples of the grasp that is going on, and of the few before it.
 
-use palpate_core::workers::TraceRow;
+use palpate_lab::workers::TraceRow;
 use std::collections::VecDeque;
 
 /// Grasps that are kept: the current one and some to compare it with.

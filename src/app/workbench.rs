@@ -16,19 +16,15 @@ use super::viewport::Viewport;
 use super::{bars, keys};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_notify::Toasts;
-use palpate_core::drawing::Camera;
-use palpate_core::grasping::ObjectDeck;
-use palpate_core::objects::{EMPTY, catalogue, thumbnail};
-use palpate_core::recognition::Model;
-use palpate_core::recording::TrialId;
-use palpate_core::scene::Scene;
-use palpate_core::sensing::SensorLayout;
-use palpate_core::trial::Frame as TrialFrame;
-use palpate_core::workers::{
-    Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, LabelView,
-    LabelWish, Labeller, Listen, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
-    TrainWish, TrainedModel, TrialPart, Wake, start_labeller,
-};
+use palpate_geometry::drawing::Camera;
+use palpate_lab::grasping::ObjectDeck;
+use palpate_sim::objects::{EMPTY, catalogue, thumbnail};
+use palpate_learn::Model;
+use palpate_tactile::trial::TrialId;
+use palpate_sim::scene::Scene;
+use palpate_tactile::SensorLayout;
+use palpate_sim::frame::Frame as TrialFrame;
+use palpate_lab::workers::{Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, LabelView, LabelWish, Labeller, Listen, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, TrainWish, TrainedModel, TrialPart, Wake, start_labeller};
 use palpate_render::{Picture, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;

@@ -3,12 +3,10 @@
 use super::Failure;
 use super::setup::SceneArguments;
 use super::terminal::{say, say_json};
-use palpate_core::objects::{anchored, catalogue};
-use palpate_core::pretended::{
-    Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
-};
+use palpate_sim::objects::{anchored, catalogue};
+use palpate_device::pretended::{Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script};
 #[cfg(unix)]
-use palpate_core::pretended::{Happened, Happening, Served, serve};
+use palpate_device::pretended::{Happened, Happening, Served, serve};
 use std::path::PathBuf;
 
 /// Arguments of `palpate emulate`.

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::terminal::note;
-use palpate_core::rig::serial::{LinkOptions, PortTrouble, SerialLink};
+use palpate_device::serial::{LinkOptions, PortTrouble, SerialLink};
 use std::time::{Duration, Instant};
 
 /// Default wait for a busy port (s): ModemManager probes a newly connected board for about this long.

@@ -1,9 +1,9 @@
 //! Scene arguments shared by all commands that simulate, and opening the store.
 
 use super::Failure;
-use palpate_core::objects::anchored;
-use palpate_core::recording::Store;
-use palpate_core::scene::{Accuracy, EngineKind, PosePreset, Scene};
+use palpate_sim::objects::anchored;
+use palpate_store::Store;
+use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use std::path::{Path, PathBuf};
 
 /// Scene and changes to it.

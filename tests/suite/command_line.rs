@@ -2,9 +2,9 @@
 
 use crate::program::{json, palpate, ran, refused, run};
 use palpate::manual::TOPICS;
-use palpate_core::objects::catalogue;
-use palpate_core::recording::Store;
-use palpate_core::scene::Effect;
+use palpate_sim::objects::catalogue;
+use palpate_store::Store;
+use palpate_sim::scene::Effect;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Stdio;

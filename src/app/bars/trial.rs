@@ -4,14 +4,14 @@ use crate::app::actions::{Action, DeskAction};
 use crate::app::panels::PanelContext;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
-use palpate_core::gripper::Phase;
-use palpate_core::palette::Rgb;
-use palpate_core::rig::serial::Control;
-use palpate_core::workers::{GripperWish, LEAD_S, TrialPart, TrialView};
+use palpate_sim::gripper::Phase;
+use palpate_geometry::palette::Rgb;
+use palpate_tactile::trial::Control;
+use palpate_lab::workers::{GripperWish, LEAD_S, TrialPart, TrialView};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let trial = context.gripper.and_then(|gripper| gripper.trial.as_ref());
-    let connected = context.gripper.is_some_and(palpate_core::workers::GripperView::is_connected);
+    let connected = context.gripper.is_some_and(palpate_lab::workers::GripperView::is_connected);
     ui.horizontal_centered(|ui| {
         let mut button = |on: bool, text: &str, about: &str, action: Action| {
             if ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about).clicked() {

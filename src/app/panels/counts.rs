@@ -3,8 +3,8 @@
 use super::{PanelContext, Source};
 use crate::app::actions::Action;
 use crate::app::plots::{Curve, TimePlot, show};
-use palpate_core::board::Sensor;
-use palpate_core::palette::Trace;
+use palpate_tactile::board::Sensor;
+use palpate_geometry::palette::Trace;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let link = context.gripper.and_then(|gripper| gripper.link.as_ref());

@@ -3,7 +3,7 @@
 use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::plots::{TimePlot, show};
-use palpate_core::sensing::Quantity;
+use palpate_tactile::Quantity;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let curves = super::pressure::curves_of(context, Quantity::Curvature, 1.0);

@@ -3,10 +3,10 @@
 use super::PanelContext;
 use crate::app::actions::Action;
 use egui::{Grid, RichText, ScrollArea, Ui};
-use palpate_core::gripper::Side;
-use palpate_core::sensing::Quantity;
-use palpate_core::units::{mm, three_digits};
-use palpate_core::workers::{FinishedGrasp, ObjectCard, Snapshot};
+use palpate_sim::gripper::Side;
+use palpate_tactile::Quantity;
+use palpate_geometry::units::{mm, three_digits};
+use palpate_lab::workers::{FinishedGrasp, ObjectCard, Snapshot};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Action>) {
     let Some(snapshot) = context.snapshot else {

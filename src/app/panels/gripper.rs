@@ -5,12 +5,13 @@ use super::{PanelContext, command_ui, wrapped};
 use crate::app::actions::Action;
 use crate::app::theme::{colour, veil};
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
-use palpate_core::board::Sensor;
-use palpate_core::palette::Theme;
-use palpate_core::rig::serial::{Control, LinkState, LinkStatus, PortInfo};
-use palpate_core::sensing::calibration::{Drift, DriftLevel};
-use palpate_core::units::three_digits;
-use palpate_core::workers::{GripperView, GripperWish, LatestReading, TrialRequest};
+use palpate_tactile::board::Sensor;
+use palpate_geometry::palette::Theme;
+use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
+use palpate_tactile::trial::Control;
+use palpate_tactile::calibration::{Drift, DriftLevel};
+use palpate_geometry::units::three_digits;
+use palpate_lab::workers::{GripperView, GripperWish, LatestReading, TrialRequest};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
@@ -65,7 +66,7 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) 
     ui.data_mut(|data| data.insert_temp(id, path));
 }
 
-fn accented(theme: Theme) -> palpate_core::palette::Rgb {
+fn accented(theme: Theme) -> palpate_geometry::palette::Rgb {
     let colours = theme.colours();
     colours.raised.mix(colours.accent, 0.35)
 }

@@ -3,7 +3,7 @@
 use super::{PanelContext, wrapped};
 use crate::app::actions::Action;
 use egui::{RichText, ScrollArea, Ui};
-use palpate_core::workers::LabelWish;
+use palpate_lab::workers::LabelWish;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     ui.horizontal_wrapped(|ui| {

@@ -3,7 +3,7 @@
 use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::plots::{Curve, TimePlot, show};
-use palpate_core::palette::Trace;
+use palpate_geometry::palette::Trace;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let curve = Curve {

@@ -4,7 +4,7 @@ use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
-use palpate_core::objects::{EMPTY, catalogue};
+use palpate_sim::objects::{EMPTY, catalogue};
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;

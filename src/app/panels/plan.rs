@@ -4,9 +4,9 @@ use super::{PanelContext, title_of};
 use crate::app::actions::Action;
 use crate::app::theme::{colour, veil};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
-use palpate_core::labelling::{MOST_WANTED, ObjectProgress};
-use palpate_core::palette::Theme;
-use palpate_core::workers::LabelWish;
+use palpate_store::labels::{MOST_WANTED, ObjectProgress};
+use palpate_geometry::palette::Theme;
+use palpate_lab::workers::LabelWish;
 
 /// Trials of an object that is added: as of the others (paper, section IV-B: 40 to 55).
 const WANTED: u32 = 50;

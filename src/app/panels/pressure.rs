@@ -3,10 +3,10 @@
 use super::PanelContext;
 use crate::app::actions::Action;
 use crate::app::plots::{Curve, TimePlot, show};
-use palpate_core::grasping::band_half_width;
-use palpate_core::gripper::Side;
-use palpate_core::palette::Trace;
-use palpate_core::sensing::{Channel, Quantity};
+use palpate_lab::grasping::band_half_width;
+use palpate_sim::gripper::Side;
+use palpate_geometry::palette::Trace;
+use palpate_tactile::{Channel, Quantity};
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let curves = curves_of(context, Quantity::Pressure, 1e-3);

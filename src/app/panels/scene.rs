@@ -4,8 +4,8 @@ use super::PanelContext;
 use crate::app::accuracy_dial::{self, choice};
 use crate::app::actions::Action;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
-use palpate_core::gripper::{Finger, PadLaw};
-use palpate_core::scene::{Auto, EngineKind, Scene, SupportKind};
+use palpate_sim::gripper::{Finger, PadLaw};
+use palpate_sim::scene::{Auto, EngineKind, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
     let mut scene = context.scene.clone();

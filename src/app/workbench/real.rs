@@ -5,11 +5,11 @@ use super::{Shown, Workbench};
 use crate::app::actions::{DeskAction, Message};
 use crate::app::modes::Mode;
 use crate::app::panels::{Source, USUAL_METHOD, control_title};
-use palpate_core::gripper::Phase;
-use palpate_core::labelling::LabelledTrial;
-use palpate_core::objects::catalogue;
-use palpate_core::rig::serial::Control;
-use palpate_core::workers::{Command, GripperWish, LabelWish, TrainRequest, TrialPart, TrialRequest};
+use palpate_sim::gripper::Phase;
+use palpate_store::labels::LabelledTrial;
+use palpate_sim::objects::catalogue;
+use palpate_tactile::trial::Control;
+use palpate_lab::workers::{Command, GripperWish, LabelWish, TrainRequest, TrialPart, TrialRequest};
 use std::path::{Path, PathBuf};
 
 impl Workbench {

@@ -2,9 +2,10 @@
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
-use palpate_core::labelling::class_name;
-use palpate_core::objects::EMPTY;
-use palpate_core::recording::{JournalEntry, Store, TrialId, export_labelled};
+use palpate_store::labels::class_name;
+use palpate_sim::objects::EMPTY;
+use palpate_store::{JournalEntry, Store, export_labelled};
+use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -11,8 +11,8 @@ use crate::app::actions::Action;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_core::grasping::IdentificationView;
-use palpate_core::workers::THRESHOLDS;
+use palpate_lab::grasping::IdentificationView;
+use palpate_lab::workers::THRESHOLDS;
 use std::sync::Arc;
 use words::{Headline, percent, reason};
 
@@ -160,7 +160,7 @@ struct Part<'a, 'b> {
 }
 
 impl Part<'_, '_> {
-    fn colours(&self) -> palpate_core::palette::ThemeColours {
+    fn colours(&self) -> palpate_geometry::palette::ThemeColours {
         self.context.view.theme.colours()
     }
 

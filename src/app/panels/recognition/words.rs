@@ -1,8 +1,8 @@
 //! What recognition has to say, in words. Nothing is drawn here.
 
 use crate::app::panels::{Recognised, title_of};
-use palpate_core::grasping::IdentificationView;
-use palpate_core::recognition::{Labels, Pmf, StopReason};
+use palpate_lab::grasping::IdentificationView;
+use palpate_learn::{Labels, Pmf, StopReason};
 
 /// Below this probability a first grasp that still goes on has no leader worth naming.
 const WORTH_NAMING: f64 = 0.4;
@@ -120,7 +120,8 @@ pub(super) fn ranked(pmf: &Pmf) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_core::recognition::{StopRule, Verdict, labels_of_catalogue};
+    use palpate_lab::datasets::labels_of_catalogue;
+    use palpate_learn::{StopRule, Verdict};
     use std::sync::Arc;
 
     fn pmf(lemon: f64) -> Pmf {
