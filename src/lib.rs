@@ -16,6 +16,8 @@
 //!   palpate        app: the window;  cli: everything without it
 //! ```
 //!
+//! The [`manual`] has a chapter for each topic of `palpate help`, among them [`manual::contributing`].
+//!
 //! Read in this order to understand a grasp:
 //!
 //! 1. [`palpate_sim::scene::Scene`], everything that can be set, and [`palpate_sim::objects::load`].
@@ -39,6 +41,7 @@
 //! | a mode of the window | a line and a layout in `src/app/modes.rs` |
 //! | a key | a line in `src/app/keys.rs` |
 //! | a headless command | a file in `src/cli/` and a line in its `Command` |
+//! | a topic of the manual | a file in `assets/help/` and a line in `src/manual.rs` |
 //! | a setting | a field of a struct below [`palpate_sim::scene::Scene`], and its range in `scene/check.rs` |
 //! | a sensor layout | a line in `src/core/sensing/layout.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
@@ -54,3 +57,4 @@
 
 pub mod app;
 pub mod cli;
+pub mod manual;

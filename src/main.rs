@@ -1,4 +1,4 @@
-//! Parses arguments, opens the window or runs a headless command, prints the error.
+//! The program: window and commands.
 
 use std::process::ExitCode;
 

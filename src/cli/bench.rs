@@ -1,4 +1,4 @@
-//! `palpate bench`: what things cost on this machine.
+//! `palpate bench`: CPU time on this machine.
 
 use super::Failure;
 use super::terminal::{say, say_json, table};
@@ -11,38 +11,42 @@ use palpate_sim::scene::Accuracy;
 
 /// Arguments of `palpate bench`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate bench physics
+  palpate bench physics --reference --json
+  palpate bench live --runs 1000")]
 pub(super) struct BenchArguments {
     #[command(subcommand)]
-    what: What,
+    benchmark: Benchmark,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
-    /// CPU time of one 4 s grasp for several scenes, on one thread.
+enum Benchmark {
+    /// Measure one 4 s grasp of several scenes at several accuracies: cost, steps, error.
     Physics {
-        /// Runs per scene; the median counts.
+        /// Runs per scene; the median is printed.
         #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
-        /// Include the reference accuracy, which takes 32 times as long.
+        /// Include the reference accuracy, which costs 32 times as much as standard.
         #[arg(long)]
         reference: bool,
         /// Print JSON instead of a table.
         #[arg(long)]
         json: bool,
     },
-    /// CPU time of a training step of the macro-layer, ours and candle's, on one thread; tests/peers/lstm_step.py times
+    /// Measure a training step of the macro-layer, with Palpate's kernel and with candle. tests/peers/lstm_step.py times
     /// PyTorch on the same sizes.
     Training {
-        /// Steps per row; the median counts.
+        /// Steps per row; the median is printed.
         #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
         /// Print JSON instead of a table.
         #[arg(long)]
         json: bool,
     },
-    /// CPU time of one live step of the macro-layer: a sample in, probabilities out.
+    /// Measure a live step of the macro-layer: a sample in, probabilities out.
     Live {
-        /// Sequences per row; the median counts.
+        /// Sequences per row; the median is printed.
         #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
         /// Print JSON instead of a table.
@@ -51,25 +55,25 @@ enum What {
     },
 }
 
-/// Tolerances that stand in the table beside the named accuracies.
+/// Tolerances in the table, beside the named accuracies.
 const TOLERANCES: [f64; 3] = [1e-3, 1e-4, 1e-5];
 
 /// Channels of C1, and of a layout with a pressure sensor on every joint.
 const FEW_AND_MANY: [usize; 2] = [4, 22];
 
 pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
-    match &arguments.what {
-        What::Physics { runs, reference, json } => physics(*runs, *reference, *json),
-        What::Training { runs, json } => {
+    match &arguments.benchmark {
+        Benchmark::Physics { runs, reference, json } => physics(*runs, *reference, *json),
+        Benchmark::Training { runs, json } => {
             let mut rows = Vec::new();
             for sizes in FEW_AND_MANY.map(StepSizes::usual) {
                 rows.push(kernel_step_cost(sizes, usize::from(*runs)));
                 rows.push(candle_step_cost(sizes, usize::from(*runs))?);
             }
             networks(&rows, *json)?;
-            if *json { Ok(()) } else { say("CPU time of one thread; PyTorch: python tests/peers/lstm_step.py") }
+            if *json { Ok(()) } else { say("CPU time of one thread. PyTorch: python tests/peers/lstm_step.py") }
         }
-        What::Live { runs, json } => networks(
+        Benchmark::Live { runs, json } => networks(
             &FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs))),
             *json,
         ),
@@ -87,7 +91,7 @@ fn networks(rows: &[NetworkCost], json: bool) -> Result<(), Failure> {
             [vec![row.what.to_owned(), row.sizes.channels.to_string()], times.to_vec()].concat()
         })
         .collect();
-    table(&["what", "channels", "CPU ms", "least"], &cells)
+    table(&["kernel", "channels", "CPU ms", "minimum ms"], &cells)
 }
 
 fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
@@ -128,13 +132,15 @@ fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
         "CPU ms",
         "us/step",
         "Newton",
-        "most",
-        "missed",
+        "max",
+        "unconverged",
         "x real time",
-        "1/km off",
-        "mN off",
+        "error 1/km",
+        "error mN",
     ];
     table(&header, &cells)?;
-    say(format!("one 4 s grasp each; median of {runs} runs, CPU time of one thread"))?;
-    say("off: root mean square error in curvature and force against a tolerance of 1e-7")
+    say(format!("One 4 s grasp each, CPU time of one thread, median of {runs} runs."))?;
+    say(
+        "Newton: iterations per solve, mean and maximum. Errors: RMS of curvature and force against a tolerance of 1e-7.",
+    )
 }

@@ -1,7 +1,7 @@
-//! `palpate calibrate`: what a part of the real gripper reads at known angles or weights, and what is known of all parts.
+//! `palpate calibrate`: calibrates parts of the real gripper at known angles and weights, and manages calibrations.
 
 mod guided;
-mod shelf;
+mod manage;
 mod zero;
 
 use super::Failure;
@@ -15,33 +15,44 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate calibrate`.
 #[derive(Debug, clap::Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:
+  palpate calibrate flexL --part A7
+  palpate calibrate fsrL --part P3 --empty-close 15
+  palpate calibrate fsrL --part P3 --points p.csv --dry-run
+  palpate calibrate list
+  palpate calibrate tare
+
+See also: palpate help gripper"
+)]
 pub(super) struct CalibrateArguments {
     #[command(subcommand)]
-    what: Option<shelf::What>,
-    /// Which sensor: flexL, flexR, fsrL or fsrR.
+    command: Option<manage::CalibrateCommand>,
+    /// Sensor: flexL, flexR, fsrL or fsrR.
     #[arg(required = true, value_parser = parse_sensor)]
     sensor: Option<Sensor>,
-    /// Name of the part that sits there, such as the number on its tail; the one that is known to sit there where it is
-    /// left out. Calibrations belong to parts: parts get swapped.
+    /// Name of the mounted part, such as the number on its tail (default: the known one). Calibrations belong to parts,
+    /// because parts get swapped.
     #[arg(long, value_name = "NAME")]
     part: Option<String>,
-    /// Take the points from a CSV file with the columns angle_deg (or load_kg, load_g) and counts, instead of from the
+    /// Read the points from a CSV file with the columns angle_deg (or load_kg, load_g) and counts instead of from the
     /// board.
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     #[command(flatten)]
     live: guided::LiveArguments,
-    /// The fixed resistor beside the sensor (ohm), where the board does not say: 47000 for strips and 4700 for pads.
+    /// Fixed resistor of the divider (ohm) (default: as the board reports, or 47000 for strips and 4700 for pads).
     #[arg(long, value_name = "OHM")]
     resistor: Option<f64>,
-    /// The largest count of the converter, where points come from a file.
+    /// Full scale of the converter (counts), for points from a file.
     #[arg(long, value_name = "COUNTS", default_value_t = 4095, value_parser = clap::value_parser!(u32).range(255..=16_777_215))]
     full_scale: u32,
-    /// Whatever should be kept beside it.
-    #[arg(long, value_name = "TEXT", default_value = "")]
+    /// Note to store with the calibration.
+    #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     note: String,
-    /// Say what would come out, and store nothing.
+    /// Print the result without storing it.
     #[arg(long)]
     dry_run: bool,
     /// Print JSON instead of text.
@@ -49,7 +60,7 @@ pub(super) struct CalibrateArguments {
     json: bool,
 }
 
-/// A sensor by the name of its channel.
+/// Finds a sensor by the name of its channel.
 fn parse_sensor(text: &str) -> Result<Sensor, String> {
     let found = Sensor::ALL.into_iter().find(|sensor| sensor.channel().eq_ignore_ascii_case(text));
     found.ok_or_else(|| "choose flexL, flexR, fsrL or fsrR".to_owned())
@@ -57,8 +68,8 @@ fn parse_sensor(text: &str) -> Result<Sensor, String> {
 
 pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Result<(), Failure> {
     let mut store = open_store(store)?;
-    if let Some(what) = &arguments.what {
-        return shelf::run(what, &mut store);
+    if let Some(command) = &arguments.command {
+        return manage::run(command, &mut store);
     }
     let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
     let part = part_name(arguments, sensor, &store)?;
@@ -78,12 +89,16 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
     let calibration = Calibration::fit(Record { note: arguments.note.clone(), ..record })?;
     let stored = if arguments.dry_run { None } else { Some(keep(&mut store, sensor, &calibration)?) };
     if arguments.json {
-        return say_json(&Told { id: stored.as_ref().map(|s| s.id), version: stored.map(|s| s.version), calibration });
+        return say_json(&Report {
+            id: stored.as_ref().map(|s| s.id),
+            version: stored.map(|s| s.version),
+            calibration,
+        });
     }
-    tell(&calibration)?;
+    print(&calibration)?;
     match stored {
         Some(stored) => say(format!(
-            "stored as calibration {}, version {} of \"{}\", which is now the {}",
+            "stored as calibration {}, version {} of \"{}\", mounted as the {}",
             stored.id,
             stored.version,
             stored.record.part,
@@ -93,9 +108,9 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
     }
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told {
+struct Report {
     id: Option<CalibrationId>,
     version: Option<i64>,
     #[serde(flatten)]
@@ -110,9 +125,7 @@ fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: &Store) -> R
     };
     Ok(name.ok_or_else(|| {
         let (place, channel) = (sensor.label(), sensor.channel());
-        format!(
-            "it is not known which part is the {place}: give it a name, as in palpate calibrate {channel} --part A7"
-        )
+        format!("no part is known as the {place}: give it a name, as in palpate calibrate {channel} --part A7")
     })?)
 }
 
@@ -125,7 +138,7 @@ fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, fi
     Ok(Record { part: part.to_owned(), kind, input, points, bending: None, note: String::new() })
 }
 
-/// Stores a calibration, and that its part sits where it was calibrated.
+/// Stores a calibration, and mounts its part where it was calibrated.
 fn keep(store: &mut Store, sensor: Sensor, calibration: &Calibration) -> Result<StoredCalibration, Failure> {
     let stored = store.add_calibration(&calibration.record)?;
     if store.mounted_parts()?[sensor as usize].as_ref() != Some(&stored.record.part) {
@@ -134,8 +147,8 @@ fn keep(store: &mut Store, sensor: Sensor, calibration: &Calibration) -> Result<
     Ok(stored)
 }
 
-/// The points with their residuals, and what came out.
-fn tell(calibration: &Calibration) -> Result<(), Failure> {
+/// Prints the points with their residuals, and the summary.
+fn print(calibration: &Calibration) -> Result<(), Failure> {
     let kind = calibration.record.kind;
     let residual = |residual: Option<f64>| match (kind, residual) {
         (_, None) => String::new(),
@@ -159,8 +172,8 @@ fn tell(calibration: &Calibration) -> Result<(), Failure> {
         })
         .collect();
     let (stimulus, off) = match kind {
-        Kind::Flex => ("angle [deg]", "off [deg]"),
-        Kind::Pad => ("load [kg]", "off [%]"),
+        Kind::Flex => ("angle [deg]", "residual [deg]"),
+        Kind::Pad => ("load [kg]", "residual [%]"),
     };
     table(&[stimulus, "counts", "kOhm", off, "     -  0  +"], &rows)?;
     say(calibration.summary())?;
@@ -170,7 +183,7 @@ fn tell(calibration: &Calibration) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A residual as a bar to the left or right of the middle; its ends are what is worth a word.
+/// A residual as a bar to the left or right of the middle; a full bar is worth a warning.
 fn bar(share: f64) -> String {
     const HALF: i32 = 8;
     let at = (share.clamp(-1.0, 1.0) * f64::from(HALF)).round() as i32;

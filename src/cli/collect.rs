@@ -1,4 +1,4 @@
-//! `palpate collect`: a simulated data set into the store, in parallel, resumable, in parts.
+//! `palpate collect`: collects a simulated data set in parallel, resumable, in parts.
 
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
@@ -10,22 +10,28 @@ use std::path::Path;
 
 /// Arguments of `palpate collect`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate collect --preset B --store set.sqlite
+  palpate collect --objects ball,cube --trials 200 --seed 7
+  palpate collect --trials 1000 --shard 3/20 --store part3.sqlite
+
+See also: palpate help datasets")]
 pub(super) struct CollectArguments {
-    /// Trials of each object.
+    /// Trials per object.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
-    /// Built-in names or files, separated by commas; without it the sixteen and the empty hand.
+    /// Built-in names or files, separated by commas (default: the sixteen and the empty hand).
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     objects: Vec<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Other seeds give other poses.
+    /// Random seed of the poses.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Do only part K of N equal parts, for several machines; `palpate trials merge` joins their stores.
+    /// Collect only part K of N, for several machines; `palpate trials merge` joins the stores.
     #[arg(long, value_name = "K/N", value_parser = parse_shard)]
     shard: Option<Shard>,
-    /// Threads; as many as there are cores where it is left out. The data do not depend on it.
+    /// Number of threads (default: one per core). The data do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print one JSON object instead of text.
@@ -41,11 +47,11 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
     parsed().ok_or_else(|| "write K/N with K from 1 to N, as in 3/8".to_owned())
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told {
+struct Report {
     #[serde(flatten)]
-    report: CollectionReport,
+    collection: CollectionReport,
     /// CPU time of the whole command (s).
     cpu_s: f64,
     threads: usize,
@@ -65,7 +71,6 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
     let mut store = open_store(store)?;
-    // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?);
     let start = cpu_time::ProcessTime::now();
     let outcome = collect(&plan, &mut store, threads, &mut |progress| {
@@ -74,20 +79,20 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
         bar.set_position(u64::from(progress.done));
     });
     bar.finish_and_clear();
-    let told = Told { report: outcome?, cpu_s: start.elapsed().as_secs_f64(), threads };
-    if arguments.json { say_json(&told) } else { tell(&told, store.path()) }
+    let report = Report { collection: outcome?, cpu_s: start.elapsed().as_secs_f64(), threads };
+    if arguments.json { say_json(&report) } else { print(&report, store.path()) }
 }
 
-fn tell(told: &Told, store: &Path) -> Result<(), Failure> {
-    let report = &told.report;
-    say(format!("collection    {} in {}", report.collection, store.display()))?;
-    say(format!("stored        {} trials now, {} were there already", report.stored, report.known))?;
-    say(format!("poses         {} drawn again because the open fingers had no room", report.redrawn))?;
-    if report.unsound > 0 {
+fn print(report: &Report, store: &Path) -> Result<(), Failure> {
+    let Report { collection, cpu_s, threads } = report;
+    say(format!("collection    {} in {}", collection.collection, store.display()))?;
+    say(format!("stored        {} new trials, {} already there", collection.stored, collection.known))?;
+    say(format!("poses         {} redrawn because the open fingers had no room", collection.redrawn))?;
+    if collection.unsound > 0 {
         say(format!(
-            "unsound       {} trials did not converge in every step; they are marked, and no data set takes them",
-            report.unsound
+            "unsound       {} trials did not converge in every step; they are marked, and data sets exclude them",
+            collection.unsound
         ))?;
     }
-    say(format!("cost          {:.1} s CPU on {} threads", told.cpu_s, told.threads))
+    say(format!("cost          {cpu_s:.1} s CPU on {threads} threads"))
 }

@@ -1,5 +1,5 @@
-//! `palpate demo`: grasps an object in random poses until it is clear what it is, tells the story, and writes a picture
-//! of each grasp. It needs no display, and shows what the window would.
+//! `palpate demo`: grasps an object in random poses until it is recognised, describes each grasp, and writes a picture of
+//! it. Needs no display.
 
 use super::Failure;
 use super::recognise::{StageOne, load_model, named};
@@ -29,34 +29,38 @@ use std::sync::Arc;
 
 /// Arguments of `palpate demo`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate demo
+  palpate demo --object tomato --out pictures/
+  palpate demo --seed 5 --threshold 0.99 --grasps 10 --no-pictures --json")]
 pub(super) struct DemoArguments {
-    /// A built-in name, or a URDF, OBJ or STL file; without it one of the sixteen is drawn at random.
+    /// Built-in name, or a URDF, OBJ or STL file (default: a random one of the sixteen).
     #[arg(long, value_name = "NAME|FILE")]
     object: Option<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Chooses object and poses; the same seed tells the same story.
+    /// Random seed of object and poses; the same seed repeats the run.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Most grasps.
+    /// Grasp limit.
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     grasps: u32,
-    /// Probability from which on it is sure; 1 grasps on to the limit.
+    /// Probability at which to stop; 1 grasps up to the limit.
     #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = parse_threshold)]
     threshold: f64,
-    /// A saved model; the one that comes with Palpate where it is left out.
+    /// Recognition model (default: the shipped one).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Leave the object as the fingers released it between grasps, instead of putting it down anew.
+    /// Leave the object as released between grasps instead of placing it anew.
     #[arg(long)]
     as_released: bool,
-    /// Where the pictures go.
+    /// Folder for the pictures.
     #[arg(long, value_name = "FOLDER", default_value = "palpate-demo")]
     out: PathBuf,
-    /// Do not draw.
+    /// Write no pictures.
     #[arg(long)]
     no_pictures: bool,
-    /// Do not keep the trials in the store.
+    /// Do not store the trials.
     #[arg(long)]
     no_store: bool,
     /// Print one JSON object instead of text.
@@ -69,30 +73,32 @@ fn parse_threshold(text: &str) -> Result<f64, String> {
     parsed.ok_or_else(|| "write a probability from 0 to 1, as in 0.9".to_owned())
 }
 
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Story {
-    /// What was grasped.
+struct Report {
+    /// Object in the hand.
     truth: String,
-    /// The class it was taken for, or `unknown`.
+    /// Recognised class, or `unknown`.
     decided: String,
     /// `sure`, `grasp-limit` or `unknown`.
     stopped_because: &'static str,
     threshold: f64,
-    /// What the last grasp said of size and shape.
+    /// Size and shape of the last grasp.
     stage_one: Option<StageOne>,
     seed: u64,
-    grasps: Vec<Told>,
+    grasps: Vec<GraspReport>,
 }
 
+/// One grasp.
 #[derive(Serialize)]
-struct Told {
+struct GraspReport {
     seed: u64,
     offset_mm: [f64; 3],
     yaw_deg: f64,
     picture: Option<PathBuf>,
     trial_id: Option<TrialId>,
     stage_one: Option<StageOne>,
-    /// What is believed after this grasp and those before it.
+    /// Belief after this grasp and those before it.
     pmf: BTreeMap<String, f64>,
     #[serde(flatten)]
     summary: GraspSummary,
@@ -119,7 +125,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         introduce(&nominal.object.source, object.as_ref(), seed)?;
     }
     let sampler = PoseSampler::new(&nominal, object.as_ref());
-    let mut grasps: Vec<Told> = Vec::new();
+    let mut grasps: Vec<GraspReport> = Vec::new();
     let mut released = None;
     let stopped = loop {
         let pose_seed = seed.wrapping_add(grasps.len() as u64).wrapping_add(1);
@@ -130,10 +136,10 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
             identification.push(frame);
         }
         identification.end_grasp();
-        let told = Told {
+        let report = GraspReport {
             stage_one: identification.verdict().and_then(|v| StageOne::of(v, &model.card.labels)),
             pmf: identification.belief().now().map(|pmf| named(&model, pmf)).unwrap_or_default(),
-            ..tell_of(&trial, &scene, pose_seed)
+            ..motion_report(&trial, &scene, pose_seed)
         };
         let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?;
         let picture = match &mut painter {
@@ -145,21 +151,21 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
             }
             None => None,
         };
-        let told = Told { picture, trial_id, ..told };
+        let report = GraspReport { picture, trial_id, ..report };
         if !arguments.json {
-            tell(grasps.len() + 1, &told, object.as_ref().map_or(&[], |o| &o.warnings))?;
+            print_grasp(grasps.len() + 1, &report, object.as_ref().map_or(&[], |o| &o.warnings))?;
         }
-        grasps.push(told);
+        grasps.push(report);
         released = trial.frames.last().cloned();
         if let Some(reason) = identification.decision() {
             break reason;
         }
         if !arguments.json {
-            say(format!("  Not sure yet: {:.0} % is asked for.", 100.0 * rule.threshold))?;
+            say(format!("  Below the threshold of {:.0} %: grasping again.", 100.0 * rule.threshold))?;
         }
     };
     let view = identification.view();
-    let story = Story {
+    let report = Report {
         truth,
         decided: view.decided().unwrap_or("unknown").to_owned(),
         stopped_because: stopped.name(),
@@ -169,21 +175,21 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         grasps,
     };
     if arguments.json {
-        say_json(&story)?;
+        say_json(&report)?;
     } else {
-        conclude(&story, stopped)?;
+        print_conclusion(&report, stopped)?;
     }
-    if story.grasps.iter().all(|told| told.summary.finite) {
+    if report.grasps.iter().all(|grasp| grasp.summary.finite) {
         Ok(())
     } else {
-        Err("a grasp left the range of numbers; see the warnings".into())
+        Err("the simulation of a grasp diverged; see the warnings".into())
     }
 }
 
-/// What is told of a grasp apart from what was recognised.
-fn tell_of(trial: &Trial, scene: &Scene, seed: u64) -> Told {
+/// The part of a report that does not depend on recognition.
+fn motion_report(trial: &Trial, scene: &Scene, seed: u64) -> GraspReport {
     let mount = &scene.gripper.mount;
-    Told {
+    GraspReport {
         seed,
         offset_mm: mount.offset.map(|x| (x * 1e5).round() * 1e-2),
         yaw_deg: (mount.yaw_deg * 10.0).round() * 0.1,
@@ -202,48 +208,48 @@ fn random_object(seed: u64) -> String {
 }
 
 fn introduce(name: &str, object: Option<&ObjectModel>, seed: u64) -> Result<(), Failure> {
-    let Some(object) = object else { return say("The hand stays empty.") };
+    let Some(object) = object else { return say("Object: none, an empty hand.") };
     let title = catalogue().iter().find(|b| b.name == name).map_or(object.name.as_str(), |b| b.title.as_str());
     let size = object.bounds.size().to_array().map(|side| format!("{:.0}", mm(side)));
     let grams = three_digits(object.mass.mass * 1e3);
-    say(format!("On the pedestal: {title} ({} mm, {grams} g). Seed {seed}.", size.join(" x ")))?;
+    say(format!("Object: {title} ({} mm, {grams} g). Seed {seed}.", size.join(" x ")))?;
     for warning in &object.warnings {
         warn(warning);
     }
     Ok(())
 }
 
-/// `known` has been said while loading.
-fn tell(number: usize, told: &Told, known: &[String]) -> Result<(), Failure> {
-    let [x, y, z] = told.offset_mm.map(|v| format!("{v:+.1}"));
+/// Prints a grasp; warnings in `known` were printed before.
+fn print_grasp(number: usize, report: &GraspReport, known: &[String]) -> Result<(), Failure> {
+    let [x, y, z] = report.offset_mm.map(|v| format!("{v:+.1}"));
     say("")?;
-    say(format!("Grasp {number}, {x} {y} {z} mm off and turned by {:+.0} degrees.", told.yaw_deg))?;
-    let summary = &told.summary;
+    say(format!("Grasp {number}: gripper shifted by {x} {y} {z} mm, turned by {:+.0} degrees.", report.yaw_deg))?;
+    let summary = &report.summary;
     match summary.contact_onset_s {
-        Some(onset) => say(format!("  The fingers close and touch it after {onset:.2} s."))?,
-        None => say("  The fingers close and never touch it.")?,
+        Some(onset) => say(format!("  First contact after {onset:.2} s."))?,
+        None => say("  No contact.")?,
     }
     if let Some(hold) = &summary.hold {
         let [left, right] = hold.curvature_per_m.map(three_digits);
-        say(format!("  They bend to {left} and {right} 1/m,"))?;
+        say(format!("  Hold: curvature {left} and {right} 1/m,"))?;
         let [left, right] = hold.force_n.map(three_digits);
         let [low, high] = hold.pressure_pa.map(|p| three_digits(p * 1e-3));
-        say(format!("  and hold it with {left} and {right} N, which is {low} and {high} kPa on the pads."))?;
+        say(format!("  force {left} and {right} N, pressure {low} and {high} kPa."))?;
         if summary.contact_onset_s.is_some() && hold.force_n == [0.0, 0.0] {
-            say("  It has slipped out of their grasp.")?;
+            say("  The object slipped out of the grasp.")?;
         }
     }
     if let Some(moved) = summary.object_moved_m.filter(|moved| *moved > 1e-4) {
-        say(format!("  It has moved by {} mm to find its place between them.", three_digits(mm(moved))))?;
+        say(format!("  The object moved by {} mm.", three_digits(mm(moved))))?;
     }
     for warning in summary.warnings.iter().filter(|w| !known.contains(w)) {
         warn(warning);
     }
-    if let Some(stage) = &told.stage_one {
+    if let Some(stage) = &report.stage_one {
         let percent = [stage.size_probability, stage.shape_probability].map(|p| format!("{:.0} %", 100.0 * p));
-        say(format!("  It feels {} ({}) and {} ({}).", stage.size, percent[0], stage.shape, percent[1]))?;
+        say(format!("  Stage one: {} ({}), {} ({}).", stage.size, percent[0], stage.shape, percent[1]))?;
     }
-    let mut likely: Vec<(&String, &f64)> = told.pmf.iter().collect();
+    let mut likely: Vec<(&String, &f64)> = report.pmf.iter().collect();
     likely.sort_by(|a, b| b.1.total_cmp(a.1));
     let first: Vec<String> = likely
         .iter()
@@ -254,46 +260,44 @@ fn tell(number: usize, told: &Told, known: &[String]) -> Result<(), Failure> {
     say(format!("  Most likely: {}.", first.join(", ")))
 }
 
-fn conclude(story: &Story, stopped: StopReason) -> Result<(), Failure> {
-    let count = story.grasps.len();
-    let grasps = if count == 1 { "one grasp".to_owned() } else { format!("{count} grasps") };
-    let right = if story.decided == story.truth { "which is right" } else { "which is wrong" };
+fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {
+    let count = report.grasps.len();
+    let grasps = if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") };
+    let right = if report.decided == report.truth { "Correct" } else { "Wrong" };
+    let (decided, truth) = (&report.decided, &report.truth);
     say("")?;
     match stopped {
-        StopReason::Sure => say(format!("After {grasps} it is sure: {}, {right} ({}).", story.decided, story.truth))?,
+        StopReason::Sure => say(format!("Recognised after {grasps}: {decided}. {right} (true object: {truth})."))?,
         StopReason::GraspLimit => {
-            say(format!(
-                "After {grasps} it may not try again. Best guess: {}, {right} ({}).",
-                story.decided, story.truth
-            ))?;
+            say(format!("Grasp limit reached ({count}). Best guess: {decided}. {right} (true object: {truth})."))?;
         }
         StopReason::Unknown => {
-            let known = story.grasps.last().is_some_and(|g| g.pmf.contains_key(&story.truth));
-            let right = if known { "which is wrong" } else { "which is right: it has never felt one" };
-            say(format!("After {grasps} it says: unknown, {right} ({}).", story.truth))?;
-            say("The grasps agree on none of the objects it knows.")?;
+            let known = report.grasps.last().is_some_and(|g| g.pmf.contains_key(truth));
+            let right = if known { "Wrong" } else { "Correct: the model does not know this object" };
+            say(format!("Unknown object after {grasps}. {right} (true object: {truth})."))?;
+            say("The grasps match none of the objects the model knows.")?;
         }
     }
     let pictures: Vec<String> =
-        story.grasps.iter().filter_map(|g| Some(g.picture.as_ref()?.display().to_string())).collect();
+        report.grasps.iter().filter_map(|g| Some(g.picture.as_ref()?.display().to_string())).collect();
     if !pictures.is_empty() {
         say(format!("Pictures: {}", pictures.join(", ")))?;
     }
-    let trials: Vec<String> = story.grasps.iter().filter_map(|g| Some(g.trial_id?.to_string())).collect();
+    let trials: Vec<String> = report.grasps.iter().filter_map(|g| Some(g.trial_id?.to_string())).collect();
     if !trials.is_empty() {
         say(format!("Trials: {} (see `palpate trials list`)", trials.join(", ")))?;
     }
     Ok(())
 }
 
-/// Draws the end of the hold.
+/// Off-screen renderer of the end of the hold.
 struct Painter {
     gpu: Gpu,
     renderer: Renderer,
 }
 
 impl Painter {
-    /// A painter, or a warning where nothing can draw.
+    /// Finds a graphics driver, or warns that there is none.
     fn find() -> Option<Self> {
         match Gpu::headless(DriverChoice::Any) {
             Ok(gpu) => {

@@ -1,4 +1,4 @@
-//! `palpate doctor`: what is wrong between the gripper's board and this computer.
+//! `palpate doctor`: diagnoses the connection between the gripper's board and this computer.
 
 use super::Failure;
 use super::link;
@@ -19,23 +19,31 @@ use std::time::{Duration, Instant};
 
 /// Arguments of `palpate doctor`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate doctor
+  palpate doctor /dev/ttyACM0 --seconds 10
+  palpate doctor --crosstalk
+  palpate doctor --wiring
+  palpate doctor --sketch due_gripper
+
+Exit codes: 0 all good, 1 something is wrong, 2 wrong use")]
 pub(super) struct DoctorArguments {
-    /// The port, a link to one, or a file of captured bytes; the only likely port where it is left out.
+    /// Port, or file of captured bytes (default: the only likely port).
     port: Option<PathBuf>,
-    /// How long to listen (s). Bend a finger and press each pad meanwhile: more can be seen then.
+    /// How long to listen (s). Bend each finger and press each pad meanwhile to test the sensors.
     #[arg(long, value_name = "S", default_value_t = USUAL_LISTEN_S, value_parser = seconds)]
     seconds: f64,
-    /// Rate of the board's serial line (bit/s); without it the usual ones are tried.
+    /// Baud rate (default: try the usual ones).
     #[arg(long, value_name = "BAUD", value_parser = super::record::parse_baud)]
     baud: Option<Baud>,
-    /// Test for crosstalk instead, step by step: each sensor in turn is moved by hand, alone, while those of the other finger
-    /// are watched. Enter leaves one out; Ctrl+C ends it and says what was seen.
+    /// Test for crosstalk instead, step by step: move one sensor at a time by hand while those of the other finger are
+    /// watched. Enter skips a sensor; Ctrl+C ends the test and prints its results.
     #[arg(long, conflicts_with = "seconds")]
     crosstalk: bool,
-    /// Print how the board is wired, which port is which, and what its lines are; and look at nothing.
+    /// Print wiring, ports and protocol, then exit.
     #[arg(long, conflicts_with_all = ["crosstalk", "json"])]
     wiring: bool,
-    /// Write the sketch for the Due into a folder, which Arduino wants to be called due_gripper; and look at nothing.
+    /// Write the Arduino sketch to a folder, which must be named due_gripper, then exit.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["crosstalk", "json", "wiring"])]
     sketch: Option<PathBuf>,
     /// Print one JSON object instead of text.
@@ -48,9 +56,9 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "write a number of seconds from 1 to 600".to_owned())
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told<'a> {
+struct Report<'a> {
     port: Option<&'a std::path::Path>,
     listened_s: f64,
     sound: bool,
@@ -71,9 +79,8 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     if arguments.crosstalk {
         return crosstalk(&options, &stop, arguments.json);
     }
-    // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new((arguments.seconds * 10.0) as u64);
-    bar.set_style(ProgressStyle::with_template("listening {bar:40} bend a finger and press each pad meanwhile")?);
+    bar.set_style(ProgressStyle::with_template("listening {bar:40} bend each finger, press each pad")?);
     let seen = examine(&options, Duration::from_secs_f64(arguments.seconds), &mut |listened_s| {
         bar.set_position((listened_s * 10.0) as u64);
         !stop.load(Ordering::Relaxed)
@@ -83,32 +90,32 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let sound = is_sound(&found);
     if arguments.json {
         let port = seen.link.as_ref().map(|link| link.port.path.as_path()).or(arguments.port.as_deref());
-        say_json(&Told { port, listened_s: seen.listened_s, sound, findings: found })?;
+        say_json(&Report { port, listened_s: seen.listened_s, sound, findings: found })?;
     } else {
-        tell(&seen, &found)?;
+        print(&seen, &found)?;
     }
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// What `--crosstalk --json` prints.
+/// Output of `--crosstalk --json`.
 #[derive(Serialize)]
-struct Crosstalk<'a> {
+struct CrosstalkReport<'a> {
     sound: bool,
     found: &'a [Bleed],
     told: Vec<String>,
 }
 
-/// How long the board may be silent before the test is given up.
+/// Silence of the board that ends the test.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// Moves one sensor after the other, by the user's hands.
+/// Runs the crosstalk test: the user moves one sensor after the other.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
-    // Nobody moves what was captured long ago.
+    // Captured bytes need no real time.
     let replay_speed = if options.path.as_ref().is_some_and(|path| path.is_file()) { f64::INFINITY } else { 1.0 };
     let options = LinkOptions { replay_speed, ..options.clone() };
     let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
-    let (mut test, mut told) = (None, String::new());
-    let (mut heard, mut newest) = (0, Instant::now());
+    let (mut test, mut shown) = (None, String::new());
+    let (mut readings, mut newest) = (0, Instant::now());
     let keys = typed_lines()?;
     while !stop.load(Ordering::Relaxed) && !link.is_over() {
         let events = link.take(Duration::from_millis(50));
@@ -116,8 +123,8 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
         for event in events {
             let LinkEvent::Heard(Heard::Reading(reading)) = event else { continue };
             newest = Instant::now();
-            heard += 1;
-            if heard < KNOWN_AFTER {
+            readings += 1;
+            if readings < KNOWN_AFTER {
                 continue;
             }
             let test = match &mut test {
@@ -127,10 +134,10 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
             test.see(&board);
             test.feed(&reading);
             let instruction = test.instruction();
-            if test.source().is_some() && told != instruction {
+            if test.source().is_some() && shown != instruction {
                 let [step, of] = test.step();
                 note(&format!("{step} of {of}: {instruction}"));
-                told = instruction;
+                shown = instruction;
             }
         }
         if let (Ok(_enter), Some(test)) = (keys.try_recv(), &mut test) {
@@ -146,26 +153,26 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
         }
     }
     let Some(test) = test else {
-        return Err(format!("nothing was heard of the board. {}", link.status().state.sentence()).into());
+        return Err(format!("no readings from the board. {}", link.status().state.sentence()).into());
     };
     let sound = test.is_sound();
     if json {
-        say_json(&Crosstalk { sound, found: test.found(), told: test.summary() })?;
+        say_json(&CrosstalkReport { sound, found: test.found(), told: test.summary() })?;
     } else {
         let row = |bleed: &Bleed| {
             let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));
             let verdict = if bleed.bleeds { Verdict::Wrong } else { Verdict::Good };
             vec![bleed.from.label().into(), bleed.into.label().into(), share, counts, verdict.name().into()]
         };
-        table(&["moved", "watched", "shows [%]", "counts", ""], &test.found().iter().map(row).collect::<Vec<_>>())?;
+        table(&["moved", "watched", "crosstalk [%]", "counts", ""], &test.found().iter().map(row).collect::<Vec<_>>())?;
         test.summary().iter().try_for_each(say)?;
     }
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn tell(seen: &Observations, found: &[Finding]) -> Result<(), Failure> {
+fn print(seen: &Observations, found: &[Finding]) -> Result<(), Failure> {
     if let Some(link) = &seen.link {
-        say(format!("{} ({}), listened to for {:.0} s\n", link.port.path.display(), link.port.title, seen.listened_s))?;
+        say(format!("{} ({}), listened for {:.0} s\n", link.port.path.display(), link.port.title, seen.listened_s))?;
     }
     for finding in found {
         say(format!("{:<9} {:<14} {}", finding.verdict.name(), finding.check, finding.seen))?;

@@ -1,4 +1,4 @@
-//! `palpate emulate`: a gripper that is not there, on a pseudo-terminal. Unix only.
+//! `palpate emulate`: emulates the gripper on a pseudo-terminal. Unix only.
 
 use super::Failure;
 use super::setup::SceneArguments;
@@ -6,6 +6,8 @@ use super::terminal::{say, say_json};
 use palpate_device::pretended::{
     Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
 };
+#[cfg(unix)]
+use palpate_device::pretended::{Happened, Happening, Served, serve};
 use palpate_sim::objects::{anchored, catalogue};
 use std::path::PathBuf;
 
@@ -13,61 +15,61 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help())]
 pub(super) struct EmulateArguments {
-    /// Make FILE a symbolic link to the terminal: what a host opens as its port.
+    /// Symbolic link to create: the port that a host opens.
     #[arg(long, value_name = "FILE", required_unless_present = "print_secrets")]
     link: Option<PathBuf>,
-    /// What is grasped, one after the other: names or files, separated by commas; without it the sixteen in turn.
+    /// Objects to grasp in turn: names or files, separated by commas (default: the sixteen).
     #[arg(long = "object", value_name = "A,B,..", value_delimiter = ',')]
     objects: Vec<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Names poses, parts, noise and faults.
+    /// Random seed of poses, sensors, noise and faults.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Samples per second.
     #[arg(long, value_name = "HZ", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rate: u32,
-    /// Channels: the four sensors, then spare inputs that swing slowly.
+    /// Number of channels: the four sensors, then spare inputs that swing slowly.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
     channels: u8,
-    /// From one grasp of its own to the next (s); 0: it waits for a host to drive it.
+    /// Period of automatic grasps (s); 0: only a host drives the fingers.
     #[arg(long, value_name = "S", default_value_t = 6.0, value_parser = seconds)]
     grasp_every: f64,
-    /// Bench procedure, as text or a file: angle=30 hold=2; load=0.1kg hold=3; close empty. `-` takes steps from standard input
-    /// as they come.
+    /// Bench procedure, as text or a file: angle=30 hold=2; load=0.1kg hold=3; close empty. `-` reads steps from standard
+    /// input.
     #[arg(long, value_name = "STEPS|FILE|-")]
     script: Option<String>,
-    /// What goes wrong and when: NAME[=VALUE]@SECONDS[/DURATION], separated by commas, as in vanish@5,garbage@7/2; see below.
-    #[arg(long, value_name = "LIST", value_parser = parse_faults_once, default_value = "")]
+    /// Faults: NAME[=VALUE]@SECONDS[/DURATION], separated by commas, as in vanish@5,garbage@7/2; see below.
+    #[arg(long, value_name = "LIST", value_parser = parse_faults_once, default_value = "", hide_default_value = true)]
     faults: Faults,
-    /// Take the hidden values of strips, pads and dividers from this file instead of drawing them.
+    /// Read the hidden values of strips, pads and dividers from this file instead of drawing them at random.
     #[arg(long, value_name = "F.json")]
     secrets: Option<PathBuf>,
-    /// Print the hidden values as JSON and stop.
+    /// Print the hidden values as JSON, then exit.
     #[arg(long)]
     print_secrets: bool,
-    /// Leave out noise, hysteresis, drift, or several of them separated by commas.
+    /// Imperfections to leave out, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     without: Vec<Imperfection>,
-    /// Highest pressure that the board puts out (bar); 0: the control box is worked by hand, and the board refuses to be told.
+    /// Highest pressure the board puts out (bar); 0: manual control box, the board refuses pressure commands.
     #[arg(long, value_name = "BAR", default_value_t = 1.5, value_parser = pressure)]
     max_bar: f64,
-    /// Rate of its serial line (bit/s): a host that reads at another gets nonsense. Without it, any will do, as on the native port.
+    /// Baud rate: a host with another rate reads garbage (default: any rate works, as on the native port).
     #[arg(long, value_name = "BAUD")]
     baud: Option<u32>,
-    /// Silence after a host has opened the port (s), as on the programming port, which restarts the board.
+    /// Silence after a host opens the port (s), as on the programming port, which restarts the board.
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = seconds)]
     boot: f64,
-    /// What the board's 32-bit clock shows at first (µs): near 4294967295 it wraps soon.
+    /// Start of the board's 32-bit clock (µs); near 4294967295 it wraps soon.
     #[arg(long, value_name = "US", default_value_t = 0)]
     clock_start: u32,
-    /// Seconds of the gripper per second.
+    /// Speed of the emulation, as a factor of real time.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
-    /// Write every line that the board prints to FILE, whole, whatever happens to it on the way.
+    /// Write every line of the board to FILE, before any fault corrupts it.
     #[arg(long, value_name = "FILE")]
     sent: Option<PathBuf>,
-    /// Print what happens as JSON, one object a line.
+    /// Print events as JSON, one object per line.
     #[arg(long)]
     json: bool,
 }
@@ -80,7 +82,7 @@ fn parse_faults_once(text: &str) -> Result<Faults, String> {
     parse_faults(text).map(Faults)
 }
 
-/// What the sensors need not have.
+/// Imperfections of the sensors that can be left out.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Imperfection {
     Noise,
@@ -89,7 +91,12 @@ enum Imperfection {
 }
 
 fn after_help() -> String {
-    format!("Faults, VALUE and duration where they are left out:\n{}", fault_help())
+    format!(
+        "Faults, with the defaults of VALUE and DURATION:\n{}\n\nExamples:\n  palpate emulate --link /tmp/gripper\n  palpate \
+         emulate --link /tmp/gripper --object ball,cube --faults vanish@20/3\n  palpate emulate --link /tmp/gripper \
+         --script \"angle=30 hold=2; close empty\"",
+        fault_help()
+    )
 }
 
 fn number(text: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
@@ -136,16 +143,16 @@ pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         faults: arguments.faults.0.clone(),
         seed: arguments.seed,
     })?;
-    serve(arguments, gripper)
+    emulate(arguments, gripper)
 }
 
-/// The hidden parts: from a file, or drawn, less what is to be left out.
+/// Reads or draws the hidden parts, without the imperfections to leave out.
 fn parts(arguments: &EmulateArguments) -> Result<HiddenParts, Failure> {
     let mut parts = match &arguments.secrets {
         None => HiddenParts::drawn(arguments.seed),
         Some(path) => {
             let wrong = |why: String| {
-                format!("{}: {why}. `palpate emulate --print-secrets` shows how it looks", path.display())
+                format!("{}: {why}. `palpate emulate --print-secrets` prints a valid file", path.display())
             };
             let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
             let parts: HiddenParts = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
@@ -163,7 +170,7 @@ fn parts(arguments: &EmulateArguments) -> Result<HiddenParts, Failure> {
     Ok(parts)
 }
 
-/// The script, from the argument or the file that it names.
+/// Reads the script from the argument or from the file it names.
 fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
     let Some(given) = arguments.script.as_deref().filter(|script| *script != "-") else { return Ok(Vec::new()) };
     let path = std::path::Path::new(given);
@@ -178,13 +185,12 @@ fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
 }
 
 #[cfg(not(unix))]
-fn serve(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
-    Err("emulate needs a pseudo-terminal, which only Unix systems have: run it on Linux or macOS".into())
+fn emulate(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
+    Err("emulate needs a pseudo-terminal: run it on Linux or macOS".into())
 }
 
 #[cfg(unix)]
-fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
-    use palpate_device::pretended::{Served, serve};
+fn emulate(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
     use std::io::Write as _;
 
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
@@ -193,18 +199,18 @@ fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<
     let mut sent = arguments.sent.as_ref().map(std::fs::File::create).transpose()?;
     let mut greeting = (!arguments.json).then(|| {
         let link = link.display();
-        format!("pretended gripper at {link}, until Ctrl+C; look at it with: palpate doctor {link}")
+        format!("emulated gripper at {link} until Ctrl+C; try: palpate doctor {link}")
     });
     let served = Served { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
     let mut failure: Option<Failure> = None;
     serve(&mut gripper, &served, &stop, &mut |gripper| {
         let mut turn = || -> Result<(), Failure> {
-            // Only once there is something to connect to.
+            // The link exists by now.
             if let Some(greeting) = greeting.take() {
                 say(greeting)?;
             }
             for happened in gripper.take_happened() {
-                tell(&happened, arguments.json)?;
+                print_event(&happened, arguments.json)?;
             }
             let printed = gripper.take_printed();
             if let Some(file) = &mut sent {
@@ -237,7 +243,7 @@ fn typed_steps() -> std::sync::mpsc::Receiver<String> {
     typed
 }
 
-/// Adds the steps of a typed line; one that is not understood is complained about, and nothing else happens.
+/// Adds the steps of a typed line; a line with an error adds none.
 #[cfg(unix)]
 fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure> {
     match parse_script(line) {
@@ -254,10 +260,9 @@ fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure>
     Ok(())
 }
 
-/// Says what happened.
+/// Prints an event.
 #[cfg(unix)]
-fn tell(happened: &palpate_device::pretended::Happened, json: bool) -> Result<(), Failure> {
-    use palpate_device::pretended::Happening;
+fn print_event(happened: &Happened, json: bool) -> Result<(), Failure> {
     if json {
         return say(serde_json::to_string(happened)?);
     }
@@ -266,14 +271,14 @@ fn tell(happened: &palpate_device::pretended::Happened, json: bool) -> Result<()
         Happening::Hold { bend_deg: [left, right], load_n, seconds } => {
             format!("holds {left:.0} and {right:.0} degrees, {:.2} and {:.2} N, for {seconds} s", load_n[0], load_n[1])
         }
-        Happening::ScriptDone => "the script is done".to_owned(),
+        Happening::ScriptDone => "end of the script".to_owned(),
         Happening::Fault { fault } => format!("fault {fault}"),
-        Happening::Watchdog => "the board vents: the host fell silent".to_owned(),
-        Happening::Failed { reason } => format!("the fingers stay as they are: {reason}"),
-        Happening::HostCame => "a host opened the port".to_owned(),
-        Happening::HostLeft => "the host closed the port".to_owned(),
-        Happening::Port { path } => format!("the port is {path}"),
-        Happening::Overrun { bytes } => format!("{bytes} bytes given up: the host does not read"),
+        Happening::Watchdog => "watchdog: the host is silent, the board vents".to_owned(),
+        Happening::Failed { reason } => format!("simulation failed, the fingers do not move: {reason}"),
+        Happening::HostCame => "host opened the port".to_owned(),
+        Happening::HostLeft => "host closed the port".to_owned(),
+        Happening::Port { path } => format!("port {path}"),
+        Happening::Overrun { bytes } => format!("{bytes} bytes dropped: the host does not read"),
     };
     say(format!("{:>9.3} s  {what}", happened.t_s))
 }

@@ -1,4 +1,4 @@
-//! `palpate fit`: stiffness, damping, torque curve and lag of a real finger from recorded grasps.
+//! `palpate fit`: estimates stiffness, damping, torque curve and lag of a real finger from recorded grasps.
 
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
@@ -12,22 +12,25 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate fit`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate fit 12 13 --out fitted.toml
+  palpate fit 12 13 14 --strip-gain 3 --pad-gain 5 --json")]
 pub(super) struct FitArguments {
-    /// Numbers of the trials: a few empty closes, and presses against something held in place.
+    /// Trial numbers: a few empty closes, and presses against a fixed object.
     #[arg(required = true)]
     trials: Vec<TrialId>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Use these calibrations instead of the newest ones of each part.
+    /// Calibration numbers to use instead of the newest of each part.
     #[arg(long, value_name = "ID,..", value_delimiter = ',')]
     calibrations: Vec<CalibrationId>,
-    /// How well the strips' gain is known: one deviation (%).
+    /// Standard deviation of the strips' gain (%).
     #[arg(long, value_name = "PERCENT")]
     strip_gain: Option<f64>,
-    /// How well the pads' gain is known: one deviation (%).
+    /// Standard deviation of the pads' gain (%).
     #[arg(long, value_name = "PERCENT")]
     pad_gain: Option<f64>,
-    /// Write a scene with the fitted gripper.
+    /// Scene file to write, with the fitted gripper.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print JSON instead of text.
@@ -35,9 +38,9 @@ pub(super) struct FitArguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told {
+struct Report {
     #[serde(flatten)]
     fit: FingerFit,
     trials: Vec<TrialId>,
@@ -45,8 +48,8 @@ struct Told {
 
 pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), Failure> {
     let store = open_store(store)?;
-    // Of another scene only the gripper counts.
-    let scene = arguments.scene.says_something().then(|| arguments.scene.scene(None)).transpose()?;
+    // Only the gripper of the scene is used.
+    let scene = arguments.scene.any_given().then(|| arguments.scene.scene(None)).transpose()?;
     let gripper = scene.as_ref().map(|scene| &scene.gripper);
     let mut recorded = RecordedGrasps::default();
     for id in &arguments.trials {
@@ -57,7 +60,7 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
     for (given, gains) in [(arguments.strip_gain, &mut trust.strip_gain), (arguments.pad_gain, &mut trust.pad_gain)] {
         if let Some(percent) = given {
             if !(0.01..=100.0).contains(&percent) {
-                return Err(format!("a gain known to {percent} % is not possible; write 0.01 to 100").into());
+                return Err(format!("a standard deviation of {percent} % is out of range; write 0.01 to 100").into());
             }
             *gains = [0.01 * percent; 2];
         }
@@ -69,16 +72,16 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
         std::fs::write(path, scene.to_toml()).map_err(|e| format!("cannot write \"{}\": {e}", path.display()))?;
     }
     if arguments.json {
-        return say_json(&Told { fit, trials: arguments.trials.clone() });
+        return say_json(&Report { fit, trials: arguments.trials.clone() });
     }
-    tell(&fit)?;
+    print(&fit)?;
     match &arguments.out {
-        Some(path) => say(format!("written {}: a scene with the fitted gripper", path.display())),
+        Some(path) => say(format!("written: {}, a scene with the fitted gripper", path.display())),
         None => Ok(()),
     }
 }
 
-fn tell(fit: &FingerFit) -> Result<(), Failure> {
+fn print(fit: &FingerFit) -> Result<(), Failure> {
     let known = |known: Known| match known {
         Known::Well => "well known",
         Known::Roughly => "roughly known",
@@ -98,7 +101,7 @@ fn tell(fit: &FingerFit) -> Result<(), Failure> {
             ]
         })
         .collect();
-    table(&["fitted", "value", "95 %", "unit", ""], &rows)?;
+    table(&["parameter", "value", "95 %", "unit", ""], &rows)?;
     say("")?;
     let rows: Vec<Vec<String>> = fit
         .remainders
@@ -109,7 +112,7 @@ fn tell(fit: &FingerFit) -> Result<(), Failure> {
             vec![left.name.clone(), format!("{} 1/m", three_digits(left.curvature_per_m)), force, shift]
         })
         .collect();
-    table(&["left over (rms)", "curvature", "force", "began late by"], &rows)?;
+    table(&["residual (RMS)", "curvature", "force", "delay"], &rows)?;
     fit.remarks.iter().for_each(|remark| warn(remark));
     Ok(())
 }

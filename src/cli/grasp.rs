@@ -1,4 +1,4 @@
-//! `palpate grasp`: one grasp, told in a few lines or as JSON, stored, and written as CSV where asked for.
+//! `palpate grasp`: simulates one grasp, prints a summary, stores the trial, writes it as CSV.
 
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
@@ -15,15 +15,23 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate grasp`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate grasp lemon
+  palpate grasp my_part.urdf --fixed --json
+  palpate grasp box --seed 7 --out box.csv --layout C6+F
+  palpate grasp --scene scene.toml --set gripper.pad.friction=0.4
+  palpate grasp ball --accuracy 1e-4 --error-band
+
+See also: palpate help scenes")]
 pub(super) struct GraspArguments {
-    /// A built-in name (lemon, ball, cube ..), a URDF, OBJ or STL file, or `empty`.
+    /// Built-in name (lemon, ball, cube ..), a URDF, OBJ or STL file, or `empty` (default: that of the scene).
     object: Option<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Draw the pose at random from this seed, as the scene's `pose` or --preset says.
+    /// Random seed of the pose, which varies as `pose` of the scene or --preset says (default: no variation).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     seed: Option<u64>,
-    /// Write the trial as CSV here, and its contacts beside it as .contacts.csv.
+    /// CSV file to write; the contacts go to a second file, .contacts.csv.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
     /// Sensor layout of the CSV: C1 to C8, each also as C1+F.
@@ -32,21 +40,21 @@ pub(super) struct GraspArguments {
     /// Divide force by the convex hull of the contacts, as the paper does, instead of the participation area.
     #[arg(long)]
     hull: bool,
-    /// Estimate the numerical error from a companion that computes the same grasp more finely.
+    /// Estimate the numerical error from a second run with finer steps.
     #[arg(long)]
     error_band: bool,
-    /// Do not keep the trial in the store.
+    /// Do not store the trial.
     #[arg(long)]
     no_store: bool,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-    /// Print the whole scene as TOML and stop.
+    /// Print the whole scene as TOML, then exit.
     #[arg(long)]
     print_scene: bool,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Report {
     #[serde(flatten)]
@@ -97,29 +105,25 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     if arguments.json {
         say_json(&report)?;
     } else {
-        tell(&report, &scene)?;
+        print(&report, &scene)?;
         if let Some(path) = &arguments.out {
             say(format!("written       {} and {}", path.display(), contacts_path(path).display()))?;
         }
     }
-    if report.summary.finite {
-        Ok(())
-    } else {
-        Err("the simulation left the range of numbers; see the warnings".into())
-    }
+    if report.summary.finite { Ok(()) } else { Err("the simulation diverged; see the warnings".into()) }
 }
 
-fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
+fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
     let summary = &report.summary;
     for warning in &summary.warnings {
         warn(warning);
     }
     let duration = scene.timing.duration_s;
-    let held = if scene.holds_object() { "held in place" } else { "resting freely" };
+    let held = if scene.holds_object() { "fixed" } else { "free" };
     say(format!("object        {}, {held}", summary.object))?;
     match summary.contact_onset_s {
         Some(onset) => say(format!("first contact {onset:.3} s"))?,
-        None => say("first contact never")?,
+        None => say("first contact none")?,
     }
     if let Some(hold) = &summary.hold {
         let pair = |name: &str, values: [f64; 2], unit: &str| {
@@ -135,7 +139,7 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
     }
     let quality = &summary.quality;
     say(format!(
-        "solver        {} steps, {:.2} Newton iterations in each solve (most {}), {}",
+        "solver        {} steps, {:.2} Newton iterations per solve (at most {}), {}",
         quality.steps,
         quality.newton_mean,
         quality.newton_max,
@@ -143,12 +147,10 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
     ))?;
     if scene.solver.accuracy.tolerance().is_some() {
         let (rejected, solves, least) = (quality.rejected_steps, quality.solves, quality.least_step_s * 1e3);
-        say(format!(
-            "error control {rejected} steps taken again shorter, {solves} solves, shortest step {least:.3} ms"
-        ))?;
+        say(format!("error control {rejected} rejected steps, {solves} solves, shortest step {least:.3} ms"))?;
     }
     if let Some(error) = &report.error_band {
-        tell_error(error)?;
+        print_error(error)?;
     }
     say(format!("cost          {:.1} ms CPU for {duration} s at accuracy {}", report.cpu_ms, report.accuracy))?;
     match report.trial_id {
@@ -157,10 +159,10 @@ fn tell(report: &Report, scene: &Scene) -> Result<(), Failure> {
     }
 }
 
-fn tell_error(error: &ErrorNorms) -> Result<(), Failure> {
+fn print_error(error: &ErrorNorms) -> Result<(), Failure> {
     let part = |name: &str, size: f64, unit: &str, share: f64| {
         let (size, percent) = (three_digits(size), three_digits(share * 100.0));
-        say(format!("{name:<13} ±{size} {unit}, {percent} % of the range [rms of the numerical error band]"))
+        say(format!("{name:<13} ±{size} {unit}, {percent} % of the range [RMS numerical error]"))
     };
     part("curvature", error.curvature_per_m, "1/m", error.curvature_share)?;
     part("pressure", error.pressure_pa * 1e-3, "kPa", error.pressure_share)?;

@@ -1,4 +1,4 @@
-//! What the commands that learn and judge share: which grasps, which threads, which models, and stopping.
+//! Arguments and helpers shared by `train` and `evaluate`.
 
 use super::Failure;
 use super::terminal::warn;
@@ -8,28 +8,28 @@ use palpate_learn::{Dataset, METHODS, Method, method};
 use palpate_store::Store;
 use palpate_tactile::model::SensorModel;
 
-/// Which grasps to learn from or to judge by.
+/// Selection of trials, and how simulated ones are sensed.
 #[derive(Debug, clap::Args)]
 pub(super) struct DataArguments {
-    /// Only trials of this collection; the beginning of its name is enough.
+    /// Only trials of this collection; a prefix of its name is enough.
     #[arg(long, value_name = "NAME")]
     pub(super) collection: Option<String>,
-    /// Only trials of this rig: sim, or serial for the real gripper.
+    /// Only trials of this gripper: sim (simulated) or serial (real).
     #[arg(long, value_name = "NAME")]
     pub(super) rig: Option<String>,
     /// Only these objects, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     pub(super) objects: Vec<String>,
-    /// Sensor layout through which simulated trials are seen: C1 to C8, each also as C1+F.
+    /// Sensor layout for simulated trials: C1 to C8, each also with force, as C1+F.
     #[arg(long, value_name = "NAME", default_value = "C1+F")]
     pub(super) layout: String,
-    /// Sensors through which simulated trials are seen: virtual (perfect) or physical-like (as the real gripper has).
+    /// Sensor model for simulated trials: virtual (perfect) or physical-like (as on the real gripper).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
-    /// Other seeds give other initial weights, orders and draws.
+    /// Random seed of initial weights, order and sampling.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Small networks and few epochs: a quick look with worse results.
+    /// Small networks and few epochs: quick, but worse results.
     #[arg(long)]
     pub(super) quick: bool,
 }
@@ -61,26 +61,26 @@ impl DataArguments {
         let data = data?;
         if data.about.collections.len() > 1 {
             let names = data.about.collections.join(", ");
-            warn(&format!("the trials are from several collections ({names}); choose one with --collection"));
+            warn(&format!("the trials are from several collections ({names}); select one with --collection"));
         }
         let left_out = data.about.left_out;
         if left_out > 0 {
-            warn(&format!("{left_out} trial(s) left out: they did not stay finite or did not converge"));
+            warn(&format!("{left_out} trial(s) excluded: they diverged or did not converge"));
         }
         Ok(data)
     }
 }
 
-/// A bar that draws on standard error, and only on a terminal.
+/// A progress bar on standard error, visible only on a terminal.
 pub(super) fn progress_bar(what: &str) -> Result<ProgressBar, Failure> {
     let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta} left")?;
     Ok(ProgressBar::new(0).with_style(style).with_message(what.to_owned()))
 }
 
-/// A method by its key, or a failure that lists them all.
+/// Finds a method by its key; the error lists all keys.
 pub(super) fn known_method(key: &str) -> Result<&'static Method, Failure> {
     method(key).ok_or_else(|| {
         let keys: Vec<&str> = METHODS.iter().map(|m| m.key).collect();
-        format!("there is no method \"{key}\"; there are {}", keys.join(", ")).into()
+        format!("no method \"{key}\"; choose one of {}", keys.join(", ")).into()
     })
 }

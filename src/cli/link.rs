@@ -1,26 +1,26 @@
-//! Opening the gripper's port for a command: one that another program has for a moment is waited for.
+//! Opens the gripper's port for a command; waits while another program has it.
 
 use super::Failure;
 use super::terminal::note;
 use palpate_device::serial::{LinkOptions, PortTrouble, SerialLink};
 use std::time::{Duration, Instant};
 
-/// How long ModemManager looks at a board that was plugged in just now, and so how long a busy port is worth waiting for (s).
+/// Default wait for a busy port (s): ModemManager probes a newly connected board for about this long.
 pub(super) const USUAL_WAIT_S: f64 = 30.0;
-/// Between two attempts.
+/// Time between two attempts.
 const RETRY: Duration = Duration::from_secs(1);
-/// How soon a request to end is noticed.
-const PIECE: Duration = Duration::from_millis(50);
+/// Interval at which a stop request is checked.
+const POLL: Duration = Duration::from_millis(50);
 
-/// Opens a port, a link to one, or a file. While another program has it, tries again each second, for up to `wait_s`
-/// seconds or until `stopped` says so.
+/// Opens a port, a link to one, or a file. While another program has it, retries each second, for up to `wait_s` seconds or
+/// until `stopped` returns true.
 pub(super) fn open(
     options: &LinkOptions,
     wait_s: f64,
     mut stopped: impl FnMut() -> bool,
 ) -> Result<SerialLink, Failure> {
     let begun = Instant::now();
-    let mut told = false;
+    let mut noted = false;
     loop {
         let error = match SerialLink::open(options) {
             Ok(link) => return Ok(link),
@@ -29,15 +29,15 @@ pub(super) fn open(
         if error.trouble != PortTrouble::Busy || begun.elapsed().as_secs_f64() >= wait_s {
             return Err(error.into());
         }
-        if !std::mem::replace(&mut told, true) {
-            note(&format!("{error}; until then it is tried each second, for {wait_s:.0} s"));
+        if !std::mem::replace(&mut noted, true) {
+            note(&format!("{error}; retrying each second, for up to {wait_s:.0} s"));
         }
         let tried = Instant::now();
         while tried.elapsed() < RETRY {
             if stopped() {
                 return Err(error.into());
             }
-            std::thread::sleep(PIECE);
+            std::thread::sleep(POLL);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The command line: every headless command, and the door to the window. Exit codes: 0 done, 1 failed, 2 wrong use.
+//! The command line: parses arguments, opens the window or runs a command. Exit codes: 0 done, 1 failed, 2 wrong use.
 
 mod bench;
 mod calibrate;
@@ -9,6 +9,7 @@ mod emulate;
 mod evaluate;
 mod fit;
 mod grasp;
+mod help;
 mod interrupt;
 mod learning;
 mod link;
@@ -24,6 +25,7 @@ mod train;
 mod trials;
 
 use crate::app::{WindowOptions, open_window};
+use crate::manual::TOPICS;
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate_learn::Model;
 use palpate_sim::objects::{EMPTY, anchored, catalogue};
@@ -32,67 +34,78 @@ use palpate_store::Store;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What went wrong, in a sentence for the user.
+/// An error with a message for the user.
 type Failure = Box<dyn std::error::Error>;
 
 /// A workbench for soft grippers that recognise what they hold.
 ///
-/// Without a command it opens the window, with OBJECT or the lemon on the pedestal. Everything the window does can
-/// also be done here, without a display.
+/// Without a command it opens the window, with OBJECT or the lemon on the pedestal. Commands need no display.
 #[derive(Debug, Parser)]
-#[command(name = "palpate", version, about, long_about)]
+#[command(name = "palpate", version, about, long_about, disable_help_subcommand = true, after_help = after_help())]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
-    /// What to begin with: a built-in object, a URDF, OBJ or STL file, or a scene file (.toml).
+    /// Object or scene to open: a built-in name, a URDF, OBJ or STL file, or a scene file (.toml).
     object: Option<String>,
-    /// Connect the window to the real gripper: a port, a link to one, or a file of captured bytes.
+    /// Port of the real gripper to connect the window to, or a file of captured bytes.
     #[arg(long, value_name = "PORT")]
     port: Option<PathBuf>,
-    /// The model that listens to the real gripper in the window (.safetensors); remembered.
+    /// Recognition model for the real gripper in the window (.safetensors); remembered.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The SQLite file that holds the trials (default: the platform's data folder).
+    /// Store of trials, an SQLite file (default: in the platform's data folder).
     #[arg(long, global = true, value_name = "FILE")]
     store: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Grasp an object once, print what happened, store the trial.
+    /// Grasp an object once, print a summary, store the trial.
     Grasp(grasp::GraspArguments),
-    /// Grasp an object in a few random poses, tell the story, write pictures; needs no display.
+    /// Grasp an object in random poses until it is recognised, with a picture of each grasp.
     Demo(demo::DemoArguments),
-    /// Grasp many objects in many random poses, in parallel, into the store; taken up again where it was interrupted.
+    /// Collect a simulated data set in parallel; resumes where it stopped.
     Collect(collect::CollectArguments),
-    /// Fit a recogniser to stored trials and save it.
+    /// Train a recogniser on stored trials and save it.
     Train(train::TrainArguments),
-    /// Judge recognisers on trials they have not seen: accuracy, calibration, stage one, several grasps, cost.
+    /// Evaluate recognisers on held-back trials: F1, calibration, successive grasps, cost.
     Evaluate(evaluate::EvaluateArguments),
-    /// Say what stored trials are grasps of.
+    /// Recognise the objects of stored trials.
     Recognise(recognise::RecogniseArguments),
-    /// Record what the real gripper's board sends, as a trial in the store.
+    /// Record a trial of the real gripper.
     Record(record::RecordArguments),
-    /// Draw a scene or a stored trial into a PNG file, without a window.
+    /// Draw a scene or a stored trial to a PNG file.
     Snapshot(snapshot::SnapshotArguments),
-    /// Which effects a scene calls for, why, what each costs and changes.
+    /// Explain which effects a scene calls for, and what each costs and changes.
     Scene(scene::SceneCommandArguments),
-    /// How many trials of each object are wanted, how many there are, and what to take next.
+    /// Show or change the labelling plan: trials wanted and done, and the next one.
     Plan(plan::PlanArguments),
-    /// List, show, label, export, delete and restore recorded trials; undo and redo.
+    /// List, show, label, export, import, merge, delete and restore trials; undo and redo.
     Trials(trials::TrialsArguments),
-    /// Calibrate a flex strip or force pad of the real gripper, and manage what is known of its parts.
+    /// Calibrate the strips and pads of the real gripper, and manage calibrations.
     Calibrate(calibrate::CalibrateArguments),
     /// Fit the simulated finger to recorded grasps of the real one.
     Fit(fit::FitArguments),
-    /// Find out what is wrong between the gripper's board and this computer, and what to do about it.
+    /// Diagnose the connection to the real gripper: what is wrong, why, and what to do.
     Doctor(doctor::DoctorArguments),
-    /// Pretend to be a gripper on a serial port, with parts nobody knows and faults on request (Unix).
+    /// Emulate the gripper on a serial port, with random sensors and optional faults (Unix).
     Emulate(emulate::EmulateArguments),
-    /// Measure what things cost on this machine, in CPU time.
+    /// Measure CPU time on this machine.
     Bench(bench::BenchArguments),
-    /// Run an experiment and print what came out.
+    /// Run an experiment and print its results.
     Study(study::StudyArguments),
+    /// List topics and commands, or print one.
+    Help(help::HelpArguments),
+}
+
+/// Topics of the manual, and the exit codes.
+fn after_help() -> String {
+    let topics: Vec<&str> = TOPICS.iter().map(|topic| topic.name).collect();
+    format!(
+        "Topics of `palpate help`: {}\n\nExit codes: 0 done, 1 failed, 2 wrong use\n\nExamples:\n  palpate lemon\n  \
+         palpate help start\n  palpate grasp lemon\n  palpate grasp --help",
+        topics.join(", ")
+    )
 }
 
 /// Opens the window on an object.
@@ -103,60 +116,59 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
         if object.to_ascii_lowercase().ends_with(".toml") {
             scene = Scene::from_file(Path::new(object))?;
         } else {
-            refuse_typing_errors(object);
+            refuse_unknown_word(object);
             scene.object.source = anchored(object);
         }
-        // A file is tried before there is a window to complain in.
+        // Errors in the file belong to the terminal, before a window opens.
         scene.load_object()?;
     }
     if let Some(path) = model {
         Model::load(path)?;
     }
-    // The folder may be another one by the next time.
+    // The path is remembered; the working folder may differ next time.
     let model = model.as_ref().map(std::path::absolute).transpose()?;
     let store = store.clone().unwrap_or_else(Store::default_path);
     Ok(open_window(WindowOptions { scene, store, port: port.clone(), model })?)
 }
 
-/// A word that is neither a command nor an object would open a window with nothing in it.
-fn refuse_typing_errors(object: &str) {
+/// Refuses a misspelt command, which would otherwise be taken for an object.
+fn refuse_unknown_word(object: &str) {
     let known = object == EMPTY || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
     if !known && Path::new(object).extension().is_none() {
         let commands = Arguments::command();
         let names: Vec<&str> = commands.get_subcommands().filter(|c| !c.is_hide_set()).map(|c| c.get_name()).collect();
-        let text = format!("'{object}' is neither a command ({}) nor an object", names.join(", "));
+        let text = format!("'{object}' is neither a command ({}) nor an object; see `palpate help`", names.join(", "));
         Arguments::command().error(clap::error::ErrorKind::InvalidSubcommand, text).exit();
     }
 }
 
-/// Runs the program as its arguments ask.
+/// Runs the program with the arguments of the command line.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     if (arguments.port.is_some() || arguments.model.is_some()) && arguments.command.is_some() {
-        let text = "--port and --model belong to the window, or after the command";
+        let text = "--port and --model before a command apply to the window only; put them after the command";
         Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
     }
     if let (Some(object), Some(_)) = (&arguments.object, &arguments.command) {
-        let text =
-            format!("'{object}' stands before a command; name the object after it, as in palpate grasp {object}");
+        let text = format!("'{object}' is before the command; name the object after it, as in palpate grasp {object}");
         Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
     }
     terminal::show_log();
-    terminal::put_faults_into_words();
-    // A fault has been told by the time it arrives here.
-    let outcome = std::panic::catch_unwind(|| obey(&arguments)).unwrap_or(Ok(ExitCode::FAILURE));
+    terminal::report_panics();
+    // The hook has reported a panic by now.
+    let outcome = std::panic::catch_unwind(|| dispatch(&arguments)).unwrap_or(Ok(ExitCode::FAILURE));
     match outcome {
         Ok(code) => code,
-        // Whoever reads our output has heard enough: `palpate trials list | head`.
+        // The reader of our output has gone: `palpate trials list | head`.
         Err(failure) if terminal::is_closed_pipe(failure.as_ref()) => ExitCode::SUCCESS,
         Err(failure) => {
-            terminal::complain(&failure.to_string());
+            terminal::error(&failure.to_string());
             ExitCode::FAILURE
         }
     }
 }
 
-fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
+fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let store = arguments.store.as_deref();
     match &arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(grasp, store)?,
@@ -176,6 +188,7 @@ fn obey(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study)?,
+        Some(Command::Help(help)) => help::run(help)?,
         None => window(arguments)?,
     }
     Ok(ExitCode::SUCCESS)

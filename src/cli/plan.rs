@@ -1,4 +1,4 @@
-//! `palpate plan`: how many trials of each object are wanted, how many there are, and what to take next.
+//! `palpate plan`: trials wanted and done per object, and the next one to record.
 
 use super::Failure;
 use super::setup::open_store;
@@ -10,35 +10,40 @@ use std::path::Path;
 
 /// Arguments of `palpate plan`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate plan
+  palpate plan set mug 40
+  palpate plan remove lemon
+  palpate plan --json")]
 pub(super) struct PlanArguments {
     #[command(subcommand)]
-    what: Option<What>,
+    command: Option<PlanCommand>,
     /// Print JSON instead of a table.
     #[arg(long, global = true)]
     json: bool,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
-    /// How far the plan is, and what to take next; also without a word after `plan`.
+enum PlanCommand {
+    /// Show progress and the next trial (the default).
     Show,
-    /// Set how many trials of an object are wanted; one that is not in the plan is added.
+    /// Set the number of trials of an object; adds it to the plan.
     Set {
-        /// The object, as it will stand in the label.
+        /// Object, as in its label.
         name: String,
-        /// How many trials, 1 to 1000; the paper took 40 to 55 of each.
+        /// Number of trials, 1 to 1000; the paper took 40 to 55 of each.
         wanted: u32,
     },
-    /// Take an object out of the plan; its trials stay.
+    /// Remove an object from the plan; its trials stay.
     Remove {
-        /// The object.
+        /// Object.
         name: String,
     },
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told {
+struct Report {
     done: u32,
     wanted: u32,
     unlabelled: usize,
@@ -49,10 +54,10 @@ struct Told {
 pub(super) fn run(arguments: &PlanArguments, store: Option<&Path>) -> Result<(), Failure> {
     let mut store = open_store(store)?;
     let mut plan = store.label_plan()?;
-    match arguments.what.as_ref().unwrap_or(&What::Show) {
-        What::Show => {}
-        What::Set { name, wanted } => plan.set(name, *wanted)?,
-        What::Remove { name } => plan.remove(name)?,
+    match arguments.command.as_ref().unwrap_or(&PlanCommand::Show) {
+        PlanCommand::Show => {}
+        PlanCommand::Set { name, wanted } => plan.set(name, *wanted)?,
+        PlanCommand::Remove { name } => plan.remove(name)?,
     }
     store.set_label_plan(&plan)?;
     show(&store, arguments.json)
@@ -66,7 +71,7 @@ fn show(store: &Store, json: bool) -> Result<(), Failure> {
     let unlabelled = rows.iter().filter(|row| row.complete && !row.discarded && row.object.is_none()).count();
     let (done, wanted) = (progress.done(), progress.wanted());
     if json {
-        return say_json(&Told { done, wanted, unlabelled, objects: progress.objects, next });
+        return say_json(&Report { done, wanted, unlabelled, objects: progress.objects, next });
     }
     table(&["object", "done", "wanted", "flagged"], &cells(&progress))?;
     say(format!("{done} of {wanted} trials"))?;
@@ -81,7 +86,7 @@ fn show(store: &Store, json: bool) -> Result<(), Failure> {
                 next.object, next.number, next.cue.turn_deg
             ))
         }
-        None => say("the plan is done"),
+        None => say("the plan is complete"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! `palpate recognise`: what a model says of stored trials, one after the other, and of all of them together.
+//! `palpate recognise`: recognises the objects of stored trials, one by one or all together.
 
 use super::Failure;
 use super::setup::open_store;
@@ -14,14 +14,18 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate recognise`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate recognise 1
+  palpate recognise 1 2 3 --together
+  palpate recognise 7 --model mine.safetensors --json")]
 pub(super) struct RecogniseArguments {
-    /// Numbers of the trials.
+    /// Trial numbers.
     #[arg(required = true)]
     trials: Vec<TrialId>,
-    /// A saved model; the one that comes with Palpate where it is left out.
+    /// Recognition model (default: the shipped one).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The trials are grasps of one object: also say what they come to together.
+    /// Treat the trials as grasps of one object, and also combine them.
     #[arg(long)]
     together: bool,
     /// Print JSON instead of text.
@@ -29,11 +33,11 @@ pub(super) struct RecogniseArguments {
     json: bool,
 }
 
-/// What is said of one trial.
+/// Result for one trial.
 #[derive(Serialize)]
-struct Said {
+struct TrialReport {
     trial: TrialId,
-    /// Its label in the store; none where nobody has said yet what it is of.
+    /// Label in the store; none for an unlabelled trial.
     truth: Option<String>,
     decided: String,
     probability: f64,
@@ -51,7 +55,7 @@ pub(super) struct StageOne {
 }
 
 impl StageOne {
-    /// The most likely size and shape; none where the model has no stage one.
+    /// Most likely size and shape; none where the model has no stage one.
     pub(super) fn of(verdict: &Verdict, labels: &Labels) -> Option<Self> {
         let properties = verdict.properties.as_ref()?;
         let ((size, size_probability), (shape, shape_probability)) = (properties.size.top(), properties.shape.top());
@@ -60,11 +64,11 @@ impl StageOne {
     }
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told {
-    trials: Vec<Said>,
-    /// All of them as grasps of one object.
+struct Report {
+    trials: Vec<TrialReport>,
+    /// All trials as grasps of one object.
     together: Option<Together>,
 }
 
@@ -75,7 +79,7 @@ struct Together {
     pmf: BTreeMap<String, f64>,
 }
 
-/// The model the user named, or the one that comes with the program.
+/// Loads the named model, or the shipped one.
 pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
     Ok(match path {
         Some(path) => Model::load(path)?,
@@ -83,7 +87,7 @@ pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
     })
 }
 
-/// Through which sensors a model wants to see simulated trials.
+/// Layout and sensor model a recogniser expects of simulated trials.
 pub(super) fn view_of(model: &Model) -> View {
     let data = &model.card.data;
     View {
@@ -102,7 +106,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let store = open_store(store)?;
     let labels = &model.card.labels;
     let mut belief = Belief::default();
-    let mut said = Vec::new();
+    let mut trials = Vec::new();
     for id in &arguments.trials {
         let data = Source::default().read_trial(&store, *id, &view_of(&model))?;
         model.check_channels(&data.channels)?;
@@ -114,7 +118,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         belief.add(with, alone.pmf.clone());
         let (class, probability) = alone.pmf.top();
         let stage_one = StageOne::of(&alone, labels);
-        said.push(Said {
+        trials.push(TrialReport {
             trial: *id,
             truth: Some(data.labels.classes[0].name.clone()).filter(|name| !name.is_empty()),
             decided: labels.classes[class].name.clone(),
@@ -129,22 +133,22 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         pmf: named(&model, pmf),
     });
     if arguments.json {
-        return say_json(&Told { trials: said, together });
+        return say_json(&Report { trials, together });
     }
-    let cells: Vec<Vec<String>> = said
+    let cells: Vec<Vec<String>> = trials
         .iter()
-        .map(|said| {
-            let properties = said.stage_one.as_ref().map_or_else(String::new, |s| format!("{}, {}", s.size, s.shape));
+        .map(|trial| {
+            let properties = trial.stage_one.as_ref().map_or_else(String::new, |s| format!("{}, {}", s.size, s.shape));
             vec![
-                said.trial.to_string(),
-                shown_name(said.truth.as_deref().unwrap_or_default()).to_owned(),
+                trial.trial.to_string(),
+                shown_name(trial.truth.as_deref().unwrap_or_default()).to_owned(),
                 properties,
-                said.decided.clone(),
-                format!("{:.0} %", 100.0 * said.probability),
+                trial.decided.clone(),
+                format!("{:.0} %", 100.0 * trial.probability),
             ]
         })
         .collect();
-    table(&["trial", "label", "stage one", "recognised as", "sure"], &cells)?;
+    table(&["trial", "label", "stage one", "recognised as", "probability"], &cells)?;
     match together {
         Some(all) => say(format!("together: {} ({:.0} %)", all.decided, 100.0 * all.probability)),
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! `palpate record`: what the real gripper's board sends, as a trial in the store.
+//! `palpate record`: records a trial of the real gripper.
 
 use super::Failure;
 use super::interrupt::stop_flag;
@@ -18,39 +18,48 @@ use std::sync::atomic::Ordering;
 
 /// Arguments of `palpate record`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate record --list
+  palpate record --object lemon --seconds 5
+  palpate record --object lemon --drive --scene scene.toml
+  palpate record --port grasp.bytes --speed 0 --json
+
+Exit codes: 0 recorded, 1 failed or cut short, 2 wrong use
+
+See also: palpate help gripper")]
 pub(super) struct RecordArguments {
-    /// The port, a link to one, or a file of captured bytes; without it the only port that looks like the board.
+    /// Port, or file of captured bytes (default: the only likely port).
     #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
-    /// How long to record (s); without it until Ctrl+C, or for as long as the programme takes.
+    /// Duration (s) (default: until Ctrl+C, or as long as the programme takes).
     #[arg(long, value_name = "N", value_parser = parse_seconds)]
     seconds: Option<f64>,
-    /// What is in the hand; "empty" for nothing. Without it `palpate trials label` says so later, and until then no data set
-    /// takes the trial.
+    /// Label: the object in the hand, or "empty". Without it the trial stays unlabelled, and out of data sets, until
+    /// `palpate trials label`.
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
-    /// Let the board drive the control box through the programme of the scene: P, K and V lines, as our firmware takes them.
+    /// Drive the control box through the programme of the scene; needs Palpate's firmware.
     #[arg(long, conflicts_with = "by_hand")]
     drive: bool,
-    /// You drive the control box by hand, in the phases of the programme, beginning with the first reading.
+    /// You drive the control box by hand, in the phases of the programme, from the first reading on.
     #[arg(long)]
     by_hand: bool,
-    /// The speed of the port; without it the usual ones are tried.
+    /// Baud rate (default: try the usual ones).
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     baud: Option<Baud>,
-    /// How long to wait for a port that another program has (s).
+    /// How long to wait while another program has the port (s).
     #[arg(long, value_name = "S", default_value_t = link::USUAL_WAIT_S, value_parser = parse_wait)]
     wait: f64,
-    /// End the trial where the board vanishes, instead of waiting for it.
+    /// End the trial when the board disappears, instead of waiting for it.
     #[arg(long)]
     no_reconnect: bool,
-    /// How fast a file is played; 0 for as fast as it can be read.
+    /// Replay speed of a file; 0: as fast as possible.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     speed: f64,
-    /// A scene file that says which gripper this is and what its control box does.
+    /// Scene file with the gripper and its programme.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// List the ports and what is plugged into them, and record nothing.
+    /// List ports and the devices on them, then exit.
     #[arg(long)]
     list: bool,
     /// Print one JSON object instead of text.
@@ -72,14 +81,14 @@ pub(super) fn parse_baud(text: &str) -> Result<Baud, String> {
     Baud::try_from(text.parse::<u32>().map_err(|e| e.to_string())?)
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Told {
+struct Report {
     trial_id: i64,
-    /// Its label, unless it has none yet.
+    /// Label; none for an unlabelled trial.
     object: Option<String>,
     port: String,
-    /// The speed in use (bit/s); none for captured bytes.
+    /// Baud rate in use; none for captured bytes.
     baud: Option<u32>,
     samples: u64,
     lost: u64,
@@ -90,7 +99,7 @@ struct Told {
     delay_p95_ms: f64,
     drift_ppm: Option<f64>,
     reconnects: u32,
-    /// Bytes and readings that this computer was too slow to take.
+    /// Bytes and readings lost because this computer was too slow.
     dropped: [u64; 2],
     format: Option<String>,
     channels: Vec<String>,
@@ -126,7 +135,6 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     let seconds = arguments.seconds.or((control != Control::Free).then_some(programme_s));
     let rig = SerialRig::begin(link, SerialPlan { control, actuation_hz, seconds }, stop)?;
     let plan = BoardTrialPlan { object: object.clone().unwrap_or_default(), scene: scene.to_toml(), seconds };
-    // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{elapsed} {msg}")?);
     let outcome = record_board(rig, &scene.programme, &plan, &mut store, &mut |recorder, status| {
         bar.set_message(progress(recorder, status));
@@ -134,9 +142,9 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     });
     bar.finish_and_clear();
     let grasp = outcome?;
-    tell(grasp.recorded, object, &grasp.status, arguments.json)?;
+    print(grasp.recorded, object, &grasp.status, arguments.json)?;
     if grasp.cut {
-        Err("the fingers did not do what they were told, so the trial ended early; it is stored".into())
+        Err("the board did not follow the programme: the trial ended early, and is stored".into())
     } else {
         Ok(())
     }
@@ -159,9 +167,9 @@ fn progress(recorder: &BoardRecorder, status: &LinkStatus) -> String {
     )
 }
 
-fn tell(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
+fn print(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
     let cadence = recorded.about.cadence;
-    let told = Told {
+    let report = Report {
         trial_id: recorded.id,
         flags: flaws(recorded.about.flags, object.as_deref()),
         object,
@@ -182,28 +190,28 @@ fn tell(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: b
         warnings: recorded.warnings,
     };
     if json {
-        return say_json(&told);
+        return say_json(&report);
     }
-    for warning in &told.warnings {
+    for warning in &report.warnings {
         warn(warning);
     }
-    let object = shown_name(told.object.as_deref().unwrap_or_default());
-    say(format!("trial {}      {object} from {}", told.trial_id, told.port))?;
-    for found in &told.flags {
+    let object = shown_name(report.object.as_deref().unwrap_or_default());
+    say(format!("trial {}      {object} from {}", report.trial_id, report.port))?;
+    for found in &report.flags {
         say(format!("flagged       {}: {}", found.flag.label(), found.remark))?;
     }
-    say(format!("samples       {} of {}", told.samples, told.channels.join(", ")))?;
+    say(format!("samples       {} of {}", report.samples, report.channels.join(", ")))?;
     if let Some(detected) = &recorded.about.detected {
-        let speed = told.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
+        let speed = report.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
         say(format!("format        {}{speed}: {}", detected.format.label(), detected.why))?;
     }
-    let (rate, jitter, delay) = (told.rate_hz, told.jitter_p95_ms, told.delay_p95_ms);
+    let (rate, jitter, delay) = (report.rate_hz, report.jitter_p95_ms, report.delay_p95_ms);
     say(format!("cadence       {rate:.2} Hz, jitter {jitter:.2} ms, delay {delay:.2} ms [95th percentiles]"))?;
-    if let Some(drift) = told.drift_ppm {
-        say(format!("clock         the board's runs {drift:+.0} ppm against this computer's"))?;
+    if let Some(drift) = report.drift_ppm {
+        say(format!("clock         drifts by {drift:+.0} ppm against this computer"))?;
     }
-    let (lost, bad, gaps) = (told.lost, told.bad_lines, told.gaps);
-    say(format!("lost          {lost} readings in {gaps} gaps, {bad} bad lines, {} reconnects", told.reconnects))
+    let (lost, bad, gaps) = (report.lost, report.bad_lines, report.gaps);
+    say(format!("lost          {lost} readings in {gaps} gaps, {bad} bad lines, {} reconnects", report.reconnects))
 }
 
 fn list(json: bool) -> Result<(), Failure> {
@@ -212,9 +220,9 @@ fn list(json: bool) -> Result<(), Failure> {
         return say_json(&ports);
     }
     if ports.is_empty() {
-        return say("no serial ports: is the board plugged in?");
+        return say("no serial ports: is the board connected?");
     }
     let cells: Vec<Vec<String>> =
         ports.iter().map(|port| vec![port.path.display().to_string(), port.title.clone()]).collect();
-    table(&["port", "what"], &cells)
+    table(&["port", "device"], &cells)
 }

@@ -1,4 +1,4 @@
-//! `palpate scene explain`: which effects a scene calls for, why, what each costs and what it changes.
+//! `palpate scene explain`: which effects a scene calls for, why, what each costs and changes.
 
 use super::Failure;
 use super::setup::SceneArguments;
@@ -12,16 +12,22 @@ use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate scene`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate scene explain lemon
+  palpate scene explain scene.toml --json
+  palpate scene explain empty --set effects.finger-contact=off
+
+See also: palpate help effects")]
 pub(super) struct SceneCommandArguments {
     #[command(subcommand)]
-    what: What,
+    command: SceneCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
-    /// Which effects are on and why, what each costs, and what leaving it out or putting it in would change.
+enum SceneCommand {
+    /// Print which effects are on and why, the cost of each, and the change if it were switched.
     Explain {
-        /// A scene file (.toml), or what to grasp: a built-in name, a URDF, OBJ or STL file, or `empty`.
+        /// Scene file (.toml), or an object: a built-in name, a URDF, OBJ or STL file, or `empty`.
         scene_or_object: Option<String>,
         #[command(flatten)]
         scene: SceneArguments,
@@ -32,48 +38,46 @@ enum What {
 }
 
 pub(super) fn run(arguments: &SceneCommandArguments) -> Result<(), Failure> {
-    let What::Explain { scene_or_object, scene, json } = &arguments.what;
+    let SceneCommand::Explain { scene_or_object, scene, json } = &arguments.command;
     let scene = scene_of(scene_or_object.as_deref(), scene)?;
     let object = scene.load_object()?;
-    // It draws on standard error, and only on a terminal.
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} effects")?);
     let progress = |done: usize, of: usize| {
         bar.set_length(of as u64);
         bar.set_position(done as u64);
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    // Nothing is written, so that Ctrl+C may end it at any moment.
     let how = Measuring { threads, cancelled: &AtomicBool::new(false), progress: &progress };
     let explanation = explain_effects(&scene, object.as_ref(), &how);
     bar.finish_and_clear();
-    let explanation = explanation.ok_or("the measurement was given up")?;
-    if *json { say_json(&explanation) } else { tell(&explanation) }
+    let explanation = explanation.ok_or("the measurement was cancelled")?;
+    if *json { say_json(&explanation) } else { print(&explanation) }
 }
 
 fn scene_of(name: Option<&str>, arguments: &SceneArguments) -> Result<Scene, Failure> {
     match name.filter(|name| name.to_ascii_lowercase().ends_with(".toml")) {
         Some(path) if arguments.scene.is_some() => {
-            Err(format!("two scene files: {path} and the one of --scene; name one of them").into())
+            Err(format!("two scene files, {path} and --scene: give one of them").into())
         }
         Some(path) => arguments.with_file(Some(&PathBuf::from(path)), None),
         None => arguments.scene(name),
     }
 }
 
-fn tell(explanation: &Explanation) -> Result<(), Failure> {
+fn print(explanation: &Explanation) -> Result<(), Failure> {
     for warning in &explanation.warnings {
         warn(warning);
     }
-    let onset = explanation.contact_onset_s.map_or("never".to_owned(), |t| format!("at {t:.3} s"));
+    let onset = explanation.contact_onset_s.map_or("none".to_owned(), |t| format!("at {t:.3} s"));
     say(format!("{}: {:.1} ms of CPU time, first contact {onset}", explanation.object, explanation.cpu_ms))?;
     for effect in &explanation.effects {
         say("")?;
-        tell_effect(effect, explanation)?;
+        print_effect(effect, explanation)?;
     }
     Ok(())
 }
 
-fn tell_effect(effect: &ExplainedEffect, explanation: &Explanation) -> Result<(), Failure> {
+fn print_effect(effect: &ExplainedEffect, explanation: &Explanation) -> Result<(), Failure> {
     let planned = &effect.planned;
     let state = if planned.on { "on" } else { "off" };
     let setting = if planned.setting == state { "as set".to_owned() } else { planned.setting.clone() };

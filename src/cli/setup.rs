@@ -1,4 +1,4 @@
-//! The arguments that say what is grasped and how, shared by all commands that simulate.
+//! Scene arguments shared by all commands that simulate, and opening the store.
 
 use super::Failure;
 use palpate_sim::objects::anchored;
@@ -6,27 +6,26 @@ use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use palpate_store::Store;
 use std::path::{Path, PathBuf};
 
-/// What to simulate.
+/// Scene and changes to it.
 #[derive(Debug, clap::Args)]
 pub(super) struct SceneArguments {
-    /// A scene file (TOML); every key may be left out. `palpate grasp --print-scene` shows all keys.
+    /// Scene file (TOML); `palpate grasp --print-scene` prints all keys with their defaults.
     #[arg(long, value_name = "FILE")]
     pub(super) scene: Option<PathBuf>,
-    /// How accurately motion is computed: draft, standard, reference, or a tolerance such as 1e-4: the largest error of a
-    /// step in joint angles (rad), and in fingertips and the object over the finger's length.
+    /// Accuracy: draft, standard, reference, or a tolerance such as 1e-4 (see palpate help accuracy).
     #[arg(long, value_name = "NAME|TOL")]
     pub(super) accuracy: Option<Accuracy>,
-    /// What computes the motion: palpate, or rapier for comparison.
+    /// Physics engine: palpate, or rapier for comparison.
     #[arg(long, value_name = "NAME", value_parser = parse_engine)]
     pub(super) engine: Option<EngineKind>,
-    /// Hold the object in place instead of letting it rest freely.
+    /// Fix the object in place.
     #[arg(long)]
     pub(super) fixed: bool,
-    /// How random poses vary: A (3 mm, 10 degrees), M (5 mm, 25 degrees), B (8 mm, any turn, any face it rests on) or
+    /// Spread of random poses: A (3 mm, 10 degrees), M (5 mm, 25 degrees), B (8 mm, any turn, any resting face) or
     /// C (12 mm, any orientation).
     #[arg(long, value_name = "A|M|B|C", value_parser = parse_preset)]
     pub(super) preset: Option<PosePreset>,
-    /// Set any key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
+    /// Set a key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
 }
@@ -41,19 +40,19 @@ fn parse_preset(text: &str) -> Result<PosePreset, String> {
 }
 
 impl SceneArguments {
-    /// The scene they describe, with another object where one is named.
+    /// Builds the scene, with another object where one is named.
     pub(super) fn scene(&self, object: Option<&str>) -> Result<Scene, Failure> {
         self.with_file(self.scene.as_deref(), object)
     }
 
-    /// True where anything was asked for.
-    pub(super) fn says_something(&self) -> bool {
+    /// True where any argument is given.
+    pub(super) fn any_given(&self) -> bool {
         let Self { scene, accuracy, engine, fixed, preset, settings } = self;
         let named = scene.is_some() || accuracy.is_some() || engine.is_some() || preset.is_some();
         named || *fixed || !settings.is_empty()
     }
 
-    /// The same on top of another scene file.
+    /// Builds the scene on top of another file.
     pub(super) fn with_file(&self, file: Option<&Path>, object: Option<&str>) -> Result<Scene, Failure> {
         let mut scene = match file {
             Some(path) => Scene::from_file(path)?,
@@ -78,7 +77,7 @@ impl SceneArguments {
     }
 }
 
-/// Opens the store the user named, or the default one.
+/// Opens the named store, or the default one.
 pub(super) fn open_store(path: Option<&Path>) -> Result<Store, Failure> {
     let store = match path {
         Some(path) => Store::open(path)?,

@@ -1,4 +1,4 @@
-//! `palpate snapshot`: a picture of a scene at some time, or of a stored trial, without a window.
+//! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
@@ -16,27 +16,31 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate snapshot`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate snapshot cube --view front --theme light --out cube.png
+  palpate snapshot --trial 1 --at 2.9 --out held.png
+  palpate snapshot ball --ghost --bare --out both.png")]
 pub(super) struct SnapshotArguments {
-    /// A built-in name, a URDF, OBJ or STL file, or `empty`; without it the scene's own object.
+    /// Built-in name, a URDF, OBJ or STL file, or `empty` (default: that of the scene).
     object: Option<String>,
     #[command(flatten)]
     scene: SceneArguments,
     /// Draw this stored trial instead of simulating.
     #[arg(long, value_name = "ID", conflicts_with_all = ["object", "scene"])]
     trial: Option<TrialId>,
-    /// The moment to draw, in seconds from the start.
+    /// Time to draw, from the start (s).
     #[arg(long, value_name = "SECONDS", default_value_t = 2.9)]
     at: f64,
-    /// From where: home, front, back, left, right, top or bottom.
+    /// View: home, front, back, left, right, top or bottom.
     #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
     view: StandardView,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
     size: [u32; 2],
-    /// dark or light.
+    /// Theme: dark or light.
     #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
     theme: Theme,
-    /// Draw fingers and object as the other engine computes them too, translucent.
+    /// Overlay fingers and object as the other engine computes them, translucent.
     #[arg(long, conflicts_with = "trial")]
     ghost: bool,
     /// Leave out force arrows.
@@ -45,7 +49,7 @@ pub(super) struct SnapshotArguments {
     /// Leave out axis gizmo, scale bar and legend.
     #[arg(long)]
     bare: bool,
-    /// Where the picture goes.
+    /// PNG file to write.
     #[arg(long, value_name = "FILE.png")]
     out: PathBuf,
 }
@@ -73,9 +77,9 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<(), Failure> {
     let (stage, frame, badge) = match arguments.trial {
         Some(id) => stored(arguments, store, id)?,
-        None => simulated(arguments, Which::Own)?,
+        None => simulated(arguments, Engine::Own)?,
     };
-    let ghost = if arguments.ghost { Some(simulated(arguments, Which::Other)?.1) } else { None };
+    let ghost = if arguments.ghost { Some(simulated(arguments, Engine::Other)?.1) } else { None };
     let view = PictureView {
         camera: Camera::default().turned_to(arguments.view),
         theme: arguments.theme,
@@ -103,17 +107,17 @@ fn draw(list: &DrawList, size: [u32; 2], out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Which engine computes a picture: the scene's own, or the one to compare with.
+/// Engine to simulate with: that of the scene, or the other one.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Which {
+enum Engine {
     Own,
     Other,
 }
 
-/// Simulates up to the moment asked for.
-fn simulated(arguments: &SnapshotArguments, which: Which) -> Result<(Stage, Frame, String), Failure> {
+/// Simulates up to the time to draw.
+fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Frame, String), Failure> {
     let mut scene = arguments.scene.scene(arguments.object.as_deref())?;
-    if which == Which::Other {
+    if engine == Engine::Other {
         scene.solver.engine = scene.solver.engine.other();
     }
     let object = scene.load_object()?;
@@ -133,9 +137,8 @@ fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> R
     let store = open_store(store)?;
     if store.board_info(id)?.is_some() || store.readings(id)?.is_some() {
         let text = format!(
-            "trial {id} was not simulated: where its fingers and its object were is not known, so there is nothing to draw. \
-             `palpate trials show {id}` tells of it, `palpate trials export {id} --out FILE.csv` writes its traces, `palpate \
-             recognise {id}` says what it is of"
+            "trial {id} was not simulated, so there are no poses to draw. Use `palpate trials show {id}`, `palpate trials \
+             export {id} --out FILE.csv` or `palpate recognise {id}`"
         );
         return Err(text.into());
     }
@@ -144,6 +147,6 @@ fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> R
     let object = scene.load_object()?;
     let stage = Stage::new(&scene, object.as_ref(), trial.info.world_from_gripper);
     let frame = trial.frames.iter().rfind(|f| f.t <= arguments.at).or(trial.frames.first());
-    let frame = frame.cloned().ok_or_else(|| format!("trial {id} holds no samples"))?;
+    let frame = frame.cloned().ok_or_else(|| format!("trial {id} has no samples"))?;
     Ok((stage, frame, format!("TRIAL {id}, {}", if trial.info.rig == "sim" { "SIMULATED" } else { "RECORDED" })))
 }

@@ -1,4 +1,4 @@
-//! `palpate study`: experiments. One line here, and a file beside, for each.
+//! `palpate study`: experiments, one file each.
 
 mod stability;
 
@@ -6,19 +6,22 @@ use super::Failure;
 
 /// Arguments of `palpate study`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate study stability --quick
+  palpate study stability --steps 100000 --seed 2 --json")]
 pub(super) struct StudyArguments {
     #[command(subcommand)]
-    which: Which,
+    study: Study,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Which {
-    /// Hard cases at every accuracy, and random scenes computed twice: what fails, and what is wrong without a word.
+enum Study {
+    /// Run hard cases at every accuracy, and random scenes twice: failures, and silently wrong results.
     Stability(stability::StabilityArguments),
 }
 
 pub(super) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
-    match &arguments.which {
-        Which::Stability(arguments) => stability::run(arguments),
+    match &arguments.study {
+        Study::Stability(arguments) => stability::run(arguments),
     }
 }

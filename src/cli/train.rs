@@ -1,4 +1,4 @@
-//! `palpate train`: fits a recogniser to stored trials and saves it.
+//! `palpate train`: trains a recogniser on stored trials and saves it.
 
 use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
@@ -13,28 +13,35 @@ use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate train`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate train --list
+  palpate train ids-lstm --trials 50 --store set.sqlite --out mine.safetensors
+  palpate train macro-layer --collection mine --set epochs=50
+  palpate train macro-layer --rig serial
+
+See also: palpate help recognition")]
 pub(super) struct TrainArguments {
-    /// The method; `--list` shows them all.
+    /// Method; --list prints all.
     #[arg(required_unless_present = "list")]
     method: Option<String>,
-    /// List the methods and what they are.
+    /// List the methods.
     #[arg(long)]
     list: bool,
     #[command(flatten)]
     data: DataArguments,
-    /// Learn from at most this many trials of each object, oldest first.
+    /// Train on at most N trials of each object, oldest first.
     #[arg(long, value_name = "N")]
     trials: Option<usize>,
-    /// Change a setting, e.g. --set epochs=50 (may be repeated).
+    /// Set a hyperparameter, e.g. --set epochs=50 (may be repeated).
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<String>,
-    /// Print the method's settings and stop.
+    /// Print the hyperparameters of the method, then exit.
     #[arg(long)]
     print_settings: bool,
-    /// Try the stated grid of settings by cross-validation on the training trials first, and train with the best.
+    /// Search the method's grid of hyperparameters by cross-validation first, and train with the best.
     #[arg(long)]
     search: bool,
-    /// Where to save the model (.safetensors); its card is written beside it.
+    /// Model file to write (.safetensors), with its card beside it (default: in the models folder).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text.
@@ -42,9 +49,9 @@ pub(super) struct TrainArguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
-struct Trained<'a> {
+struct Report<'a> {
     model: &'a Path,
     method: &'a str,
     trials: usize,
@@ -59,13 +66,13 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     if arguments.list {
         let rows: Vec<Vec<String>> =
             METHODS.iter().map(|m| vec![m.key.to_owned(), m.title.to_owned(), m.about.to_owned()]).collect();
-        return table(&["method", "name", "what it is"], &rows);
+        return table(&["method", "name", "description"], &rows);
     }
     let method = known_method(arguments.method.as_deref().unwrap_or_default())?;
     if arguments.print_settings {
         return match method.recipe {
             Some(recipe) => say_json(&recipe()),
-            None => say("this method has no settings that can be changed"),
+            None => say("this method has no hyperparameters to set"),
         };
     }
     let store = open_store(store)?;
@@ -78,7 +85,7 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     }
     let out = arguments.out.clone().unwrap_or_else(|| models_folder().join(format!("{}.safetensors", method.key)));
     model.save(&out)?;
-    let trained = Trained {
+    let report = Report {
         model: &out,
         method: method.key,
         trials: data.examples.len(),
@@ -89,25 +96,25 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
         search,
     };
     if arguments.json {
-        return say_json(&trained);
+        return say_json(&report);
     }
     say(format!("method      {} ({})", method.title, method.key))?;
-    say(format!("data        {} trials: {}", trained.trials, trained.data))?;
-    say(format!("channels    {}", trained.channels.join(", ")))?;
-    say(format!("parameters  {}", trained.parameters))?;
-    say(format!("cost        {:.1} s CPU", trained.train_cpu_s))?;
+    say(format!("data        {} trials: {}", report.trials, report.data))?;
+    say(format!("channels    {}", report.channels.join(", ")))?;
+    say(format!("parameters  {}", report.parameters))?;
+    say(format!("cost        {:.1} s CPU", report.train_cpu_s))?;
     if model.card.rejection.is_none() {
-        say("unknown     never said: whatever is in the hand is named as one of these objects")?;
+        say("unknown     not supported: every grasp is assigned to one of these objects")?;
     }
     say(format!("saved       {}", out.display()))
 }
 
-/// Settings as the user wrote them: numbers, true or false.
+/// Parses hyperparameters: numbers, true or false.
 fn parse_settings(written: &[String]) -> Result<serde_json::Map<String, serde_json::Value>, Failure> {
     let parse = |text: &String| -> Result<(String, serde_json::Value), Failure> {
         let (name, value) = text.split_once('=').ok_or_else(|| format!("write --set NAME=VALUE, not \"{text}\""))?;
         let value = serde_json::from_str(value.trim())
-            .map_err(|_unread| format!("setting {name}: \"{value}\" is no number, true or false"))?;
+            .map_err(|_unread| format!("setting {name}: \"{value}\" is not a number, true or false"))?;
         Ok((name.trim().to_owned(), value))
     };
     written.iter().map(parse).collect()

@@ -1,4 +1,4 @@
-//! `palpate trials`: the store from the terminal.
+//! `palpate trials`: manages the store of trials.
 
 mod labels;
 mod show;
@@ -6,7 +6,7 @@ mod show;
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
-use labels::Labelling;
+use labels::LabelCommand;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::shown_name;
 use palpate_store::{
@@ -21,14 +21,24 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate trials`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate trials list --object lemon
+  palpate trials show 1
+  palpate trials export 1 2 3 --out csv/
+  palpate trials label 7 lemon
+  palpate trials discard 7
+  palpate trials undo
+  palpate trials merge part1.sqlite part2.sqlite --store set.sqlite
+
+See also: palpate help store, palpate help formats")]
 pub(super) struct TrialsArguments {
     #[command(subcommand)]
-    what: What,
+    command: TrialsCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
-    /// One line per trial, oldest first.
+enum TrialsCommand {
+    /// List trials, oldest first.
     List {
         /// Only trials of this object.
         #[arg(long)]
@@ -40,102 +50,102 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// What is known of one trial.
+    /// Show one trial: summary, effects, quality, labels.
     Show {
-        /// Its number.
+        /// Trial number.
         id: TrialId,
         /// Print JSON instead of text.
         #[arg(long)]
         json: bool,
     },
     #[command(flatten)]
-    Labels(Labelling),
-    /// Write trials as CSV, two files each; or with --labelled all labelled trials of the real gripper as a data set.
+    Labels(LabelCommand),
+    /// Export trials as CSV files; with --labelled, all labelled trials of the real gripper as a data set.
     Export {
-        /// Their numbers.
+        /// Trial numbers.
         #[arg(required_unless_present = "labelled")]
         ids: Vec<TrialId>,
-        /// All labelled trials of the real gripper into a new folder: trials.csv lists them, signals.csv is what `palpate trials
-        /// import` takes, raw/ has counts and bytes.
+        /// Export all labelled trials of the real gripper to a new folder: trials.csv (list), signals.csv (for `palpate trials
+        /// import`) and raw/ (counts and bytes).
         #[arg(long, conflicts_with_all = ["ids", "layout", "hull", "unsound"])]
         labelled: bool,
-        /// A folder, or for a single trial a file.
+        /// Folder, or file for a single trial.
         #[arg(long, value_name = "PATH")]
         out: PathBuf,
-        /// Sensor layout: C1 to C8, each also as C1+F.
+        /// Sensor layout: C1 to C8, each also with force, as C1+F.
         #[arg(long, value_name = "NAME", default_value = "C1+F")]
         layout: String,
         /// Divide force by the convex hull of the contacts, as the paper does.
         #[arg(long)]
         hull: bool,
-        /// Write trials that did not stay finite or did not converge as well.
+        /// Include trials that diverged or did not converge.
         #[arg(long)]
         unsound: bool,
     },
-    /// Take in grasps that were recorded elsewhere, from CSV files with the columns trial, label, t_s and any channels.
+    /// Import grasps from CSV files with the columns trial, label, t_s and any channels.
     Import {
-        /// The files. Columns `size` (tiny, large) and `shape` (cubic, cylindrical, spherical) teach stage one.
+        /// CSV files. Optional columns for stage one: size (tiny, large), shape (cubic, cylindrical, spherical).
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
     },
-    /// Copy the trials of other stores into this one; what is here already is not copied again.
+    /// Copy trials from other stores into this one, without duplicates.
     Merge {
-        /// The other stores.
+        /// Stores to copy from.
         #[arg(required = true, value_name = "FILE")]
         stores: Vec<PathBuf>,
     },
-    /// Mark trials as deleted: no list shows them and no data set takes them; `restore` or `undo` takes it back.
+    /// Mark trials as deleted: lists and data sets exclude them; `restore` or `undo` brings them back.
     #[command(visible_alias = "discard")]
     Delete {
-        /// Their numbers.
+        /// Trial numbers.
         #[arg(required = true)]
         ids: Vec<TrialId>,
     },
-    /// Bring deleted trials back.
+    /// Restore deleted trials.
     Restore {
-        /// Their numbers.
+        /// Trial numbers.
         #[arg(required = true)]
         ids: Vec<TrialId>,
     },
-    /// Remove all deleted trials for good.
+    /// Remove all deleted trials permanently.
     Purge,
 }
 
 pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(), Failure> {
     let mut store = open_store(store)?;
-    match &arguments.what {
-        What::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
-        What::Show { id, json } => show::show(&store, *id, *json),
-        What::Labels(labelling) => labels::run(labelling, &mut store),
-        What::Export { labelled: true, out, .. } => labels::export(&store, out),
-        What::Export { ids, out, layout, hull, unsound, .. } => {
+    match &arguments.command {
+        TrialsCommand::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
+        TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
+        TrialsCommand::Labels(command) => labels::run(command, &mut store),
+        TrialsCommand::Export { labelled: true, out, .. } => labels::export(&store, out),
+        TrialsCommand::Export { ids, out, layout, hull, unsound, .. } => {
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
             export(&store, &ids, out, &SensorLayout::named(layout)?, area)
         }
-        What::Import { files } => {
+        TrialsCommand::Import { files } => {
             for file in files {
                 import(&mut store, file)?;
             }
             Ok(())
         }
-        What::Merge { stores } => {
+        TrialsCommand::Merge { stores } => {
             for other in stores {
                 let merged = store.merge_from(other)?;
                 let (added, known) = (merged.added, merged.known);
-                say(format!("{}: {added} trial(s) added, {known} were here already", other.display()))?;
+                say(format!("{}: {added} trial(s) added, {known} already there", other.display()))?;
             }
             Ok(())
         }
-        What::Delete { ids } => {
+        TrialsCommand::Delete { ids } => {
             store.delete(ids)?;
             say(format!("deleted {} trial(s); `palpate trials restore` brings them back", ids.len()))
         }
-        What::Restore { ids } => {
+        TrialsCommand::Restore { ids } => {
             store.restore(ids)?;
             say(format!("restored {} trial(s)", ids.len()))
         }
-        What::Purge => say(format!("removed {} trial(s) for good", store.purge()?)),
+        TrialsCommand::Purge => say(format!("removed {} trial(s) permanently", store.purge()?)),
     }
 }
 
@@ -147,7 +157,7 @@ fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
     let collection = file.file_stem().map_or_else(|| "import".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let added = store.insert_imported(&collection, &import.trials)?;
     let known = import.trials.len() - added as usize;
-    say(format!("{}: {added} trial(s) added as collection {collection}, {known} were here already", file.display()))
+    say(format!("{}: {added} trial(s) added as collection {collection}, {known} already there", file.display()))
 }
 
 fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Result<(), Failure> {
@@ -173,7 +183,7 @@ fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Resul
             ]
         })
         .collect();
-    table(&["id", "object", "recorded (UTC)", "from", "samples", "seed", ""], &cells)
+    table(&["id", "object", "recorded (UTC)", "gripper", "samples", "seed", ""], &cells)
 }
 
 fn remark(row: &TrialRow) -> String {
@@ -185,7 +195,7 @@ fn remark(row: &TrialRow) -> String {
         remarks.push("interrupted or still recording".to_owned());
     }
     if !row.sound {
-        remarks.push("not sound: no data set takes it".to_owned());
+        remarks.push("unsound: data sets exclude it".to_owned());
     }
     if row.warnings > 0 {
         remarks.push(format!("{} warning(s)", row.warnings));
@@ -207,7 +217,7 @@ fn scene_of(trial: &Trial) -> Result<Scene, Failure> {
     Ok(Scene::from_toml(&trial.info.scene)?)
 }
 
-/// Those of the trials that may be learned from: a CSV file says nothing of the others' flaws.
+/// Excludes unsound trials, whose flaws a CSV file would not show.
 fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
     let unsound: BTreeSet<TrialId> = store.list(false)?.iter().filter(|row| !row.sound).map(|row| row.id).collect();
     let (left_out, kept): (Vec<TrialId>, Vec<TrialId>) = ids.iter().partition(|id| unsound.contains(id));
@@ -215,8 +225,7 @@ fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
         return Ok(kept);
     }
     let list: Vec<String> = left_out.iter().map(ToString::to_string).collect();
-    let text =
-        format!("trial {} left out: it did not stay finite or did not converge (--unsound writes it)", list.join(", "));
+    let text = format!("trial {} excluded: diverged or did not converge (--unsound includes it)", list.join(", "));
     if kept.is_empty() {
         return Err(text.into());
     }

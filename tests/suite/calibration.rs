@@ -250,7 +250,7 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     // The part is known to sit there now.
     let text = run(at, &["calibrate", "flexL", "--points", "strip.csv"]);
     assert!(
-        text.code == Some(0) && text.out.contains("version 2 of \"A7\", which is now the left flex strip"),
+        text.code == Some(0) && text.out.contains("version 2 of \"A7\", mounted as the left flex strip"),
         "{text:?}"
     );
     assert_eq!(run(at, &["calibrate", "fsrL", "--part", "P1", "--points", "pad.csv", "--dry-run"]).code, Some(0));
@@ -260,7 +260,7 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     let close = ["--empty-close", "3.5", "--auto", "--dry-run", "--json", "--port"];
     let learned = json(at, &[&pad[..], &close, &["close.bytes"]].concat());
     assert!(learned["bending"]["knots"].as_array().unwrap().len() > 3, "{learned}");
-    refused(at, &[&pad[..], &["--port", "close.bytes"]].concat(), &["--port is of no use", "--empty-close"]);
+    refused(at, &[&pad[..], &["--port", "close.bytes"]].concat(), &["--port has no effect", "--empty-close"]);
     let listed = json(at, &["calibrate", "list", "--json"]);
     assert_eq!((listed["calibrations"].as_array().unwrap().len(), &listed["mounted"]["flexL"]), (2, &"A7".into()));
     assert_eq!(run(at, &["calibrate", "export", "--out", "c.json"]).code, Some(0));
@@ -270,7 +270,7 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     let mut other = palpate(&at.join("other.sqlite"));
     let taken = ran(&other.args(["calibrate", "import", "c.json", "c.json"]).current_dir(at).output().unwrap());
     assert!(
-        taken.code == Some(0) && taken.out.contains("2 calibration(s) added") && taken.out.contains("2 were here"),
+        taken.code == Some(0) && taken.out.contains("2 calibration(s) added") && taken.out.contains("2 already there"),
         "{taken:?}"
     );
     let mounted = run(at, &["calibrate", "mount", "flexR", "A9"]);
@@ -322,7 +322,7 @@ fn a_captured_stream_is_calibrated_hands_free() {
     let flat = made["curve"]["flex"]["flat_ohm"].as_f64().unwrap();
     assert!((flat / parts.strips[1].part.flat_ohm - 1.0).abs() < 0.01, "{flat}");
     let missing = [&arguments[..8], &["0,50,90,10"]].concat();
-    refused(at, &missing, &["over before all points were taken"]);
+    refused(at, &missing, &["ended before all points were recorded"]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What the program prints and how it exits, run as a user would run it.
 
 use crate::program::{json, palpate, ran, refused, run};
+use palpate::manual::TOPICS;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Effect;
 use palpate_store::Store;
@@ -65,7 +66,7 @@ fn a_scene_is_explained_effect_by_effect() {
 fn text_results_go_to_standard_output_and_warnings_beside() {
     let folder = folder();
     let ran = run(folder.path(), &["grasp", "empty", "--set", "effects.finger-contact=off"]);
-    assert!(ran.out.contains("first contact never") && ran.out.contains("stored        trial 1"), "{ran:?}");
+    assert!(ran.out.contains("first contact none") && ran.out.contains("stored        trial 1"), "{ran:?}");
     assert!(ran.err.starts_with("warning: the fingers pass"), "{ran:?}");
 }
 
@@ -285,10 +286,39 @@ fn a_data_set_survives_a_kill_and_is_joined_from_parts() {
 }
 
 #[test]
-fn every_command_teaches() {
+fn help_lists_and_prints_topics_and_commands() {
     let folder = folder();
-    for command in ["grasp", "collect", "train", "evaluate", "recognise", "snapshot", "demo", "trials", "bench"] {
-        let ran = run(folder.path(), &[command, "--help"]);
-        assert!(ran.code == Some(0) && ran.out.contains("Usage:") && ran.out.lines().count() > 8, "{ran:?}");
+    let at = folder.path();
+    let list = run(at, &["help"]);
+    assert!(list.code == Some(0) && list.err.is_empty(), "{list:?}");
+    for topic in TOPICS {
+        let summary = topic.summary().split([':', '.']).next().unwrap();
+        assert!(list.out.contains(&format!("\n  {}", topic.name)) && list.out.contains(summary), "{list:?}");
+        let page = run(at, &["help", topic.name]);
+        assert!(page.code == Some(0) && page.out.contains(summary) && page.out.lines().count() > 10, "{page:?}");
+        assert!(!page.out.contains('\x1b') && page.err.is_empty(), "emphasis belongs to a terminal: {page:?}");
+    }
+    for command in ["grasp", "collect", "train", "evaluate", "recognise", "snapshot", "demo", "trials", "bench", "help"]
+    {
+        let long = run(at, &[command, "--help"]);
+        assert!(long.code == Some(0) && long.out.contains("Usage:") && long.out.contains("Examples:"), "{long:?}");
+        assert_eq!(run(at, &["help", command]).out, long.out);
+    }
+    assert_eq!(run(at, &["help", "trials", "label"]).out, run(at, &["trials", "label", "--help"]).out);
+    for (wrong, nearest) in
+        [(&["help", "scnes"][..], "scenes"), (&["help", "grsp"], "grasp"), (&["help", "trials", "lable"], "label")]
+    {
+        let ran = run(at, wrong);
+        assert!(ran.code == Some(2) && ran.out.is_empty() && ran.err.contains(&format!("'{nearest}'")), "{ran:?}");
+    }
+}
+
+#[test]
+fn the_readme_is_short_and_begins_with_two_commands() {
+    let readme = include_str!("../../README.md");
+    assert!(readme.lines().count() <= 150, "the manual belongs into assets/help");
+    assert!(readme.contains("\n    cargo run --release ") && readme.contains("\n    cargo test "));
+    for topic in TOPICS.iter().filter(|topic| topic.name != "start") {
+        assert!(readme.contains(topic.name), "the README does not name {}", topic.name);
     }
 }

@@ -91,7 +91,7 @@ fn an_afternoon_of_labels_from_the_terminal() {
         assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");
         ran.out
     };
-    assert!(said(&["trials", "undo"]).contains("taken back: trial 1: label unlabelled -> lemmon"));
+    assert!(said(&["trials", "undo"]).contains("undone: trial 1: label unlabelled -> lemmon"));
     assert!(said(&["trials", "label", "1", "lemon", "--unsure"]).contains("lemon, unsure"));
     said(&["trials", "note", "1", "slipped at the end"]);
     said(&["trials", "tag", "1", "wet", "late"]);
@@ -99,7 +99,7 @@ fn an_afternoon_of_labels_from_the_terminal() {
     assert!(list.contains("unsure, [wet, late], \"slipped at the end\""), "{list}");
     said(&["trials", "discard", "2"]);
     assert!(said(&["trials", "undo"]).contains("trial 2: discarded"));
-    assert!(said(&["trials", "redo"]).contains("no longer taken back"));
+    assert!(said(&["trials", "redo"]).contains("redone: "));
     said(&["trials", "delete", "1"]);
     refused(at, &["trials", "label", "1", "ball"], &["trial 1", "restore"]);
     said(&["trials", "restore", "1"]);

@@ -206,7 +206,7 @@ fn a_port_that_another_program_has_is_waited_for() {
     std::thread::sleep(Duration::from_millis(1500));
     drop(other);
     let recorded = ran(&waits.wait_with_output().unwrap());
-    assert!(recorded.code == Some(0) && recorded.err.contains("tried each second"), "{recorded:?}");
+    assert!(recorded.code == Some(0) && recorded.err.contains("retrying each second"), "{recorded:?}");
     let told: Value = serde_json::from_str(&recorded.out).unwrap();
     assert!(told["samples"].as_u64() > Some(30) && told["baud"] == 115_200, "{told}");
 }

@@ -1,5 +1,5 @@
-//! Calibrating with the board connected: asks for the next angle or weight, watches until the reading has settled, and takes it
-//! when told to, or by itself.
+//! Guided calibration with the board connected: asks for the next angle or weight, waits until the reading has settled, and
+//! records the point on Enter or automatically.
 
 use super::super::Failure;
 use super::super::link;
@@ -16,31 +16,30 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-/// Where the readings come from, and who says when.
+/// Source of the readings, and how points are recorded.
 #[derive(Debug, clap::Args)]
 pub(super) struct LiveArguments {
-    /// The port of the board, or a file of captured bytes; the only likely port where it is left out.
+    /// Port, or file of captured bytes (default: the only likely port).
     #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
-    /// Angles (degrees) or weights (kg) to set, separated by commas, instead of the usual ones.
+    /// Angles (degrees) or weights (kg), separated by commas (default: 0, 30, 60, 90 degrees; weights up to 0.5 kg).
     #[arg(long, value_name = "A,B,..", value_delimiter = ',', conflicts_with = "points")]
     plan: Vec<f64>,
-    /// Take each point by itself, as soon as the reading has changed and settled; without it, Enter takes it.
+    /// Record each point automatically once the reading has changed and settled, instead of on Enter.
     #[arg(long)]
     auto: bool,
-    /// Of a pad: watch the empty hand close for so many seconds afterwards, to learn how its zero moves with bending. The
-    /// strip of the same finger must be calibrated.
+    /// Pads only: then record an empty close of this duration, to measure how bending shifts the zero. The strip of the same
+    /// finger must be calibrated.
     #[arg(long, value_name = "S", value_parser = parse_seconds)]
     pub(super) empty_close: Option<f64>,
 }
 
 impl LiveArguments {
-    /// Where points come from a file, the board is only needed for an empty close.
+    /// Refuses live arguments where points come from a file and there is no empty close.
     pub(super) fn refuse_beside_points(&self) -> Result<(), Failure> {
         let given = [("--port", self.port.is_some()), ("--auto", self.auto)].into_iter().find(|(_, given)| *given);
         given.map_or(Ok(()), |(name, _)| {
-            Err(format!("{name} is of no use here: the points come from a file. Leave it out, or add --empty-close")
-                .into())
+            Err(format!("{name} has no effect: the points come from a file. Leave it out, or add --empty-close").into())
         })
     }
 }
@@ -50,24 +49,24 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "write a number of seconds from 1 to 600".to_owned())
 }
 
-/// How long a board may take to say what it is (s).
+/// How long to wait for the first readings (s).
 const PATIENCE_S: f64 = 8.0;
 
-/// How long a hands-free procedure waits for a change (s).
+/// How long an automatic procedure waits for a change (s).
 const AUTO_PATIENCE_S: f64 = 60.0;
 
-/// The board, and whoever sits at the keyboard.
+/// The board and the keyboard.
 struct Bench {
     link: SerialLink,
     keys: Receiver<String>,
     shows_progress: bool,
     state: LinkState,
-    /// Readings that came and were not looked at yet.
+    /// Readings received and not yet processed.
     pending: VecDeque<Reading>,
 }
 
-/// What was typed.
-enum Wish {
+/// A typed command.
+enum Input {
     Take(Option<f64>),
     Skip,
     Undo,
@@ -94,10 +93,10 @@ pub(super) fn record(
         procedure = procedure.with_plan(&plan);
     }
     note(&format!(
-        "calibrating \"{part}\", the {}; Enter takes a point, a number takes it as that angle or weight,",
+        "Calibrating \"{part}\", the {}. Enter records a point; a number records it as that angle or weight;",
         sensor.label()
     ));
-    note("s leaves it out, u takes the last one back, q ends");
+    note("s skips it, u undoes the last one, q quits.");
     while procedure.next().is_some() {
         bench.one_point(&mut procedure, live.auto)?;
     }
@@ -108,7 +107,7 @@ pub(super) fn record(
     }
 }
 
-/// A pad whose points are known already, with the zero that bending gives it.
+/// Adds an empty close to a pad whose points come from a file.
 pub(super) fn watch_empty_close(
     live: &LiveArguments,
     seconds: f64,
@@ -135,7 +134,7 @@ fn with_empty_close(
     Ok(Record { bending: Some(bench.empty_close(close, auto)?), ..record })
 }
 
-/// The board, and what it sends for some seconds.
+/// Listens for some seconds; returns the board and its readings.
 pub(super) fn watch(port: Option<&Path>, seconds: f64) -> Result<(Board, Vec<Reading>), Failure> {
     let mut bench = Bench::open(port, true)?;
     bench.board()?;
@@ -143,7 +142,7 @@ pub(super) fn watch(port: Option<&Path>, seconds: f64) -> Result<(Board, Vec<Rea
     let start = Instant::now();
     while readings.last().zip(readings.first()).is_none_or(|(last, first)| last.t_s - first.t_s < seconds) {
         if start.elapsed().as_secs_f64() > seconds + PATIENCE_S {
-            return Err(format!("the board fell silent. {}", bench.state.sentence()).into());
+            return Err(format!("the board stopped sending. {}", bench.state.sentence()).into());
         }
         bench.listen()?;
         readings.extend(bench.pending.drain(..));
@@ -168,7 +167,7 @@ impl Bench {
         })
     }
 
-    /// What the board is, once enough was heard of it.
+    /// Waits until the channels of the board are known.
     fn board(&mut self) -> Result<Board, Failure> {
         let start = Instant::now();
         loop {
@@ -180,13 +179,13 @@ impl Bench {
                 return Ok(self.link.status().board);
             }
             if start.elapsed().as_secs_f64() > PATIENCE_S {
-                let said = self.link.status().state.sentence();
-                return Err(format!("no readings from the board within {PATIENCE_S:.0} s. {said}").into());
+                let state = self.link.status().state.sentence();
+                return Err(format!("no readings from the board within {PATIENCE_S:.0} s. {state}").into());
             }
         }
     }
 
-    /// Takes in what has come since the last call; says when the link changes its state.
+    /// Receives readings; reports changes of the link.
     fn listen(&mut self) -> Result<(), Failure> {
         let events = self.link.take(Duration::from_millis(100));
         let state = self.link.status().state;
@@ -197,9 +196,7 @@ impl Bench {
             self.state = state;
         }
         if events.is_empty() && self.pending.is_empty() && self.link.is_over() {
-            return Err(
-                format!("the board's stream is over before all points were taken. {}", self.state.sentence()).into()
-            );
+            return Err(format!("the stream ended before all points were recorded. {}", self.state.sentence()).into());
         }
         let reading = |event| match event {
             LinkEvent::Heard(Heard::Reading(reading)) => Some(reading),
@@ -209,39 +206,37 @@ impl Bench {
         Ok(())
     }
 
-    fn wish(&self) -> Result<Option<Wish>, Failure> {
+    fn input(&self) -> Result<Option<Input>, Failure> {
         let line = match self.keys.try_recv() {
             Ok(line) => line,
             Err(TryRecvError::Empty) => return Ok(None),
             Err(TryRecvError::Disconnected) => {
-                return Err(
-                    "standard input has ended: nobody is there to set angles or weights; --auto needs nobody".into()
-                );
+                return Err("standard input has ended; use --auto to record without a keyboard".into());
             }
         };
         Ok(match line.trim() {
-            "" => Some(Wish::Take(None)),
-            "s" => Some(Wish::Skip),
-            "u" => Some(Wish::Undo),
-            "q" => Some(Wish::Quit),
+            "" => Some(Input::Take(None)),
+            "s" => Some(Input::Skip),
+            "u" => Some(Input::Undo),
+            "q" => Some(Input::Quit),
             text => match text.parse::<f64>() {
-                Ok(number) => Some(Wish::Take(Some(number))),
+                Ok(number) => Some(Input::Take(Some(number))),
                 Err(_) => {
-                    warn(&format!("\"{text}\" is not understood: Enter, a number, s, u or q"));
+                    warn(&format!("unknown input \"{text}\": press Enter, or type a number, s, u or q"));
                     None
                 }
             },
         })
     }
 
-    /// One step of the procedure: a point taken, left out or taken back.
+    /// Runs one step of the procedure: records, skips or undoes a point.
     fn one_point(&mut self, procedure: &mut Procedure, auto: bool) -> Result<(), Failure> {
         let Some(planned) = procedure.next() else { return Ok(()) };
         let kind = procedure.record().kind;
         note(&format!("{} ({} left)", procedure.instruction(), procedure.left()));
         let start = Instant::now();
         loop {
-            // One by one, so that a hands-free procedure sees each plateau however fast the stream is.
+            // One by one, so that an automatic procedure sees each plateau however fast the stream is.
             self.listen()?;
             procedure.see(&self.link.status().board);
             while let Some(reading) = self.pending.pop_front() {
@@ -253,39 +248,41 @@ impl Bench {
             self.show(procedure);
             if auto {
                 if start.elapsed().as_secs_f64() > AUTO_PATIENCE_S {
-                    let why =
-                        procedure.settled().err().map_or_else(|| "nothing has changed".to_owned(), |e| e.to_string());
-                    return Err(format!("{} was not seen: {why}", kind.told(planned)).into());
+                    let why = procedure
+                        .settled()
+                        .err()
+                        .map_or_else(|| "the reading did not change".to_owned(), |e| e.to_string());
+                    return Err(format!("no point at {}: {why}", kind.told(planned)).into());
                 }
                 continue;
             }
-            match self.wish()? {
+            match self.input()? {
                 None => {}
-                Some(Wish::Take(number)) => {
+                Some(Input::Take(number)) => {
                     let stimulus = number.map_or(planned, |number| kind.stimulus(number));
                     match self.take(procedure, stimulus) {
                         Ok(()) => return Ok(()),
                         Err(why) => {
                             self.clear_line();
-                            warn(&format!("{} is not taken: {why}", kind.told(stimulus)));
+                            warn(&format!("{} not recorded: {why}", kind.told(stimulus)));
                         }
                     }
                 }
-                Some(Wish::Skip) => {
+                Some(Input::Skip) => {
                     procedure.skip();
                     return Ok(());
                 }
-                Some(Wish::Undo) => {
+                Some(Input::Undo) => {
                     let undone = procedure.undo().map(|point| kind.told(point.stimulus));
                     note(
                         &undone.map_or_else(
-                            || "there is no point yet".to_owned(),
-                            |at| format!("{at} is to be taken again"),
+                            || "no point to undo".to_owned(),
+                            |at| format!("{at} removed: record it again"),
                         ),
                     );
                     return Ok(());
                 }
-                Some(Wish::Quit) => return Err("ended by you; nothing was stored".into()),
+                Some(Input::Quit) => return Err("cancelled; nothing was stored".into()),
             }
         }
     }
@@ -298,7 +295,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The reading as it stands, on a line that is written over; nothing where nobody looks.
+    /// Shows the present reading on a line that is overwritten, on a terminal only.
     fn show(&self, procedure: &Procedure) {
         if !self.shows_progress {
             return;
@@ -317,12 +314,12 @@ impl Bench {
         }
     }
 
-    /// How the zero of a pad moves while its finger bends.
+    /// Measures how bending shifts the zero of a pad.
     fn empty_close(&mut self, mut close: EmptyClose, auto: bool) -> Result<BendingZero, Failure> {
         note(&close.instruction());
         if !auto {
-            note("press Enter and begin");
-            while self.wish()?.is_none() {
+            note("Press Enter, then close the hand");
+            while self.input()?.is_none() {
                 self.listen()?;
             }
             self.pending.clear();

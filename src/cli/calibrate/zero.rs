@@ -1,4 +1,4 @@
-//! Where zero is: `palpate calibrate tare` takes it now, `palpate calibrate drift` shows how it has wandered.
+//! Zeros: `palpate calibrate tare` stores the present ones, `palpate calibrate drift` shows those of stored trials.
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
@@ -13,13 +13,13 @@ use std::path::PathBuf;
 /// Arguments of `palpate calibrate tare`.
 #[derive(Debug, clap::Args)]
 pub(super) struct TareArguments {
-    /// The port of the board, or a file of captured bytes; the only likely port where it is left out.
+    /// Port, or file of captured bytes (default: the only likely port).
     #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
-    /// For how long the hand is watched at rest (s).
+    /// Duration of the measurement at rest (s).
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds)]
     seconds: f64,
-    /// Show where zero is, and store nothing.
+    /// Print the zeros without storing them.
     #[arg(long)]
     dry_run: bool,
     /// Print JSON instead of text.
@@ -30,7 +30,7 @@ pub(super) struct TareArguments {
 /// Arguments of `palpate calibrate drift`.
 #[derive(Debug, clap::Args)]
 pub(super) struct DriftArguments {
-    /// Numbers of trials of the real gripper; all of them where there are none.
+    /// Trial numbers (default: all trials of the real gripper).
     trials: Vec<TrialId>,
     /// Print JSON instead of a table.
     #[arg(long)]
@@ -42,11 +42,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "write a number of seconds from 0.3 to 60".to_owned())
 }
 
-/// What `tare --json` prints.
+/// Output of `tare --json`.
 #[derive(Serialize)]
-struct Taken {
+struct TareReport {
     drift: Vec<Drift>,
-    /// Absent where nothing was stored.
+    /// Stored zero; none with `--dry-run`.
     stored: Option<StoredTare>,
     warnings: Vec<String>,
 }
@@ -55,7 +55,7 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
     let serving = store.serving(None, &[])?;
     if serving.calibrations.is_empty() {
         let why = serving.warnings.first().cloned().unwrap_or_default();
-        return Err(format!("no part that sits in the gripper is calibrated, so that there is no zero: {why}").into());
+        return Err(format!("no mounted part is calibrated, so there is no zero: {why}").into());
     }
     let (board, readings) = guided::watch(arguments.port.as_deref(), arguments.seconds)?;
     let readout = Readout::new(&board, &serving.calibrations)?;
@@ -64,38 +64,38 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
     let stored = if arguments.dry_run { None } else { Some(store.add_tare(&zero)?) };
     let warnings = [readout.warnings(), &serving.warnings].concat();
     if arguments.json {
-        return say_json(&Taken { drift, stored, warnings });
+        return say_json(&TareReport { drift, stored, warnings });
     }
     let rows: Vec<Vec<String>> = drift
         .iter()
         .map(|drift| vec![drift.sensor.label().to_owned(), drift.told(), drift.badge().to_owned(), to_do(drift)])
         .collect();
-    table(&["at rest", "moved", "", ""], &rows)?;
+    table(&["sensor", "drift", "", ""], &rows)?;
     warnings.iter().for_each(|warning| warn(warning));
     match stored {
         None => say("not stored"),
         Some(stored) => {
             let versions = stored.parts.iter().map(|part| format!("\"{}\" version {}", part.part, part.version));
             let versions: Vec<String> = versions.collect();
-            say(format!("stored as the zero of {}, until they are calibrated anew", versions.join(", ")))
+            say(format!("stored as the zero of {}, until their next calibration", versions.join(", ")))
         }
     }
 }
 
-/// What to do about a zero that has moved.
+/// Advice for a drifted zero.
 fn to_do(drift: &Drift) -> String {
     let what = match (drift.level, drift.sensor.is_flex()) {
         (DriftLevel::Steady, _) => "nothing to do",
-        (DriftLevel::Moved, _) => "corrected from now on; calibrate again if it goes on moving",
-        (DriftLevel::TooFar, true) => "not corrected: straighten the finger, or look whether the strip has slipped",
-        (DriftLevel::TooFar, false) => "not corrected: free the pad, or look whether it is pinched",
+        (DriftLevel::Moved, _) => "corrected from now on; calibrate again if it drifts further",
+        (DriftLevel::TooFar, true) => "not corrected: straighten the finger, or check whether the strip has slipped",
+        (DriftLevel::TooFar, false) => "not corrected: free the pad, or check whether it is pinched",
     };
     what.to_owned()
 }
 
-/// What `drift --json` prints of each trial.
+/// One trial in the output of `drift --json`.
 #[derive(Serialize)]
-struct Row {
+struct DriftRow {
     trial: TrialId,
     created: String,
     object: String,
@@ -103,24 +103,24 @@ struct Row {
 }
 
 pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Failure> {
-    let rows: Vec<Row> = store
+    let rows: Vec<DriftRow> = store
         .list(false)?
         .into_iter()
         .filter(|row| row.rig == BOARD_RIG && (arguments.trials.is_empty() || arguments.trials.contains(&row.id)))
-        .map(|row| -> Result<Row, Failure> {
+        .map(|row| -> Result<DriftRow, Failure> {
             let read = store.board_signals(row.id, &[])?;
             let drift = read.map_or_else(Vec::new, |read| read.derived.drift);
-            Ok(Row { trial: row.id, created: row.created, object: row.object, drift })
+            Ok(DriftRow { trial: row.id, created: row.created, object: row.object, drift })
         })
         .collect::<Result<_, _>>()?;
     if let Some(id) = arguments.trials.iter().find(|id| rows.iter().all(|row| row.trial != **id)) {
-        return Err(format!("there is no trial {id} of the real gripper: `palpate trials list` shows them").into());
+        return Err(format!("no trial {id} of the real gripper: see `palpate trials list`").into());
     }
     if arguments.json {
         return say_json(&rows);
     }
     if rows.is_empty() {
-        return say("no trials of the real gripper yet: `palpate record` makes one");
+        return say("no trials of the real gripper yet: `palpate record` records one");
     }
     let cells: Vec<Vec<String>> = rows
         .iter()
@@ -137,7 +137,7 @@ pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Fai
     if let Some(tare) = store.tare()? {
         for part in &tare.parts {
             let date = part.taken.chars().take(19).collect::<String>().replace('T', " ");
-            say(format!("\"{}\", the {}: tare {} of {date} serves", part.part, part.sensor.label(), part.version))?;
+            say(format!("\"{}\", the {}: tare {} of {date} applies", part.part, part.sensor.label(), part.version))?;
         }
     }
     Ok(())

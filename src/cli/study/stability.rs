@@ -1,4 +1,4 @@
-//! `palpate study stability`: the hard-case table and the random scenes.
+//! `palpate study stability`: hard cases and random scenes.
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table};
@@ -9,13 +9,13 @@ use serde::Serialize;
 /// Arguments of `palpate study stability`.
 #[derive(Debug, clap::Args)]
 pub(super) struct StabilityArguments {
-    /// Seconds instead of minutes: draft and standard only, short runs, few random steps.
+    /// Take seconds instead of minutes: draft and standard only, short runs, few random steps.
     #[arg(long)]
     quick: bool,
-    /// Random steps, before the finer ones that check them (default: 1000000, with --quick 20000).
+    /// Number of random steps, without the finer ones that check them (default: 1000000, with --quick 20000).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     steps: Option<u64>,
-    /// Other seeds give other random scenes.
+    /// Random seed of the scenes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Print one JSON object instead of tables.
@@ -23,13 +23,13 @@ pub(super) struct StabilityArguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Report {
-    /// Cases by settings.
+    /// One row per case and setting.
     table: Vec<CaseRow>,
     random: RandomReport,
-    /// Share of the random scenes that have a right answer and were silently given another.
+    /// Share of silently wrong results among the random scenes that have a correct one.
     silently_wrong_rate: f64,
 }
 
@@ -37,7 +37,6 @@ const STEPS: u64 = 1_000_000;
 const QUICK_STEPS: u64 = 20_000;
 
 pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
-    // It draws on standard error, and only on a terminal.
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?;
     let bar = ProgressBar::new(0).with_style(style);
     let accuracies = if arguments.quick { QUICK_ACCURACIES } else { &ACCURACIES };
@@ -65,30 +64,32 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
     if arguments.json {
         say_json(&report)?;
     } else {
-        tell(&report)?;
+        print(&report)?;
     }
     match report.table.iter().filter(|row| !row.holds).count() + report.random.non_finite {
         0 => Ok(()),
-        failed => Err(format!("{failed} hard case(s) or random scene(s) do not hold").into()),
+        failed => Err(format!("{failed} hard case(s) or random scene(s) failed").into()),
     }
 }
 
-fn tell(report: &Report) -> Result<(), Failure> {
+fn print(report: &Report) -> Result<(), Failure> {
     let cells: Vec<Vec<String>> = report.table.iter().map(cells_of).collect();
-    table(&["case", "setting", "nearest its limit", "measured", "limit", ""], &cells)?;
+    table(&["case", "setting", "closest to its limit", "measured", "limit", ""], &cells)?;
     let random = &report.random;
     say("")?;
-    say(format!("random scenes {} of seed {}, {} steps", random.scenes, random.seed, random.steps))?;
-    say(format!("              {} steps more to check them at h/4", random.finer_steps))?;
+    say(format!("random scenes {} (seed {}), {} steps", random.scenes, random.seed, random.steps))?;
+    say(format!("              {} finer steps (h/4) to check them", random.finer_steps))?;
     say(format!("not finite    {} scenes", random.non_finite))?;
     say(format!("not converged {} steps", random.missed_steps))?;
     say(format!("Newton        {:.2} iterations per step, {} at most", random.newton_mean, random.newton_max))?;
     let (p99, most) = (random.friction_residual_p99, random.friction_residual_max);
     say(format!("friction      residual {p99:.3} at the 99th percentile, {most:.3} at most"))?;
     let (wrong, no_answer) = (random.wrong, random.no_answer);
-    say(format!("answers       {wrong} change at h/4, {no_answer} of these with a push of 1 um as well"))?;
+    say(format!(
+        "results       {wrong} change at h/4, {no_answer} of these also with a push of 1 um (ill-conditioned)"
+    ))?;
     let rate = 100.0 * report.silently_wrong_rate;
-    say(format!("silently      {} wrong ({rate:.2} % of those that have an answer)", random.silently_wrong))?;
+    say(format!("silently wrong {} ({rate:.2} % of the well-conditioned ones)", random.silently_wrong))?;
     say("")?;
     let mut shortest = 0.0;
     let steps: Vec<Vec<String>> = random
@@ -101,7 +102,7 @@ fn tell(report: &Report) -> Result<(), Failure> {
             [vec![range], counts.to_vec()].concat()
         })
         .collect();
-    table(&["step ms", "scenes", "change at h/4", "no answer", "silently wrong"], &steps)?;
+    table(&["step ms", "scenes", "change at h/4", "ill-conditioned", "silently wrong"], &steps)?;
     say("")?;
     let flags: Vec<Vec<String>> = random
         .flags
@@ -111,13 +112,13 @@ fn tell(report: &Report) -> Result<(), Failure> {
             vec![row.flag.clone(), percent(row.recall), percent(row.false_alarms)]
         })
         .collect();
-    table(&["flag", "wrong caught %", "right suspected %"], &flags)
+    table(&["flag", "wrong detected %", "false alarms %"], &flags)
 }
 
 fn cells_of(row: &CaseRow) -> Vec<String> {
-    let verdict = if row.holds { "holds" } else { "FAILS" };
+    let verdict = if row.holds { "pass" } else { "FAIL" };
     let [what, measured, limit] = match (row.findings.first(), &row.not_finite) {
-        (_, Some(body)) => [format!("{body} left the range of numbers"), String::new(), String::new()],
+        (_, Some(body)) => [format!("{body} diverged"), String::new(), String::new()],
         (Some(finding), None) => {
             let limit = match finding.limit {
                 Limit::AtMost(limit) => format!("<= {limit:.3e}"),

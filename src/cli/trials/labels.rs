@@ -1,48 +1,48 @@
-//! `palpate trials label`, `note`, `tag`, `undo`, `redo`, `journal` and `export --labelled`: what is said of trials, and who
-//! changed what.
+//! `palpate trials label`, `note`, `tag`, `undo`, `redo`, `journal` and `export --labelled`.
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
+use palpate_sim::objects::EMPTY;
 use palpate_store::labels::class_name;
 use palpate_store::{JournalEntry, Store, export_labelled};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The commands.
+/// Subcommands that change or show labels.
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Labelling {
-    /// Say what a trial of the real gripper is of: its label, which recognisers learn.
+pub(super) enum LabelCommand {
+    /// Label a trial of the real gripper with its object.
     Label {
-        /// Its number.
+        /// Trial number.
         id: TrialId,
-        /// The label; `empty` for the empty hand.
+        /// Label; `empty` for the empty hand.
         name: String,
-        /// Mark the label as doubted.
+        /// Mark the label as unsure.
         #[arg(long)]
         unsure: bool,
     },
-    /// Note something on a trial; an empty text removes the note.
+    /// Set the note of a trial; an empty text removes it.
     Note {
-        /// Its number.
+        /// Trial number.
         id: TrialId,
-        /// The note.
+        /// Note.
         text: String,
     },
-    /// Set the tags of a trial; without any they are removed.
+    /// Set the tags of a trial; no tags removes them.
     Tag {
-        /// Its number.
+        /// Trial number.
         id: TrialId,
-        /// The tags, which take the place of those it has.
+        /// Tags, which replace the present ones.
         tags: Vec<String>,
     },
-    /// Take back the last change of a label, note or tag, or the last deletion, one trial at a time; also after a restart.
+    /// Undo the last change of a label, note or tag, or the last deletion, one trial at a time.
     Undo,
-    /// Do again what was taken back last.
+    /// Redo the last undone change.
     Redo,
-    /// Who changed what: labels, notes, tags, deletions, guesses, the plan; newest first. Nothing is ever removed from it.
+    /// Show the journal of all changes (labels, notes, tags, deletions, guesses, plan), newest first.
     Journal {
-        /// How many entries.
+        /// Number of entries.
         #[arg(long, value_name = "N", default_value_t = 30)]
         last: usize,
         /// Print JSON instead of a table.
@@ -51,26 +51,30 @@ pub(super) enum Labelling {
     },
 }
 
-pub(super) fn run(what: &Labelling, store: &mut Store) -> Result<(), Failure> {
-    match what {
-        Labelling::Label { id, name, unsure } => label(store, *id, name, *unsure),
-        Labelling::Note { id, text } => {
+pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failure> {
+    match command {
+        LabelCommand::Label { id, name, unsure } => label(store, *id, name, *unsure),
+        LabelCommand::Note { id, text } => {
             store.set_note(*id, text)?;
-            say(if text.trim().is_empty() { format!("trial {id}: note removed") } else { format!("trial {id}: noted") })
+            say(if text.trim().is_empty() {
+                format!("trial {id}: note removed")
+            } else {
+                format!("trial {id}: note set")
+            })
         }
-        Labelling::Tag { id, tags } => {
+        LabelCommand::Tag { id, tags } => {
             store.set_tags(*id, tags)?;
             say(format!("trial {id}: tags [{}]", tags.join(", ")))
         }
-        Labelling::Undo => match store.undo()? {
-            Some(entry) => say(format!("taken back: {}", entry.sentence())),
-            None => say("there is nothing to take back"),
+        LabelCommand::Undo => match store.undo()? {
+            Some(entry) => say(format!("undone: {}", entry.sentence())),
+            None => say("nothing to undo"),
         },
-        Labelling::Redo => match store.redo()? {
-            Some(entry) => say(format!("no longer taken back: {}", entry.restored())),
-            None => say("nothing was taken back since the last change"),
+        LabelCommand::Redo => match store.redo()? {
+            Some(entry) => say(format!("redone: {}", entry.restored())),
+            None => say("nothing to redo"),
         },
-        Labelling::Journal { last, json } => journal(&store.journal(*last)?, *json),
+        LabelCommand::Journal { last, json } => journal(&store.journal(*last)?, *json),
     }
 }
 
@@ -80,10 +84,8 @@ fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(),
     let known = planned || store.labelled_trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
     store.label_trial(id, &name)?;
     store.set_unsure(id, unsure)?;
-    if !known && name != palpate_sim::objects::EMPTY {
-        warn(&format!(
-            "\"{name}\" is a new class: it is not in the plan and no trial has it (`trials undo` takes it back)"
-        ));
+    if !known && name != EMPTY {
+        warn(&format!("\"{name}\" is a new class: not in the plan, and no other trial has it (`palpate trials undo`)"));
     }
     say(format!("trial {id}: {name}{}", if unsure { ", unsure" } else { "" }))
 }
@@ -93,7 +95,7 @@ fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {
         return say_json(&entries);
     }
     if entries.is_empty() {
-        return say("nothing has been changed yet");
+        return say("no changes yet");
     }
     let cells: Vec<Vec<String>> = entries
         .iter()
@@ -103,13 +105,13 @@ fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {
             vec![entry.number.to_string(), entry.sentence(), when, from.to_owned()]
         })
         .collect();
-    table(&["no", "what", "when (UTC)", ""], &cells)
+    table(&["no", "change", "at (UTC)", ""], &cells)
 }
 
-/// Writes all labelled trials.
+/// Exports all labelled trials.
 pub(super) fn export(store: &Store, out: &Path) -> Result<(), Failure> {
     let exported = export_labelled(store, out)?;
-    // Hundreds of trials lack the same calibration: it is said once.
+    // Hundreds of trials may lack the same calibration: one warning.
     let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (id, why) in &exported.left_out {
         reasons.entry(why).or_default().push(id.to_string());
@@ -117,11 +119,8 @@ pub(super) fn export(store: &Store, out: &Path) -> Result<(), Failure> {
     for (why, ids) in reasons {
         let (named, all) = (ids.iter().take(5).cloned().collect::<Vec<_>>().join(", "), ids.len());
         let more = if all > 5 { format!(" and {} more", all - 5) } else { String::new() };
-        warn(&format!("trial {named}{more} left out of signals.csv: {why}"));
+        warn(&format!("trial {named}{more} missing in signals.csv: {why}"));
     }
     let (trials, derived) = (exported.trials, exported.derived);
-    say(format!(
-        "{}: {trials} trial(s), {derived} of them with derived channels in signals.csv",
-        exported.folder.display()
-    ))
+    say(format!("{}: {trials} trial(s), {derived} of them in signals.csv", exported.folder.display()))
 }

@@ -1,4 +1,4 @@
-//! `palpate trials show`: what is known of one trial, simulated, imported, or of the real gripper.
+//! `palpate trials show`: one trial, simulated, imported, or of the real gripper.
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, warn};
@@ -12,9 +12,9 @@ use palpate_tactile::board::Gap;
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
 
-/// What `trials show --json` prints.
+/// Output of `trials show --json` for a simulated trial.
 #[derive(Serialize)]
-struct Shown {
+struct SimulatedReport {
     id: TrialId,
     rig: String,
     seed: u64,
@@ -26,9 +26,9 @@ struct Shown {
     scene: String,
 }
 
-/// What `trials show --json` prints of a trial that was recorded elsewhere.
+/// Output of `trials show --json` for an imported trial.
 #[derive(Serialize)]
-struct ShownImport {
+struct ImportReport {
     id: TrialId,
     rig: String,
     object: String,
@@ -40,7 +40,7 @@ struct ShownImport {
 
 fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Result<(), Failure> {
     let info = store.load(id)?.info;
-    let shown = ShownImport {
+    let report = ImportReport {
         id,
         rig: info.rig,
         object: info.object,
@@ -50,17 +50,17 @@ fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Resu
         channels: signals.channels,
     };
     if json {
-        return say_json(&shown);
+        return say_json(&report);
     }
-    let from = shown.collection.as_deref().unwrap_or("nowhere");
-    say(format!("trial {id}: {} (imported, collection {from})", shown.object))?;
-    say(format!("{} samples over {:.2} s", shown.samples, shown.duration_s))?;
-    say(format!("channels {}", shown.channels.join(", ")))
+    let from = report.collection.as_deref().unwrap_or("none");
+    say(format!("trial {id}: {} (imported, collection {from})", report.object))?;
+    say(format!("{} samples over {:.2} s", report.samples, report.duration_s))?;
+    say(format!("channels {}", report.channels.join(", ")))
 }
 
-/// What `trials show --json` prints of a trial of a real gripper.
+/// Output of `trials show --json` for a trial of the real gripper.
 #[derive(Serialize)]
-struct ShownBoard {
+struct BoardReport {
     id: TrialId,
     rig: String,
     object: String,
@@ -71,13 +71,13 @@ struct ShownBoard {
     about: BoardInfo,
     gaps: Vec<Gap>,
     warnings: Vec<String>,
-    /// Its label and what goes with it.
+    /// Label, note, tags, flags and guess.
     labels: LabelledTrial,
 }
 
 fn show_board(store: &Store, id: TrialId, trial: BoardTrial, json: bool) -> Result<(), Failure> {
     let info = store.load(id)?.info;
-    let shown = ShownBoard {
+    let report = BoardReport {
         id,
         rig: info.rig,
         object: info.object,
@@ -90,35 +90,35 @@ fn show_board(store: &Store, id: TrialId, trial: BoardTrial, json: bool) -> Resu
         labels: store.labelled_trials()?.into_iter().find(|row| row.id == id).unwrap_or_default(),
     };
     if json {
-        return say_json(&shown);
+        return say_json(&report);
     }
-    for warning in &shown.warnings {
+    for warning in &report.warnings {
         warn(warning);
     }
-    say(format!("trial {id}: {} (real gripper on {})", shown_name(&shown.object), shown.about.port))?;
-    say_labels(&shown.labels)?;
-    say(format!("{} samples over {:.2} s, recorded by Palpate {}", shown.samples, shown.duration_s, shown.version))?;
-    say(format!("channels {}", shown.about.board.channels.join(", ")))?;
-    if let Some(detected) = &shown.about.detected {
+    say(format!("trial {id}: {} (real gripper on {})", shown_name(&report.object), report.about.port))?;
+    print_labels(&report.labels)?;
+    say(format!("{} samples over {:.2} s, recorded by Palpate {}", report.samples, report.duration_s, report.version))?;
+    say(format!("channels {}", report.about.board.channels.join(", ")))?;
+    if let Some(detected) = &report.about.detected {
         say(format!("format {}: {}", detected.format.label(), detected.why))?;
     }
-    let (line, bad_lines) = (cadence_line(&shown.about.cadence), shown.about.cadence.bad_lines);
-    say(format!("{line}, {bad_lines} bad lines, {} reconnects", shown.about.reconnects))?;
-    for gap in &shown.gaps {
-        let since = |t: f64| t - shown.about.began_s;
+    let (line, bad_lines) = (cadence_line(&report.about.cadence), report.about.cadence.bad_lines);
+    say(format!("{line}, {bad_lines} bad lines, {} reconnects", report.about.reconnects))?;
+    for gap in &report.gaps {
+        let since = |t: f64| t - report.about.began_s;
         let lost = gap.lost.map_or_else(|| "an unknown number of".to_owned(), |lost| lost.to_string());
         say(format!("gap {:.2} s to {:.2} s, {lost} readings: {}", since(gap.from_s), since(gap.to_s), gap.cause))?;
     }
     Ok(())
 }
 
-/// What somebody, or a model, has said of it.
-fn say_labels(labels: &LabelledTrial) -> Result<(), Failure> {
+/// Prints flags, note, tags and the guess of a model.
+fn print_labels(labels: &LabelledTrial) -> Result<(), Failure> {
     for found in &labels.flags {
         say(format!("flagged {}: {}", found.flag.label(), found.remark))?;
     }
     if labels.unsure {
-        say("whoever gave the label was not sure")?;
+        say("the label is marked as unsure")?;
     }
     if !labels.note.is_empty() {
         say(format!("note {}", labels.note))?;
@@ -127,7 +127,7 @@ fn say_labels(labels: &LabelledTrial) -> Result<(), Failure> {
         say(format!("tags {}", labels.tags.join(", ")))?;
     }
     match &labels.guess {
-        Some(guess) => say(format!("{} took it for {} ({:.0} %)", guess.model, guess.class, 100.0 * guess.p)),
+        Some(guess) => say(format!("{} guessed {} ({:.0} %)", guess.model, guess.class, 100.0 * guess.p)),
         None => Ok(()),
     }
 }
@@ -145,7 +145,7 @@ pub(super) fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure
 fn show_simulated(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
     let trial = store.load(id)?;
     let summary = GraspSummary::new(&trial, &scene_of(&trial)?);
-    let shown = Shown {
+    let report = SimulatedReport {
         id,
         rig: trial.info.rig,
         seed: trial.info.seed,
@@ -156,18 +156,18 @@ fn show_simulated(store: &Store, id: TrialId, json: bool) -> Result<(), Failure>
         scene: trial.info.scene,
     };
     if json {
-        return say_json(&shown);
+        return say_json(&report);
     }
-    for warning in &shown.summary.warnings {
+    for warning in &report.summary.warnings {
         warn(warning);
     }
-    say(format!("trial {id}: {} ({}, seed {})", shown.summary.object, shown.rig, shown.seed))?;
-    say(format!("{} samples, recorded by Palpate {}", shown.samples, shown.version))?;
-    match shown.summary.contact_onset_s {
+    say(format!("trial {id}: {} ({}, seed {})", report.summary.object, report.rig, report.seed))?;
+    say(format!("{} samples, recorded by Palpate {}", report.samples, report.version))?;
+    match report.summary.contact_onset_s {
         Some(onset) => say(format!("first contact at {onset:.3} s"))?,
         None => say("no contact")?,
     }
-    if let Some(hold) = &shown.summary.hold {
+    if let Some(hold) = &report.summary.hold {
         let [left, right] = hold.force_n;
         say(format!("hold force {left:.3} N left, {right:.3} N right"))?;
         let [left, right] = hold.curvature_per_m;
@@ -175,18 +175,18 @@ fn show_simulated(store: &Store, id: TrialId, json: bool) -> Result<(), Failure>
         let [left, right] = hold.pressure_pa.map(|p| p * 1e-3);
         say(format!("pressure {left:.2} kPa left, {right:.2} kPa right"))?;
     }
-    for effect in &shown.plan.effects {
+    for effect in &report.plan.effects {
         let state = if effect.on { "on" } else { "off" };
         say(format!("effect {} {state} ({}): {}", effect.name, effect.setting, effect.reason))?;
     }
-    let quality = &shown.summary.quality;
+    let quality = &report.summary.quality;
     say(format!("{} steps, {:.2} Newton iterations each", quality.steps, quality.newton_mean))?;
     say(format!(
         "static residual at hold {:.1e}, friction residual {:.1e}",
         quality.static_residual, quality.friction_residual
     ))?;
     if !quality.is_sound() {
-        say("not sound: no data set takes it")?;
+        say("unsound: data sets exclude it")?;
     }
-    say("its scene is in `palpate trials show --json`")
+    say("`--json` also prints its scene")
 }

@@ -1,8 +1,8 @@
-//! What is known of all parts: list, show, export, import, mount, withdraw.
+//! Manages calibrations: list, show, export, import, mount, withdraw.
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
-use super::{parse_sensor, tell, zero};
+use super::{parse_sensor, print, zero};
 use palpate_store::{CalibrationId, Store, StoredCalibration};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::Calibration;
@@ -10,86 +10,86 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum What {
-    /// All calibrations, oldest first, and which parts sit where.
+pub(super) enum CalibrateCommand {
+    /// List all calibrations, oldest first, and the mounted parts.
     List {
-        /// Only those of this part.
+        /// Only calibrations of this part.
         #[arg(long, value_name = "NAME")]
         part: Option<String>,
         /// Print JSON instead of a table.
         #[arg(long)]
         json: bool,
     },
-    /// One calibration with its points and residuals.
+    /// Show one calibration with its points and residuals.
     Show {
-        /// Its number.
+        /// Calibration number.
         id: CalibrationId,
         /// Print JSON instead of text.
         #[arg(long)]
         json: bool,
     },
-    /// Write calibrations into a JSON file.
+    /// Export calibrations to a JSON file.
     Export {
-        /// Their numbers; all where there are none.
+        /// Calibration numbers (default: all).
         ids: Vec<CalibrationId>,
-        /// The file.
+        /// File to write.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Take calibrations in from JSON files; what is here already is not taken twice.
+    /// Import calibrations from JSON files, without duplicates.
     Import {
-        /// The files.
+        /// JSON files.
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
     },
-    /// Note that a part sits in a place from now on: after parts were swapped.
+    /// Set which part is mounted in a place, after parts were swapped.
     Mount {
-        /// Where: flexL, flexR, fsrL or fsrR.
+        /// Place: flexL, flexR, fsrL or fsrR.
         #[arg(value_parser = parse_sensor)]
         sensor: Sensor,
         /// Name of the part.
         part: String,
     },
-    /// Take the zero of all sensors now, with the hand open and left alone; it serves until a part is calibrated anew.
+    /// Store the present zero of all sensors, hand open and at rest; applies until the next calibration of a part.
     Tare(zero::TareArguments),
-    /// How far the zeros of stored trials have moved from their calibrations.
+    /// Show how far the zeros of stored trials have drifted from their calibrations.
     Drift(zero::DriftArguments),
-    /// Let a calibration serve no trial any more, unless it is asked for; the one before it serves again.
+    /// Withdraw a calibration; the previous version applies again.
     Withdraw {
-        /// Its number.
+        /// Calibration number.
         id: CalibrationId,
     },
-    /// Take a withdrawal back.
+    /// Restore a withdrawn calibration.
     Restore {
-        /// Its number.
+        /// Calibration number.
         id: CalibrationId,
     },
 }
 
-pub(super) fn run(what: &What, store: &mut Store) -> Result<(), Failure> {
-    match what {
-        What::List { part, json } => list(store, part.as_deref(), *json),
-        What::Show { id, json } => show(store, *id, *json),
-        What::Export { ids, out } => export(store, ids, out),
-        What::Import { files } => files.iter().try_for_each(|file| import(store, file)),
-        What::Mount { sensor, part } => mount(store, *sensor, part.trim()),
-        What::Tare(arguments) => zero::tare(arguments, store),
-        What::Drift(arguments) => zero::drift(arguments, store),
-        What::Withdraw { id } => {
+pub(super) fn run(command: &CalibrateCommand, store: &mut Store) -> Result<(), Failure> {
+    match command {
+        CalibrateCommand::List { part, json } => list(store, part.as_deref(), *json),
+        CalibrateCommand::Show { id, json } => show(store, *id, *json),
+        CalibrateCommand::Export { ids, out } => export(store, ids, out),
+        CalibrateCommand::Import { files } => files.iter().try_for_each(|file| import(store, file)),
+        CalibrateCommand::Mount { sensor, part } => mount(store, *sensor, part.trim()),
+        CalibrateCommand::Tare(arguments) => zero::tare(arguments, store),
+        CalibrateCommand::Drift(arguments) => zero::drift(arguments, store),
+        CalibrateCommand::Withdraw { id } => {
             store.withdraw_calibration(*id, true)?;
-            say(format!("calibration {id} serves no more; `palpate calibrate restore {id}` takes that back"))
+            say(format!("calibration {id} withdrawn; `palpate calibrate restore {id}` brings it back"))
         }
-        What::Restore { id } => {
+        CalibrateCommand::Restore { id } => {
             store.withdraw_calibration(*id, false)?;
-            say(format!("calibration {id} serves again"))
+            say(format!("calibration {id} restored"))
         }
     }
 }
 
-/// What `list --json` prints.
+/// Output of `list --json`.
 #[derive(Serialize)]
-struct Listed {
-    /// Which part sits where, by channel.
+struct ListReport {
+    /// Mounted parts by channel.
     mounted: std::collections::BTreeMap<&'static str, String>,
     calibrations: Vec<Row>,
 }
@@ -98,9 +98,9 @@ struct Listed {
 struct Row {
     #[serde(flatten)]
     stored: StoredCalibration,
-    /// What came out; absent where its points make no calibration.
+    /// Result; absent where the points make no calibration.
     summary: Option<String>,
-    /// Why not.
+    /// Why the points make no calibration.
     fault: Option<String>,
 }
 
@@ -112,12 +112,12 @@ fn list(store: &Store, part: Option<&str>, json: bool) -> Result<(), Failure> {
         let summary = fitted.as_ref().ok().map(Calibration::summary);
         Row { stored, summary, fault: fitted.err().map(|fault| fault.to_string()) }
     });
-    let listed = Listed { mounted: mounted.collect(), calibrations: rows.collect() };
+    let listed = ListReport { mounted: mounted.collect(), calibrations: rows.collect() };
     if json {
         return say_json(&listed);
     }
     for (channel, part) in &listed.mounted {
-        say(format!("{channel:<6}is \"{part}\""))?;
+        say(format!("{channel:<6}\"{part}\""))?;
     }
     if listed.calibrations.is_empty() {
         return say("no calibrations yet: `palpate calibrate flexL --part A7` makes one");
@@ -128,21 +128,21 @@ fn list(store: &Store, part: Option<&str>, json: bool) -> Result<(), Failure> {
         .map(|Row { stored, summary, fault }| {
             let remark = match (&stored.withdrawn, fault) {
                 (Some(_), _) => "withdrawn: ".to_owned(),
-                (None, Some(_)) => "serves nothing: ".to_owned(),
+                (None, Some(_)) => "unusable: ".to_owned(),
                 (None, None) => String::new(),
             };
-            let came_out = summary.as_ref().or(fault.as_ref()).cloned().unwrap_or_default();
+            let result = summary.as_ref().or(fault.as_ref()).cloned().unwrap_or_default();
             vec![
                 stored.id.to_string(),
                 stored.record.part.clone(),
                 stored.version.to_string(),
                 stored.created.chars().take(19).collect::<String>().replace('T', " "),
                 stored.record.kind.label().to_owned(),
-                format!("{remark}{came_out}"),
+                format!("{remark}{result}"),
             ]
         })
         .collect();
-    table(&["id", "part", "version", "made (UTC)", "kind", ""], &cells)
+    table(&["id", "part", "version", "made (UTC)", "kind", "result"], &cells)
 }
 
 fn show(store: &Store, id: CalibrationId, json: bool) -> Result<(), Failure> {
@@ -150,7 +150,7 @@ fn show(store: &Store, id: CalibrationId, json: bool) -> Result<(), Failure> {
     let calibration = Calibration::fit(stored.record.clone())?;
     if json {
         #[derive(Serialize)]
-        struct Shown<'a> {
+        struct Report<'a> {
             id: CalibrationId,
             version: i64,
             created: &'a str,
@@ -160,19 +160,19 @@ fn show(store: &Store, id: CalibrationId, json: bool) -> Result<(), Failure> {
         }
         let StoredCalibration { version, created, withdrawn, .. } = &stored;
         let withdrawn = withdrawn.as_deref();
-        return say_json(&Shown { id, version: *version, created, withdrawn, calibration: &calibration });
+        return say_json(&Report { id, version: *version, created, withdrawn, calibration: &calibration });
     }
     let StoredCalibration { version, created, record, withdrawn, .. } = &stored;
     say(format!("calibration {id}: {} \"{}\", version {version}, made {created}", record.kind.label(), record.part))?;
-    tell(&calibration)?;
+    print(&calibration)?;
     if let Some(bending) = &record.bending {
-        say(format!("its zero is known up to a curvature of {:.1} 1/m", bending.reaches()))?;
+        say(format!("zero known up to a curvature of {:.1} 1/m", bending.reaches()))?;
     }
     if !record.note.is_empty() {
         say(&record.note)?;
     }
     if withdrawn.is_some() {
-        warn("it was withdrawn");
+        warn("this calibration is withdrawn");
     }
     Ok(())
 }
@@ -187,24 +187,24 @@ fn export(store: &Store, ids: &[CalibrationId], out: &Path) -> Result<(), Failur
     say(format!("{}: {} calibration(s)", out.display(), chosen.len()))
 }
 
-/// Files larger than this hold no calibrations (bytes).
+/// Largest accepted file (bytes).
 const LARGEST_FILE: u64 = 1 << 24;
 
 fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
-    let refuse = |cause: String| format!("cannot take in \"{}\": {cause}", file.display());
+    let refuse = |cause: String| format!("cannot import \"{}\": {cause}", file.display());
     let size = std::fs::metadata(file).map_err(|e| refuse(e.to_string()))?.len();
     if size > LARGEST_FILE {
-        return Err(refuse(format!("{size} bytes is too large for calibrations")).into());
+        return Err(refuse(format!("{size} bytes are too many for calibrations")).into());
     }
     let text = std::fs::read_to_string(file).map_err(|e| refuse(e.to_string()))?;
     let others: Vec<StoredCalibration> = serde_json::from_str(&text)
-        .map_err(|e| refuse(format!("it is no list of calibrations as `palpate calibrate export` writes it ({e})")))?;
+        .map_err(|e| refuse(format!("not a list of calibrations as written by `palpate calibrate export` ({e})")))?;
     for other in &others {
         Calibration::fit(other.record.clone())
             .map_err(|fault| refuse(format!("the calibration of \"{}\": {fault}", other.record.part)))?;
     }
     let added = store.import_calibrations(&others)?;
-    say(format!("{}: {added} calibration(s) added, {} were here already", file.display(), others.len() - added))
+    say(format!("{}: {added} calibration(s) added, {} already there", file.display(), others.len() - added))
 }
 
 fn mount(store: &mut Store, sensor: Sensor, part: &str) -> Result<(), Failure> {
@@ -212,7 +212,7 @@ fn mount(store: &mut Store, sensor: Sensor, part: &str) -> Result<(), Failure> {
         return Err("the part needs a name".into());
     }
     store.mount_part(sensor, part)?;
-    say(format!("\"{part}\" is the {} from now on", sensor.label()))?;
+    say(format!("\"{part}\" mounted as the {}", sensor.label()))?;
     let serving = store.serving(None, &[])?;
     serving.warnings.iter().filter(|warning| warning.contains(sensor.label())).for_each(|warning| warn(warning));
     Ok(())
