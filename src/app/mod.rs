@@ -33,7 +33,8 @@ pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_lab::datasets::models_folder;
-use palpate_lab::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
+use palpate_lab::gripper::listen_to_port;
+use palpate_lab::workers::{GripperWish, examine_port, explain_scene, fit_trials};
 use palpate_learn::shipped_model;
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;

@@ -17,11 +17,12 @@ use super::{bars, keys};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_notify::Toasts;
 use palpate_geometry::drawing::Camera;
-use palpate_lab::grasping::ObjectDeck;
+use palpate_lab::grasping::{GraspStage, ObjectDeck};
+use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWish, GripperWorker, LabelView,
-    LabelWish, Labeller, Listen, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot,
-    TrainWish, TrainedModel, TrialPart, Wake, start_labeller,
+    LabelWish, Labeller, MeasuredAccuracy, NotSent, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, TrainWish,
+    TrainedModel, Wake, start_labeller,
 };
 use palpate_learn::Model;
 use palpate_render::{Picture, describe_adapter};
@@ -84,7 +85,7 @@ pub struct Workbench {
     /// Traces of the real gripper.
     felt: Traces,
     /// The part of the trial that was seen last: the simulation closes its fingers with the real ones.
-    trial_part: Option<TrialPart>,
+    trial_part: Option<GraspStage>,
     /// The wish by which the last trial was begun.
     begun_by: u64,
     connected: bool,

@@ -116,7 +116,8 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         None => Scene::default(),
     };
     let object = arguments.object.as_deref().map(class_name).transpose()?;
-    let mut store = open_store(store)?;
+    // Opened once here: a store that cannot be used is reported before the board is.
+    let store = open_store(store)?.path().to_owned();
     let stop = stop_flag()?;
     let options = LinkOptions {
         path: arguments.port.clone(),
@@ -130,44 +131,36 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         (false, true) => Control::ByHand,
         (false, false) => Control::Free,
     };
-    let actuation_hz = f64::from(scene.timing.actuation_hz);
-    let programme_s = f64::from(scene.programme.total_ticks()) / actuation_hz;
-    let seconds = arguments.seconds.or((control != Control::Free).then_some(programme_s));
-    let rig = SerialRig::begin(link, SerialPlan { control, actuation_hz, seconds }, stop)?;
-    let plan = BoardTrialPlan { object: object.clone().unwrap_or_default(), scene: scene.to_toml(), seconds };
+    let request = TrialRequest { object: object.clone(), control, length_s: arguments.seconds, adds: false };
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{elapsed} {msg}")?);
-    let outcome = record_board(rig, &scene.programme, &plan, &mut store, &mut |recorder, status| {
-        bar.set_message(progress(recorder, status));
+    let mut gripper = SerialGripper::new(Box::new(link));
+    let outcome = record(&mut gripper, &scene, request, store, &stop, &mut |progress| {
+        bar.set_message(progress_line(&progress));
         bar.tick();
     });
     bar.finish_and_clear();
-    let grasp = outcome?;
-    print(grasp.recorded, object, &grasp.status, arguments.json)?;
-    if grasp.cut {
-        Err("the board did not follow the programme: the trial ended early, and is stored".into())
-    } else {
-        Ok(())
+    let recording = outcome?;
+    print(recording.trial, object, &recording.status, arguments.json)?;
+    match recording.aborted {
+        Some(cause) => Err(format!("the trial ended early, and is stored: {cause}").into()),
+        None => Ok(()),
     }
 }
 
-fn progress(recorder: &BoardRecorder, status: &LinkStatus) -> String {
-    let cadence = &status.cadence;
-    let state = match &status.state {
+fn progress_line(progress: &RecordProgress<'_>) -> String {
+    let LinkStatus { cadence, state, .. } = progress.status;
+    let state = match state {
         LinkState::Listening => String::new(),
         state => format!(" {}", state.sentence()),
     };
+    let trial = progress.id.map_or_else(|| "trial".to_owned(), |id| format!("trial {id}"));
     format!(
-        "trial {}: {} samples, {:.1} Hz, jitter {:.1} ms, {} lost, {} bad lines{state}",
-        recorder.id(),
-        recorder.samples(),
-        cadence.rate_hz,
-        cadence.jitter_p95_ms,
-        cadence.lost,
-        cadence.bad_lines
+        "{trial}: {} samples, {:.1} Hz, jitter {:.1} ms, {} lost, {} bad lines{state}",
+        progress.samples, cadence.rate_hz, cadence.jitter_p95_ms, cadence.lost, cadence.bad_lines
     )
 }
 
-fn print(recorded: Recorded, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
+fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
     let cadence = recorded.about.cadence;
     let report = Report {
         trial_id: recorded.id,

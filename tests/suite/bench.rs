@@ -5,10 +5,9 @@ use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use palpate::app::{Action, GripperToolsSetup, PanelKind, ViewState, Workbench, WorkbenchSetup};
 use palpate_geometry::palette::Theme;
+use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::study::{Explanation, Measuring};
-use palpate_lab::workers::{
-    Command, Examine, FitTrials, Listen, Snapshot, examine_port, explain_scene, fit_trials, listen_to_port,
-};
+use palpate_lab::workers::{Command, Examine, FitTrials, Snapshot, examine_port, explain_scene, fit_trials};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;

@@ -5,9 +5,12 @@ use crate::calibration::{calibrated, parts};
 use crate::scripted;
 use crate::streams::Pretended;
 use palpate_device::pretended::{HandPlan, HiddenParts, PretendedSetup};
+use palpate_lab::grasping::GraspStage;
+use palpate_lab::gripper::{Listen, NotOpened};
+use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{
     CalibrationPlan, CalibrationWish, Examine, ExamineRequest, GripperSetup, GripperView, GripperWish, GripperWorker,
-    Listen, NotOpened, Notice, TraceRow, TrialPart, TrialRequest,
+    Notice, TraceRow,
 };
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
@@ -140,7 +143,7 @@ impl Desk {
     /// A whole trial.
     fn trial(&mut self, control: Control, adds: bool) -> i64 {
         let before = self.worker.view().and_then(|view| view.ended.as_ref().map(|ended| ended.id));
-        self.wish(GripperWish::Begin(TrialRequest { object: Some("lemon".to_owned()), control, adds }));
+        self.wish(GripperWish::Begin(TrialRequest { object: Some("lemon".to_owned()), length_s: None, control, adds }));
         self.until(|view| view.trial.is_some());
         let ended = self.until(|view| view.trial.is_none() && view.ended.as_ref().map(|e| e.id) != before);
         ended.ended.as_ref().unwrap().id
@@ -157,6 +160,16 @@ fn store_calibrations(path: &Path, parts: &HiddenParts) {
         store.add_calibration(&calibration.record).unwrap();
         store.mount_part(sensor, &calibration.record.part).unwrap();
     }
+}
+
+/// The trial that is recorded has its number.
+fn numbered(view: &GripperView) -> bool {
+    view.trial.as_ref().is_some_and(|trial| trial.id.is_some())
+}
+
+/// Number of the trial that ended last.
+fn ended(view: &GripperView) -> Option<i64> {
+    view.ended.as_ref().map(|ended| ended.id)
 }
 
 #[test]
@@ -189,11 +202,11 @@ fn stop_vents_ends_the_trial_and_says_so() {
     desk.wish(GripperWish::Vent);
     desk.until_said("no board is connected: vent at the control box");
     desk.connect();
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
     desk.wish(GripperWish::Vent);
-    let view = desk.until(|view| view.trial.is_none());
-    desk.until_said("told to vent");
+    let view = desk.until(|view| view.trial.is_none() && view.ended.is_some());
+    desk.until_said("Vent sent");
     let ended = view.ended.clone().unwrap();
     assert!(!ended.discarded && ended.warnings.iter().any(|text| text.contains("vented by the user")), "{ended:?}");
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
@@ -206,14 +219,14 @@ fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
     // What waits is written about once a second of the clock, which must come before the trial's end.
     let mut desk = Desk::on(pretended(&parts(1, false), None, TRUE_TO_TIME, 30));
     desk.connect();
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
     let pressed = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
     // Another program throws it away for good: nothing more can be written of it.
-    let id = pressed.trial.as_ref().unwrap().id;
+    let id = pressed.trial.as_ref().and_then(|trial| trial.id).unwrap();
     let mut store = desk.store();
     store.discard_trial(id).unwrap();
     store.purge().unwrap();
-    desk.until_said("the trial was broken off");
+    desk.until_said("recording stopped");
     let view = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     // It was told to, and did not wait until it missed us.
     assert!(!view.console.iter().any(|line| line.text.contains("watchdog")), "{:?}", view.console);
@@ -224,26 +237,26 @@ fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
 #[test]
 fn trials_are_ended_begun_anew_and_given_up() {
     let mut desk = Desk::on(board(&parts(1, false)));
-    let request = || TrialRequest { object: None, control: Control::ByHand, adds: false };
+    let request = || TrialRequest { object: None, length_s: None, control: Control::ByHand, adds: false };
     desk.wish(GripperWish::Begin(request()));
     desk.until_said("connect the gripper first");
     desk.connect();
     desk.wish(GripperWish::Begin(request()));
-    let first = desk.until(|view| view.trial.is_some()).trial.clone().unwrap();
-    assert_eq!((first.part, first.length_s.map(|s| (s * 10.0).round())), (TrialPart::Ready, Some(44.0)));
+    let first = desk.until(numbered).trial.clone().unwrap();
+    assert_eq!((first.stage, first.length_s.map(|s| (s * 10.0).round())), (GraspStage::Lead, Some(44.0)));
     // Another begins: the first ends there and is kept.
     desk.wish(GripperWish::Begin(request()));
-    let second = desk.until(|view| view.trial.as_ref().is_some_and(|trial| trial.id != first.id));
+    let second = desk.until(|view| numbered(view) && view.trial.as_ref().is_some_and(|trial| trial.id != first.id));
     let second = second.trial.clone().unwrap().id;
     desk.wish(GripperWish::Discard);
     desk.until(|view| view.trial.is_none());
     desk.wish(GripperWish::Begin(TrialRequest { control: Control::Free, ..request() }));
     desk.until(|view| view.trial.as_ref().is_some_and(|trial| trial.t_s > 7.0));
     desk.wish(GripperWish::End);
-    let free = desk.until(|view| view.trial.is_none()).ended.clone().unwrap().id;
+    let free = desk.until(|view| view.trial.is_none() && ended(view) > second).ended.clone().unwrap().id;
     let rows = desk.store().list(true).unwrap();
     let deleted: Vec<(i64, bool)> = rows.iter().map(|row| (row.id, row.deleted.is_some())).collect();
-    assert_eq!(deleted, [(first.id, false), (second, true), (free, false)]);
+    assert_eq!(deleted, [(first.id.unwrap(), false), (second.unwrap(), true), (free, false)]);
     // Closing the window ends what goes on.
     desk.wish(GripperWish::Begin(request()));
     desk.until(|view| view.trial.is_some());
@@ -357,7 +370,7 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
     let parts = parts(1, false);
     let mut desk = Desk::on(moving(&parts));
     store_calibrations(&desk.store, &parts);
-    let request = TrialRequest { object: None, control: Control::Free, adds: false };
+    let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
     desk.connect();
     desk.wish(GripperWish::Watch(Some(request)));
     for number in 1..=2 {
@@ -399,12 +412,12 @@ fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
 #[test]
 fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
     let mut desk = Desk::on(moving(&parts(1, false)));
-    let request = TrialRequest { object: None, control: Control::Free, adds: false };
+    let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
     desk.connect();
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     desk.wish(GripperWish::Watch(Some(request.clone())));
     desk.wish(GripperWish::Begin(request));
-    let id = desk.until(|view| view.trial.is_some()).trial.as_ref().unwrap().id;
+    let id = desk.until(numbered).trial.as_ref().unwrap().id;
     // A whole grasp passes.
     for pressed in [true, false] {
         let is = |bar: Option<f64>| if pressed { bar > Some(0.5) } else { bar < Some(0.01) };
@@ -413,7 +426,7 @@ fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
     }
     desk.wish(GripperWish::End);
     let ended = desk.until(|view| view.ended.is_some()).ended.clone().unwrap();
-    assert_eq!(ended.id, id);
+    assert_eq!(Some(ended.id), id);
 }
 
 #[test]
@@ -444,7 +457,7 @@ fn zeros_are_taken_from_open_hands_alone() {
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
     desk.wish(GripperWish::Tare);
     desk.until_said("bar is on: vent");
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Free, adds: false }));
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Free, adds: false }));
     desk.wish(GripperWish::Tare);
     desk.until_said("nothing was tared: a trial goes on");
     assert!(desk.store().tare().unwrap().is_none());
@@ -455,7 +468,7 @@ fn a_store_that_cannot_be_written_is_told_before_a_trial() {
     let mut desk = Desk::with(board(&parts(1, false)), "notes.txt");
     std::fs::write(&desk.store, "not a store".repeat(100)).unwrap();
     desk.connect();
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, control: Control::Driven, adds: false }));
+    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
     desk.until_said("not a store");
     let view = desk.until(|view| view.latest.is_some());
     assert!(view.trial.is_none() && view.is_connected());

@@ -15,10 +15,9 @@ use palpate_device::doctor::{Observations, Traces};
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
 use palpate_device::wire::Rail;
 use palpate_geometry::palette::Theme;
+use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
-use palpate_lab::workers::{
-    CalibrationPlan, CalibrationWish, Examine, FitTrials, FittedFinger, GripperWish, Listen, NotOpened,
-};
+use palpate_lab::workers::{CalibrationPlan, CalibrationWish, Examine, FitTrials, FittedFinger, GripperWish};
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
 use palpate_store::{BOARD_RIG, BoardInfo, Store};

@@ -4,7 +4,7 @@
 use palpate_device::pretended::{PretendedGripper, PretendedSetup};
 use palpate_device::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
 use palpate_device::wire::{ConsoleLine, Decoder, Heard};
-use palpate_lab::workers::BoardStream;
+use palpate_lab::gripper::BoardStream;
 use palpate_tactile::board::{Board, Gap, Reading};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;

@@ -5,7 +5,8 @@ use crate::app::panels::PanelContext;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
 use palpate_geometry::palette::Rgb;
-use palpate_lab::workers::{GripperWish, LEAD_S, TrialPart, TrialView};
+use palpate_lab::grasping::{GraspStage, LEAD_S};
+use palpate_lab::workers::{GripperWish, TrialView};
 use palpate_sim::gripper::Phase;
 use palpate_tactile::trial::Control;
 
@@ -32,7 +33,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         let colours = context.view.theme.colours();
         match trial {
             Some(trial) => {
-                let (text, ink) = (instruction(trial), part_colour(context, trial.part));
+                let (text, ink) = (instruction(trial), part_colour(context, trial.stage));
                 ui.label(RichText::new(text).heading().strong().color(colour(ink)));
                 progress_ui(ui, trial, ink, colours.raised);
             }
@@ -49,26 +50,26 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
 /// What is to be done now, as whoever stands at the control box wants to hear it.
 pub(in crate::app) fn instruction(trial: &TrialView) -> String {
     let by_hand = trial.request.control == Control::ByHand;
-    match trial.part {
-        TrialPart::Ready if by_hand => "Ready to close".to_owned(),
-        TrialPart::Ready => "At rest".to_owned(),
-        TrialPart::Phase(Phase::Close) if by_hand => "CLOSE: turn the pressure up".to_owned(),
-        TrialPart::Phase(Phase::Close) => "Closing".to_owned(),
-        TrialPart::Phase(Phase::Hold) if by_hand => "HOLD: leave it".to_owned(),
-        TrialPart::Phase(Phase::Hold) => "Holding".to_owned(),
-        TrialPart::Phase(Phase::Release) if by_hand => "RELEASE: turn the pressure down".to_owned(),
-        TrialPart::Phase(Phase::Release) => "Releasing".to_owned(),
-        TrialPart::Settling => "Coming to rest".to_owned(),
-        TrialPart::Free => "Recording".to_owned(),
+    match trial.stage {
+        GraspStage::Lead if by_hand => "Ready to close".to_owned(),
+        GraspStage::Lead => "At rest".to_owned(),
+        GraspStage::Phase(Phase::Close) if by_hand => "CLOSE: turn the pressure up".to_owned(),
+        GraspStage::Phase(Phase::Close) => "Closing".to_owned(),
+        GraspStage::Phase(Phase::Hold) if by_hand => "HOLD: leave it".to_owned(),
+        GraspStage::Phase(Phase::Hold) => "Holding".to_owned(),
+        GraspStage::Phase(Phase::Release) if by_hand => "RELEASE: turn the pressure down".to_owned(),
+        GraspStage::Phase(Phase::Release) => "Releasing".to_owned(),
+        GraspStage::Settle => "Coming to rest".to_owned(),
+        GraspStage::Free => "Recording".to_owned(),
     }
 }
 
-fn part_colour(context: &PanelContext<'_>, part: TrialPart) -> Rgb {
+fn part_colour(context: &PanelContext<'_>, part: GraspStage) -> Rgb {
     let colours = context.view.theme.colours();
     match part {
-        TrialPart::Phase(Phase::Close | Phase::Hold) => colours.accent,
-        TrialPart::Phase(Phase::Release) => colours.warning,
-        TrialPart::Ready | TrialPart::Settling | TrialPart::Free => colours.text,
+        GraspStage::Phase(Phase::Close | Phase::Hold) => colours.accent,
+        GraspStage::Phase(Phase::Release) => colours.warning,
+        GraspStage::Lead | GraspStage::Settle | GraspStage::Free => colours.text,
     }
 }
 
@@ -76,7 +77,7 @@ fn part_colour(context: &PanelContext<'_>, part: TrialPart) -> Rgb {
 fn progress_ui(ui: &mut Ui, trial: &TrialView, ink: Rgb, ground: Rgb) {
     let left = trial.left_s.map_or_else(String::new, |left_s| format!("{left_s:.1} s"));
     ui.add_sized([52.0, 20.0], egui::Label::new(RichText::new(left).monospace()));
-    ui.weak(format!("trial {}, {} readings", trial.id, trial.samples));
+    ui.weak(format!("{}, {} readings", trial.title(), trial.samples));
     let Some(length_s) = trial.length_s.filter(|_| ui.available_width() > 60.0) else { return };
     let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width() - 6.0, 16.0), egui::Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, "Time in the trial"));

@@ -8,7 +8,8 @@ use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::workers::{GripperView, GripperWish, LatestReading, TrialRequest};
+use palpate_lab::recording::TrialRequest;
+use palpate_lab::workers::{GripperView, GripperWish, LatestReading};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
@@ -247,7 +248,7 @@ fn control_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, ac
     let mut watching = gripper.watching.is_some();
     let about = "A trial begins when the pressure rises or the fingers move, and ends when they are back at rest";
     if ui.checkbox(&mut watching, "Trials begin and end by themselves  (W)").on_hover_text(about).changed() {
-        let request = TrialRequest { object: None, control: Control::Free, adds: false };
+        let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
         actions.push(Action::Gripper(GripperWish::Watch(watching.then_some(request))));
     }
 }

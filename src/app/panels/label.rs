@@ -119,7 +119,7 @@ fn going_on_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial:
     if let Some(left_s) = trial.left_s {
         ui.label(RichText::new(format!("{left_s:.1} s")).size(30.0).monospace());
     }
-    ui.weak(format!("trial {}: {} readings", trial.id, trial.samples));
+    ui.weak(format!("{}: {} readings", trial.title(), trial.samples));
     if let Some(next) = &view.next {
         object_ui(ui, context, &next.object, &cue(next));
     }

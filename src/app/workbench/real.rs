@@ -5,7 +5,9 @@ use super::{Shown, Workbench};
 use crate::app::actions::{DeskAction, Message};
 use crate::app::modes::Mode;
 use crate::app::panels::{Source, USUAL_METHOD, control_title};
-use palpate_lab::workers::{Command, GripperWish, LabelWish, TrainRequest, TrialPart, TrialRequest};
+use palpate_lab::grasping::GraspStage;
+use palpate_lab::recording::TrialRequest;
+use palpate_lab::workers::{Command, GripperWish, LabelWish, TrainRequest};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::catalogue;
 use palpate_store::labels::LabelledTrial;
@@ -58,7 +60,7 @@ impl Workbench {
             }
             DeskAction::ToggleWatch => {
                 let watching = self.gripper.view().is_some_and(|gripper| gripper.watching.is_some());
-                let request = TrialRequest { object: None, control: Control::Free, adds: false };
+                let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
                 self.gripper.wish(GripperWish::Watch((!watching).then_some(request)));
                 let state = if watching { "when R is pressed" } else { "by themselves, when the fingers move" };
                 self.tell(Message::Info(format!("trials begin {state}")));
@@ -111,7 +113,7 @@ impl Workbench {
             self.view.draft.selected = None;
             self.labeller.ask(LabelWish::Refresh);
         }
-        let part = gripper.trial.as_ref().map(|trial| trial.part);
+        let part = gripper.trial.as_ref().map(|trial| trial.stage);
         if self.trial_part != part {
             if self.trial_part.is_none() {
                 // One that begins by itself asks nobody whether they are done with writing.
@@ -121,7 +123,7 @@ impl Workbench {
                 self.view.draft.done();
             }
             self.trial_part = part;
-            if part == Some(TrialPart::Phase(Phase::Close)) {
+            if part == Some(GraspStage::Phase(Phase::Close)) {
                 self.close_twin();
             }
         }
@@ -234,7 +236,12 @@ impl Workbench {
             self.labeller.ask(LabelWish::Discard(trial.id));
         }
         self.view.draft.done();
-        let request = TrialRequest { object: None, control: self.view.control, adds: self.view.mode == Mode::Demo };
+        let request = TrialRequest {
+            object: None,
+            length_s: None,
+            control: self.view.control,
+            adds: self.view.mode == Mode::Demo,
+        };
         self.begun_by = self.gripper.wish(GripperWish::Begin(request));
     }
 

@@ -89,6 +89,13 @@ pub struct TrialView {
     pub samples: u64,
 }
 
+impl TrialView {
+    /// `trial 7`, or `trial` before it has a number.
+    pub fn title(&self) -> String {
+        self.id.map_or_else(|| "trial".to_owned(), |id| format!("trial {id}"))
+    }
+}
+
 /// A trial that has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EndedTrial {
