@@ -3,8 +3,8 @@
 use super::Failure;
 use super::setup::SceneArguments;
 use super::terminal::{say, say_json};
-use palpate_device::pretended::{
-    Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
+use palpate_device::emulator::{
+    EmulatedGripper, EmulatorSetup, Fault, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
 };
 use palpate_sim::objects::{anchored, catalogue};
 use std::path::PathBuf;
@@ -126,7 +126,7 @@ pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         grasp_every_s: Some(arguments.grasp_every).filter(|every| *every > 0.0),
         script,
     };
-    let gripper = PretendedGripper::new(PretendedSetup {
+    let gripper = EmulatedGripper::new(EmulatorSetup {
         hand,
         parts,
         rate_hz: arguments.rate,
@@ -178,13 +178,13 @@ fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
 }
 
 #[cfg(not(unix))]
-fn serve(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
+fn serve(_arguments: &EmulateArguments, _gripper: EmulatedGripper) -> Result<(), Failure> {
     Err("emulate needs a pseudo-terminal, which only Unix systems have: run it on Linux or macOS".into())
 }
 
 #[cfg(unix)]
-fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
-    use palpate_device::pretended::{Served, serve};
+fn serve(arguments: &EmulateArguments, mut gripper: EmulatedGripper) -> Result<(), Failure> {
+    use palpate_device::emulator::{PortSetup, serve};
     use std::io::Write as _;
 
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
@@ -193,9 +193,9 @@ fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<
     let mut sent = arguments.sent.as_ref().map(std::fs::File::create).transpose()?;
     let mut greeting = (!arguments.json).then(|| {
         let link = link.display();
-        format!("pretended gripper at {link}, until Ctrl+C; look at it with: palpate doctor {link}")
+        format!("emulated gripper at {link}, until Ctrl+C; look at it with: palpate doctor {link}")
     });
-    let served = Served { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
+    let served = PortSetup { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
     let mut failure: Option<Failure> = None;
     serve(&mut gripper, &served, &stop, &mut |gripper| {
         let mut turn = || -> Result<(), Failure> {
@@ -239,7 +239,7 @@ fn typed_steps() -> std::sync::mpsc::Receiver<String> {
 
 /// Adds the steps of a typed line; one that is not understood is complained about, and nothing else happens.
 #[cfg(unix)]
-fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure> {
+fn take_steps(gripper: &mut EmulatedGripper, line: &str) -> Result<(), Failure> {
     match parse_script(line) {
         Ok(steps) => {
             for mut step in steps {
@@ -256,24 +256,24 @@ fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure>
 
 /// Says what happened.
 #[cfg(unix)]
-fn tell(happened: &palpate_device::pretended::Happened, json: bool) -> Result<(), Failure> {
-    use palpate_device::pretended::Happening;
+fn tell(happened: &palpate_device::emulator::EmulatorEvent, json: bool) -> Result<(), Failure> {
+    use palpate_device::emulator::EmulatorEventKind;
     if json {
         return say(serde_json::to_string(happened)?);
     }
     let what = match &happened.what {
-        Happening::Grasp { number, object } => format!("grasp {number}: {object}"),
-        Happening::Hold { bend_deg: [left, right], load_n, seconds } => {
+        EmulatorEventKind::Grasp { number, object } => format!("grasp {number}: {object}"),
+        EmulatorEventKind::Hold { bend_deg: [left, right], load_n, seconds } => {
             format!("holds {left:.0} and {right:.0} degrees, {:.2} and {:.2} N, for {seconds} s", load_n[0], load_n[1])
         }
-        Happening::ScriptDone => "the script is done".to_owned(),
-        Happening::Fault { fault } => format!("fault {fault}"),
-        Happening::Watchdog => "the board vents: the host fell silent".to_owned(),
-        Happening::Failed { reason } => format!("the fingers stay as they are: {reason}"),
-        Happening::HostCame => "a host opened the port".to_owned(),
-        Happening::HostLeft => "the host closed the port".to_owned(),
-        Happening::Port { path } => format!("the port is {path}"),
-        Happening::Overrun { bytes } => format!("{bytes} bytes given up: the host does not read"),
+        EmulatorEventKind::ScriptDone => "the script is done".to_owned(),
+        EmulatorEventKind::Fault { fault } => format!("fault {fault}"),
+        EmulatorEventKind::Watchdog => "the board vents: the host fell silent".to_owned(),
+        EmulatorEventKind::Failed { reason } => format!("the fingers stay as they are: {reason}"),
+        EmulatorEventKind::HostCame => "a host opened the port".to_owned(),
+        EmulatorEventKind::HostLeft => "the host closed the port".to_owned(),
+        EmulatorEventKind::Port { path } => format!("the port is {path}"),
+        EmulatorEventKind::Overrun { bytes } => format!("{bytes} bytes given up: the host does not read"),
     };
     say(format!("{:>9.3} s  {what}", happened.t_s))
 }

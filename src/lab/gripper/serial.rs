@@ -3,8 +3,8 @@
 
 use super::conductor::{Conductor, VENT};
 use crate::gripper::{Event, Rig, RigError};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkState, LinkStatus, SerialLink};
-use palpate_device::wire::Heard;
 use palpate_sim::frame::Quality;
 use palpate_sim::gripper::Phase;
 use palpate_tactile::capture::Captured;
@@ -131,7 +131,7 @@ impl SerialRig {
             self.over = true;
             return None;
         }
-        if let LinkEvent::Heard(Heard::Said(text)) = &event
+        if let LinkEvent::Decoded(DecodedEvent::Reply(text)) = &event
             && (text.starts_with("refused") || text.starts_with("vent"))
         {
             self.notes.push(format!("the board said: {text}"));
@@ -165,14 +165,14 @@ fn leave_out_before(heard: &mut VecDeque<LinkEvent>, from_s: f64) {
     let mut place = 0;
     heard.retain(|event| {
         place += 1;
-        place > begins || matches!(event, LinkEvent::Heard(Heard::Board(_)))
+        place > begins || matches!(event, LinkEvent::Decoded(DecodedEvent::Board(_)))
     });
 }
 
 fn reading_time(event: &LinkEvent) -> Option<f64> {
     match event {
-        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
-        LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Decoded(_) | LinkEvent::Captured(_) => None,
     }
 }
 

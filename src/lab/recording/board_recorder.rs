@@ -2,8 +2,8 @@
 //! [`BoardRecorder::flush_if_due`] after each, so that a kill loses at most a second.
 
 use crate::labelling::{Observed, Thinned, flags_of, sparkline};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkStatus};
-use palpate_device::wire::Heard;
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Plan, Quality};
 use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
@@ -144,19 +144,19 @@ impl BoardRecorder {
                 }
                 self.chunk.bytes.push(piece);
             }
-            LinkEvent::Heard(Heard::Reading(reading)) => {
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
                 self.samples += 1;
                 self.last = Some((reading.t_s, None));
                 self.kept.push(&reading);
                 self.newest_s = Some(reading.t_s);
                 self.chunk.readings.push(reading);
             }
-            LinkEvent::Heard(Heard::Gap(gap)) => {
+            LinkEvent::Decoded(DecodedEvent::Gap(gap)) => {
                 self.lost += gap.lost.unwrap_or(0);
                 self.note_gap(gap);
             }
-            LinkEvent::Heard(Heard::Board(board)) => self.about.board = board,
-            LinkEvent::Heard(Heard::Said(_)) => {}
+            LinkEvent::Decoded(DecodedEvent::Board(board)) => self.about.board = board,
+            LinkEvent::Decoded(DecodedEvent::Reply(_)) => {}
         }
     }
 

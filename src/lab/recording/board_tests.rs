@@ -1,9 +1,9 @@
 //! Trials of a real gripper: recorded, stored, merged, exported, and killed half-way.
 
 use super::*;
+use palpate_device::protocol::CaptureReader;
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, SerialLink};
-use palpate_device::wire::CaptureReader;
-use palpate_device::wire::Heard;
 use palpate_sim::scene::Scene;
 use palpate_store::{BOARD_RIG, Store, StoreError, write_board_csv};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
@@ -126,7 +126,7 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     })?;
     let plan = BoardTrialPlan { object: "cube".to_owned(), scene: String::new(), seconds: None };
     let mut recorder = BoardRecorder::begin(&mut store, &plan, &link.status(), 0.0)?;
-    let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+    let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Decoded(DecodedEvent::Reading(_)));
     while !link.is_over() {
         for event in link.take(Duration::from_millis(20)) {
             let reading = is_reading(&event);

@@ -4,8 +4,8 @@ use super::messages::{EndedTrial, LEAD_S, TrialPart, TrialRequest, TrialView};
 use super::recent::Recent;
 use crate::gripper::Conductor;
 use crate::recording::{BoardRecorder, BoardTrialPlan};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkStatus};
-use palpate_device::wire::Heard;
 use palpate_sim::gripper::{Phase, Programme};
 use palpate_sim::scene::Scene;
 use palpate_store::labels::cadence_line;
@@ -65,8 +65,8 @@ impl Running {
         };
         let before = recent.since(from_s);
         let first = before.iter().find_map(|event| match event {
-            LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
-            LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
+            LinkEvent::Decoded(_) | LinkEvent::Captured(_) => None,
         });
         let began_s = first.unwrap_or(from_s);
         let mut recorder = BoardRecorder::begin(store, &plan, status, began_s)?;
@@ -92,18 +92,18 @@ impl Running {
     /// Takes in what the link has heard.
     pub(super) fn take(&mut self, event: LinkEvent) {
         match &event {
-            LinkEvent::Heard(Heard::Said(text)) if text.starts_with("refused") => {
+            LinkEvent::Decoded(DecodedEvent::Reply(text)) if text.starts_with("refused") => {
                 let cause = format!("the board said: {text}");
                 self.note(cause.clone());
                 self.cut(cause);
             }
-            LinkEvent::Heard(Heard::Said(text)) if text.starts_with("vent") => {
+            LinkEvent::Decoded(DecodedEvent::Reply(text)) if text.starts_with("vent") => {
                 let cause = format!("the board vented by itself ({text})");
                 self.recorder.interrupt(&cause);
                 self.cut(cause);
             }
             LinkEvent::Captured(Captured::Interrupted { cause, .. }) => self.cut(cause.clone()),
-            LinkEvent::Heard(_) | LinkEvent::Captured(_) => {}
+            LinkEvent::Decoded(_) | LinkEvent::Captured(_) => {}
         }
         self.recorder.take(event);
     }
