@@ -9,6 +9,7 @@ use super::fields::{Field, Parsed, parse};
 use super::handshake::{self, Handshake};
 use super::line_log::{ConsoleLine, LineKind, LineLog};
 use super::lines::{Line, LineSplitter};
+use super::reply::BoardReply;
 use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
 use super::shape::{Candidate, Judged, Role, Shapes};
 use super::teleplot::Assembler;
@@ -24,8 +25,8 @@ pub enum DecodedEvent {
     Gap(Gap),
     /// What is known of the board has changed. Its channels are only ever added to, or renamed in place.
     Board(Board),
-    /// A remark of the board, without its `#`.
-    Reply(String),
+    /// A reply or remark of the board.
+    Reply(BoardReply),
 }
 
 /// Listens to one board. Memory stays bounded whatever it sends.
@@ -270,7 +271,7 @@ impl Reader {
             self.name_columns(heard);
             heard.push(DecodedEvent::Board(self.board()));
         }
-        heard.push(DecodedEvent::Reply(text.strip_prefix('#').unwrap_or(text).trim().to_owned()));
+        heard.push(DecodedEvent::Reply(BoardReply::parse(text)));
     }
 
     fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {

@@ -1,7 +1,7 @@
 //! A link over a real pseudo-terminal.
 
 use super::*;
-use crate::protocol::DecodedEvent;
+use crate::protocol::{BoardReply, DecodedEvent};
 use palpate_tactile::board::{Gap, Reading};
 use palpate_tactile::capture::Captured;
 use serialport::{SerialPort, TTYPort};
@@ -98,7 +98,9 @@ fn lines_go_to_the_board_and_its_remarks_come_back() {
     emulated.board.read_exact(&mut told).expect("is told");
     assert_eq!(&told, b"P 0.55\n");
     emulated.board.write_all(b"# ok p=0.55\n").expect("writes");
-    let said = |events: &[LinkEvent]| events.contains(&LinkEvent::Decoded(DecodedEvent::Reply("ok p=0.55".to_owned())));
+    let said = |events: &[LinkEvent]| {
+        events.contains(&LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar: 0.55 })))
+    };
     assert!(said(&take_until(&link, said)));
     drop(emulated.port);
 }

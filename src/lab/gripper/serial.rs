@@ -131,10 +131,10 @@ impl SerialRig {
             self.over = true;
             return None;
         }
-        if let LinkEvent::Decoded(DecodedEvent::Reply(text)) = &event
-            && (text.starts_with("refused") || text.starts_with("vent"))
+        if let LinkEvent::Decoded(DecodedEvent::Reply(reply)) = &event
+            && reply.ends_control()
         {
-            self.notes.push(format!("the board said: {text}"));
+            self.notes.push(format!("the board said: {reply}"));
             self.cut();
         }
         if matches!(event, LinkEvent::Captured(Captured::Interrupted { .. })) {

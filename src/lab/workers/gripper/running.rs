@@ -4,7 +4,7 @@ use super::messages::{EndedTrial, LEAD_S, TrialPart, TrialRequest, TrialView};
 use super::recent::Recent;
 use crate::gripper::Conductor;
 use crate::recording::{BoardRecorder, BoardTrialPlan};
-use palpate_device::protocol::DecodedEvent;
+use palpate_device::protocol::{BoardReply, DecodedEvent};
 use palpate_device::serial::{LinkEvent, LinkStatus};
 use palpate_sim::gripper::{Phase, Programme};
 use palpate_sim::scene::Scene;
@@ -92,12 +92,12 @@ impl Running {
     /// Takes in what the link has heard.
     pub(super) fn take(&mut self, event: LinkEvent) {
         match &event {
-            LinkEvent::Decoded(DecodedEvent::Reply(text)) if text.starts_with("refused") => {
+            LinkEvent::Decoded(DecodedEvent::Reply(text @ BoardReply::Refused { .. })) => {
                 let cause = format!("the board said: {text}");
                 self.note(cause.clone());
                 self.cut(cause);
             }
-            LinkEvent::Decoded(DecodedEvent::Reply(text)) if text.starts_with("vent") => {
+            LinkEvent::Decoded(DecodedEvent::Reply(text @ BoardReply::Vented { .. })) => {
                 let cause = format!("the board vented by itself ({text})");
                 self.recorder.interrupt(&cause);
                 self.cut(cause);
