@@ -5,11 +5,11 @@ use super::link;
 use super::terminal::{note, say, say_json, table, typed_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::doctor::{
-    Bleed, CrosstalkTest, Finding, Observations, USUAL_LISTEN_S, Verdict, WIRING_PAGE, examine, findings, is_sound,
-    summary, write_sketch,
+    Bleed, CheckFinding, CheckStatus, CrosstalkTest, Observations, USUAL_LISTEN_S, WIRING_PAGE, examine, findings,
+    is_sound, summary, write_sketch,
 };
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{Baud, LinkEvent, LinkOptions};
-use palpate_device::wire::Heard;
 use palpate_tactile::board::KNOWN_AFTER;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -62,7 +62,7 @@ struct Report<'a> {
     port: Option<&'a std::path::Path>,
     listened_s: f64,
     sound: bool,
-    findings: Vec<Finding>,
+    findings: Vec<CheckFinding>,
 }
 
 pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
@@ -121,7 +121,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
         let events = link.take(Duration::from_millis(50));
         let board = link.status().board;
         for event in events {
-            let LinkEvent::Heard(Heard::Reading(reading)) = event else { continue };
+            let LinkEvent::Decoded(DecodedEvent::Reading(reading)) = event else { continue };
             newest = Instant::now();
             readings += 1;
             if readings < KNOWN_AFTER {
@@ -161,7 +161,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     } else {
         let row = |bleed: &Bleed| {
             let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));
-            let verdict = if bleed.bleeds { Verdict::Wrong } else { Verdict::Good };
+            let verdict = if bleed.bleeds { CheckStatus::Failed } else { CheckStatus::Passed };
             vec![bleed.from.label().into(), bleed.into.label().into(), share, counts, verdict.name().into()]
         };
         table(&["moved", "watched", "crosstalk [%]", "counts", ""], &test.found().iter().map(row).collect::<Vec<_>>())?;
@@ -170,7 +170,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print(seen: &Observations, found: &[Finding]) -> Result<(), Failure> {
+fn print(seen: &Observations, found: &[CheckFinding]) -> Result<(), Failure> {
     if let Some(link) = &seen.link {
         say(format!("{} ({}), listened for {:.0} s\n", link.port.path.display(), link.port.title, seen.listened_s))?;
     }

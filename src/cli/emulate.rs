@@ -3,11 +3,11 @@
 use super::Failure;
 use super::setup::SceneArguments;
 use super::terminal::{say, say_json};
-use palpate_device::pretended::{
-    Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
+use palpate_device::emulator::{
+    EmulatedGripper, EmulatorSetup, Fault, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
 };
 #[cfg(unix)]
-use palpate_device::pretended::{Happened, Happening, Served, serve};
+use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
 use palpate_sim::objects::{anchored, catalogue};
 use std::path::PathBuf;
 
@@ -133,7 +133,7 @@ pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         grasp_every_s: Some(arguments.grasp_every).filter(|every| *every > 0.0),
         script,
     };
-    let gripper = PretendedGripper::new(PretendedSetup {
+    let gripper = EmulatedGripper::new(EmulatorSetup {
         hand,
         parts,
         rate_hz: arguments.rate,
@@ -185,12 +185,12 @@ fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
 }
 
 #[cfg(not(unix))]
-fn emulate(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<(), Failure> {
+fn emulate(_arguments: &EmulateArguments, _gripper: EmulatedGripper) -> Result<(), Failure> {
     Err("emulate needs a pseudo-terminal: run it on Linux or macOS".into())
 }
 
 #[cfg(unix)]
-fn emulate(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
+fn emulate(arguments: &EmulateArguments, mut gripper: EmulatedGripper) -> Result<(), Failure> {
     use std::io::Write as _;
 
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
@@ -201,7 +201,7 @@ fn emulate(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Resul
         let link = link.display();
         format!("emulated gripper at {link} until Ctrl+C; try: palpate doctor {link}")
     });
-    let served = Served { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
+    let served = PortSetup { link, speed: arguments.speed, baud: arguments.baud, boot_s: arguments.boot };
     let mut failure: Option<Failure> = None;
     serve(&mut gripper, &served, &stop, &mut |gripper| {
         let mut turn = || -> Result<(), Failure> {
@@ -245,7 +245,7 @@ fn typed_steps() -> std::sync::mpsc::Receiver<String> {
 
 /// Adds the steps of a typed line; a line with an error adds none.
 #[cfg(unix)]
-fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure> {
+fn take_steps(gripper: &mut EmulatedGripper, line: &str) -> Result<(), Failure> {
     match parse_script(line) {
         Ok(steps) => {
             for mut step in steps {
@@ -262,23 +262,23 @@ fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure>
 
 /// Prints an event.
 #[cfg(unix)]
-fn print_event(happened: &Happened, json: bool) -> Result<(), Failure> {
+fn print_event(happened: &EmulatorEvent, json: bool) -> Result<(), Failure> {
     if json {
         return say(serde_json::to_string(happened)?);
     }
     let what = match &happened.what {
-        Happening::Grasp { number, object } => format!("grasp {number}: {object}"),
-        Happening::Hold { bend_deg: [left, right], load_n, seconds } => {
+        EmulatorEventKind::Grasp { number, object } => format!("grasp {number}: {object}"),
+        EmulatorEventKind::Hold { bend_deg: [left, right], load_n, seconds } => {
             format!("holds {left:.0} and {right:.0} degrees, {:.2} and {:.2} N, for {seconds} s", load_n[0], load_n[1])
         }
-        Happening::ScriptDone => "end of the script".to_owned(),
-        Happening::Fault { fault } => format!("fault {fault}"),
-        Happening::Watchdog => "watchdog: the host is silent, the board vents".to_owned(),
-        Happening::Failed { reason } => format!("simulation failed, the fingers do not move: {reason}"),
-        Happening::HostCame => "host opened the port".to_owned(),
-        Happening::HostLeft => "host closed the port".to_owned(),
-        Happening::Port { path } => format!("port {path}"),
-        Happening::Overrun { bytes } => format!("{bytes} bytes dropped: the host does not read"),
+        EmulatorEventKind::ScriptDone => "end of the script".to_owned(),
+        EmulatorEventKind::Fault { fault } => format!("fault {fault}"),
+        EmulatorEventKind::Watchdog => "watchdog: the host is silent, the board vents".to_owned(),
+        EmulatorEventKind::Failed { reason } => format!("simulation failed, the fingers do not move: {reason}"),
+        EmulatorEventKind::HostCame => "host opened the port".to_owned(),
+        EmulatorEventKind::HostLeft => "host closed the port".to_owned(),
+        EmulatorEventKind::Port { path } => format!("port {path}"),
+        EmulatorEventKind::Overrun { bytes } => format!("{bytes} bytes dropped: the host does not read"),
     };
     say(format!("{:>9.3} s  {what}", happened.t_s))
 }

@@ -1,6 +1,6 @@
 //! Sensor boards: bytes in, readings out, pressure out. The line protocol, serial ports, diagnosis, and an emulated gripper.
 
 pub mod doctor;
-pub mod pretended;
+pub mod emulator;
+pub mod protocol;
 pub mod serial;
-pub mod wire;

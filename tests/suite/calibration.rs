@@ -1,4 +1,4 @@
-//! The pretended gripper calibrated and fitted: what is hidden in its parts and fingers is found again from what its
+//! The emulated gripper calibrated and fitted: what is hidden in its parts and fingers is found again from what its
 //! board prints.
 
 use crate::bench::{Bench, BenchSetup};
@@ -8,8 +8,8 @@ use crate::program::{json, palpate, ran, refused, run};
 use crate::streams::alike;
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::ALL_PANELS;
-use palpate_device::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
-use palpate_device::wire::{Decoder, Heard};
+use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
+use palpate_device::protocol::{DecodedEvent, Decoder};
 use palpate_lab::gripper::Listen;
 use palpate_lab::study::{FingerFit, Known, Observation, Trust, fit_finger};
 use palpate_sim::gripper::Phase;
@@ -37,7 +37,7 @@ pub(crate) fn readings(
 ) -> (Board, Vec<Reading>) {
     let script = parse_script(script).unwrap();
     let hand = HandPlan { scene: scene.clone(), objects: vec![EMPTY.to_owned()], seed, grasp_every_s: None, script };
-    let setup = PretendedSetup {
+    let setup = EmulatorSetup {
         hand,
         parts: parts.clone(),
         rate_hz: 50,
@@ -47,7 +47,7 @@ pub(crate) fn readings(
         faults: vec![],
         seed,
     };
-    let mut gripper = PretendedGripper::new(setup).unwrap();
+    let mut gripper = EmulatedGripper::new(setup).unwrap();
     let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
     for k in 1..=(seconds / 0.005) as u32 {
         let now = 0.005 * f64::from(k);
@@ -55,8 +55,8 @@ pub(crate) fn readings(
         decoder.push(&gripper.take_bytes(), now, &mut heard);
     }
     let reading = |heard| match heard {
-        Heard::Reading(reading) => Some(reading),
-        Heard::Gap(_) | Heard::Board(_) | Heard::Said(_) => None,
+        DecodedEvent::Reading(reading) => Some(reading),
+        DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
     };
     (decoder.board().clone(), heard.into_iter().filter_map(reading).collect())
 }
@@ -183,7 +183,7 @@ pub(crate) fn scenes() -> [Scene; 2] {
     [known, hidden]
 }
 
-/// A grasp of the pretended gripper as the fit takes it.
+/// A grasp of the emulated gripper as the fit takes it.
 fn observed(parts: &HiddenParts, readout: &Readout, script: &str, fixed: bool, seed: u64) -> Observation {
     let [mut known, mut hidden] = scenes();
     let object = if fixed { "bigball" } else { EMPTY };
@@ -290,7 +290,7 @@ pub(crate) fn capture(parts: &HiddenParts, script: &str, faults: &str, seconds: 
     let hand =
         HandPlan { scene: Scene::default(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script };
     let (channels, most_steps, clock_start_us) = (4, 30, 0);
-    let setup = PretendedSetup {
+    let setup = EmulatorSetup {
         hand,
         parts: parts.clone(),
         rate_hz: 50,
@@ -300,7 +300,7 @@ pub(crate) fn capture(parts: &HiddenParts, script: &str, faults: &str, seconds: 
         faults: parse_faults(faults).unwrap(),
         seed: 1,
     };
-    let mut gripper = PretendedGripper::new(setup).unwrap();
+    let mut gripper = EmulatedGripper::new(setup).unwrap();
     let mut bytes = CAPTURE_MAGIC.to_vec();
     for k in 1..=(100.0 * seconds) as u32 {
         let arrived_s = 0.01 * f64::from(k);

@@ -1,5 +1,5 @@
 //! A labelling afternoon at the desk, by keys alone: record, label, record again, discard, take back, find, export. The
-//! gripper is the pretended one, on a clock that runs as fast as it can.
+//! gripper is the emulated one, on a clock that runs as fast as it can.
 
 use crate::bench::{Bench, BenchSetup};
 use crate::calibration::{calibrated, parts};

@@ -1,8 +1,8 @@
 //! The firmware, compiled from the header that goes onto the board, against a stand-in for its pins; and the same script
 //! through the board that `palpate emulate` pretends to be: both print the same bytes.
 
-use palpate_device::pretended::{BoardSetup, FirmwareBoard};
-use palpate_device::wire::{Decoder, Heard};
+use palpate_device::emulator::{BoardSetup, FirmwareBoard};
+use palpate_device::protocol::{DecodedEvent, Decoder};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 
 /// What happens to the board.
 #[derive(Clone, Debug)]
-enum Happening {
+enum EmulatorEventKind {
     /// It is polled at a time of its clock (µs).
     Poll(u32),
     /// Only the watchdog's timer comes round, at a time of its clock (µs).
@@ -22,8 +22,8 @@ enum Happening {
     Hear(Vec<u8>),
 }
 
-fn hear(line: &str) -> Happening {
-    Happening::Hear(format!("{line}\n").into_bytes())
+fn hear(line: &str) -> EmulatorEventKind {
+    EmulatorEventKind::Hear(format!("{line}\n").into_bytes())
 }
 
 /// The stand-in, compiled once. Without a C compiler these tests fail and say so.
@@ -59,7 +59,7 @@ fn setup(period_us: u32, channels: usize, most_steps: u8) -> BoardSetup {
 }
 
 /// Everything that the compiled firmware prints, and what its stand-in notes beside (`!`).
-fn in_c(setup: &BoardSetup, start_us: u32, happenings: &[Happening]) -> String {
+fn in_c(setup: &BoardSetup, start_us: u32, happenings: &[EmulatorEventKind]) -> String {
     let numbers = [setup.period_us, setup.channels.len() as u32, setup.bits, u32::from(setup.most_steps), start_us];
     let mut program = Command::new(&STAND_IN.1)
         .args(numbers.map(|number| number.to_string()))
@@ -70,9 +70,9 @@ fn in_c(setup: &BoardSetup, start_us: u32, happenings: &[Happening]) -> String {
     let mut script = String::new();
     for happening in happenings {
         match happening {
-            Happening::Poll(us) => writeln!(script, "t {us}").unwrap(),
-            Happening::Watch(us) => writeln!(script, "w {us}").unwrap(),
-            Happening::Hear(bytes) => {
+            EmulatorEventKind::Poll(us) => writeln!(script, "t {us}").unwrap(),
+            EmulatorEventKind::Watch(us) => writeln!(script, "w {us}").unwrap(),
+            EmulatorEventKind::Hear(bytes) => {
                 let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
                 writeln!(script, "x {hex}").unwrap();
             }
@@ -92,7 +92,7 @@ fn printed(text: &str) -> Vec<&str> {
 }
 
 /// The same through the pretended board.
-fn in_rust(setup: &BoardSetup, start_us: u32, happenings: &[Happening]) -> String {
+fn in_rust(setup: &BoardSetup, start_us: u32, happenings: &[EmulatorEventKind]) -> String {
     let (mut conversions, mut last, mut within) = (0_u32, usize::MAX, 0_u32);
     let mut convert = |channel: usize| {
         conversions += 1;
@@ -105,13 +105,13 @@ fn in_rust(setup: &BoardSetup, start_us: u32, happenings: &[Happening]) -> Strin
     let mut now = start_us;
     for happening in happenings {
         match happening {
-            Happening::Poll(us) => {
+            EmulatorEventKind::Poll(us) => {
                 now = *us;
                 board.poll(now, &mut convert, &mut out);
             }
             // The pretended board is never stuck: it is watched when it is polled.
-            Happening::Watch(_) => {}
-            Happening::Hear(bytes) => bytes.iter().for_each(|byte| {
+            EmulatorEventKind::Watch(_) => {}
+            EmulatorEventKind::Hear(bytes) => bytes.iter().for_each(|byte| {
                 board.hear(*byte, now, &mut out);
             }),
         }
@@ -125,8 +125,8 @@ fn number(line: &str, key: &str) -> f64 {
 }
 
 /// Polls from a time on, each so much after the one before (µs).
-fn polls(start_us: u32, every_us: u32, count: u32) -> Vec<Happening> {
-    (0..count).map(|k| Happening::Poll(start_us.wrapping_add(k * every_us))).collect()
+fn polls(start_us: u32, every_us: u32, count: u32) -> Vec<EmulatorEventKind> {
+    (0..count).map(|k| EmulatorEventKind::Poll(start_us.wrapping_add(k * every_us))).collect()
 }
 
 #[test]
@@ -170,8 +170,8 @@ fn the_parser_reads_what_it_prints_and_takes_no_line_that_lost_a_digit() {
             decoder.push(&bytes, 0.02 * k as f64, &mut heard);
         }
         let counts = heard.iter().filter_map(|heard| match heard {
-            Heard::Reading(reading) => Some((reading.seq, reading.counts.clone())),
-            Heard::Gap(_) | Heard::Board(_) | Heard::Said(_) => None,
+            DecodedEvent::Reading(reading) => Some((reading.seq, reading.counts.clone())),
+            DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
         });
         (counts.collect::<Vec<_>>(), decoder.cadence())
     };
@@ -185,7 +185,7 @@ fn the_parser_reads_what_it_prints_and_takes_no_line_that_lost_a_digit() {
 
 #[test]
 fn a_sample_that_is_missed_is_counted_and_the_next_is_on_time() {
-    let told = in_c(&setup(20_000, 2, 0), 0, &[0, 20_000, 95_000, 100_000, 120_500].map(Happening::Poll));
+    let told = in_c(&setup(20_000, 2, 0), 0, &[0, 20_000, 95_000, 100_000, 120_500].map(EmulatorEventKind::Poll));
     let pairs: Vec<[f64; 2]> =
         printed(&told)[1..].iter().map(|line| ["t_us", "seq"].map(|key| number(line, key))).collect();
     assert_eq!(pairs, [[0.0, 0.0], [20_000.0, 1.0], [95_000.0, 4.0], [100_000.0, 5.0], [120_500.0, 6.0]]);
@@ -194,8 +194,8 @@ fn a_sample_that_is_missed_is_counted_and_the_next_is_on_time() {
 #[test]
 fn pressure_comes_in_steps_up_to_the_maximum_and_rubbish_is_refused() {
     let asked = ["P 0.55", "P 0.57", "P 1.05", "P 1.00", "K", "p 0.5", "P", "P -1", "P 0.5x", "hello", "", "V", "?"];
-    let mut happenings: Vec<Happening> = asked.iter().map(|line| hear(line)).collect();
-    happenings.push(Happening::Hear([vec![b'A'; 500], b"\nP 0.05\r\n".to_vec()].concat()));
+    let mut happenings: Vec<EmulatorEventKind> = asked.iter().map(|line| hear(line)).collect();
+    happenings.push(EmulatorEventKind::Hear([vec![b'A'; 500], b"\nP 0.05\r\n".to_vec()].concat()));
     let told = in_c(&setup(20_000, 4, 20), 0, &happenings);
     let not_understood = "# refused reason=not-understood";
     let hello = printed(&told)[0];
@@ -224,7 +224,7 @@ fn pressure_comes_in_steps_up_to_the_maximum_and_rubbish_is_refused() {
 
 #[test]
 fn a_board_without_a_control_box_says_so() {
-    let told = in_c(&setup(20_000, 4, 0), 0, &[hear("P 0.50"), Happening::Poll(0)]);
+    let told = in_c(&setup(20_000, 4, 0), 0, &[hear("P 0.50"), EmulatorEventKind::Poll(0)]);
     assert_eq!(printed(&told)[1], "# refused reason=no-control-box");
     assert!(!printed(&told)[2].contains("p_bar"));
 }
@@ -232,8 +232,8 @@ fn a_board_without_a_control_box_says_so() {
 #[test]
 fn silence_of_the_host_vents_within_a_second_but_a_sign_of_life_does_not() {
     let start = u32::MAX - 700_000;
-    let after = |us: u32| Happening::Poll(start.wrapping_add(us));
-    let vents = |happenings: &[Happening]| {
+    let after = |us: u32| EmulatorEventKind::Poll(start.wrapping_add(us));
+    let vents = |happenings: &[EmulatorEventKind]| {
         let told = in_c(&setup(20_000, 4, 30), start, happenings);
         let vented = printed(&told).contains(&"# vent reason=watchdog");
         assert_eq!(vented, told.contains("!pressure 10\n!pressure 0") || told.contains("0\n# vent"), "{told}");
@@ -249,10 +249,15 @@ fn silence_of_the_host_vents_within_a_second_but_a_sign_of_life_does_not() {
 
 #[test]
 fn the_watchdog_vents_without_a_word_while_the_loop_is_stuck_and_says_so_later() {
-    let stuck = [Happening::Poll(0), hear("P 0.50"), Happening::Watch(900_000), Happening::Watch(1_000_001)];
+    let stuck = [
+        EmulatorEventKind::Poll(0),
+        hear("P 0.50"),
+        EmulatorEventKind::Watch(900_000),
+        EmulatorEventKind::Watch(1_000_001),
+    ];
     let told = in_c(&setup(20_000, 4, 30), 0, &stuck);
     assert!(told.contains("# ok p=0.50\n!pressure 0\n!conversions"), "{told}");
-    let told = in_c(&setup(20_000, 4, 30), 0, &[&stuck[..], &[Happening::Poll(1_020_000)]].concat());
+    let told = in_c(&setup(20_000, 4, 30), 0, &[&stuck[..], &[EmulatorEventKind::Poll(1_020_000)]].concat());
     assert!(printed(&told)[3] == "# vent reason=watchdog" && told.matches("!pressure 0").count() == 2, "{told}");
 }
 
@@ -261,9 +266,9 @@ fn whatever_happens_the_pretended_board_prints_what_the_firmware_does() {
     let byte = prop_oneof![4 => proptest::sample::select(b"PVK?0123456789. \r\n".to_vec()), 1 => any::<u8>()];
     let lines = ["P 0.50\n", "P 1.00\n", "P 1.50\r\n", "P 0.07\n", "K\n", "V\n", "?\n"];
     let happening = prop_oneof![
-        6 => prop_oneof![9 => 0..30_000_u32, 1 => 0..3_000_000_u32].prop_map(Happening::Poll),
-        2 => proptest::sample::select(lines.to_vec()).prop_map(|line| Happening::Hear(line.into())),
-        1 => proptest::collection::vec(byte, 1..60).prop_map(Happening::Hear),
+        6 => prop_oneof![9 => 0..30_000_u32, 1 => 0..3_000_000_u32].prop_map(EmulatorEventKind::Poll),
+        2 => proptest::sample::select(lines.to_vec()).prop_map(|line| EmulatorEventKind::Hear(line.into())),
+        1 => proptest::collection::vec(byte, 1..60).prop_map(EmulatorEventKind::Hear),
     ];
     let board =
         (prop_oneof![Just(1000_u32), Just(20_000)], 1..=8_usize, prop_oneof![Just(0_u8), 1..=30_u8], any::<u32>());
@@ -275,7 +280,7 @@ fn whatever_happens_the_pretended_board_prints_what_the_firmware_does() {
             // Times were drawn as spans from one poll to the next.
             let mut now = start_us;
             for happening in &mut happenings {
-                if let Happening::Poll(us) = happening {
+                if let EmulatorEventKind::Poll(us) = happening {
                     now = now.wrapping_add(*us);
                     *us = now;
                 }

@@ -1,10 +1,10 @@
 //! The thread that owns the board of the real gripper: one link for the live view, trials, recognition and a calibration,
-//! tried on the pretended gripper with a clock of its own.
+//! tried on the emulated gripper with a clock of its own.
 
 use crate::calibration::{calibrated, parts};
 use crate::scripted;
 use crate::streams::Pretended;
-use palpate_device::pretended::{HandPlan, HiddenParts, PretendedSetup};
+use palpate_device::emulator::{EmulatorSetup, HandPlan, HiddenParts};
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::recording::TrialRequest;
@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// A worker on the pretended gripper, and what it has said.
+/// A worker on the emulated gripper, and what it has said.
 struct Desk {
     worker: GripperWorker,
     woken: Receiver<()>,
@@ -37,7 +37,7 @@ struct Desk {
 /// Views after which something that was waited for will not come any more.
 const MOST_VIEWS: u32 = 3000;
 
-/// A look at the pretended gripper takes this long in truth.
+/// A look at the emulated gripper takes this long in truth.
 const FAST: Duration = Duration::from_micros(100);
 /// A look when its time is the time of the clock.
 const TRUE_TO_TIME: Duration = Duration::from_millis(10);
@@ -48,24 +48,24 @@ fn scene() -> Scene {
     scene
 }
 
-/// The pretended gripper, waiting to be driven.
+/// The emulated gripper, waiting to be driven.
 pub(crate) fn board(parts: &HiddenParts) -> Listen {
-    pretended(parts, None, FAST, 30)
+    emulated(parts, None, FAST, 30)
 }
 
-/// The pretended gripper, grasping by itself.
+/// The emulated gripper, grasping by itself.
 fn moving(parts: &HiddenParts) -> Listen {
-    pretended(parts, Some(7.0), FAST, 30)
+    emulated(parts, Some(7.0), FAST, 30)
 }
 
-fn pretended(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, most_steps: u8) -> Listen {
+fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, most_steps: u8) -> Listen {
     let parts = parts.clone();
     Arc::new(move |port| {
         if let Some(port) = port {
             return Err(format!("there is no {}", port.display()).into());
         }
         let hand = HandPlan { scene: scene(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s, script: vec![] };
-        let setup = PretendedSetup {
+        let setup = EmulatorSetup {
             hand,
             parts: parts.clone(),
             rate_hz: 50,
@@ -217,7 +217,7 @@ fn stop_vents_ends_the_trial_and_says_so() {
 #[test]
 fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
     // What waits is written about once a second of the clock, which must come before the trial's end.
-    let mut desk = Desk::on(pretended(&parts(1, false), None, TRUE_TO_TIME, 30));
+    let mut desk = Desk::on(emulated(&parts(1, false), None, TRUE_TO_TIME, 30));
     desk.connect();
     desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
     let pressed = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
@@ -395,7 +395,7 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
 #[test]
 fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
     // Half a bar at most, where the programme goes up to one.
-    let mut desk = Desk::on(pretended(&parts(1, false), None, FAST, 10));
+    let mut desk = Desk::on(emulated(&parts(1, false), None, FAST, 10));
     desk.connect();
     let id = desk.trial(Control::Driven, false);
     desk.until_said("the trial was ended, and the fingers vented: the board said: refused reason=above-maximum");

@@ -11,9 +11,9 @@ use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Action};
-use palpate_device::doctor::{Observations, Traces};
+use palpate_device::doctor::{ChannelTraces, Observations};
+use palpate_device::protocol::Saturation;
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
-use palpate_device::wire::Rail;
 use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
@@ -55,14 +55,14 @@ fn sound() -> Observations {
         board: Board { rate_hz: Some(50.0), firmware: Some("1".to_owned()), ..Board::default() },
         detected: None,
         cadence,
-        rails: vec![None; 4],
+        saturation: vec![None; 4],
         looks_10_bit: false,
         units: Vec::new(),
         reconnects: 0,
         now_s: 8.0,
         dropped: [0; 2],
     };
-    let mut traces = Traces::default();
+    let mut traces = ChannelTraces::default();
     for k in 0..100_u8 {
         let bend = 4.0 * f32::from(k);
         let counts = [1400.0 + bend, 1500.0, 3.0 * bend, bend].map(Some).to_vec();
@@ -76,7 +76,7 @@ fn troubled() -> Observations {
     let mut seen = sound();
     seen.modem_manager = true;
     if let Some(link) = &mut seen.link {
-        link.rails[1] = Some(Rail::High);
+        link.saturation[1] = Some(Saturation::High);
         link.cadence.bad_lines = 60;
     }
     seen
@@ -149,7 +149,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
     let idle = run(at, &["doctor", "idle.bytes", "--crosstalk"]);
     assert!(idle.code == Some(1) && idle.out.contains("Not moved: left flex strip"), "{idle:?}");
     let text = run(at, &["doctor", "hand.bytes", "--crosstalk"]);
-    assert!(text.out.contains("100 nF from each pin") && text.out.contains("WRONG"), "{text:?}");
+    assert!(text.out.contains("100 nF from each pin") && text.out.contains("FAILED"), "{text:?}");
     refused(at, &["doctor", "nowhere", "--crosstalk"], &["nowhere"]);
 }
 
@@ -325,7 +325,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         bench.harness.step();
         bench.until_shown(true, "things are wrong");
         bench.until_shown(true, "then stopped");
-        assert!(bench.harness.query_by_label("lines: WRONG").is_some());
+        assert!(bench.harness.query_by_label("lines: FAILED").is_some());
         bench.harness.run_steps(3);
         let wrong = bench.harness.render().unwrap();
         bench.harness.get_by_label("Copy the command for modem-manager").click();

@@ -1,9 +1,9 @@
-//! A labelling afternoon in the terminal, on bytes of the pretended gripper: flags, labels, undoing, what gets into a data
+//! A labelling afternoon in the terminal, on bytes of the emulated gripper: flags, labels, undoing, what gets into a data
 //! set, and what comes out of the store.
 
 use crate::calibration::{calibrated, parts, readings, scenes, stored};
 use crate::program::{json, refused, run};
-use palpate_device::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
+use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
 use palpate_lab::datasets::{Source, View};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
@@ -11,7 +11,7 @@ use palpate_store::{ExportError, Store, export_labelled};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use std::path::Path;
 
-/// The bytes of five seconds of a pretended gripper that does a script.
+/// The bytes of five seconds of a emulated gripper that does a script.
 fn capture(at: &Path, name: &str, script: &str, faults: &str) {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
@@ -19,8 +19,8 @@ fn capture(at: &Path, name: &str, script: &str, faults: &str) {
     let hand = HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 2, grasp_every_s: None, script };
     let (parts, faults) = (HiddenParts::drawn(2), parse_faults(faults).unwrap());
     let (rate_hz, channels, most_steps, clock_start_us) = (50, 4, 30, 0);
-    let setup = PretendedSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 2 };
-    let mut gripper = PretendedGripper::new(setup).unwrap();
+    let setup = EmulatorSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 2 };
+    let mut gripper = EmulatedGripper::new(setup).unwrap();
     let mut file = CAPTURE_MAGIC.to_vec();
     for k in 1..=1000 {
         let arrived_s = 0.005 * f64::from(k);
@@ -40,7 +40,7 @@ fn record(at: &Path, name: &str, more: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn faults_of_the_pretended_gripper_are_flagged_and_a_good_grasp_is_not() {
+fn faults_of_the_emulated_gripper_are_flagged_and_a_good_grasp_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let lemon = "rest=0.5; grasp lemon";

@@ -7,13 +7,13 @@
 //! - `firmware`: the logic of the board, compiled and run against a stand-in for its pins.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
-//! - `pretended`: the pretended gripper, with every fault, recorded and diagnosed.
+//! - `emulator`: the emulated gripper, with every fault, recorded and diagnosed.
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
-//! - `calibration`: the pretended gripper calibrated and fitted.
+//! - `calibration`: the emulated gripper calibrated and fitted.
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
 //! - `gripper_tools`: doctor and fit in the window.
 //! - `training`: training on labelled trials of the board, in the window.
@@ -34,6 +34,7 @@ mod command_line;
 mod cpu_renderer;
 mod desk;
 mod determinism;
+mod emulator;
 mod files;
 mod firmware;
 mod fuzz;
@@ -46,7 +47,6 @@ mod panels;
 mod peers;
 mod physics;
 mod pictures;
-mod pretended;
 mod program;
 mod recognition_panel;
 mod scripted;

@@ -1,9 +1,9 @@
-//! Boards without a port, for what listens to one: readings that a test makes up, and the pretended gripper on a clock
+//! Boards without a port, for what listens to one: readings that a test makes up, and the emulated gripper on a clock
 //! that runs as fast as it is asked.
 
-use palpate_device::pretended::{PretendedGripper, PretendedSetup};
+use palpate_device::emulator::{EmulatedGripper, EmulatorSetup};
+use palpate_device::protocol::{ConsoleLine, DecodedEvent, Decoder};
 use palpate_device::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
-use palpate_device::wire::{ConsoleLine, Decoder, Heard};
 use palpate_lab::gripper::BoardStream;
 use palpate_tactile::board::{Board, Gap, Reading};
 use palpate_tactile::cadence::Cadence;
@@ -24,7 +24,7 @@ fn listening(board: Board, cadence: Cadence, now_s: f64) -> LinkStatus {
         board,
         detected: None,
         cadence,
-        rails: Vec::new(),
+        saturation: Vec::new(),
         looks_10_bit: false,
         units: Vec::new(),
         reconnects: 0,
@@ -60,7 +60,7 @@ pub(crate) fn once_with_a_gap() -> MadeUp<impl FnMut(Duration) -> (f64, Vec<Link
         reading(t_s, [1420.0 + 500.0 * wave, 1400.0 + 450.0 * wave, 900.0 * wave, 700.0 * wave].map(Some).to_vec())
     };
     let gap = Gap { from_s: 1.0, to_s: 1.8, lost: Some(39), cause: "the board was unplugged".to_owned() };
-    let gap = LinkEvent::Heard(Heard::Gap(gap));
+    let gap = LinkEvent::Decoded(DecodedEvent::Gap(gap));
     let mut events: Vec<LinkEvent> = (0..=50).map(sample).chain([gap]).chain((90..=150).map(sample)).collect();
     let next = move |patience| {
         if events.is_empty() {
@@ -72,7 +72,7 @@ pub(crate) fn once_with_a_gap() -> MadeUp<impl FnMut(Duration) -> (f64, Vec<Link
 }
 
 fn reading(t_s: f64, counts: Vec<Option<f32>>) -> LinkEvent {
-    LinkEvent::Heard(Heard::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }))
+    LinkEvent::Decoded(DecodedEvent::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }))
 }
 
 impl<F: FnMut(Duration) -> (f64, Vec<LinkEvent>)> BoardStream for MadeUp<F> {
@@ -103,9 +103,9 @@ impl<F: FnMut(Duration) -> (f64, Vec<LinkEvent>)> BoardStream for MadeUp<F> {
     }
 }
 
-/// The pretended gripper. Each look at it lets 10 ms of its time pass.
+/// The emulated gripper. Each look at it lets 10 ms of its time pass.
 pub(crate) struct Pretended {
-    gripper: PretendedGripper,
+    gripper: EmulatedGripper,
     decoder: Decoder,
     t_s: f64,
     /// How long a look takes in truth.
@@ -116,8 +116,8 @@ pub(crate) struct Pretended {
 const LOOK_S: f64 = 0.01;
 
 impl Pretended {
-    pub(crate) fn new(setup: PretendedSetup, look: Duration) -> Self {
-        let gripper = PretendedGripper::new(setup).unwrap();
+    pub(crate) fn new(setup: EmulatorSetup, look: Duration) -> Self {
+        let gripper = EmulatedGripper::new(setup).unwrap();
         Self { gripper, decoder: Decoder::default(), t_s: 0.0, look }
     }
 }
@@ -133,7 +133,7 @@ impl BoardStream for Pretended {
         }
         self.decoder.push(&bytes, self.t_s, &mut heard);
         let piece = LinkEvent::Captured(Captured::Bytes { arrived_s: self.t_s, bytes });
-        std::iter::once(piece).chain(heard.into_iter().map(LinkEvent::Heard)).collect()
+        std::iter::once(piece).chain(heard.into_iter().map(LinkEvent::Decoded)).collect()
     }
 
     fn status(&self) -> LinkStatus {

@@ -3,7 +3,7 @@
 use super::PanelContext;
 use crate::app::actions::Action;
 use egui::{RichText, ScrollArea, TextWrapMode, Ui};
-use palpate_device::wire::Verdict;
+use palpate_device::protocol::LineKind;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Action>) {
     let lines = context.gripper.map(|gripper| &gripper.console).filter(|lines| !lines.is_empty());
@@ -27,12 +27,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Act
             ui.horizontal(|ui| {
                 ui.label(RichText::new(time).monospace().weak());
                 let text = RichText::new(&line.text).monospace();
-                match line.verdict {
-                    Verdict::Read => ui.label(text),
-                    Verdict::Said => ui.label(text.color(ui.visuals().hyperlink_color)),
-                    Verdict::Bad(why) => ui.label(text.color(ui.visuals().error_fg_color)).on_hover_text(why),
+                match line.kind {
+                    LineKind::Values => ui.label(text),
+                    LineKind::Remark => ui.label(text.color(ui.visuals().hyperlink_color)),
+                    LineKind::Bad(why) => ui.label(text.color(ui.visuals().error_fg_color)).on_hover_text(why),
                 };
-                if let Verdict::Bad(why) = line.verdict {
+                if let LineKind::Bad(why) = line.kind {
                     ui.weak(why);
                 }
             });

@@ -9,7 +9,7 @@ use crate::app::theme::colour;
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
 use palpate_device::doctor::{
-    Bleed, CHECKS, Finding, SKETCH, USUAL_LISTEN_S, Verdict, WIRING_RULES, is_sound, summary, wires,
+    Bleed, CHECKS, CheckFinding, CheckStatus, SKETCH, USUAL_LISTEN_S, WIRING_RULES, is_sound, summary, wires,
 };
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
@@ -165,12 +165,12 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &Examination) {
     }
     ui.add_space(2.0);
     // What is to be done comes first; among equals, the order of the checks.
-    let mut findings: Vec<&Finding> = examination.findings.iter().collect();
+    let mut findings: Vec<&CheckFinding> = examination.findings.iter().collect();
     findings.sort_by_key(|finding| match finding.verdict {
-        Verdict::Wrong => 0,
-        Verdict::Note => 1,
-        Verdict::Good => 2,
-        Verdict::NotSeen => 3,
+        CheckStatus::Failed => 0,
+        CheckStatus::Note => 1,
+        CheckStatus::Passed => 2,
+        CheckStatus::Skipped => 3,
     });
     for finding in findings {
         finding_ui(ui, theme, finding);
@@ -183,7 +183,7 @@ fn sentence(text: &str) -> String {
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
-fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
+fn finding_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     ui.horizontal_top(|ui| {
         mark_ui(ui, theme, finding);
         ui.vertical(|ui| {
@@ -202,13 +202,13 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
 }
 
 /// What was checked and what was seen, in one line where there is room.
-fn headline_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
+fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let colours = theme.colours();
     let (name, seen) = match finding.verdict {
-        Verdict::Wrong => (colours.error, colours.text),
-        Verdict::Note => (colours.warning, colours.text),
-        Verdict::Good => (colours.text, colours.quiet_text),
-        Verdict::NotSeen => (colours.quiet_text, colours.quiet_text),
+        CheckStatus::Failed => (colours.error, colours.text),
+        CheckStatus::Note => (colours.warning, colours.text),
+        CheckStatus::Passed => (colours.text, colours.quiet_text),
+        CheckStatus::Skipped => (colours.quiet_text, colours.quiet_text),
     };
     let font = egui::TextStyle::Body.resolve(ui.style());
     let mut line = LayoutJob::default();
@@ -218,7 +218,7 @@ fn headline_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
 }
 
 /// A sign for the verdict, and its words for screen readers and pointers.
-fn mark_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
+fn mark_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let (rect, response) = ui.allocate_exact_size(egui::vec2(18.0, 18.0), Sense::hover());
     let label = format!("{}: {}", finding.check, finding.verdict.name());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &label));
@@ -228,10 +228,10 @@ fn mark_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
         ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, text, font, ink);
     };
     match finding.verdict {
-        Verdict::Good => icons::sign(ui, Icon::Check, rect, colour(colours.accent)),
-        Verdict::Wrong => icons::sign(ui, Icon::Cross, rect, colour(colours.error)),
-        Verdict::Note => letter("!", colour(colours.warning)),
-        Verdict::NotSeen => letter("–", colour(colours.quiet_text)),
+        CheckStatus::Passed => icons::sign(ui, Icon::Check, rect, colour(colours.accent)),
+        CheckStatus::Failed => icons::sign(ui, Icon::Cross, rect, colour(colours.error)),
+        CheckStatus::Note => letter("!", colour(colours.warning)),
+        CheckStatus::Skipped => letter("–", colour(colours.quiet_text)),
     }
     response.on_hover_text(label);
 }

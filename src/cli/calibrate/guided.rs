@@ -5,8 +5,8 @@ use super::super::Failure;
 use super::super::link;
 use super::super::terminal::{note, typed_lines, warn};
 use super::CalibrateArguments;
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
-use palpate_device::wire::Heard;
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
 use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
@@ -199,8 +199,9 @@ impl Bench {
             return Err(format!("the stream ended before all points were recorded. {}", self.state.sentence()).into());
         }
         let reading = |event| match event {
-            LinkEvent::Heard(Heard::Reading(reading)) => Some(reading),
-            LinkEvent::Heard(Heard::Gap(_) | Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => None,
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading),
+            LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_))
+            | LinkEvent::Captured(_) => None,
         };
         self.pending.extend(events.into_iter().filter_map(reading));
         Ok(())

@@ -1,8 +1,8 @@
 //! The checks, each from what was seen to what it means.
 
-use super::{Finding, Observations, SKETCH, Trace, Verdict};
+use super::{ChannelTrace, CheckFinding, CheckStatus, Observations, SKETCH};
+use crate::protocol::Saturation;
 use crate::serial::{LinkState, LinkStatus, MODEM_MANAGER_COMMAND, PortTrouble};
-use crate::wire::Rail;
 use palpate_geometry::units::three_digits;
 use palpate_tactile::board::{Board, Sensor};
 
@@ -81,11 +81,11 @@ fn quoted(path: &str) -> String {
 
 impl Check {
     /// Looks.
-    pub fn look(&self, seen: &Observations) -> Finding {
+    pub fn look(&self, seen: &Observations) -> CheckFinding {
         let Told { verdict, seen: told, cause, fix, command } = (self.look)(seen);
-        let worth_it = matches!(verdict, Verdict::Note | Verdict::Wrong);
+        let worth_it = matches!(verdict, CheckStatus::Note | CheckStatus::Failed);
         let command = command.or_else(|| self.next.command(seen).filter(|_| worth_it));
-        Finding { check: self.name, verdict, seen: told, cause, fix, command }
+        CheckFinding { check: self.name, verdict, seen: told, cause, fix, command }
     }
 }
 
@@ -109,7 +109,7 @@ pub const CHECKS: &[Check] = &[
 
 /// A finding without its name.
 struct Told {
-    verdict: Verdict,
+    verdict: CheckStatus,
     seen: String,
     cause: Option<String>,
     fix: Option<String>,
@@ -117,24 +117,24 @@ struct Told {
 }
 
 impl Told {
-    fn new(verdict: Verdict, seen: impl Into<String>) -> Self {
+    fn new(verdict: CheckStatus, seen: impl Into<String>) -> Self {
         Self { verdict, seen: seen.into(), cause: None, fix: None, command: None }
     }
 
     fn good(seen: impl Into<String>) -> Self {
-        Self::new(Verdict::Good, seen)
+        Self::new(CheckStatus::Passed, seen)
     }
 
     fn not_seen(seen: impl Into<String>) -> Self {
-        Self::new(Verdict::NotSeen, seen)
+        Self::new(CheckStatus::Skipped, seen)
     }
 
     fn note(seen: impl Into<String>) -> Self {
-        Self::new(Verdict::Note, seen)
+        Self::new(CheckStatus::Note, seen)
     }
 
     fn wrong(seen: impl Into<String>) -> Self {
-        Self::new(Verdict::Wrong, seen)
+        Self::new(CheckStatus::Failed, seen)
     }
 
     fn because(self, cause: impl Into<String>, fix: impl Into<String>) -> Self {
@@ -360,12 +360,12 @@ fn named(link: &LinkStatus, holds: impl Fn(usize, Option<Sensor>) -> bool) -> Ve
     held.map(|(_, name)| name.clone()).collect()
 }
 
-fn rail(link: &LinkStatus, channel: usize) -> Option<Rail> {
-    link.rails.get(channel).copied().flatten()
+fn rail(link: &LinkStatus, channel: usize) -> Option<Saturation> {
+    link.saturation.get(channel).copied().flatten()
 }
 
 fn is_high(link: &LinkStatus, channel: usize) -> bool {
-    rail(link, channel) == Some(Rail::High)
+    rail(link, channel) == Some(Saturation::High)
 }
 
 fn saturation(seen: &Observations) -> Told {
@@ -391,7 +391,7 @@ fn open_circuit(seen: &Observations) -> Told {
         let without = named(link, |channel, _| trace(channel).without > trace(channel).numbers);
         let off = named(link, |channel, sensor| sensor.is_some_and(Sensor::is_flex) && is_high(link, channel));
         let shorted = named(link, |channel, sensor| {
-            sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Rail::Low)
+            sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Saturation::Low)
         });
         if !off.is_empty() {
             return Told::wrong(format!("{} at the upper end", off.join(", "))).because(
@@ -442,7 +442,7 @@ fn crosstalk(seen: &Observations) -> Told {
 }
 
 /// What a pad shows that should read nothing at times: it never does, and goes with the channel before it.
-fn bleeding(link: &LinkStatus, channel: usize, trace: &Trace, scale: f64) -> Option<Told> {
+fn bleeding(link: &LinkStatus, channel: usize, trace: &ChannelTrace, scale: f64) -> Option<Told> {
     if trace.numbers == 0 || trace.least <= IDLE_COUNTS * scale {
         return None;
     }

@@ -1,8 +1,8 @@
 //! One look at a port: open it, ask the board who it is, listen.
 
-use super::{Observations, Traces};
+use super::{ChannelTraces, Observations};
+use crate::protocol::DecodedEvent;
 use crate::serial::{LinkEvent, LinkOptions, SerialLink, is_running, list_ports};
-use crate::wire::Heard;
 use std::time::{Duration, Instant};
 
 /// How long events are waited for at a time.
@@ -20,7 +20,7 @@ pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(
         modem_manager: is_running("ModemManager"),
         link: None,
         listened_s: 0.0,
-        traces: Traces::default(),
+        traces: ChannelTraces::default(),
     };
     let link = match SerialLink::open(options) {
         Ok(link) => link,
@@ -35,7 +35,7 @@ pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(
             let _told = link.send("?");
         }
         for event in link.take(PATIENCE) {
-            if let LinkEvent::Heard(Heard::Reading(reading)) = event {
+            if let LinkEvent::Decoded(DecodedEvent::Reading(reading)) = event {
                 seen.traces.add(&reading);
             }
         }

@@ -14,7 +14,7 @@ mod wiring;
 pub use checks::{CHECKS, Check};
 pub use crosstalk::{Bleed, CrosstalkTest};
 pub use examine::examine;
-pub use traces::{Trace, Traces};
+pub use traces::{ChannelTrace, ChannelTraces};
 pub use wiring::{SKETCH, SketchError, WIRING_PAGE, WIRING_RULES, Wire, wires, write_sketch};
 
 use crate::serial::{LinkStatus, PortError, PortInfo};
@@ -23,36 +23,36 @@ use serde::Serialize;
 /// What a check came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum CheckStatus {
     /// Nothing could be seen, because of what an earlier check found, or because nothing moved.
-    NotSeen,
+    Skipped,
     /// As it should be.
-    Good,
+    Passed,
     /// Nothing is wrong, but it is worth knowing.
     Note,
     /// Something is wrong.
-    Wrong,
+    Failed,
 }
 
-impl Verdict {
+impl CheckStatus {
     /// In a word or two.
     pub fn name(self) -> &'static str {
         match self {
-            Self::NotSeen => "not seen",
-            Self::Good => "good",
+            Self::Skipped => "skipped",
+            Self::Passed => "ok",
             Self::Note => "note",
-            Self::Wrong => "WRONG",
+            Self::Failed => "FAILED",
         }
     }
 }
 
 /// What a check found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub struct CheckFinding {
     /// Name of the check.
     pub check: &'static str,
     /// What it came to.
-    pub verdict: Verdict,
+    pub verdict: CheckStatus,
     /// What was seen, in a sentence.
     pub seen: String,
     /// Why that is so, where something is wrong or worth knowing.
@@ -77,20 +77,20 @@ pub struct Observations {
     /// How long it was listened to (s).
     pub listened_s: f64,
     /// What was read meanwhile.
-    pub traces: Traces,
+    pub traces: ChannelTraces,
 }
 
 /// How long to listen where nobody says (s): enough to bend a finger and press each pad.
 pub const USUAL_LISTEN_S: f64 = 8.0;
 
 /// True where nothing is wrong.
-pub fn is_sound(found: &[Finding]) -> bool {
-    found.iter().all(|finding| finding.verdict != Verdict::Wrong)
+pub fn is_sound(found: &[CheckFinding]) -> bool {
+    found.iter().all(|finding| finding.verdict != CheckStatus::Failed)
 }
 
 /// In a sentence: how much is wrong.
-pub fn summary(found: &[Finding]) -> String {
-    match found.iter().filter(|finding| finding.verdict == Verdict::Wrong).count() {
+pub fn summary(found: &[CheckFinding]) -> String {
+    match found.iter().filter(|finding| finding.verdict == CheckStatus::Failed).count() {
         0 => "nothing is wrong".to_owned(),
         1 => "one thing is wrong".to_owned(),
         more => format!("{more} things are wrong"),
@@ -98,6 +98,6 @@ pub fn summary(found: &[Finding]) -> String {
 }
 
 /// All checks, in the order in which they are told.
-pub fn findings(seen: &Observations) -> Vec<Finding> {
+pub fn findings(seen: &Observations) -> Vec<CheckFinding> {
     CHECKS.iter().map(|check| check.look(seen)).collect()
 }

@@ -1,8 +1,8 @@
 //! The checks on made-up observations: a sound gripper, and one trouble at a time.
 
-use super::{CHECKS, Finding, Observations, Traces, Verdict, findings};
+use super::{CHECKS, ChannelTraces, CheckFinding, CheckStatus, Observations, findings};
+use crate::protocol::Saturation;
 use crate::serial::{BoardKind, LinkState, LinkStatus, PortError, PortInfo, PortTrouble, UsbIdentity};
-use crate::wire::Rail;
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::cadence::Cadence;
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ fn sound() -> Observations {
         board,
         detected: None,
         cadence,
-        rails: vec![None; 4],
+        saturation: vec![None; 4],
         looks_10_bit: false,
         units: Vec::new(),
         reconnects: 0,
@@ -39,8 +39,8 @@ fn sound() -> Observations {
 }
 
 /// Four channels while a finger is bent by up to 400 counts.
-fn moving(counts: impl Fn(f32) -> [f32; 4]) -> Traces {
-    let mut traces = Traces::default();
+fn moving(counts: impl Fn(f32) -> [f32; 4]) -> ChannelTraces {
+    let mut traces = ChannelTraces::default();
     for k in 0..100_u8 {
         let counts = counts(4.0 * f32::from(k)).map(Some).to_vec();
         traces.add(&Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts, line_bar: None });
@@ -49,10 +49,10 @@ fn moving(counts: impl Fn(f32) -> [f32; 4]) -> Traces {
 }
 
 /// The checks that do not find everything good.
-fn complaints(seen: &Observations) -> Vec<(&'static str, Verdict)> {
-    let told = findings(seen).into_iter().filter(|finding| finding.verdict != Verdict::Good);
-    let told: Vec<Finding> = told.collect();
-    for finding in told.iter().filter(|finding| finding.verdict > Verdict::Good) {
+fn complaints(seen: &Observations) -> Vec<(&'static str, CheckStatus)> {
+    let told = findings(seen).into_iter().filter(|finding| finding.verdict != CheckStatus::Passed);
+    let told: Vec<CheckFinding> = told.collect();
+    for finding in told.iter().filter(|finding| finding.verdict > CheckStatus::Passed) {
         assert!(finding.cause.is_some() && finding.fix.is_some(), "{finding:?}");
     }
     told.iter().map(|finding| (finding.check, finding.verdict)).collect()
@@ -86,17 +86,17 @@ fn a_port_that_does_not_open_is_told_once_and_the_rest_is_not_seen() {
         };
         let seen = Observations { refused: Some(refused), link: None, ..sound() };
         let told = findings(&seen);
-        let wrong: Vec<&Finding> = told.iter().filter(|finding| finding.verdict == Verdict::Wrong).collect();
+        let wrong: Vec<&CheckFinding> = told.iter().filter(|finding| finding.verdict == CheckStatus::Failed).collect();
         assert!(wrong.len() == 1 && wrong[0].check == check, "{wrong:?}");
         assert_eq!((wrong[0].command.as_deref(), wrong[0].cause.as_deref()), (Some("sudo"), Some("why")));
-        assert!(told.iter().filter(|finding| finding.verdict == Verdict::NotSeen).count() >= 10);
+        assert!(told.iter().filter(|finding| finding.verdict == CheckStatus::Skipped).count() >= 10);
     }
 }
 
 #[test]
 fn modem_manager_is_worth_a_note_where_it_can_do_harm() {
     let seen = Observations { modem_manager: true, ..sound() };
-    assert_eq!(complaints(&seen), [("modem-manager", Verdict::Note)]);
+    assert_eq!(complaints(&seen), [("modem-manager", CheckStatus::Note)]);
     let mut terminal = changed(|link| link.port.usb = None);
     terminal.modem_manager = true;
     assert_eq!(complaints(&terminal), []);
@@ -110,8 +110,9 @@ fn a_silent_port_is_told_by_what_it_is() {
             link.cadence = Cadence::default();
             link.port.kind.native = native;
         });
-        seen.traces = Traces::default();
-        let told = findings(&seen).into_iter().find(|finding| finding.verdict == Verdict::Wrong).expect("one is wrong");
+        seen.traces = ChannelTraces::default();
+        let told =
+            findings(&seen).into_iter().find(|finding| finding.verdict == CheckStatus::Failed).expect("one is wrong");
         assert_eq!(told.check, "silence");
         told.cause.unwrap_or_default()
     };
@@ -120,17 +121,17 @@ fn a_silent_port_is_told_by_what_it_is() {
 
 #[test]
 fn each_trouble_is_found_by_its_own_check() {
-    let high = |channel: usize| changed(|link| link.rails[channel] = Some(Rail::High));
-    let wrong = |check| vec![(check, Verdict::Wrong)];
+    let high = |channel: usize| changed(|link| link.saturation[channel] = Some(Saturation::High));
+    let wrong = |check| vec![(check, CheckStatus::Failed)];
     assert_eq!(complaints(&high(2)), wrong("saturation"));
     assert_eq!(complaints(&high(0)), wrong("open-circuit"));
-    assert_eq!(complaints(&changed(|link| link.rails[1] = Some(Rail::Low))), wrong("open-circuit"));
-    assert_eq!(complaints(&changed(|link| link.rails[3] = Some(Rail::Low))), [], "an idle pad is at zero");
+    assert_eq!(complaints(&changed(|link| link.saturation[1] = Some(Saturation::Low))), wrong("open-circuit"));
+    assert_eq!(complaints(&changed(|link| link.saturation[3] = Some(Saturation::Low))), [], "an idle pad is at zero");
     assert_eq!(complaints(&changed(|link| link.looks_10_bit = true)), wrong("bits"));
     assert_eq!(complaints(&changed(|link| link.cadence.lost = 10)), wrong("rate"));
     assert_eq!(complaints(&changed(|link| link.cadence.rate_hz = 42.0)), wrong("rate"));
     let unreadable = |link: &mut LinkStatus| (link.cadence.lost, link.cadence.bad_lines) = (40, 40);
-    assert_eq!(complaints(&changed(unreadable)), [("lines", Verdict::Wrong), ("rate", Verdict::Note)]);
+    assert_eq!(complaints(&changed(unreadable)), [("lines", CheckStatus::Failed), ("rate", CheckStatus::Note)]);
     assert_eq!(complaints(&changed(|link| link.cadence.bad_lines = 40)), wrong("lines"));
     assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = Some(-1e6))), wrong("clock"));
     let lost = |link: &mut LinkStatus| link.state = LinkState::Lost { cause: "unplugged".to_owned() };
@@ -139,7 +140,7 @@ fn each_trouble_is_found_by_its_own_check() {
 
 #[test]
 fn what_is_worth_knowing_is_no_error() {
-    let note = |check| vec![(check, Verdict::Note)];
+    let note = |check| vec![(check, CheckStatus::Note)];
     assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = Some(200.0))), note("clock"));
     assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = None)), note("clock"));
     assert_eq!(complaints(&changed(|link| link.board.firmware = None)), note("firmware"));
@@ -156,9 +157,9 @@ fn what_is_worth_knowing_is_no_error() {
 #[test]
 fn a_pad_that_follows_the_strip_before_it_is_crosstalk_and_one_that_is_pressed_is_not() {
     let bled = Observations { traces: moving(|bend| [1400.0, 1500.0 + bend, 0.2 * (1500.0 + bend), bend]), ..sound() };
-    assert_eq!(complaints(&bled), [("crosstalk", Verdict::Wrong)]);
+    assert_eq!(complaints(&bled), [("crosstalk", CheckStatus::Failed)]);
     let pressed = Observations { traces: moving(|bend| [1400.0 + bend, 1500.0, 700.0, bend]), ..sound() };
-    assert_eq!(complaints(&pressed), [("crosstalk", Verdict::Note)]);
+    assert_eq!(complaints(&pressed), [("crosstalk", CheckStatus::Note)]);
     // A grasp: the pad follows the strip, but from nothing.
     let grasped = moving(|bend| [1400.0 + bend, 1500.0 + bend, (8.0 * (bend - 200.0)).max(0.0), bend]);
     assert_eq!(complaints(&Observations { traces: grasped, ..sound() }), []);
@@ -170,9 +171,12 @@ fn nonsense_is_told_as_a_wrong_rate() {
         link.state = LinkState::Unreadable { hint: String::new() };
         link.cadence = Cadence { printable_share: 0.4, bad_lines: 30, ..Cadence::default() };
     });
-    seen.traces = Traces::default();
+    seen.traces = ChannelTraces::default();
     let told = complaints(&seen);
-    assert!(told.contains(&("baud", Verdict::Wrong)) && told.contains(&("lines", Verdict::Wrong)), "{told:?}");
+    assert!(
+        told.contains(&("baud", CheckStatus::Failed)) && told.contains(&("lines", CheckStatus::Failed)),
+        "{told:?}"
+    );
 }
 
 #[test]

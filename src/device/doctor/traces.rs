@@ -13,7 +13,7 @@ const MOST_CHANGES: usize = 1000;
 
 /// One channel and how it changes with the one before it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trace {
+pub struct ChannelTrace {
     /// Readings with a number.
     pub numbers: u64,
     /// Readings without one.
@@ -30,14 +30,14 @@ pub struct Trace {
     slopes: Vec<f64>,
 }
 
-impl Default for Trace {
+impl Default for ChannelTrace {
     fn default() -> Self {
         let (least, most) = (f64::INFINITY, f64::NEG_INFINITY);
         Self { numbers: 0, without: 0, least, most, least_share: 0.0, from: None, slopes: Vec::new() }
     }
 }
 
-impl Trace {
+impl ChannelTrace {
     fn add(&mut self, t: f64, count: Option<f32>, before: Option<f32>) {
         let Some(y) = count.map(f64::from) else {
             self.without += 1;
@@ -79,16 +79,16 @@ const FEWEST: usize = 4;
 
 /// All channels, in the order in which the board reads them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traces {
+pub struct ChannelTraces {
     /// One for each.
-    pub channels: Vec<Trace>,
+    pub channels: Vec<ChannelTrace>,
 }
 
-impl Traces {
+impl ChannelTraces {
     /// Takes in a reading.
     pub fn add(&mut self, reading: &Reading) {
         let width = reading.counts.len();
-        self.channels.resize(self.channels.len().max(width), Trace::default());
+        self.channels.resize(self.channels.len().max(width), ChannelTrace::default());
         for (channel, trace) in self.channels.iter_mut().enumerate().take(width) {
             let before = channel.checked_sub(1).and_then(|before| reading.counts[before]);
             trace.add(reading.t_s, reading.counts[channel], before);
@@ -100,8 +100,8 @@ impl Traces {
 mod tests {
     use super::*;
 
-    fn traces(rows: impl Iterator<Item = [Option<f32>; 3]>) -> Traces {
-        let mut traces = Traces::default();
+    fn traces(rows: impl Iterator<Item = [Option<f32>; 3]>) -> ChannelTraces {
+        let mut traces = ChannelTraces::default();
         for counts in rows {
             let reading = Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts: counts.to_vec(), line_bar: None };
             traces.add(&reading);

@@ -14,7 +14,7 @@ use super::ports::{PortInfo, choose, describe, list_ports};
 use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
 use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
-use crate::wire::{ConsoleLine, Decoder, Rail};
+use crate::protocol::{ConsoleLine, Decoder, Saturation};
 use palpate_tactile::board::Detected;
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::cadence::Cadence;
@@ -110,7 +110,7 @@ pub struct LinkStatus {
     /// How well it keeps time.
     pub cadence: Cadence,
     /// Channels at an end of the converter's range, or without numbers.
-    pub rails: Vec<Option<Rail>>,
+    pub saturation: Vec<Option<Saturation>>,
     /// The counts look like those of ten bits.
     pub looks_10_bit: bool,
     /// Channels whose numbers have a unit behind them, and which.
@@ -166,22 +166,22 @@ impl LinkStatus {
             format!("{name} comes in {unit}, and is taken for counts: print what analogRead gives, without a unit")
         }));
         let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
-        for (channel, (name, rail)) in self.board.channels.iter().zip(&self.rails).enumerate() {
+        for (channel, (name, rail)) in self.board.channels.iter().zip(&self.saturation).enumerate() {
             let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
             remarks.extend(match (rail, sensor.is_some_and(Sensor::is_flex)) {
-                (Some(Rail::High), true) => {
+                (Some(Saturation::High), true) => {
                     Some(format!("{name} is at the upper end of the range: the strip or one of its wires has come off"))
                 }
-                (Some(Rail::Low), true) => Some(format!("{name} reads nothing: the strip is shorted, or its divider not fed")),
-                (Some(Rail::High), false) => Some(format!(
+                (Some(Saturation::Low), true) => Some(format!("{name} reads nothing: the strip is shorted, or its divider not fed")),
+                (Some(Saturation::High), false) => Some(format!(
                     "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
                      ground that is missing or too large"
                 )),
-                (Some(Rail::NoNumber), _) => sensor.map(|_| {
+                (Some(Saturation::NoNumber), _) => sensor.map(|_| {
                     format!("{name} has no numbers: an open circuit as the sketch sees it; look at its lines in the console")
                 }),
                 // A pad that nothing touches reads nothing.
-                (Some(Rail::Low), false) | (None, _) => None,
+                (Some(Saturation::Low), false) | (None, _) => None,
             });
         }
         remarks
@@ -263,7 +263,7 @@ impl Shared {
                     }
                     self.readings.store(decoder.readings(), Ordering::Relaxed);
                 }
-                let events = heard.drain(..).map(LinkEvent::Heard);
+                let events = heard.drain(..).map(LinkEvent::Decoded);
                 self.events.push(std::iter::once(LinkEvent::Captured(piece)).chain(events));
             }
         }
@@ -375,7 +375,7 @@ impl SerialLink {
             board: decoder.board(),
             detected: decoder.detected(),
             cadence: decoder.cadence(),
-            rails: decoder.rails(),
+            saturation: decoder.saturation(),
             looks_10_bit: decoder.looks_10_bit(),
             units: decoder.units(),
             reconnects: shared.reconnects.load(Ordering::Relaxed),

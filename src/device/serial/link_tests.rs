@@ -1,7 +1,7 @@
 //! A link over a real pseudo-terminal.
 
 use super::*;
-use crate::wire::Heard;
+use crate::protocol::{BoardReply, DecodedEvent};
 use palpate_tactile::board::{Gap, Reading};
 use palpate_tactile::capture::Captured;
 use serialport::{SerialPort, TTYPort};
@@ -9,18 +9,18 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A pretended board: what is written to its first part comes out of the port at the link.
-struct Pretended {
+/// A emulated board: what is written to its first part comes out of the port at the link.
+struct Emulated {
     board: TTYPort,
     /// Keeps the port alive while nobody else has it open.
     port: TTYPort,
 }
 
-fn pretended(link: &Path) -> Pretended {
+fn emulated(link: &Path) -> Emulated {
     let (board, port) = TTYPort::pair().expect("a pseudo-terminal");
     let _old = std::fs::remove_file(link);
     std::os::unix::fs::symlink(port.name().expect("has a name"), link).expect("links");
-    Pretended { board, port }
+    Emulated { board, port }
 }
 
 fn options(path: &Path) -> LinkOptions {
@@ -42,20 +42,25 @@ fn take_until(link: &SerialLink, mut done: impl FnMut(&[LinkEvent]) -> bool) -> 
 }
 
 fn readings(events: &[LinkEvent]) -> Vec<&Reading> {
-    let reading = |event: &'_ LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+    let reading = |event: &'_ LinkEvent| matches!(event, LinkEvent::Decoded(DecodedEvent::Reading(_)));
     let found = events.iter().filter(|event| reading(event));
-    found.filter_map(|event| if let LinkEvent::Heard(Heard::Reading(r)) = event { Some(r) } else { None }).collect()
+    found
+        .filter_map(|event| if let LinkEvent::Decoded(DecodedEvent::Reading(r)) = event { Some(r) } else { None })
+        .collect()
 }
 
 fn gaps(events: &[LinkEvent]) -> Vec<&Gap> {
-    events.iter().filter_map(|e| if let LinkEvent::Heard(Heard::Gap(gap)) = e { Some(gap) } else { None }).collect()
+    events
+        .iter()
+        .filter_map(|e| if let LinkEvent::Decoded(DecodedEvent::Gap(gap)) = e { Some(gap) } else { None })
+        .collect()
 }
 
 #[test]
 fn a_board_that_vanishes_is_found_again_and_leaves_one_gap() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("due");
-    let mut first = pretended(&path);
+    let mut first = emulated(&path);
     let link = SerialLink::open(&options(&path)).expect("opens");
     assert_eq!(link.status().state, LinkState::Waiting);
     first.board.write_all(b"\n").expect("writes");
@@ -65,7 +70,7 @@ fn a_board_that_vanishes_is_found_again_and_leaves_one_gap() {
     let mut taken = take_until(&link, |events| readings(events).len() == 50);
     drop(first);
     take_until(&link, |_| matches!(link.status().state, LinkState::Lost { .. }));
-    let mut second = pretended(&path);
+    let mut second = emulated(&path);
     let back = take_until(&link, |_| link.status().reconnects == 1);
     taken.extend(back);
     second.board.write_all(b"cut\n").expect("writes");
@@ -85,17 +90,19 @@ fn a_board_that_vanishes_is_found_again_and_leaves_one_gap() {
 fn lines_go_to_the_board_and_its_remarks_come_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("due");
-    let mut pretended = pretended(&path);
+    let mut emulated = emulated(&path);
     let link = SerialLink::open(&options(&path)).expect("opens");
     let start = Instant::now();
     while link.send("P 0.55").is_err() && start.elapsed() < Duration::from_secs(5) {}
     let mut told = [0; 7];
-    pretended.board.read_exact(&mut told).expect("is told");
+    emulated.board.read_exact(&mut told).expect("is told");
     assert_eq!(&told, b"P 0.55\n");
-    pretended.board.write_all(b"# ok p=0.55\n").expect("writes");
-    let said = |events: &[LinkEvent]| events.contains(&LinkEvent::Heard(Heard::Said("ok p=0.55".to_owned())));
+    emulated.board.write_all(b"# ok p=0.55\n").expect("writes");
+    let said = |events: &[LinkEvent]| {
+        events.contains(&LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar: 0.55 })))
+    };
     assert!(said(&take_until(&link, said)));
-    drop(pretended.port);
+    drop(emulated.port);
 }
 
 #[test]
@@ -106,7 +113,7 @@ fn ports_that_cannot_be_opened_say_why() {
     assert_eq!(trouble(&path), Err(PortTrouble::NotFound));
     assert_eq!(trouble(folder.path()), Err(PortTrouble::NotSerial));
     assert_eq!(trouble(Path::new("/dev/null")), Err(PortTrouble::NotSerial));
-    let _pretended = pretended(&path);
+    let _emulated = emulated(&path);
     let _link = SerialLink::open(&options(&path)).expect("opens");
     assert_eq!(trouble(&path), Err(PortTrouble::Busy));
 }
@@ -115,18 +122,18 @@ fn ports_that_cannot_be_opened_say_why() {
 fn a_thousand_readings_a_second_with_eight_channels_all_arrive() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("due");
-    let mut pretended = pretended(&path);
+    let mut emulated = emulated(&path);
     let link = SerialLink::open(&options(&path)).expect("opens");
     let count = 1500;
     let writer = std::thread::spawn(move || {
         let start = Instant::now();
-        pretended.board.write_all(b"\n").expect("writes");
+        emulated.board.write_all(b"\n").expect("writes");
         for i in 0..count {
-            pretended.board.write_all(line(i, 8).as_bytes()).expect("writes");
+            emulated.board.write_all(line(i, 8).as_bytes()).expect("writes");
             let due = start + Duration::from_millis(u64::from(i));
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         }
-        pretended
+        emulated
     });
     let taken = take_until(&link, |events| readings(events).len() == count as usize);
     drop(writer.join());
@@ -173,21 +180,21 @@ fn speak_at(board: &mut TTYPort, speed: u32, from: u32) {
 fn a_board_that_goes_on_at_another_speed_is_found_there() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("due");
-    let mut pretended = pretended(&path);
+    let mut emulated = emulated(&path);
     let link = SerialLink::open(&options(&path)).expect("opens");
     let (mut events, start, mut sent) = (Vec::new(), Instant::now(), 0);
     while link.status().state != LinkState::Listening && start.elapsed() < Duration::from_secs(20) {
-        speak_at(&mut pretended.board, 115_200, sent);
+        speak_at(&mut emulated.board, 115_200, sent);
         sent += 20;
     }
     // Another sketch: the same numbers, at another speed.
     let before = link.status().cadence.samples;
     while link.status().baud != Some(57_600) && start.elapsed() < Duration::from_secs(60) {
-        speak_at(&mut pretended.board, 57_600, sent);
+        speak_at(&mut emulated.board, 57_600, sent);
         sent += 20;
     }
     for _ in 0..3 {
-        speak_at(&mut pretended.board, 57_600, sent);
+        speak_at(&mut emulated.board, 57_600, sent);
         sent += 20;
     }
     events.extend(link.take(Duration::from_millis(200)));

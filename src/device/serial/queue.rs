@@ -1,6 +1,6 @@
 //! Queues between the threads of a link. They are bounded: what does not fit is counted and told, never silently lost.
 
-use crate::wire::Heard;
+use crate::protocol::DecodedEvent;
 use palpate_tactile::board::Gap;
 use palpate_tactile::capture::Captured;
 use std::collections::VecDeque;
@@ -18,7 +18,7 @@ pub enum LinkEvent {
     /// Bytes as they came, or a mark that the connection was lost. What they say follows.
     Captured(Captured),
     /// What they say.
-    Heard(Heard),
+    Decoded(DecodedEvent),
 }
 
 /// What to do where a queue is full.
@@ -152,12 +152,12 @@ impl EventQueue {
         let mut kept = Vec::new();
         while state.events.len() > self.room {
             match state.events.pop_front() {
-                Some(LinkEvent::Heard(Heard::Reading(reading))) => {
+                Some(LinkEvent::Decoded(DecodedEvent::Reading(reading))) => {
                     let (count, from_s) = state.dropped.unwrap_or((0, reading.t_s));
                     state.dropped = Some((count + 1, from_s));
                     state.dropped_in_all += 1;
                 }
-                Some(board @ LinkEvent::Heard(Heard::Board(_))) => kept = vec![board],
+                Some(board @ LinkEvent::Decoded(DecodedEvent::Board(_))) => kept = vec![board],
                 _ => {}
             }
         }
@@ -184,7 +184,7 @@ impl EventQueue {
                 lost: Some(lost),
                 cause: "this computer was too slow: readings were dropped".to_owned(),
             };
-            events.insert(0, LinkEvent::Heard(Heard::Gap(gap)));
+            events.insert(0, LinkEvent::Decoded(DecodedEvent::Gap(gap)));
         }
         state.taken_s = times.last().copied().or(state.taken_s);
         drop(state);
@@ -211,8 +211,8 @@ impl EventQueue {
 
 fn reading_time(event: &LinkEvent) -> Option<f64> {
     match event {
-        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
-        LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Decoded(_) | LinkEvent::Captured(_) => None,
     }
 }
 
@@ -223,20 +223,26 @@ mod tests {
 
     fn reading(i: u32) -> LinkEvent {
         let t_s = f64::from(i);
-        LinkEvent::Heard(Heard::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None }))
+        LinkEvent::Decoded(DecodedEvent::Reading(Reading {
+            t_s,
+            arrived_s: t_s,
+            seq: None,
+            counts: vec![],
+            line_bar: None,
+        }))
     }
 
     #[test]
     fn readings_that_nobody_takes_become_one_gap() {
         let queue = EventQueue::with_room(WhenFull::Drop, 10);
-        queue.push([LinkEvent::Heard(Heard::Board(Board::default())), reading(0)].into_iter());
+        queue.push([LinkEvent::Decoded(DecodedEvent::Board(Board::default())), reading(0)].into_iter());
         assert_eq!(queue.take(Duration::ZERO).len(), 2);
         for i in 1..=100 {
             queue.push(std::iter::once(reading(i)));
         }
         let events = queue.take(Duration::ZERO);
         assert_eq!(events.len(), 11);
-        let LinkEvent::Heard(Heard::Gap(gap)) = &events[0] else { panic!("{events:?}") };
+        let LinkEvent::Decoded(DecodedEvent::Gap(gap)) = &events[0] else { panic!("{events:?}") };
         assert_eq!((gap.from_s, gap.to_s, gap.lost), (0.0, 91.0, Some(90)));
         assert!(queue.dropped_readings() == 90 && queue.take(Duration::ZERO).is_empty());
     }

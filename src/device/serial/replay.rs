@@ -2,7 +2,7 @@
 
 use super::link::{LinkState, Shared};
 use super::port_error::PortError;
-use crate::wire::CaptureReader;
+use crate::protocol::CaptureReader;
 use palpate_tactile::capture::Captured;
 use std::fs::File;
 use std::io::BufReader;

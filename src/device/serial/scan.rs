@@ -1,7 +1,7 @@
 //! At which speed a board speaks: each is listened to for a moment and judged by what can be read.
 
 use super::baud::Baud;
-use crate::wire::Decoder;
+use crate::protocol::Decoder;
 use palpate_tactile::cadence::Cadence;
 use serialport::{ClearBuffer, SerialPort};
 use std::io::ErrorKind;

@@ -10,8 +10,8 @@
 //! hands in.
 
 use crate::gripper::GripperEvent;
+use palpate_device::protocol::{BoardReply, DecodedEvent};
 use palpate_device::serial::LinkEvent;
-use palpate_device::wire::Heard;
 use palpate_sim::gripper::{Phase, Programme};
 use palpate_sim::scene::Scene;
 use palpate_tactile::capture::Captured;
@@ -174,12 +174,12 @@ impl GraspController {
     /// must not continue later with a leap of pressure. The cause, where the event interrupts the grasp.
     pub fn observe(&mut self, event: &GripperEvent) -> Option<String> {
         let cause = match event {
-            GripperEvent::Board(LinkEvent::Heard(Heard::Said(text))) if text.starts_with("refused") => {
-                self.abort(format!("the board {text}"));
+            GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Refused { reason }))) => {
+                self.abort(format!("the board refused a command ({reason})"));
                 return None;
             }
-            GripperEvent::Board(LinkEvent::Heard(Heard::Said(text))) if text.starts_with("vent") => {
-                format!("the board vented by itself ({text})")
+            GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Vented { cause }))) => {
+                format!("the board vented by itself ({cause})")
             }
             GripperEvent::Board(LinkEvent::Captured(Captured::Interrupted { cause, .. })) => cause.clone(),
             GripperEvent::Board(_) | GripperEvent::Sampled(_) | GripperEvent::Tick | GripperEvent::Finished => {
@@ -294,13 +294,11 @@ mod tests {
 
     #[test]
     fn what_the_board_says_aborts_driven_grasps_only() {
-        let said = |text: &str| GripperEvent::Board(LinkEvent::Heard(Heard::Said(text.to_owned())));
+        let vented = BoardReply::Vented { cause: "watchdog".to_owned() };
+        let vented = GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(vented)));
         for (control, aborts) in [(Control::Driven, true), (Control::ByHand, false), (Control::Free, false)] {
             let mut controller = GraspController::new(plan(control), 0.0);
-            assert_eq!(
-                controller.observe(&said("vent watchdog")),
-                Some("the board vented by itself (vent watchdog)".to_owned())
-            );
+            assert_eq!(controller.observe(&vented), Some("the board vented by itself (watchdog)".to_owned()));
             assert_eq!(controller.abort_cause().is_some(), aborts, "{control:?}");
             assert_eq!(controller.is_over(0.0), aborts);
             assert_eq!(controller.command(9.0).is_none(), control != Control::ByHand, "{control:?}");

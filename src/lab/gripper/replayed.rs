@@ -1,8 +1,8 @@
 //! A stored trial as a gripper: the same events in the same order, whatever pressure is set.
 
 use super::{Gripper, GripperError, GripperEvent};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::LinkEvent;
-use palpate_device::wire::Heard;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_store::BoardTrial;
@@ -24,11 +24,11 @@ impl ReplayedGripper {
 
     /// Replays the readings and gaps of a recorded trial, in order of time.
     pub fn of_readings(trial: BoardTrial) -> Self {
-        let mut timed: Vec<(f64, Heard)> = vec![(f64::NEG_INFINITY, Heard::Board(trial.about.board))];
-        timed.extend(trial.gaps.into_iter().map(|gap| (gap.from_s.next_up(), Heard::Gap(gap))));
-        timed.extend(trial.readings.into_iter().map(|reading| (reading.t_s, Heard::Reading(reading))));
+        let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(trial.about.board))];
+        timed.extend(trial.gaps.into_iter().map(|gap| (gap.from_s.next_up(), DecodedEvent::Gap(gap))));
+        timed.extend(trial.readings.into_iter().map(|reading| (reading.t_s, DecodedEvent::Reading(reading))));
         timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Self::new(timed.into_iter().map(|(_, event)| GripperEvent::Board(LinkEvent::Heard(event))).collect())
+        Self::new(timed.into_iter().map(|(_, event)| GripperEvent::Board(LinkEvent::Decoded(event))).collect())
     }
 
     fn new(events: Vec<GripperEvent>) -> Self {
@@ -45,7 +45,7 @@ impl Gripper for ReplayedGripper {
         let event = self.events.next().unwrap_or(GripperEvent::Finished);
         match &event {
             GripperEvent::Sampled(Frame { t, .. }) => self.now_s = *t,
-            GripperEvent::Board(LinkEvent::Heard(Heard::Reading(reading))) => self.now_s = reading.t_s,
+            GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reading(reading))) => self.now_s = reading.t_s,
             GripperEvent::Board(_) | GripperEvent::Tick | GripperEvent::Finished => {}
         }
         Ok(event)

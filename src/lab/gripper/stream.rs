@@ -1,7 +1,7 @@
 //! What is listened to: a port, a file of captured bytes, or what a test makes up.
 
+use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
-use palpate_device::wire::ConsoleLine;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,8 +1,8 @@
-//! Grasps in streams: made up, random, and of the pretended gripper.
+//! Grasps in streams: made up, random, and of the emulated gripper.
 
 use super::segmentation::*;
-use palpate_device::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
-use palpate_device::wire::{Decoder, Heard};
+use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
+use palpate_device::protocol::{DecodedEvent, Decoder};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
@@ -162,15 +162,15 @@ fn pressure_says_it_to_the_reading() {
 }
 
 /// What a board prints while a script is done, read as a host reads it.
-fn pretended(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) {
+fn emulated(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     let script = parse_script(script).expect("sound");
     let hand = HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 5, grasp_every_s: None, script };
     let (parts, faults) = (HiddenParts::drawn(5), parse_faults(faults).expect("sound"));
     let (rate_hz, channels, most_steps, clock_start_us) = (50, 4, 30, 0);
-    let setup = PretendedSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 5 };
-    let mut gripper = PretendedGripper::new(setup).expect("it knows them");
+    let setup = EmulatorSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 5 };
+    let mut gripper = EmulatedGripper::new(setup).expect("it knows them");
     let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
     for k in 1..=(seconds / 0.005) as u32 {
         let now = 0.005 * f64::from(k);
@@ -178,16 +178,16 @@ fn pretended(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) 
         decoder.push(&gripper.take_bytes(), now, &mut heard);
     }
     let reading = |heard| match heard {
-        Heard::Reading(reading) => Some(reading),
-        Heard::Gap(_) | Heard::Board(_) | Heard::Said(_) => None,
+        DecodedEvent::Reading(reading) => Some(reading),
+        DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
     };
     (decoder.board(), heard.into_iter().filter_map(reading).collect())
 }
 
 #[test]
-fn the_pretended_gripper_is_followed_with_and_without_its_pressure() {
+fn the_emulated_gripper_is_followed_with_and_without_its_pressure() {
     let script = "rest=3; grasp lemon; rest=3; close empty; rest=3; grasp button bar=0.8; rest=3";
-    let (board, with) = pretended(script, "loss=0.2@5/1", 26.0);
+    let (board, with) = emulated(script, "loss=0.2@5/1", 26.0);
     let pressed: Vec<f64> = with
         .windows(2)
         .filter(|pair| pair[0].line_bar == Some(0.0) && pair[1].line_bar > Some(0.0))

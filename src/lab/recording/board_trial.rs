@@ -6,8 +6,8 @@ use super::recent::RecentEvents;
 use super::recorder::{BoardTrialEnd, Recorder};
 use crate::grasping::{GraspController, GraspPlan};
 use crate::gripper::{Gripper, GripperEvent, SerialGripper};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::LinkEvent;
-use palpate_device::wire::Heard;
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{Control, PhaseMark};
@@ -189,7 +189,7 @@ impl BoardTrialRecording {
 /// Time of a reading (s); none for other events.
 pub(super) fn reading_time(event: &LinkEvent) -> Option<f64> {
     match event {
-        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
-        LinkEvent::Heard(_) | LinkEvent::Captured(_) => None,
+        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Decoded(_) | LinkEvent::Captured(_) => None,
     }
 }

@@ -1,8 +1,8 @@
 //! The writing side of a trial of the real gripper: what waits to be written, and what its header needs at the end.
 
 use crate::labelling::{Observed, decimated, flags_of, sparkline};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkStatus};
-use palpate_device::wire::Heard;
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Plan, Quality};
 use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
@@ -118,18 +118,18 @@ impl BoardWriter {
                 }
                 self.chunk.bytes.push(piece);
             }
-            LinkEvent::Heard(Heard::Reading(reading)) => {
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
                 self.samples += 1;
                 self.last = Some((reading.t_s, None));
                 self.newest_s = Some(reading.t_s);
                 self.chunk.readings.push(reading);
             }
-            LinkEvent::Heard(Heard::Gap(gap)) => {
+            LinkEvent::Decoded(DecodedEvent::Gap(gap)) => {
                 self.lost += gap.lost.unwrap_or(0);
                 self.add_gap(gap);
             }
-            LinkEvent::Heard(Heard::Board(board)) => self.about.board = board,
-            LinkEvent::Heard(Heard::Said(_)) => {}
+            LinkEvent::Decoded(DecodedEvent::Board(board)) => self.about.board = board,
+            LinkEvent::Decoded(DecodedEvent::Reply(_)) => {}
         }
     }
 

@@ -1,7 +1,7 @@
 //! The last seconds of a stream: the rest before a trial belongs to it, because the zeros are taken there.
 
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::LinkEvent;
-use palpate_device::wire::Heard;
 use palpate_tactile::board::Reading;
 use std::collections::VecDeque;
 
@@ -29,7 +29,7 @@ impl RecentEvents {
     /// Everything from a time on, with the bytes of its first reading.
     pub fn since(&self, from_s: f64) -> Vec<LinkEvent> {
         let Some(first) = self.readings().position(|reading| reading.t_s >= from_s) else { return Vec::new() };
-        let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+        let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Decoded(DecodedEvent::Reading(_)));
         let mut places = self.events.iter().enumerate().filter(|(_, event)| is_reading(event)).map(|(place, _)| place);
         let place = places.nth(first).unwrap_or(0);
         // The bytes of a reading stand before it.
@@ -53,8 +53,9 @@ impl RecentEvents {
 
     fn readings(&self) -> impl Iterator<Item = &Reading> {
         self.events.iter().filter_map(|event| match event {
-            LinkEvent::Heard(Heard::Reading(reading)) => Some(reading),
-            LinkEvent::Heard(Heard::Gap(_) | Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => None,
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading),
+            LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_))
+            | LinkEvent::Captured(_) => None,
         })
     }
 }
@@ -62,9 +63,9 @@ impl RecentEvents {
 /// When an event happened, on the clock of the readings (s); none for what has no time.
 fn time_of(event: &LinkEvent) -> Option<f64> {
     match event {
-        LinkEvent::Heard(Heard::Reading(reading)) => Some(reading.t_s),
+        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
         LinkEvent::Captured(piece) => Some(piece.arrived_s()),
-        LinkEvent::Heard(Heard::Gap(_) | Heard::Board(_) | Heard::Said(_)) => None,
+        LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_)) => None,
     }
 }
 
@@ -86,12 +87,14 @@ mod tests {
                 recent.push(&LinkEvent::Captured(Captured::Bytes { arrived_s: t_s, bytes: vec![0; 8] }));
             }
             let reading = Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None };
-            recent.push(&LinkEvent::Heard(Heard::Reading(reading)));
+            recent.push(&LinkEvent::Decoded(DecodedEvent::Reading(reading)));
         }
         assert!(recent.events.len() < 2300, "{}", recent.events.len());
         let since = recent.since(99.5055);
         assert!(matches!(&since[0], LinkEvent::Captured(piece) if (piece.arrived_s() - 99.5).abs() < 1e-9));
-        assert!(matches!(&since[1], LinkEvent::Heard(Heard::Reading(reading)) if (reading.t_s - 99.506).abs() < 1e-9));
+        assert!(
+            matches!(&since[1], LinkEvent::Decoded(DecodedEvent::Reading(reading)) if (reading.t_s - 99.506).abs() < 1e-9)
+        );
         assert_eq!(recent.last(0.1).len(), 100);
         assert!(recent.since(200.0).is_empty());
     }

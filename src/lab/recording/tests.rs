@@ -2,9 +2,9 @@
 
 use super::board_writer::BoardWriter;
 use super::*;
+use palpate_device::protocol::CaptureReader;
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, PortError, SerialLink};
-use palpate_device::wire::CaptureReader;
-use palpate_device::wire::Heard;
 use palpate_sim::scene::Scene;
 use palpate_store::{BOARD_RIG, Store, write_board_csv};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
@@ -133,7 +133,7 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     let whole = record(&mut store, &bytes)?.id;
     let link = replayed(&bytes)?;
     let mut writer = BoardWriter::begin(&mut store, &plan(&link, "cube"))?;
-    let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Heard(Heard::Reading(_)));
+    let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Decoded(DecodedEvent::Reading(_)));
     let mut readings = 0;
     while !link.is_over() {
         for event in link.take(Duration::from_millis(20)) {

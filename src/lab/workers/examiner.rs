@@ -3,7 +3,7 @@
 
 use super::desk::{Desk, Outlet};
 use super::messages::Wake;
-use palpate_device::doctor::{Finding, Observations, examine, findings};
+use palpate_device::doctor::{CheckFinding, Observations, examine, findings};
 use palpate_device::serial::LinkOptions;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -49,7 +49,7 @@ pub struct Examination {
     /// It was ended before its time.
     pub cut_short: bool,
     /// What was found.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<CheckFinding>,
 }
 
 /// A handle on the thread.
@@ -95,7 +95,7 @@ fn examined(
 mod tests {
     use super::super::desk::watch::{until, waker};
     use super::*;
-    use palpate_device::doctor::{Verdict, is_sound};
+    use palpate_device::doctor::{CheckStatus, is_sound};
     use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 
     fn request(port: PathBuf, seconds: f64) -> ExamineRequest {
@@ -121,7 +121,7 @@ mod tests {
         let told = view.last.as_ref().ok_or("it has looked")?;
         assert!(told.port.as_ref().is_some_and(|port| port.contains("board.bytes")), "{told:?}");
         let verdict = |check: &str| told.findings.iter().find(|f| f.check == check).map(|f| f.verdict);
-        assert_eq!((verdict("lines"), verdict("firmware")), (Some(Verdict::Good), Some(Verdict::Note)));
+        assert_eq!((verdict("lines"), verdict("firmware")), (Some(CheckStatus::Passed), Some(CheckStatus::Note)));
         assert!(!told.cut_short && told.listened_s < 5.0, "a file ends when it ends");
         doctor.ask(request(folder.path().join("gone"), 5.0));
         let view = until(&doctor, &woken, |view| view.running.is_none() && view.last != Some(Arc::clone(told)));

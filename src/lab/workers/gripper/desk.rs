@@ -15,8 +15,8 @@ use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
 use crate::workers::listener::Listener;
 use crate::workers::{Latest, Notice, TraceRow, Wake};
+use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
-use palpate_device::wire::Heard;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
 use palpate_tactile::Channel;
@@ -346,19 +346,19 @@ impl Desk {
         let begun = self.begun;
         connection.recent.push(&event);
         match &event {
-            LinkEvent::Heard(Heard::Reading(reading)) => {
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
                 let reading = reading.clone();
                 self.hear_reading(&reading);
             }
-            LinkEvent::Heard(Heard::Board(board)) if connection.board != *board => {
+            LinkEvent::Decoded(DecodedEvent::Board(board)) if connection.board != *board => {
                 connection.board = board.clone();
                 self.read_calibrations();
             }
-            LinkEvent::Heard(Heard::Gap(gap)) => {
+            LinkEvent::Decoded(DecodedEvent::Gap(gap)) => {
                 let rows = connection.plotted.gap(gap.from_s);
                 self.plot(rows);
             }
-            LinkEvent::Heard(Heard::Board(_) | Heard::Said(_)) | LinkEvent::Captured(_) => {}
+            LinkEvent::Decoded(DecodedEvent::Board(_) | DecodedEvent::Reply(_)) | LinkEvent::Captured(_) => {}
         }
         // What began a trial just now is among what it was begun with.
         if begun == self.begun

@@ -3,7 +3,7 @@
 use super::messages::{GripperView, GripperWish};
 use crate::workers::examiner::{Examine, ExamineRequest};
 use crate::workers::latest::Latest;
-use palpate_device::doctor::{Observations, Traces};
+use palpate_device::doctor::{ChannelTraces, Observations};
 use palpate_device::serial::{LinkStatus, is_running, list_ports};
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
@@ -26,12 +26,12 @@ pub struct ObserveRequest {
 pub(super) struct Observing {
     request: ObserveRequest,
     began: Instant,
-    traces: Traces,
+    traces: ChannelTraces,
 }
 
 impl Observing {
     pub(super) fn new(request: ObserveRequest) -> Self {
-        Self { request, began: Instant::now(), traces: Traces::default() }
+        Self { request, began: Instant::now(), traces: ChannelTraces::default() }
     }
 
     pub(super) fn add(&mut self, reading: &Reading) {

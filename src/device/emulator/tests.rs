@@ -1,10 +1,10 @@
-//! The whole pretended gripper, without a port.
+//! The whole emulated gripper, without a port.
 
 use super::*;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 
-fn setup(script: &str, faults: &str) -> PretendedSetup {
+fn setup(script: &str, faults: &str) -> EmulatorSetup {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     let script = parse_script(script).expect("sound");
@@ -13,11 +13,11 @@ fn setup(script: &str, faults: &str) -> PretendedSetup {
     parts.noise_counts = 0.0;
     (parts.hysteresis, parts.drift) = (false, false);
     let faults = parse_faults(faults).expect("sound");
-    PretendedSetup { hand, parts, rate_hz: 50, channels: 4, most_steps: 30, clock_start_us: 0, faults, seed: 1 }
+    EmulatorSetup { hand, parts, rate_hz: 50, channels: 4, most_steps: 30, clock_start_us: 0, faults, seed: 1 }
 }
 
 /// Everything it sends until a time (s), told to go on every 5 ms.
-fn sent(gripper: &mut PretendedGripper, from_s: f64, to_s: f64) -> Vec<u8> {
+fn sent(gripper: &mut EmulatedGripper, from_s: f64, to_s: f64) -> Vec<u8> {
     let turns = ((to_s - from_s) / 0.005).round() as u32;
     (1..=turns)
         .flat_map(|k| {
@@ -27,8 +27,8 @@ fn sent(gripper: &mut PretendedGripper, from_s: f64, to_s: f64) -> Vec<u8> {
         .collect()
 }
 
-fn text(setup: PretendedSetup, to_s: f64) -> String {
-    let mut gripper = PretendedGripper::new(setup).expect("nothing to load");
+fn text(setup: EmulatorSetup, to_s: f64) -> String {
+    let mut gripper = EmulatedGripper::new(setup).expect("nothing to load");
     String::from_utf8(sent(&mut gripper, 0.0, to_s)).expect("plain text")
 }
 
@@ -80,9 +80,9 @@ fn counts_are_those_of_the_hidden_parts() {
 #[test]
 fn the_same_seed_gives_the_same_bytes_whatever_the_turns() {
     let faults = "garbage@0.5,loss@1,partial@2,burst@3,clock@0";
-    let setup = |seed| PretendedSetup { parts: HiddenParts::drawn(2), seed, ..setup("close empty", faults) };
+    let setup = |seed| EmulatorSetup { parts: HiddenParts::drawn(2), seed, ..setup("close empty", faults) };
     let all = |seed, every: f64| {
-        let mut gripper = PretendedGripper::new(setup(seed)).expect("nothing to load");
+        let mut gripper = EmulatedGripper::new(setup(seed)).expect("nothing to load");
         let mut bytes = Vec::new();
         for k in 0..=(5.0 / every) as u32 {
             gripper.advance(f64::from(k) * every);
@@ -97,7 +97,7 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_turns() {
 
 #[test]
 fn a_host_drives_it_and_the_watchdog_lets_go() {
-    let mut gripper = PretendedGripper::new(setup("", "")).expect("nothing to load");
+    let mut gripper = EmulatedGripper::new(setup("", "")).expect("nothing to load");
     let open = sent(&mut gripper, 0.0, 0.1);
     let mut told = Vec::new();
     gripper.hear(b"P 0.50\n");
@@ -115,14 +115,14 @@ fn a_host_drives_it_and_the_watchdog_lets_go() {
     let silent = sent(&mut gripper, 2.1, 5.0);
     let text = String::from_utf8_lossy(&silent).into_owned();
     assert!(text.contains("# vent reason=watchdog") && flex(&silent).expect("a sample").1 == 0.0);
-    assert!(gripper.take_happened().iter().any(|happened| happened.what == Happening::Watchdog));
+    assert!(gripper.take_happened().iter().any(|happened| happened.what == EmulatorEventKind::Watchdog));
 }
 
 #[test]
 fn every_fault_does_what_it_says() {
     let clean = text(setup("", ""), 3.0);
     let lines = |faults: &str| {
-        let mut gripper = PretendedGripper::new(setup("", faults)).expect("nothing to load");
+        let mut gripper = EmulatedGripper::new(setup("", faults)).expect("nothing to load");
         String::from_utf8_lossy(&sent(&mut gripper, 0.0, 3.0)).into_owned()
     };
     let at = |text: &str, s: f64, key: &str| number(samples(text)[(50.0 * s) as usize], key);
@@ -163,7 +163,7 @@ fn a_stuck_channel_keeps_its_reading_while_the_others_go_on() {
 
 #[test]
 fn a_thousand_samples_a_second_on_eight_channels() {
-    let setup = PretendedSetup { rate_hz: 1000, channels: 8, parts: HiddenParts::drawn(1), ..setup("", "") };
+    let setup = EmulatorSetup { rate_hz: 1000, channels: 8, parts: HiddenParts::drawn(1), ..setup("", "") };
     let told = text(setup, 1.0);
     let lines = samples(&told);
     assert_eq!(lines.len(), 1001);
@@ -172,7 +172,7 @@ fn a_thousand_samples_a_second_on_eight_channels() {
 
 #[test]
 fn sensors_with_a_memory_follow_a_grasp_from_its_first_sample_on() {
-    let setup = PretendedSetup { parts: HiddenParts::drawn(1), ..setup("close empty", "") };
+    let setup = EmulatorSetup { parts: HiddenParts::drawn(1), ..setup("close empty", "") };
     assert!(setup.parts.hysteresis && setup.parts.drift && setup.parts.noise_counts > 0.0);
     let told = text(setup, 4.5);
     let count = |k: usize| number(samples(&told)[k], "flexL").expect("printed");

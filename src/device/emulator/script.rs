@@ -1,4 +1,4 @@
-//! What the pretended experimenter does on the bench, step by step: the procedures of a calibration.
+//! Bench scripts: what the emulated experimenter does, step by step, as in a calibration.
 //!
 //! Steps stand on lines or between semicolons; `#` begins a remark. Words of a step are separated by spaces:
 //!

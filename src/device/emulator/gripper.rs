@@ -1,4 +1,4 @@
-//! The pretended gripper: fingers, sensors, board and line, with whatever goes wrong on the way. It has no port and no
+//! The emulated gripper: fingers, sensors, board and line, with whatever goes wrong on the way. It has no port and no
 //! clock of its own: told how late it is and what the host said, it gives bytes. The same seed, the same times and the
 //! same words of the host give the same bytes.
 
@@ -22,7 +22,7 @@ const SAME_TIME_S: f64 = 5e-7;
 
 /// What the gripper is and does.
 #[derive(Clone, Debug)]
-pub struct PretendedSetup {
+pub struct EmulatorSetup {
     /// What its fingers do.
     pub hand: HandPlan,
     /// What its sensors are made of.
@@ -44,7 +44,7 @@ pub struct PretendedSetup {
 /// Something worth telling.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
-pub enum Happening {
+pub enum EmulatorEventKind {
     /// The fingers close.
     Grasp {
         /// Which grasp, from 1.
@@ -93,17 +93,17 @@ pub enum Happening {
 
 /// Something worth telling, and when.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Happened {
+pub struct EmulatorEvent {
     /// Time since the first host (s).
     pub t_s: f64,
     /// What.
     #[serde(flatten)]
-    pub what: Happening,
+    pub what: EmulatorEventKind,
 }
 
 /// The gripper.
 #[derive(Debug)]
-pub struct PretendedGripper {
+pub struct EmulatedGripper {
     hand: Hand,
     parts: HiddenParts,
     sensors: Sensors,
@@ -125,14 +125,14 @@ pub struct PretendedGripper {
     held_back: Vec<u8>,
     released_s: f64,
     bytes: Vec<u8>,
-    happened: Vec<Happened>,
+    happened: Vec<EmulatorEvent>,
     /// What the board printed, before anything went wrong with it.
     printed: String,
 }
 
-impl PretendedGripper {
+impl EmulatedGripper {
     /// Makes it and starts its board. Takes some tenths of a second for each object.
-    pub fn new(setup: PretendedSetup) -> Result<Self, ObjectError> {
+    pub fn new(setup: EmulatorSetup) -> Result<Self, ObjectError> {
         let spare = (1..).map(|k| format!("aux{k}"));
         let channels = Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).chain(spare).take(setup.channels);
         let ohm = [setup.parts.strips.map(|s| s.divider_ohm), setup.parts.pads.map(|p| p.divider_ohm)];
@@ -185,7 +185,7 @@ impl PretendedGripper {
     }
 
     /// What has happened since it was asked last.
-    pub fn take_happened(&mut self) -> Vec<Happened> {
+    pub fn take_happened(&mut self) -> Vec<EmulatorEvent> {
         std::mem::take(&mut self.happened)
     }
 
@@ -267,7 +267,7 @@ impl PretendedGripper {
         let mut said = String::new();
         self.board.poll(due, &mut |channel| converter.convert(channel, &shares), &mut said);
         if said.starts_with("# vent") {
-            self.tell(Happening::Watchdog);
+            self.tell(EmulatorEventKind::Watchdog);
         }
         self.send(&said);
     }
@@ -296,15 +296,15 @@ impl PretendedGripper {
     }
 
     /// Notes that something happened now.
-    pub fn tell(&mut self, what: Happening) {
-        self.happened.push(Happened { t_s: self.now_s, what });
+    pub fn tell(&mut self, what: EmulatorEventKind) {
+        self.happened.push(EmulatorEvent { t_s: self.now_s, what });
     }
 
     fn tell_faults(&mut self) {
         for k in 0..self.faults.len() {
             if !self.struck[k] && self.faults[k].from_s <= self.now_s {
                 self.struck[k] = true;
-                self.tell(Happening::Fault { fault: self.faults[k].to_string() });
+                self.tell(EmulatorEventKind::Fault { fault: self.faults[k].to_string() });
             }
         }
     }
@@ -312,10 +312,10 @@ impl PretendedGripper {
     fn tell_hand(&mut self) {
         for began in self.hand.take_began() {
             self.tell(match began {
-                Began::Grasp { number, object } => Happening::Grasp { number, object },
-                Began::Hold { bend_deg, load_n, seconds } => Happening::Hold { bend_deg, load_n, seconds },
-                Began::Done => Happening::ScriptDone,
-                Began::Failed(reason) => Happening::Failed { reason },
+                Began::Grasp { number, object } => EmulatorEventKind::Grasp { number, object },
+                Began::Hold { bend_deg, load_n, seconds } => EmulatorEventKind::Hold { bend_deg, load_n, seconds },
+                Began::Done => EmulatorEventKind::ScriptDone,
+                Began::Failed(reason) => EmulatorEventKind::Failed { reason },
             });
         }
     }
@@ -413,7 +413,7 @@ impl Conversions {
         self.ten_bits = on(FaultKind::TenBit).next().is_some();
         self.crosstalk = on(FaultKind::Crosstalk).map(|fault| fault.value).next().unwrap_or(0.0);
         for channel in 0..self.kept.len() {
-            self.at_rail[channel] = on(FaultKind::Rail).any(|fault| fault.value as usize == channel);
+            self.at_rail[channel] = on(FaultKind::Saturated).any(|fault| fault.value as usize == channel);
             self.stuck[channel] = on(FaultKind::Stuck).any(|fault| fault.value as usize == channel);
         }
     }

@@ -18,7 +18,7 @@ const CHECKED_FROM: u32 = 2;
 
 /// A hello.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Hello {
+pub(super) struct Handshake {
     /// What it says of the board.
     pub(super) board: Board,
     /// Lines of numbers end in a checksum.
@@ -27,7 +27,7 @@ pub(super) struct Hello {
 
 /// Reads a hello line, with its `#`; none where it is another remark, an error where it was damaged. What it leaves out is
 /// as [`Board::default`] has it, but for the channels, which then stay empty.
-pub(super) fn parse(line: &str) -> Result<Option<Hello>, &'static str> {
+pub(super) fn parse(line: &str) -> Result<Option<Handshake>, &'static str> {
     let mut words = line.strip_prefix('#').unwrap_or(line).split_whitespace();
     if words.next() != Some(GREETING) {
         return Ok(None);
@@ -38,7 +38,7 @@ pub(super) fn parse(line: &str) -> Result<Option<Hello>, &'static str> {
     if !checked && version.is_some_and(|version| version >= CHECKED_FROM) {
         return Err("its checksum is missing");
     }
-    Ok(Some(Hello { board, checked }))
+    Ok(Some(Handshake { board, checked }))
 }
 
 /// What the words behind the greeting say.

@@ -23,10 +23,10 @@ mod uart;
 
 pub use board::{BoardSetup, FirmwareBoard, OVERSAMPLE, WATCHDOG_US};
 pub use faults::{Fault, FaultKind, fault_help, parse_faults};
-pub use gripper::{Happened, Happening, PretendedGripper, PretendedSetup};
+pub use gripper::{EmulatedGripper, EmulatorEvent, EmulatorEventKind, EmulatorSetup};
 pub use hand::HandPlan;
 pub use parts::{HiddenParts, PadSetup, Stimulus, StripSetup};
 #[cfg(unix)]
-pub use port::{PortError, Served, serve};
+pub use port::{PortSetup, ServeError, serve};
 pub use script::{ScriptError, Step, parse_script, parse_step};
 pub use uart::misread;

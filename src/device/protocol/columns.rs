@@ -19,7 +19,7 @@ enum Origin {
     #[default]
     Number,
     Header,
-    Hello,
+    Handshake,
     Order,
 }
 
@@ -45,7 +45,7 @@ impl Columns {
         let (origin, names) = if let Some(names) = self.header.as_ref().filter(fits) {
             (Origin::Header, names.clone())
         } else if let Some(names) = hello.map(|board| &board.channels).filter(fits) {
-            (Origin::Hello, names.clone())
+            (Origin::Handshake, names.clone())
         } else if count == Sensor::ALL.len() {
             (Origin::Order, Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).collect())
         } else {
@@ -65,7 +65,7 @@ impl Columns {
     pub(super) fn why(&self) -> &'static str {
         match self.origin {
             Origin::Header => "a line of names says what they are",
-            Origin::Hello => "the board's first line says what they are",
+            Origin::Handshake => "the board's first line says what they are",
             Origin::Order => {
                 "no line of names was seen, so that four columns are taken for flexL, flexR, fsrL, fsrR in this order"
             }

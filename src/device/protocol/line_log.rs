@@ -10,11 +10,11 @@ const SHOWN: usize = 240;
 /// What was made of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum LineKind {
     /// Numbers.
-    Read,
+    Values,
     /// A remark, or names of columns.
-    Said,
+    Remark,
     /// Nothing; why.
     Bad(&'static str),
 }
@@ -27,17 +27,17 @@ pub struct ConsoleLine {
     /// Its text; what is none is escaped.
     pub text: String,
     /// What was made of it.
-    pub verdict: Verdict,
+    pub kind: LineKind,
 }
 
 /// The newest lines.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tail {
+pub(super) struct LineLog {
     lines: VecDeque<ConsoleLine>,
 }
 
-impl Tail {
-    pub(super) fn add(&mut self, line: &[u8], arrived_s: f64, verdict: Verdict) {
+impl LineLog {
+    pub(super) fn add(&mut self, line: &[u8], arrived_s: f64, kind: LineKind) {
         if self.lines.len() == LINES {
             self.lines.pop_front();
         }
@@ -46,7 +46,7 @@ impl Tail {
             Ok(text) if !text.chars().any(char::is_control) => text.to_owned(),
             _ => shown.escape_ascii().to_string(),
         };
-        self.lines.push_back(ConsoleLine { arrived_ms: (arrived_s.max(0.0) * 1e3) as u64, text, verdict });
+        self.lines.push_back(ConsoleLine { arrived_ms: (arrived_s.max(0.0) * 1e3) as u64, text, kind });
     }
 
     pub(super) fn lines(&self) -> impl Iterator<Item = &ConsoleLine> {

@@ -6,26 +6,27 @@ use super::checksum;
 use super::clock::{Counters, Stamp, StreamClock};
 use super::columns::Columns;
 use super::fields::{Field, Parsed, parse};
-use super::hello::{self, Hello};
+use super::handshake::{self, Handshake};
+use super::line_log::{ConsoleLine, LineKind, LineLog};
 use super::lines::{Line, LineSplitter};
-use super::rails::{FULL_10_BIT, FULL_12_BIT, Rail, RailWatch, Reach};
+use super::reply::BoardReply;
+use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
 use super::shape::{Candidate, Judged, Role, Shapes};
-use super::tail::{ConsoleLine, Tail, Verdict};
 use super::teleplot::Assembler;
 use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
 
 /// What was heard, in its order.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Heard {
+pub enum DecodedEvent {
     /// A line of the board.
     Reading(Reading),
     /// Readings are missing before the one that comes next.
     Gap(Gap),
     /// What is known of the board has changed. Its channels are only ever added to, or renamed in place.
     Board(Board),
-    /// A remark of the board, without its `#`.
-    Said(String),
+    /// A reply or remark of the board.
+    Reply(BoardReply),
 }
 
 /// Listens to one board. Memory stays bounded whatever it sends.
@@ -45,15 +46,15 @@ struct Reader {
     /// The sensor on each of them.
     sensors: Vec<Option<Sensor>>,
     /// What the board said of itself.
-    hello: Option<Hello>,
+    hello: Option<Handshake>,
     teleplot: Assembler,
     clock: StreamClock,
     meter: Meter,
-    rails: RailWatch,
-    reach: Reach,
+    saturation: SaturationWatch,
+    adc_range: AdcRange,
     /// The full scale that was told last.
     told_scale: Option<u32>,
-    tail: Tail,
+    line_log: LineLog,
     /// Lines since the last reading that could not be read.
     unreadable: u64,
     /// Why readings may be missing before the next one.
@@ -75,7 +76,7 @@ fn is_same_channel(a: &str, b: &str) -> bool {
 
 impl Decoder {
     /// Takes in bytes that arrived at a time (s since the stream began) and adds what they say to `heard`.
-    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         let Self { splitter, reader } = self;
         reader.meter.bytes(bytes, arrived_s);
         splitter.push(bytes, |line| match line {
@@ -94,7 +95,7 @@ impl Decoder {
         // Another sketch may be on the board when it comes back; it need not say hello.
         self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
-        self.reader.reach = Reach::default();
+        self.reader.adc_range = AdcRange::default();
         self.reader.columns.interrupt();
         self.reader.meter.forget_what_came_before();
     }
@@ -131,12 +132,12 @@ impl Decoder {
 
     /// The newest lines as they came, oldest first.
     pub fn console(&self) -> impl Iterator<Item = &ConsoleLine> {
-        self.reader.tail.lines()
+        self.reader.line_log.lines()
     }
 
     /// For each channel, where it has said nothing of its sensor for half a second or more.
-    pub fn rails(&self) -> Vec<Option<Rail>> {
-        self.reader.rails.at()
+    pub fn saturation(&self) -> Vec<Option<Saturation>> {
+        self.reader.saturation.at()
     }
 
     /// The unit that stands behind a channel's numbers, for each that has one.
@@ -170,25 +171,25 @@ impl Reader {
 
     /// How far its converter counts: as it says, and else as its counts tell.
     fn full_scale(&self) -> u32 {
-        self.reach.full_scale(self.said().map(|board| board.full_scale))
+        self.adc_range.full_scale(self.said().map(|board| board.full_scale))
     }
 
     fn looks_10_bit(&self) -> bool {
-        let Some(said) = self.said().filter(|_| self.rails.looks_10_bit()) else {
-            return self.rails.looks_10_bit();
+        let Some(said) = self.said().filter(|_| self.saturation.looks_10_bit()) else {
+            return self.saturation.looks_10_bit();
         };
         // Against the board's word only strips speak: they are never near zero.
         let board = self.board();
         let is_told_by = |sensor: Sensor| {
             let place = board.channel_of(sensor).filter(|_| sensor.is_flex());
             let ohm = |place: usize| board.divider_ohm.get(place).copied().unwrap_or(0.0);
-            place.is_some_and(|place| self.rails.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
+            place.is_some_and(|place| self.saturation.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
         };
         said.full_scale >= FULL_12_BIT && Sensor::ALL.into_iter().any(is_told_by)
     }
 
     fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
-        self.tail.add(line, arrived_s, Verdict::Bad(why));
+        self.line_log.add(line, arrived_s, LineKind::Bad(why));
         self.give_up(arrived_s);
         self.unreadable += 1;
         self.meter.bad_line(arrived_s);
@@ -202,7 +203,7 @@ impl Reader {
         }
     }
 
-    fn line(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+    fn line(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         if line.starts_with(b"#") {
             return self.remark(line, arrived_s, heard);
         }
@@ -214,7 +215,7 @@ impl Reader {
                 (Format::Csv, self.columns.name(cells, self.hello.as_ref().map(|hello| &hello.board)), odd)
             }
             Ok(Parsed::Named { format: Format::Teleplot, fields, odd }) => {
-                self.tail.add(line, arrived_s, Verdict::Read);
+                self.line_log.add(line, arrived_s, LineKind::Values);
                 match self.teleplot.push(fields) {
                     None => return,
                     Some(fields) => (Format::Teleplot, fields, odd),
@@ -223,7 +224,7 @@ impl Reader {
             Ok(Parsed::Named { format, fields, odd }) => (format, fields, odd),
         };
         if format != Format::Teleplot {
-            self.tail.add(line, arrived_s, Verdict::Read);
+            self.line_log.add(line, arrived_s, LineKind::Values);
         }
         match self.shapes.judge(Candidate { format, fields, odd, arrived_s }) {
             Judged::Known(line) => {
@@ -242,7 +243,7 @@ impl Reader {
 
     /// A first line is most often the rest of one, and passed over. A line of names is read: a board that is reset by being
     /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
-    fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+    fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
         let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
         if names.first().is_some_and(is_known) {
@@ -257,32 +258,32 @@ impl Reader {
         if wanted && !has_one { Err("its checksum is missing") } else { Ok(()) }
     }
 
-    fn remark(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+    fn remark(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         let text = std::str::from_utf8(line).map_err(|_not_text| "it holds bytes that are no text");
-        let (text, hello) = match text.and_then(|text| Ok((text, hello::parse(text)?))) {
+        let (text, hello) = match text.and_then(|text| Ok((text, handshake::parse(text)?))) {
             Ok(said) => said,
             Err(why) => return self.bad(line, why, arrived_s),
         };
-        self.tail.add(line, arrived_s, Verdict::Said);
+        self.line_log.add(line, arrived_s, LineKind::Remark);
         if hello.is_some() && self.hello != hello {
             self.hello = hello;
-            self.reach = Reach::default();
+            self.adc_range = AdcRange::default();
             self.name_columns(heard);
-            heard.push(Heard::Board(self.board()));
+            heard.push(DecodedEvent::Board(self.board()));
         }
-        heard.push(Heard::Said(text.strip_prefix('#').unwrap_or(text).trim().to_owned()));
+        heard.push(DecodedEvent::Reply(BoardReply::parse(text)));
     }
 
-    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<Heard>) {
+    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         if !self.columns.set_header(names) {
             return self.bad(line, "it is neither numbers nor names of sensors", arrived_s);
         }
-        self.tail.add(line, arrived_s, Verdict::Said);
+        self.line_log.add(line, arrived_s, LineKind::Remark);
         self.name_columns(heard);
     }
 
     /// Columns that have gone by other names so far get those that have become known.
-    fn name_columns(&mut self, heard: &mut Vec<Heard>) {
+    fn name_columns(&mut self, heard: &mut Vec<DecodedEvent>) {
         if self.shapes.format != Some(Format::Csv) {
             return;
         }
@@ -301,14 +302,14 @@ impl Reader {
         }
         self.shapes.roles(&mut self.channels);
         self.find_sensors();
-        heard.push(Heard::Board(self.board()));
+        heard.push(DecodedEvent::Board(self.board()));
     }
 
     fn find_sensors(&mut self) {
         self.sensors = self.channels.iter().map(|name| Sensor::called(name)).collect();
     }
 
-    fn reading(&mut self, line: &Candidate, heard: &mut Vec<Heard>) {
+    fn reading(&mut self, line: &Candidate, heard: &mut Vec<DecodedEvent>) {
         let known = self.channels.len();
         let roles = self.shapes.roles(&mut self.channels);
         let mut counts = vec![None; self.channels.len()];
@@ -333,7 +334,7 @@ impl Reader {
         }
         if self.channels.len() != known {
             self.find_sensors();
-            heard.push(Heard::Board(self.board()));
+            heard.push(DecodedEvent::Board(self.board()));
         }
         let stamp = if whole { self.clock.stamp(&counters, line.arrived_s) } else { None };
         let Some(stamp) = stamp else {
@@ -342,17 +343,17 @@ impl Reader {
         };
         let said = self.said().map(|board| board.full_scale);
         let [strip, largest] = self.largest(&counts);
-        self.reach.add(stamp.t_s, strip, largest, said);
+        self.adc_range.add(stamp.t_s, strip, largest, said);
         if self.told_scale.replace(self.full_scale()) != Some(self.full_scale()) {
-            heard.push(Heard::Board(self.board()));
+            heard.push(DecodedEvent::Board(self.board()));
         }
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
         let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { self.full_scale() };
-        self.rails.add(&counts, &sent, stamp.t_s, full_scale);
+        self.saturation.add(&counts, &sent, stamp.t_s, full_scale);
         let Stamp { t_s, seq, .. } = stamp;
-        heard.push(Heard::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
+        heard.push(DecodedEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
     }
 
     /// The largest count of the strips, and of all sensors; what else a board sends need not come from its converter.
@@ -369,7 +370,7 @@ impl Reader {
         largest
     }
 
-    fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<Heard>) {
+    fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<DecodedEvent>) {
         let unreadable = std::mem::take(&mut self.unreadable);
         let broken = self.broken.take();
         let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
@@ -383,6 +384,6 @@ impl Reader {
             (None, false, n) => format!("{n} lines could not be read"),
         };
         self.meter.gap(stamp.missing);
-        heard.push(Heard::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
+        heard.push(DecodedEvent::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
     }
 }

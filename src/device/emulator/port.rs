@@ -1,10 +1,10 @@
-//! The pseudo-terminal on which the pretended gripper is reached, and the link that names it.
+//! The pseudo-terminal on which the emulated gripper is reached, and the link that names it.
 //!
 //! The terminal's other end is not kept open here, so that a host that comes or goes is noticed. Each host gets a fresh
 //! terminal: nothing that was meant for the last one is left in it, and no lock that the last one put on it.
 
 use super::faults::FaultKind;
-use super::gripper::{Happening, PretendedGripper};
+use super::gripper::{EmulatedGripper, EmulatorEventKind};
 use super::uart::misread;
 use serialport::{SerialPort as _, TTYPort};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -27,7 +27,7 @@ const TELL_EVERY: Duration = Duration::from_secs(1);
 
 /// How the gripper is reached.
 #[derive(Clone, Debug)]
-pub struct Served {
+pub struct PortSetup {
     /// The symbolic link that names the terminal.
     pub link: PathBuf,
     /// Seconds of the gripper per second.
@@ -38,9 +38,9 @@ pub struct Served {
     pub boot_s: f64,
 }
 
-/// Why a pretended gripper cannot be reached.
+/// Why a emulated gripper cannot be reached.
 #[derive(Debug, thiserror::Error)]
-pub enum PortError {
+pub enum ServeError {
     /// Something else stands where the link should be.
     #[error("{path} exists and is no link to a terminal: it is left alone. Choose another name, or remove it")]
     Taken {
@@ -63,11 +63,11 @@ pub enum PortError {
 /// Runs the gripper on a pseudo-terminal until `stop` is set. `turn` is called again and again, to take what happened and to
 /// say what comes next.
 pub fn serve(
-    gripper: &mut PretendedGripper,
-    served: &Served,
+    gripper: &mut EmulatedGripper,
+    served: &PortSetup,
     stop: &AtomicBool,
-    turn: &mut dyn FnMut(&mut PretendedGripper),
-) -> Result<(), PortError> {
+    turn: &mut dyn FnMut(&mut EmulatedGripper),
+) -> Result<(), ServeError> {
     let mut port = Port::new(served, gripper)?;
     while !stop.load(Ordering::Relaxed) {
         port.turn(gripper)?;
@@ -78,7 +78,7 @@ pub fn serve(
 
 /// The port as a host sees it.
 struct Port<'a> {
-    served: &'a Served,
+    served: &'a PortSetup,
     /// Gone while it has vanished.
     terminal: Option<Terminal>,
     link: Link,
@@ -89,7 +89,7 @@ struct Port<'a> {
 }
 
 impl<'a> Port<'a> {
-    fn new(served: &'a Served, gripper: &mut PretendedGripper) -> Result<Self, PortError> {
+    fn new(served: &'a PortSetup, gripper: &mut EmulatedGripper) -> Result<Self, ServeError> {
         let link = Link::new(&served.link)?;
         let mut port = Self { served, terminal: None, link, since: None, host: None };
         port.appear(gripper)?;
@@ -97,15 +97,15 @@ impl<'a> Port<'a> {
     }
 
     /// Opens a terminal, beside the one there was if that is still held by its writer.
-    fn appear(&mut self, gripper: &mut PretendedGripper) -> Result<(), PortError> {
+    fn appear(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
         let (terminal, path) = Terminal::open(&self.link)?;
-        gripper.tell(Happening::Port { path });
+        gripper.tell(EmulatorEventKind::Port { path });
         self.terminal = Some(terminal);
         Ok(())
     }
 
     /// Looks what the host does, lets the gripper's time pass, and hands over what it printed.
-    fn turn(&mut self, gripper: &mut PretendedGripper) -> Result<(), PortError> {
+    fn turn(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
         if let Some(since) = self.since {
             gripper.advance(since.elapsed().as_secs_f64() * self.served.speed);
         }
@@ -131,20 +131,20 @@ impl<'a> Port<'a> {
         Ok(())
     }
 
-    fn host_is_there(&mut self, gripper: &mut PretendedGripper) {
+    fn host_is_there(&mut self, gripper: &mut EmulatedGripper) {
         if self.host.is_none() {
             let now = Instant::now();
             self.since.get_or_insert(now);
             self.host = Some(now);
             // What came out before was for nobody.
             drop(gripper.take_bytes());
-            gripper.tell(Happening::HostCame);
+            gripper.tell(EmulatorEventKind::HostCame);
         }
     }
 
-    fn nobody_is_there(&mut self, gripper: &mut PretendedGripper) -> Result<(), PortError> {
+    fn nobody_is_there(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
         if self.host.take().is_some() {
-            gripper.tell(Happening::HostLeft);
+            gripper.tell(EmulatorEventKind::HostLeft);
             self.terminal = None;
             self.appear(gripper)?;
         }
@@ -153,11 +153,11 @@ impl<'a> Port<'a> {
         Ok(())
     }
 
-    fn vanish(&mut self, gripper: &mut PretendedGripper) {
+    fn vanish(&mut self, gripper: &mut EmulatedGripper) {
         if self.terminal.take().is_some() {
             self.link.remove();
             if self.host.take().is_some() {
-                gripper.tell(Happening::HostLeft);
+                gripper.tell(EmulatorEventKind::HostLeft);
             }
         }
         drop(gripper.take_bytes());
@@ -165,7 +165,7 @@ impl<'a> Port<'a> {
     }
 
     /// Gives the host what the board printed, as its line makes it arrive.
-    fn hand_over(&mut self, gripper: &mut PretendedGripper) {
+    fn hand_over(&mut self, gripper: &mut EmulatedGripper) {
         let bytes = gripper.take_bytes();
         let (Some(terminal), Some(host)) = (&mut self.terminal, self.host) else { return };
         if host.elapsed().as_secs_f64() * self.served.speed < self.served.boot_s {
@@ -177,7 +177,7 @@ impl<'a> Port<'a> {
         };
         terminal.send(bytes);
         if let Some(bytes) = terminal.take_given_up() {
-            gripper.tell(Happening::Overrun { bytes });
+            gripper.tell(EmulatorEventKind::Overrun { bytes });
         }
     }
 }
@@ -189,21 +189,21 @@ struct Link {
 
 impl Link {
     /// Complains when something else is in its place.
-    fn new(path: &Path) -> Result<Self, PortError> {
+    fn new(path: &Path) -> Result<Self, ServeError> {
         match std::fs::symlink_metadata(path) {
             Err(e) if e.kind() == ErrorKind::NotFound => {}
             Ok(_) if leads_to_a_terminal(path) => {}
-            _ => return Err(PortError::Taken { path: path.to_owned() }),
+            _ => return Err(ServeError::Taken { path: path.to_owned() }),
         }
         Ok(Self { path: path.to_owned() })
     }
 
     /// Makes it lead to a terminal; at no moment is there none if there was one.
-    fn lead_to(&self, terminal: &str) -> Result<(), PortError> {
+    fn lead_to(&self, terminal: &str) -> Result<(), ServeError> {
         let mut beside = self.path.clone().into_os_string();
         beside.push(format!(".{}", std::process::id()));
         let made = symlink(terminal, &beside).and_then(|()| std::fs::rename(&beside, &self.path));
-        made.map_err(|cause| PortError::Link { path: self.path.clone(), cause })
+        made.map_err(|cause| ServeError::Link { path: self.path.clone(), cause })
     }
 
     fn remove(&self) {
@@ -237,7 +237,7 @@ struct Terminal {
 }
 
 impl Terminal {
-    fn open(link: &Link) -> Result<(Self, String), PortError> {
+    fn open(link: &Link) -> Result<(Self, String), ServeError> {
         let (mut near, far) = TTYPort::pair()?;
         near.set_timeout(GRAIN)?;
         let name = far.name().unwrap_or_default();
@@ -246,14 +246,14 @@ impl Terminal {
         let waiting = Arc::new(AtomicUsize::new(0));
         let left = Arc::clone(&waiting);
         std::thread::Builder::new()
-            .name("pretended-port".to_owned())
+            .name("emulator-port".to_owned())
             .spawn(move || {
                 for piece in pieces {
                     write(&mut writer, &piece);
                     left.fetch_sub(piece.len(), Ordering::Relaxed);
                 }
             })
-            .map_err(|cause| PortError::Link { path: link.path.clone(), cause })?;
+            .map_err(|cause| ServeError::Link { path: link.path.clone(), cause })?;
         link.lead_to(&name)?;
         Ok((Self { near, output, waiting, given_up: 0, told: Instant::now() }, name))
     }

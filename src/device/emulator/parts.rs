@@ -1,4 +1,4 @@
-//! What the pretended gripper is made of: values that nobody knows of a real one, and that a calibration finds out.
+//! What the emulated gripper is made of: values that nobody knows of a real one, and that a calibration finds out.
 
 use palpate_tactile::electronics::{Divider, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::model::Stream;
@@ -27,7 +27,7 @@ pub struct PadSetup {
     pub divider_ohm: f64,
 }
 
-/// Everything that is hidden in the pretended gripper's electronics. What is hidden in its fingers stands in the scene.
+/// Everything that is hidden in the emulated gripper's electronics. What is hidden in its fingers stands in the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HiddenParts {

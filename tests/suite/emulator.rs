@@ -1,4 +1,4 @@
-//! The pretended gripper over a real pseudo-terminal, with everything that can go wrong: what is recorded is what was sent,
+//! The emulated gripper over a real pseudo-terminal, with everything that can go wrong: what is recorded is what was sent,
 //! what is missing is said, the stream goes on by itself, and the doctor names cause and fix.
 
 #![cfg(unix)]
@@ -268,11 +268,11 @@ fn diagnosed(arguments: &[&str], seconds: &str) -> (i32, Vec<(String, String)>, 
     let told: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {output:?}"));
     let text = |finding: &Value, key: &str| finding[key].as_str().unwrap_or_default().to_owned();
     let findings = told["findings"].as_array().unwrap();
-    for finding in findings.iter().filter(|finding| ["note", "wrong"].contains(&text(finding, "verdict").as_str())) {
+    for finding in findings.iter().filter(|finding| ["note", "failed"].contains(&text(finding, "verdict").as_str())) {
         let all = ["cause", "fix", "command"];
         assert!(all.iter().all(|part| !text(finding, part).is_empty()), "{finding}");
     }
-    let wrong = findings.iter().filter(|finding| !["good", "not-seen"].contains(&text(finding, "verdict").as_str()));
+    let wrong = findings.iter().filter(|finding| !["passed", "skipped"].contains(&text(finding, "verdict").as_str()));
     let wrong = wrong.map(|finding| (text(finding, "check"), text(finding, "verdict"))).collect();
     (output.status.code().unwrap_or(-1), wrong, told)
 }
@@ -301,7 +301,7 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
         for ((faults, _, _, check), look) in looks {
             let (code, wrong, told) = look.join().unwrap();
             let wrong: Vec<&str> =
-                wrong.iter().filter(|(_, verdict)| verdict == "wrong").map(|(c, _)| c.as_str()).collect();
+                wrong.iter().filter(|(_, verdict)| verdict == "failed").map(|(c, _)| c.as_str()).collect();
             let want: Vec<&str> = check.split_whitespace().collect();
             assert_eq!((code, &wrong), (i32::from(!want.is_empty()), &want), "{faults}: {told:#}");
         }

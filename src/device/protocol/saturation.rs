@@ -3,7 +3,7 @@
 /// Where a channel says nothing of its sensor: an end of the converter's range, or no number at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Rail {
+pub enum Saturation {
     /// No counts: the pin is at ground.
     Low,
     /// All of them: the pin is at the reference voltage, or above.
@@ -40,7 +40,7 @@ const TEN_BITS_AFTER_S: f64 = 1.0;
 
 /// How far a converter counts, by what it has sent.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Reach {
+pub(super) struct AdcRange {
     /// More than is said, or usual: at least three readings in a row were beyond.
     more: Option<u32>,
     /// Readings in a row that are beyond, and the least of them.
@@ -52,7 +52,7 @@ pub(super) struct Reach {
     ten: bool,
 }
 
-impl Reach {
+impl AdcRange {
     /// Takes in the largest counts of a reading, of the strips and of all sensors. `said` is what the board says of its full
     /// scale.
     pub(super) fn add(&mut self, t_s: f64, strip: f32, largest: f32, said: Option<u32>) {
@@ -86,7 +86,7 @@ impl Reach {
 
 /// Watches the counts.
 #[derive(Clone, Debug, Default)]
-pub(super) struct RailWatch {
+pub(super) struct SaturationWatch {
     channels: Vec<Channel>,
     now_s: f64,
     since_s: Option<f64>,
@@ -95,11 +95,11 @@ pub(super) struct RailWatch {
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
     /// The end at which it stands, and since when (s).
-    at: Option<(Rail, f64)>,
+    at: Option<(Saturation, f64)>,
     largest: f32,
 }
 
-impl RailWatch {
+impl SaturationWatch {
     /// Takes in counts of a converter with this full scale. What is not sent at all says nothing.
     pub(super) fn add(&mut self, counts: &[Option<f32>], sent: &[bool], t_s: f64, full_scale: u32) {
         self.channels.resize(counts.len(), Channel::default());
@@ -112,9 +112,9 @@ impl RailWatch {
             let rail = match count {
                 // What is beyond does not come from this converter.
                 Some(count) if *count > full + near => None,
-                Some(count) if *count >= full - near => Some(Rail::High),
-                Some(count) if *count <= near => Some(Rail::Low),
-                None if *sent => Some(Rail::NoNumber),
+                Some(count) if *count >= full - near => Some(Saturation::High),
+                Some(count) if *count <= near => Some(Saturation::Low),
+                None if *sent => Some(Saturation::NoNumber),
                 Some(_) | None => None,
             };
             channel.at = rail.map(|rail| match channel.at {
@@ -125,8 +125,8 @@ impl RailWatch {
     }
 
     /// The end at which each channel has stood for long.
-    pub(super) fn at(&self) -> Vec<Option<Rail>> {
-        let told = |(rail, since): (Rail, f64)| (self.now_s - since > TOLD_AFTER_S).then_some(rail);
+    pub(super) fn at(&self) -> Vec<Option<Saturation>> {
+        let told = |(rail, since): (Saturation, f64)| (self.now_s - since > TOLD_AFTER_S).then_some(rail);
         self.channels.iter().map(|channel| channel.at.and_then(told)).collect()
     }
 
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn an_end_is_told_after_half_a_second() {
-        let mut watch = RailWatch::default();
+        let mut watch = SaturationWatch::default();
         for i in 0..100u32 {
             let t = 0.02 * f64::from(i);
             watch.add(
@@ -161,10 +161,10 @@ mod tests {
                 FULL_12_BIT,
             );
             let told = watch.at();
-            assert_eq!(told[0], (t > 0.5).then_some(Rail::High), "{t}");
-            assert_eq!((told[1], told[2]), (None, (t > 0.5).then_some(Rail::NoNumber)));
+            assert_eq!(told[0], (t > 0.5).then_some(Saturation::High), "{t}");
+            assert_eq!((told[1], told[2]), (None, (t > 0.5).then_some(Saturation::NoNumber)));
             assert_eq!(told[4], None, "it is not sent any more");
-            assert_eq!(told[3], (t > 0.5).then_some(Rail::Low), "{t}");
+            assert_eq!(told[3], (t > 0.5).then_some(Saturation::Low), "{t}");
         }
         watch.add(
             &[Some(4000.0), Some(5000.0), Some(9.0), Some(9.0), None],
@@ -179,7 +179,7 @@ mod tests {
     fn told(levels: f64, average: u32, shares: [f64; 3]) -> [[u32; 2]; 3] {
         let converter = Converter { levels, ..Converter::DUE };
         let mut noise = Stream::new(1, "rails", "noise");
-        let mut watch = RailWatch::default();
+        let mut watch = SaturationWatch::default();
         let mut times = [[0; 2]; 3];
         for i in 0..500u32 {
             let counts = shares.map(|share| {
@@ -189,8 +189,8 @@ mod tests {
             });
             watch.add(&counts, &[true; 3], 0.02 * f64::from(i), levels as u32 - 1);
             for (times, told) in times.iter_mut().zip(watch.at()) {
-                times[0] += u32::from(told == Some(Rail::Low));
-                times[1] += u32::from(told == Some(Rail::High));
+                times[0] += u32::from(told == Some(Saturation::Low));
+                times[1] += u32::from(told == Some(Saturation::High));
             }
         }
         times
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_converter_reaches_as_far_as_three_readings_in_a_row() {
-        let mut reach = Reach::default();
+        let mut reach = AdcRange::default();
         let mut now = 0.0;
         let mut all = |said: Option<u32>, counts: &[f32]| {
             counts.iter().for_each(|count| {
@@ -227,7 +227,7 @@ mod tests {
         assert_eq!(all(None, &[300.0, 9000.0, 9000.0, 140_000.0]), 16_383, "the least of them tells");
         assert_eq!(all(None, &[2.0, 5e9, 5e9, 5e9]), 16_383, "no converter counts as far");
         assert_eq!(all(Some(65_535), &[9000.0]), 65_535);
-        let mut said = Reach::default();
+        let mut said = AdcRange::default();
         (0..9).for_each(|k| said.add(f64::from(k), 1000.0, 1000.0, Some(4095)));
         assert_eq!(said.full_scale(Some(4095)), 4095, "a board that says so is believed");
     }
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn ten_bits_are_told_by_strips_within_a_second_and_by_pads_never() {
         let full_scale = |strip: f32, pad: f32, last: &[f32]| {
-            let mut reach = Reach::default();
+            let mut reach = AdcRange::default();
             for k in 0..200u32 {
                 reach.add(0.02 * f64::from(k), strip, strip.max(pad), None);
             }
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn ten_bits_are_suspected_from_the_largest_count() {
         let largest = |count: f32, seconds: f64| {
-            let mut watch = RailWatch::default();
+            let mut watch = SaturationWatch::default();
             watch.add(&[Some(count)], &[true], 0.0, FULL_12_BIT);
             watch.add(&[Some(10.0)], &[true], seconds, FULL_12_BIT);
             assert_eq!((watch.is_connected(0), watch.is_connected(1)), (count >= 128.0, false));

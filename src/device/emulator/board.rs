@@ -1,7 +1,7 @@
 //! The board's side of the line: what `assets/firmware/due_gripper/gripper_logic.h` does, statement by statement. A test
 //! compiles that header and compares what both print, byte by byte.
 
-use crate::wire::checksum;
+use crate::protocol::checksum;
 use std::fmt::Write as _;
 
 /// Version that the hello line gives.

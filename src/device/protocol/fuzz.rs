@@ -2,7 +2,7 @@
 //! stream. A test hears a second of it; `palpate workshop --fuzz-wire SECONDS` goes on for as long as one likes.
 
 use super::checksum::checksum;
-use super::decoder::{Decoder, Heard};
+use super::decoder::{DecodedEvent, Decoder};
 
 /// What is never exceeded: channels of a board.
 const MOST_CHANNELS: usize = 64;
@@ -20,7 +20,7 @@ pub struct FuzzStream {
 #[derive(Clone, Debug, Default)]
 pub struct FuzzListener {
     decoder: Decoder,
-    heard: Vec<Heard>,
+    heard: Vec<DecodedEvent>,
     last_s: Option<f64>,
     channels: usize,
     readings: u64,
@@ -134,9 +134,9 @@ impl FuzzListener {
         }
     }
 
-    fn check(&mut self, event: &Heard) -> Result<(), &'static str> {
+    fn check(&mut self, event: &DecodedEvent) -> Result<(), &'static str> {
         match event {
-            Heard::Reading(reading) => {
+            DecodedEvent::Reading(reading) => {
                 self.readings += 1;
                 let before = self.last_s.replace(reading.t_s);
                 if before.is_some_and(|before| reading.t_s <= before) {
@@ -149,18 +149,18 @@ impl FuzzListener {
                     return Err("a number is not finite");
                 }
             }
-            Heard::Gap(gap) => {
+            DecodedEvent::Gap(gap) => {
                 if self.last_s != Some(gap.from_s) || gap.to_s <= gap.from_s {
                     return Err("a gap does not lie behind the last reading");
                 }
             }
-            Heard::Board(board) => {
+            DecodedEvent::Board(board) => {
                 if board.channels.len() < self.channels || board.channels.len() > MOST_CHANNELS {
                     return Err("channels were taken away, or are too many");
                 }
                 self.channels = board.channels.len();
             }
-            Heard::Said(_) => {}
+            DecodedEvent::Reply(_) => {}
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ pub enum FaultKind {
     /// A channel keeps its reading.
     Stuck,
     /// A channel is at the upper rail.
-    Rail,
+    Saturated,
     /// A channel's sensor has come off.
     Open,
     /// A channel is printed as `nan`.
@@ -57,7 +57,7 @@ const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, w
 
 const TABLE: [Row; 16] = [
     row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE keeps its reading"),
-    row(FaultKind::Rail, "rail", 0.0, FOR_EVER, "channel VALUE is at the upper rail"),
+    row(FaultKind::Saturated, "rail", 0.0, FOR_EVER, "channel VALUE is at the upper rail"),
     row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE has come off"),
     row(FaultKind::Nan, "nan", 0.0, FOR_EVER, "channel VALUE is printed as nan"),
     row(FaultKind::Crosstalk, "crosstalk", 0.2, FOR_EVER, "each channel takes a share VALUE of the one before"),

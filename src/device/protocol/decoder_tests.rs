@@ -6,7 +6,7 @@ use palpate_tactile::board::{Format, TimeSource};
 use proptest::prelude::*;
 
 /// What a stream says, with each chunk arriving at its time.
-fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<Heard>) {
+fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<DecodedEvent>) {
     let mut decoder = Decoder::default();
     let mut heard = Vec::new();
     for (t, bytes) in chunks {
@@ -16,17 +16,17 @@ fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<
 }
 
 /// Lines that arrive every 20 ms, the first behind the end of another.
-fn hear_lines(lines: &[String]) -> (Decoder, Vec<Heard>) {
+fn hear_lines(lines: &[String]) -> (Decoder, Vec<DecodedEvent>) {
     let lines: Vec<String> = lines.iter().map(|line| format!("\n{line}\n")).collect();
     hear(lines.iter().enumerate().map(|(i, line)| (0.02 * i as f64, line.as_bytes())))
 }
 
-fn readings(heard: &[Heard]) -> Vec<&Reading> {
-    heard.iter().filter_map(|h| if let Heard::Reading(reading) = h { Some(reading) } else { None }).collect()
+fn readings(heard: &[DecodedEvent]) -> Vec<&Reading> {
+    heard.iter().filter_map(|h| if let DecodedEvent::Reading(reading) = h { Some(reading) } else { None }).collect()
 }
 
-fn gaps(heard: &[Heard]) -> Vec<&Gap> {
-    heard.iter().filter_map(|h| if let Heard::Gap(gap) = h { Some(gap) } else { None }).collect()
+fn gaps(heard: &[DecodedEvent]) -> Vec<&Gap> {
+    heard.iter().filter_map(|h| if let DecodedEvent::Gap(gap) = h { Some(gap) } else { None }).collect()
 }
 
 fn firmware_line(i: u32) -> String {
@@ -185,14 +185,14 @@ fn ten_bits_are_seen_whatever_the_board_says_unless_it_has_reasons() {
         let sample = |i: u32| format!("t_us:{},flexL:{},flexR:{count},fsrL:{pad},fsrR:0", 20_000 * i, count + i % 3);
         let lines: Vec<String> = std::iter::once(hello.to_owned()).chain((0..300).map(sample)).collect();
         let (decoder, _) = hear_lines(&lines);
-        (decoder.looks_10_bit(), decoder.rails()[0])
+        (decoder.looks_10_bit(), decoder.saturation()[0])
     };
     assert_eq!(looks("# no hello", 350, 0), (true, None));
     assert_eq!(looks(HELLO, 350, 0), (true, None), "a strip is above a quarter of the range");
-    assert_eq!(looks(HELLO, 1021, 0), (true, Some(Rail::High)), "and this one is open");
+    assert_eq!(looks(HELLO, 1021, 0), (true, Some(Saturation::High)), "and this one is open");
     assert_eq!(looks(HELLO, 1400, 900), (false, None));
     assert_eq!(looks(&HELLO.replace("47000", "100000"), 800, 0), (false, None), "beside 100 kOhm it may be lower");
-    assert_eq!(looks(HELLO, 0, 900), (false, Some(Rail::Low)), "a pad may be anywhere");
+    assert_eq!(looks(HELLO, 0, 900), (false, Some(Saturation::Low)), "a pad may be anywhere");
     assert_eq!(looks(&HELLO.replace("adc=12", "adc=10"), 350, 0), (false, None), "it says so");
 }
 
@@ -280,7 +280,7 @@ fn another_sketch_after_an_interruption_is_another_board() {
             t += 0.02;
             decoder.push(format!("\n{line}\n").as_bytes(), t, &mut heard);
         }
-        heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None })
+        heard.iter().rev().find_map(|h| if let DecodedEvent::Board(board) = h { Some(board.clone()) } else { None })
     };
     let told = say(
         &mut decoder,
@@ -341,8 +341,10 @@ fn the_converters_reach_is_told_by_the_counts_of_a_sketch_that_says_nothing() {
         let sample = |i: u32| format!("flexL:{},flexR:{strip},fsrL:3,fsrR:0,heap:70000", strip + i % 3);
         let lines: Vec<String> = std::iter::once(first.to_owned()).chain((0..80).map(sample)).collect();
         let (decoder, heard) = hear_lines(&lines);
-        let told =
-            heard.iter().rev().find_map(|h| if let Heard::Board(board) = h { Some(board.clone()) } else { None });
+        let told = heard
+            .iter()
+            .rev()
+            .find_map(|h| if let DecodedEvent::Board(board) = h { Some(board.clone()) } else { None });
         assert_eq!(told, Some(decoder.board()));
         decoder.board().full_scale
     };
@@ -407,18 +409,18 @@ proptest! {
         let (mut last, mut channels) = (f64::NEG_INFINITY, 0);
         for event in &heard {
             match event {
-                Heard::Reading(reading) => {
+                DecodedEvent::Reading(reading) => {
                     prop_assert!(reading.t_s > last && reading.t_s <= reading.arrived_s + 1e-3, "{reading:?}");
                     prop_assert_eq!(reading.counts.len(), channels);
                     prop_assert!(reading.counts.iter().flatten().all(|count| count.is_finite()));
                     last = reading.t_s;
                 }
-                Heard::Gap(gap) => prop_assert!(gap.from_s == last && gap.to_s > gap.from_s, "{gap:?}"),
-                Heard::Board(board) => {
+                DecodedEvent::Gap(gap) => prop_assert!(gap.from_s == last && gap.to_s > gap.from_s, "{gap:?}"),
+                DecodedEvent::Board(board) => {
                     prop_assert!(board.channels.len() >= channels && board.channels.len() <= 64);
                     channels = board.channels.len();
                 }
-                Heard::Said(_) => {}
+                DecodedEvent::Reply(_) => {}
             }
         }
         prop_assert_eq!(decoder.cadence().samples as usize, readings(&heard).len());
