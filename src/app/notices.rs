@@ -37,19 +37,17 @@ impl Default for Notices {
 impl Notices {
     /// Shows a message. Long sentences stay until they can have been read, errors twice as long.
     pub(super) fn tell(&mut self, message: UserMessage) {
-        let (UserMessage::Info(text) | UserMessage::Warning(text) | UserMessage::Error(text)) = &message;
-        self.messages.push_back(text.clone());
+        let (text, toast, patience): (String, fn(String) -> Toast, u32) = match message {
+            UserMessage::Info(text) => (text, |text| Toast::info(text), 1),
+            UserMessage::Warning(text) => (text, |text| Toast::warning(text), 1),
+            UserMessage::Error(text) => (text, |text| Toast::error(text), 2),
+        };
+        let time = patience * Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
+        self.toasts.add(toast(folded(&text, LINE_LETTERS))).duration(Some(time)).show_progress_bar(false);
+        self.messages.push_back(text);
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
         }
-        let time = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
-        let text = folded(text, LINE_LETTERS);
-        let (toast, time) = match message {
-            UserMessage::Info(_) => (Toast::info(text), time),
-            UserMessage::Warning(_) => (Toast::warning(text), time),
-            UserMessage::Error(_) => (Toast::error(text), 2 * time),
-        };
-        self.toasts.add(toast).duration(Some(time)).show_progress_bar(false);
     }
 
     pub(super) fn info(&mut self, text: impl Into<String>) {

@@ -55,7 +55,7 @@ pub struct ViewState {
 }
 
 /// Change of the view state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum ViewAction {
     /// Change to another mode.
     SetMode(Mode),

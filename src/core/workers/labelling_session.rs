@@ -565,11 +565,11 @@ mod tests {
         let begin = LabellingEffect::BeginTrial(request());
         // Without a connection nothing is thrown away.
         let gripper = GripperView::default();
-        assert_eq!(session.apply(LabellingAction::Record, &now(&gripper, &labels)), [begin.clone()]);
+        assert_eq!(session.apply(LabellingAction::Record, &now(&gripper, &labels)), std::slice::from_ref(&begin));
         let gripper = running(5);
         assert_eq!(
             session.apply(LabellingAction::Record, &now(&gripper, &labels)),
-            [LabellingEffect::DiscardRunning, begin.clone()]
+            [LabellingEffect::DiscardRunning, begin]
         );
         // A trial that is requested counts as running.
         session.trial_requested(7);
