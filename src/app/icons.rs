@@ -35,7 +35,7 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, ink: Color32, ground: Color32) {
     let middle = rect.center();
     let painter = ui.painter();
     let bar = |x: f32| painter.rect_filled(Rect::from_center_size(middle + vec2(x, 0.0), vec2(3.0, 11.0)), 0.5, ink);
-    // A triangle whose base stands at x, pointing right (+1) or left (-1).
+    // A triangle with its base at x, pointing right (+1) or left (-1).
     let triangle = |x: f32, to: f32| {
         let corner = |dx: f32, dy: f32| middle + vec2(x + dx, dy);
         let points = vec![corner(0.0, -5.5), corner(9.0 * to, 0.0), corner(0.0, 5.5)];

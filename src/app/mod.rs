@@ -16,10 +16,10 @@
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
 //! | simulation | `features/simulation.rs` | simulated gripper and its scene |
 //! | gripper | `features/gripper.rs` `features/files.rs` | real gripper; opening and saving |
-//! | workflow | `features/labelling.rs` `features/recognition.rs` | what acts on both grippers |
+//! | workflow | `features/labelling.rs` `features/recognition.rs` | labelling session; recognition by both grippers |
 //! | actions | `actions.rs` `features/` | actions of all features |
-//! | context | `context.rs` | what panels read |
-//! | parts | `widgets.rs` `plots.rs` `keys/binding.rs` | what panels and modes are made of |
+//! | context | `context.rs` | read-only context of panels |
+//! | parts | `widgets.rs` `plots.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `modes/` | curves of channels; layout and keys of each mode |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
 //! | tiles | `tiling.rs` | panels beside each other |
@@ -64,7 +64,7 @@ pub use features::view::{ViewAction, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
 pub use panels::{ALL as ALL_PANELS, PanelKind};
-pub use startup::{Surroundings, check_surroundings};
+pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
 pub use view_source::ViewSource;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
@@ -93,8 +93,8 @@ pub struct WindowOptions {
 const FIRST_SIZE: [f32; 2] = [1280.0, 820.0];
 const LEAST_SIZE: [f32; 2] = [720.0, 480.0];
 
-/// Opens the window and returns when it is closed. The error is a text for the user.
-pub fn open_window(options: WindowOptions) -> Result<(), String> {
+/// Opens the window and returns when it is closed.
+pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
     let surroundings = check_surroundings()?;
     surroundings.apply();
     let native = eframe::NativeOptions {

@@ -14,6 +14,7 @@ use crate::app::keys;
 use crate::app::modes;
 use crate::app::notices::Notices;
 use crate::app::panels::PanelKind;
+use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::tiling::{Tiling, panel_frame};
 use crate::app::view_source::ViewSource;
@@ -85,14 +86,13 @@ struct Published {
 }
 
 impl Workbench {
-    /// Starts all threads and prepares the graphics. The error is a text for the user.
-    pub fn new(ctx: &egui::Context, setup: WorkbenchSetup<'_>) -> Result<Self, String> {
-        let failed = |what: &'static str| move |error: std::io::Error| format!("cannot start {what}: {error}");
+    /// Starts all threads and prepares the graphics.
+    pub fn new(ctx: &egui::Context, setup: WorkbenchSetup<'_>) -> Result<Self, ThreadError> {
         let WorkbenchSetup { scene, store, mut view, explain, listen, playing, wake, .. } = setup;
         let model = setup.model.as_ref().ok();
         let worker = SimWorker::start(SimWorkerSetup {
             scene: scene.clone(),
-            layout: SensorLayout::named(LIVE_LAYOUT).map_err(|e| e.to_string())?,
+            layout: SensorLayout::named(LIVE_LAYOUT).expect("is in the catalogue of layouts"),
             store: store.clone(),
             recording: true,
             grasps: GRASPS,
@@ -100,8 +100,10 @@ impl Workbench {
             playing,
             wake: Arc::clone(&wake),
         });
-        let effects = EffectsWorker::start(explain, Arc::clone(&wake)).map_err(failed("the measurement of effects"))?;
-        let simulation = SimulationFeature::new(worker.map_err(failed("the simulation"))?, effects, scene.clone());
+        let effects =
+            EffectsWorker::start(explain, Arc::clone(&wake)).map_err(ThreadError::of("the measurement of effects"))?;
+        let simulation =
+            SimulationFeature::new(worker.map_err(ThreadError::of("the simulation"))?, effects, scene.clone());
         let gripper = GripperWorker::start(GripperSetup {
             scene: scene.clone(),
             store: store.clone(),
@@ -110,10 +112,11 @@ impl Workbench {
             listen,
             wake: Arc::clone(&wake),
         })
-        .map_err(failed("the gripper's thread"))?;
+        .map_err(ThreadError::of("the gripper's thread"))?;
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let mut tools = GripperTools::start(tools, &store, &wake)?;
-        let labeller = start_labeller(store.clone(), Arc::clone(&wake)).map_err(failed("the labelling thread"))?;
+        let labeller =
+            start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -248,7 +251,7 @@ impl Workbench {
         }
     }
 
-    /// Lets each feature take in what has happened since the last frame.
+    /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
         let Self { view, notices, simulation, gripper, labelling, recognition, tools, files, .. } = self;
         simulation.gather(view, notices);

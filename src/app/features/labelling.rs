@@ -1,4 +1,4 @@
-//! Labelling in the window: hands the user's actions to the [`LabellingSession`] and carries out what follows.
+//! Labelling in the window: hands actions to the [`LabellingSession`] and carries out its effects.
 
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::simulation::SimulationFeature;
@@ -46,7 +46,7 @@ impl LabellingFeature {
         self.session.hides_prediction(&context(&self.labeller, gripper, labels, view))
     }
 
-    /// Takes in what gripper and labels have done since the last frame.
+    /// Updates the session with gripper and labels.
     pub(in crate::app) fn gather(
         &mut self,
         gripper: &mut GripperFeature,

@@ -1,5 +1,5 @@
-//! Features of the window: each owns its state, its actions and how they are applied. What an action of one feature does
-//! to another goes from a higher layer to a lower one (see the table in [`crate::app`]).
+//! Features of the window: each owns its state, its actions and their application. A feature may act on those of lower
+//! layers (see the table in [`crate::app`]).
 
 pub(super) mod files;
 pub(super) mod gripper;

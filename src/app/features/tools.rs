@@ -1,6 +1,7 @@
 //! Tools for the real gripper, each in a thread of its own behind a panel: diagnostics, finger fit, training.
 
 use crate::app::notices::Notices;
+use crate::app::startup::ThreadError;
 use palpate_core::workers::{
     Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish,
     TrainedModel, Trainer, Wake,
@@ -28,7 +29,7 @@ pub struct GripperToolsSetup {
 pub enum ToolAction {
     /// Examine the gripper's board.
     Examine(ExamineRequest),
-    /// Stop the examination and report what was seen so far.
+    /// Stop the examination and report so far.
     StopExamining,
     /// List trials, or fit the finger to some.
     Fit(FitWish),
@@ -64,17 +65,13 @@ struct Awaited {
 }
 
 impl GripperTools {
-    /// Starts the threads on the store at `store`. The error is a text for the user.
-    pub(in crate::app) fn start(setup: GripperToolsSetup, store: &Path, wake: &Wake) -> Result<Self, String> {
-        let failed = |what: &str| {
-            let what = what.to_owned();
-            move |error: std::io::Error| format!("cannot start {what}: {error}")
-        };
+    /// Starts the threads on the store at `store`.
+    pub(in crate::app) fn start(setup: GripperToolsSetup, store: &Path, wake: &Wake) -> Result<Self, ThreadError> {
         let wake = || Arc::clone(wake);
         Ok(Self {
-            examiner: Examiner::start(setup.examine, wake()).map_err(failed("the doctor"))?,
-            fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(failed("the finger fit"))?,
-            trainer: Trainer::start(store.to_owned(), setup.models, wake()).map_err(failed("training"))?,
+            examiner: Examiner::start(setup.examine, wake()).map_err(ThreadError::of("the doctor"))?,
+            fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(ThreadError::of("the finger fit"))?,
+            trainer: Trainer::start(store.to_owned(), setup.models, wake()).map_err(ThreadError::of("training"))?,
             loads: 0,
             awaited: None,
         })

@@ -253,7 +253,7 @@ impl LabellingSession {
         self.requested_by = number;
     }
 
-    /// Takes in what gripper and labels have done since the last look.
+    /// Updates the session with gripper and labels.
     pub fn observe(&mut self, now: &SessionContext<'_>) -> Vec<LabellingEffect> {
         let mut effects = Vec::new();
         if let Some(gripper) = now.gripper {
