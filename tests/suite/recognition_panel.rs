@@ -46,7 +46,7 @@ fn a_grasp_is_followed_until_it_is_sure() {
     let mut bench = alone(Theme::Dark);
     assert!(says(&bench, "Ready") && says(&bench, "press play to start a grasp"));
     bench.advance_to(0.5);
-    assert!(says(&bench, "Feeling .."));
+    assert!(says(&bench, "Sensing .."));
     bench.advance_to(2.6);
     assert!(says(&bench, "Lemon, 61 %") && says(&bench, "grasp 1 of at most 4; threshold 90 %"));
     assert!(says(&bench, "large 95 %") && says(&bench, "spherical 86 %"));

@@ -190,7 +190,7 @@ impl Part<'_, '_> {
             Headline::Decided(..) => colours.accent,
             Headline::Unknown => colours.warning,
             Headline::Leading(..) => colours.text,
-            Headline::Waiting | Headline::Feeling => colours.quiet_text,
+            Headline::Waiting | Headline::Sensing => colours.quiet_text,
         });
         let mut left = rect.left();
         if let Headline::Leading(class, _) | Headline::Decided(class, _) = headline {

@@ -14,7 +14,7 @@ pub(super) enum Headline {
     /// No answer yet.
     Waiting,
     /// Too early to say.
-    Feeling,
+    Sensing,
     /// Leading class by index, and its probability.
     Leading(usize, f64),
     /// Decided class by index, and its probability.
@@ -29,7 +29,7 @@ impl Headline {
         match view.decision {
             Some(StopReason::Unknown) => Self::Unknown,
             Some(StopReason::Sure | StopReason::GraspLimit) => Self::Decided(class, p),
-            None if view.listening && view.beliefs.is_empty() && p < WORTH_NAMING => Self::Feeling,
+            None if view.listening && view.beliefs.is_empty() && p < WORTH_NAMING => Self::Sensing,
             None => Self::Leading(class, p),
         }
     }
@@ -38,7 +38,7 @@ impl Headline {
     pub(super) fn text(self, labels: &Labels) -> (String, Option<f64>) {
         match self {
             Self::Waiting => ("Ready".to_owned(), None),
-            Self::Feeling => ("Feeling ..".to_owned(), None),
+            Self::Sensing => ("Sensing ..".to_owned(), None),
             Self::Unknown => ("Unknown".to_owned(), None),
             Self::Leading(class, p) | Self::Decided(class, p) => (title(labels, class), Some(p)),
         }
@@ -175,7 +175,7 @@ mod tests {
             verdict: Some(Verdict { pmf: Pmf::uniform(17), properties: None }),
             ..listening(0.5, &[])
         };
-        assert_eq!(Headline::of(&torn), Headline::Feeling);
+        assert_eq!(Headline::of(&torn), Headline::Sensing);
     }
 
     #[test]
