@@ -193,7 +193,7 @@ fn the_window_trains_and_uses_what_it_trained() {
     let [dark, light] = Theme::ALL.map(|theme| {
         let setup = BenchSetup { size: [320.0, 760.0], fill: labelled, ..BenchSetup::default() };
         let mut bench: Bench = bench("training", theme, setup);
-        bench.until_shown(true, "63 of 5 objects");
+        bench.until_shown(true, "63 trials of 5 objects");
         assert!(bench.harness.query_by_label("cube: 3, needs 5").is_some());
         press(&mut bench, "Method");
         bench.harness.run_steps(3);

@@ -138,7 +138,7 @@ fn classes_ui(ui: &mut Ui, theme: Theme, classes: &[LabelledClass]) {
         wrapped(ui, RichText::new("None yet. Record trials of the real gripper and label them.").weak());
         return;
     }
-    wrapped(ui, RichText::new(format!("{all} of {} objects", classes.len())).weak());
+    wrapped(ui, RichText::new(format!("{all} trials of {} objects", classes.len())).weak());
     let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
     ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {
