@@ -18,17 +18,17 @@
 //!
 //! Read in this order to understand a grasp:
 //!
-//! 1. [`palpate_core::scene::Scene`], everything that can be set, and [`palpate_core::objects::load`].
-//! 2. [`palpate_core::gripper`], what a finger and its pad are; [`palpate_core::physics`], how they move.
-//! 3. [`palpate_core::grasping::grasp`], which runs a programme on a [`palpate_core::rig::Rig`] and returns a
-//!    [`palpate_core::trial::Trial`].
-//! 4. [`palpate_core::sensing::Sensors`], which reads channels off its frames.
-//! 5. [`palpate_core::recognition`], which answers them, and [`palpate_core::grasping::Identification`], which adds up
+//! 1. [`palpate_sim::scene::Scene`], everything that can be set, and [`palpate_sim::objects::load`].
+//! 2. [`palpate_sim::gripper`], what a finger and its pad are; [`palpate_sim::physics`], how they move.
+//! 3. [`palpate_lab::grasping::grasp`], which runs a programme on a [`palpate_lab::gripper::Rig`] and returns a
+//!    [`palpate_tactile::trial::Trial`].
+//! 4. [`palpate_tactile::Sensors`], which reads channels off its frames.
+//! 5. [`palpate_learn`], which answers them, and [`palpate_lab::grasping::Identification`], which adds up
 //!    grasp after grasp until it is clear what is in the hand.
-//! 6. [`palpate_core::picture::Stage`], which turns a frame into a [`palpate_core::drawing::DrawList`], and
+//! 6. [`palpate_lab::picture::Stage`], which turns a frame into a [`palpate_geometry::drawing::DrawList`], and
 //!    [`palpate_render::Renderer`], which draws that.
-//! 7. [`palpate_core::workers::SimWorker`], the thread in which all this happens live,
-//!    [`palpate_core::workers::GripperWorker`], its like for the real gripper, and [`app::Workbench`], which shows both.
+//! 7. [`palpate_lab::workers::SimWorker`], the thread in which all this happens live,
+//!    [`palpate_lab::workers::GripperWorker`], its like for the real gripper, and [`app::Workbench`], which shows both.
 //!
 //! # Where to add what
 //!
@@ -39,11 +39,11 @@
 //! | a mode of the window | a line and a layout in `src/app/modes.rs` |
 //! | a key | a line in `src/app/keys.rs` |
 //! | a headless command | a file in `src/cli/` and a line in its `Command` |
-//! | a setting | a field of a struct below [`palpate_core::scene::Scene`], and its range in `scene/check.rs` |
+//! | a setting | a field of a struct below [`palpate_sim::scene::Scene`], and its range in `scene/check.rs` |
 //! | a sensor layout | a line in `src/core/sensing/layout.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
-//! | a recogniser | a file in `src/core/recognition/` and a line in [`palpate_core::recognition::METHODS`] |
-//! | a rig | a file in `src/core/rig/` that implements [`palpate_core::rig::Rig`] |
+//! | a recogniser | a file in `src/core/recognition/` and a line in [`palpate_learn::METHODS`] |
+//! | a rig | a file in `src/core/rig/` that implements [`palpate_lab::gripper::Rig`] |
 //! | a file format for objects | `src/core/objects/load.rs` |
 //!
 //! # What is deliberately absent

@@ -7,7 +7,7 @@ use crate::app::features::simulation::SimulationAction;
 use crate::app::features::tools::ToolAction;
 use crate::app::features::view::ViewAction;
 use crate::app::notices::UserMessage;
-use palpate_core::workers::{Command, GripperWish, LabelWish, LabellingAction};
+use palpate_lab::workers::{Command, GripperWish, LabelWish, LabellingAction};
 
 /// Action of the user, by the feature that applies it.
 #[derive(Clone)]

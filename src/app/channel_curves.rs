@@ -2,10 +2,10 @@
 
 use crate::app::context::PanelContext;
 use crate::app::plots::PlotCurve;
-use palpate_core::grasping::band_half_width;
-use palpate_core::gripper::Side;
-use palpate_core::palette::Trace;
-use palpate_core::sensing::{Channel, Quantity};
+use palpate_lab::grasping::band_half_width;
+use palpate_sim::gripper::Side;
+use palpate_geometry::palette::Trace;
+use palpate_tactile::{Channel, Quantity};
 
 /// Curves of all channels of a quantity, their values multiplied by `factor`.
 pub(super) fn channel_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {

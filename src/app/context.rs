@@ -4,9 +4,9 @@ use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::{SourceData, ViewSource};
-use palpate_core::scene::Scene;
-use palpate_core::trial::Frame;
-use palpate_core::workers::{EffectsWorker, GripperView, LabelDraft, LabelView, MeasuredAccuracy, Snapshot};
+use palpate_sim::scene::Scene;
+use palpate_sim::frame::Frame;
+use palpate_lab::workers::{EffectsWorker, GripperView, LabelDraft, LabelView, MeasuredAccuracy, Snapshot};
 use std::collections::BTreeMap;
 
 /// Everything a panel may read.

@@ -2,7 +2,7 @@
 //! Desktops without dialogs still have the field for a path, and files can be dropped.
 
 use crate::app::notices::UserMessage;
-use palpate_core::scene::Scene;
+use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 

@@ -69,9 +69,10 @@ pub use view_source::ViewSource;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
-use palpate_core::recognition::{models_folder, shipped_model};
-use palpate_core::scene::Scene;
-use palpate_core::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
+use palpate_lab::datasets::models_folder;
+use palpate_learn::shipped_model;
+use palpate_sim::scene::Scene;
+use palpate_lab::workers::{GripperWish, examine_port, explain_scene, fit_trials, listen_to_port};
 use palpate_render::wgpu;
 use std::path::PathBuf;
 use std::sync::Arc;

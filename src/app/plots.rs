@@ -12,8 +12,8 @@ use egui_plot::{
     AxisHints, FilledArea, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform,
     Span, Text, VLine,
 };
-use palpate_core::palette::{Theme, Trace};
-use palpate_core::units::three_digits;
+use palpate_geometry::palette::{Theme, Trace};
+use palpate_geometry::units::three_digits;
 
 /// Value of one row of a trace; `None` where it is undefined.
 pub(super) type TraceValue = Box<dyn Fn(&GraspTrace, usize) -> Option<f64>>;

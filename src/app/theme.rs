@@ -1,7 +1,7 @@
 //! The look of the window: egui's style from our palette.
 
 use egui::{Color32, CornerRadius, FontFamily, FontId, Stroke, TextStyle, Visuals};
-use palpate_core::palette::{Rgb, Theme};
+use palpate_geometry::palette::{Rgb, Theme};
 
 /// A palette colour for egui.
 pub(super) fn colour(Rgb(r, g, b): Rgb) -> Color32 {

@@ -6,7 +6,7 @@ use crate::app::panels::{self, PanelKind};
 use crate::app::theme::colour;
 use egui::{Frame, Margin, Ui};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
-use palpate_core::palette::Theme;
+use palpate_geometry::palette::Theme;
 
 /// Background and margin of a panel.
 pub(super) fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {

@@ -1,6 +1,6 @@
 //! Traces of the current grasp and of the few before it, for the plots.
 
-use palpate_core::workers::TraceRow;
+use palpate_lab::workers::TraceRow;
 use std::collections::VecDeque;
 
 /// Grasps that are kept.

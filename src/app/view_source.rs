@@ -1,11 +1,11 @@
 //! Source of the data that plots and recognition show: the simulated gripper or the real one.
 
 use crate::app::traces::{GraspTrace, TraceHistory};
-use palpate_core::grasping::IdentificationView;
-use palpate_core::rig::serial::Control;
-use palpate_core::scene::Scene;
-use palpate_core::sensing::Channel;
-use palpate_core::workers::{GripperView, LEAD_S, Snapshot, object_title};
+use palpate_lab::grasping::IdentificationView;
+use palpate_tactile::trial::Control;
+use palpate_sim::scene::Scene;
+use palpate_tactile::Channel;
+use palpate_lab::workers::{GripperView, LEAD_S, Snapshot, object_title};
 use std::sync::Arc;
 
 /// Gripper whose data are shown.

@@ -2,8 +2,8 @@
 //! into the window during it.
 
 use egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
-use palpate_core::drawing::DrawList;
-use palpate_core::picture::PictureView;
+use palpate_geometry::drawing::DrawList;
+use palpate_lab::picture::PictureView;
 use palpate_render::wgpu;
 use palpate_render::{Blit, Renderer};
 

@@ -3,8 +3,8 @@
 use crate::app::actions::Actions;
 use crate::app::theme::colour;
 use egui::{Button, Label, RichText, TextEdit, Ui};
-use palpate_core::palette::Theme;
-use palpate_core::workers::GripperWish;
+use palpate_geometry::palette::Theme;
+use palpate_lab::workers::GripperWish;
 use std::path::PathBuf;
 
 /// Text that wraps.

@@ -20,14 +20,11 @@ use crate::app::tiling::{Tiling, panel_frame};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
-use palpate_core::objects::{catalogue, thumbnail};
-use palpate_core::recognition::Model;
-use palpate_core::scene::Scene;
-use palpate_core::sensing::SensorLayout;
-use palpate_core::workers::{
-    EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelView, Listen, MeasuredAccuracy,
-    SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
-};
+use palpate_sim::objects::{catalogue, thumbnail};
+use palpate_learn::Model;
+use palpate_sim::scene::Scene;
+use palpate_tactile::SensorLayout;
+use palpate_lab::workers::{EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelView, Listen, MeasuredAccuracy, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller};
 use palpate_render::{Picture, describe_adapter};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;

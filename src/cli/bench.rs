@@ -2,12 +2,9 @@
 
 use super::Failure;
 use super::terminal::{say, say_json, table};
-use palpate_core::scene::Accuracy;
-use palpate_core::study::{
-    CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost,
-    physics_truth,
-};
-use palpate_core::units::three_digits;
+use palpate_sim::scene::Accuracy;
+use palpate_lab::study::{CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost, physics_truth};
+use palpate_geometry::units::three_digits;
 
 /// Arguments of `palpate bench`.
 #[derive(Debug, clap::Args)]

@@ -7,9 +7,9 @@ mod zero;
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
-use palpate_core::board::{Board, Sensor};
-use palpate_core::recording::{CalibrationId, Store, StoredCalibration, read_points_csv};
-use palpate_core::sensing::calibration::{Calibration, Input, Kind, Record};
+use palpate_tactile::board::{Board, Sensor};
+use palpate_store::{CalibrationId, Store, StoredCalibration, read_points_csv};
+use palpate_tactile::calibration::{Calibration, Input, Kind, Record};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::grasping::{CollectionPlan, CollectionReport, Shard, all_objects, collect};
+use palpate_lab::grasping::{CollectionPlan, CollectionReport, Shard, all_objects, collect};
 use serde::Serialize;
 use std::path::Path;
 

@@ -4,13 +4,10 @@ use super::Failure;
 use super::link;
 use super::terminal::{note, say, say_json, table, typed_lines};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::board::KNOWN_AFTER;
-use palpate_core::doctor::{
-    Bleed, CrosstalkTest, Finding, Observations, USUAL_LISTEN_S, Verdict, WIRING_PAGE, examine, findings, is_sound,
-    summary, write_sketch,
-};
-use palpate_core::rig::serial::{Baud, LinkEvent, LinkOptions};
-use palpate_core::wire::Heard;
+use palpate_tactile::board::KNOWN_AFTER;
+use palpate_device::doctor::{Bleed, CrosstalkTest, Finding, Observations, USUAL_LISTEN_S, Verdict, WIRING_PAGE, examine, findings, is_sound, summary, write_sketch};
+use palpate_device::serial::{Baud, LinkEvent, LinkOptions};
+use palpate_device::wire::Heard;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -3,10 +3,8 @@
 use super::Failure;
 use super::setup::SceneArguments;
 use super::terminal::{say, say_json};
-use palpate_core::objects::{anchored, catalogue};
-use palpate_core::pretended::{
-    Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script,
-};
+use palpate_sim::objects::{anchored, catalogue};
+use palpate_device::pretended::{Fault, HandPlan, HiddenParts, PretendedGripper, PretendedSetup, Step, fault_help, parse_faults, parse_script};
 use std::path::PathBuf;
 
 /// Arguments of `palpate emulate`.
@@ -184,7 +182,7 @@ fn serve(_arguments: &EmulateArguments, _gripper: PretendedGripper) -> Result<()
 
 #[cfg(unix)]
 fn serve(arguments: &EmulateArguments, mut gripper: PretendedGripper) -> Result<(), Failure> {
-    use palpate_core::pretended::{Served, serve};
+    use palpate_device::pretended::{Served, serve};
     use std::io::Write as _;
 
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
@@ -256,8 +254,8 @@ fn take_steps(gripper: &mut PretendedGripper, line: &str) -> Result<(), Failure>
 
 /// Says what happened.
 #[cfg(unix)]
-fn tell(happened: &palpate_core::pretended::Happened, json: bool) -> Result<(), Failure> {
-    use palpate_core::pretended::Happening;
+fn tell(happened: &palpate_device::pretended::Happened, json: bool) -> Result<(), Failure> {
+    use palpate_device::pretended::Happening;
     if json {
         return say(serde_json::to_string(happened)?);
     }

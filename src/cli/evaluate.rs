@@ -4,8 +4,8 @@ use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
-use palpate_core::recognition::{METHODS, Method, Model, StopRule};
-use palpate_core::study::{Comparison, ComparisonRow, Controls, in_table_order};
+use palpate_learn::{METHODS, Method, Model, StopRule};
+use palpate_lab::study::{Comparison, ComparisonRow, Controls, in_table_order};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -128,7 +128,7 @@ fn tell(
         .map(|row| {
             let e = &row.evaluation;
             let after = |grasps: usize| e.f1_by_grasps.get(grasps - 1).map_or_else(|| "-".to_owned(), |f| percent(*f));
-            let stage = |pick: fn(&palpate_core::recognition::evaluation::StageOneScores) -> f64| {
+            let stage = |pick: fn(&palpate_learn::evaluation::StageOneScores) -> f64| {
                 e.stage_one.as_ref().map_or_else(|| "-".to_owned(), |s| percent(pick(s)))
             };
             vec![
@@ -153,7 +153,7 @@ fn tell(
 }
 
 fn tell_controls(controls: &Controls) -> Result<(), Failure> {
-    let line = |what: &str, i: palpate_core::recognition::metrics::Interval| {
+    let line = |what: &str, i: palpate_learn::metrics::Interval| {
         let percent = [i.estimate, i.low, i.high].map(|x| format!("{:.1}", 100.0 * x));
         format!("{what:<28}{} ({} to {})", percent[0], percent[1], percent[2])
     };

@@ -3,9 +3,10 @@
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json, table, warn};
-use palpate_core::recording::{CalibrationId, TrialId};
-use palpate_core::study::{FingerFit, Known, RecordedGrasps, fit_finger};
-use palpate_core::units::three_digits;
+use palpate_store::CalibrationId;
+use palpate_tactile::trial::TrialId;
+use palpate_lab::study::{FingerFit, Known, RecordedGrasps, fit_finger};
+use palpate_geometry::units::three_digits;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -3,11 +3,13 @@
 use super::Failure;
 use super::setup::{SceneArguments, open_store};
 use super::terminal::{say, say_json, warn};
-use palpate_core::grasping::{ErrorNorms, GraspSummary, error_band, grasp, jittered};
-use palpate_core::recording::{TrialId, contacts_path, write_contacts_csv, write_trial_csv};
-use palpate_core::scene::Scene;
-use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
-use palpate_core::units::{mm, three_digits};
+use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp};
+use palpate_sim::poses::jittered;
+use palpate_store::{contacts_path, write_contacts_csv, write_trial_csv};
+use palpate_tactile::trial::TrialId;
+use palpate_sim::scene::Scene;
+use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_geometry::units::{mm, three_digits};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -3,9 +3,10 @@
 use super::Failure;
 use super::terminal::warn;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::recognition::{Dataset, METHODS, Method, Source, View, method};
-use palpate_core::recording::Store;
-use palpate_core::sensing::model::SensorModel;
+use palpate_lab::datasets::{Source, View};
+use palpate_learn::{Dataset, METHODS, Method, method};
+use palpate_store::Store;
+use palpate_tactile::model::SensorModel;
 
 /// Which grasps to learn from or to judge by.
 #[derive(Debug, clap::Args)]

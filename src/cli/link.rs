@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::terminal::note;
-use palpate_core::rig::serial::{LinkOptions, PortTrouble, SerialLink};
+use palpate_device::serial::{LinkOptions, PortTrouble, SerialLink};
 use std::time::{Duration, Instant};
 
 /// How long ModemManager looks at a board that was plugged in just now, and so how long a busy port is worth waiting for (s).

@@ -26,10 +26,10 @@ mod workshop;
 
 use crate::app::{WindowOptions, open_window};
 use clap::{CommandFactory, Parser, Subcommand};
-use palpate_core::objects::{EMPTY, anchored, catalogue};
-use palpate_core::recognition::Model;
-use palpate_core::recording::Store;
-use palpate_core::scene::Scene;
+use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_learn::Model;
+use palpate_store::Store;
+use palpate_sim::scene::Scene;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

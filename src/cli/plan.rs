@@ -3,8 +3,8 @@
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
-use palpate_core::labelling::{NextTrial, ObjectProgress, Progress};
-use palpate_core::recording::Store;
+use palpate_store::labels::{NextTrial, ObjectProgress, Progress};
+use palpate_store::Store;
 use serde::Serialize;
 use std::path::Path;
 

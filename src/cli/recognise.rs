@@ -3,10 +3,11 @@
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
-use palpate_core::labelling::shown_name;
-use palpate_core::recognition::{Belief, Labels, Model, Pmf, Source, Verdict, View, shipped_model};
-use palpate_core::recording::TrialId;
-use palpate_core::sensing::model::SensorModel;
+use palpate_store::labels::shown_name;
+use palpate_lab::datasets::{Source, View};
+use palpate_learn::{Belief, Labels, Model, Pmf, Verdict, shipped_model};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::model::SensorModel;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

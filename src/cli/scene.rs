@@ -4,9 +4,9 @@ use super::Failure;
 use super::setup::SceneArguments;
 use super::terminal::{say, say_json, warn};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::scene::Scene;
-use palpate_core::study::{ExplainedEffect, Explanation, Measuring, explain_effects};
-use palpate_core::units::three_digits;
+use palpate_sim::scene::Scene;
+use palpate_lab::study::{ExplainedEffect, Explanation, Measuring, explain_effects};
+use palpate_geometry::units::three_digits;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 

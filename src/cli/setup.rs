@@ -1,9 +1,9 @@
 //! The arguments that say what is grasped and how, shared by all commands that simulate.
 
 use super::Failure;
-use palpate_core::objects::anchored;
-use palpate_core::recording::Store;
-use palpate_core::scene::{Accuracy, EngineKind, PosePreset, Scene};
+use palpate_sim::objects::anchored;
+use palpate_store::Store;
+use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use std::path::{Path, PathBuf};
 
 /// What to simulate.

@@ -7,14 +7,12 @@ use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
 use labels::Labelling;
-use palpate_core::labelling::shown_name;
-use palpate_core::recording::{
-    Store, TrialId, TrialRow, contacts_path, export_board_trial, file_name_of, read_trials_csv, write_contacts_csv,
-    write_signals_csv, write_trial_csv,
-};
-use palpate_core::scene::Scene;
-use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
-use palpate_core::trial::Trial;
+use palpate_store::labels::shown_name;
+use palpate_store::{Store, TrialRow, contacts_path, export_board_trial, file_name_of, read_trials_csv, write_contacts_csv, write_signals_csv, write_trial_csv};
+use palpate_tactile::trial::TrialId;
+use palpate_sim::scene::Scene;
+use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::trial::Trial;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

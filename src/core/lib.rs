@@ -45,7 +45,7 @@
 //! let trial = grasp(&scene, object.as_ref(), 0);
 //! let summary = GraspSummary::new(&trial, &scene);
 //! assert!(summary.converged && summary.contact_onset_s.is_some());
-//! # Ok::<(), palpate_core::objects::ObjectError>(())
+//! # Ok::<(), palpate_sim::objects::ObjectError>(())
 //! ```
 //!
 //! # What holds everywhere

@@ -3,7 +3,7 @@
 use super::shadow::{ShadowMap, light_from_world};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
-use palpate_core::drawing::DrawList;
+use palpate_geometry::drawing::DrawList;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, Device, Queue};
 
 /// Mirrors `Frame` in shaders/common/frame.wgsl.

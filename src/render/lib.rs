@@ -1,4 +1,4 @@
-//! Draws Palpate's soft fingers and objects: a [`DrawList`](palpate_core::drawing::DrawList) in, pixels out.
+//! Draws Palpate's soft fingers and objects: a [`DrawList`](palpate_geometry::drawing::DrawList) in, pixels out.
 //!
 //! The same code draws into the window, into test pictures and off-screen. It keeps within WebGL2's limits: no compute,
 //! no storage buffers, four samples.

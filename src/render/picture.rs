@@ -1,7 +1,7 @@
 //! Pictures without a window: draw a list, read the pixels back, write a PNG.
 
 use super::{Gpu, Renderer};
-use palpate_core::drawing::DrawList;
+use palpate_geometry::drawing::DrawList;
 use std::path::{Path, PathBuf};
 
 /// Pixels, sRGB with opacity, row by row from the top.

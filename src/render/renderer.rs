@@ -4,7 +4,7 @@ use super::frame::FrameBindings;
 use super::passes::{self, Pass, PassSetup, Prepare};
 use super::shadow::ShadowMap;
 use super::targets::Targets;
-use palpate_core::drawing::DrawList;
+use palpate_geometry::drawing::DrawList;
 use wgpu::{CommandEncoder, Device, Queue, Texture, TextureView};
 
 /// Long-lived pipelines and textures; what changes from picture to picture is uploaded by the passes.

@@ -2,7 +2,7 @@
 
 use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont};
 use glam::Vec2;
-use palpate_core::drawing::Align;
+use palpate_geometry::drawing::Align;
 use std::collections::HashMap;
 use wgpu::{Device, Queue, Texture, TextureView};
 

@@ -4,14 +4,12 @@ use crate::scripted;
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use palpate::app::{Action, GripperToolsSetup, PanelKind, ViewState, Workbench, WorkbenchSetup};
-use palpate_core::palette::Theme;
-use palpate_core::recognition::Model;
-use palpate_core::recording::Store;
-use palpate_core::scene::Scene;
-use palpate_core::study::{Explanation, Measuring};
-use palpate_core::workers::{
-    Command, Examine, FitTrials, Listen, Snapshot, examine_port, explain_scene, fit_trials, listen_to_port,
-};
+use palpate_geometry::palette::Theme;
+use palpate_learn::Model;
+use palpate_store::Store;
+use palpate_sim::scene::Scene;
+use palpate_lab::study::{Explanation, Measuring};
+use palpate_lab::workers::{Command, Examine, FitTrials, Listen, Snapshot, examine_port, explain_scene, fit_trials, listen_to_port};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};

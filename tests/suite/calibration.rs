@@ -8,20 +8,22 @@ use crate::program::{json, palpate, ran, refused, run};
 use crate::streams::alike;
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::ALL_PANELS;
-use palpate_core::board::{Board, Reading, Sensor};
-use palpate_core::gripper::Phase;
-use palpate_core::gripper::{Gripper, Side, TorquePoint};
-use palpate_core::objects::{EMPTY, ObjectModel};
-use palpate_core::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
-use palpate_core::recording::{BoardChunk, BoardInfo, Store, TrialId};
-use palpate_core::scene::Scene;
-use palpate_core::sensing::calibration::Input;
-use palpate_core::sensing::calibration::{BendingZero, Calibration, Curve, Kind, Procedure, Readout};
-use palpate_core::sensing::electronics::StripPart;
-use palpate_core::study::{FingerFit, Known, Observation, Trust, fit_finger};
-use palpate_core::trial::PhaseMark;
-use palpate_core::wire::{CAPTURE_MAGIC, Captured, Decoder, Heard};
-use palpate_core::workers::Listen;
+use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_sim::gripper::Phase;
+use palpate_sim::gripper::{Gripper, Side, TorquePoint};
+use palpate_sim::objects::{EMPTY, ObjectModel};
+use palpate_device::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
+use palpate_store::{BoardChunk, BoardInfo, Store};
+use palpate_tactile::trial::TrialId;
+use palpate_sim::scene::Scene;
+use palpate_tactile::calibration::Input;
+use palpate_tactile::calibration::{BendingZero, Calibration, Curve, Kind, Procedure, Readout};
+use palpate_tactile::electronics::StripPart;
+use palpate_lab::study::{FingerFit, Known, Observation, Trust, fit_finger};
+use palpate_tactile::trial::PhaseMark;
+use palpate_device::wire::{Decoder, Heard};
+use palpate_tactile::capture::{Captured, MAGIC};
+use palpate_lab::workers::Listen;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
@@ -68,7 +70,7 @@ fn holds(angles: &[f64], loads: &[f64]) -> String {
 /// The usual procedure for all four sensors at once, hands-free; pads learn their zero from an empty close.
 pub(crate) fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor, Calibration)>) {
     let steps = |kind: Kind| {
-        let plan = palpate_core::sensing::calibration::plan(kind);
+        let plan = palpate_tactile::calibration::plan(kind);
         plan.into_iter().map(|stimulus| kind.shown(stimulus)).collect::<Vec<f64>>()
     };
     let mut calibrations = Vec::new();
@@ -151,7 +153,7 @@ fn hidden_parts_are_read_within_a_degree_and_5_per_cent_through_noise() {
 fn a_resistor_that_is_not_what_the_board_says_is_told() {
     let mut wrong = parts(4, false);
     wrong.pads[1].divider_ohm = 1e3;
-    let plan = palpate_core::sensing::calibration::plan(Kind::Pad);
+    let plan = palpate_tactile::calibration::plan(Kind::Pad);
     let loads: Vec<f64> = plan.iter().map(|force| Kind::Pad.shown(*force)).collect();
     let (mut board, stream) = readings(&wrong, &Scene::default(), &holds(&[], &loads), 16.0, 1);
     // The hello line says what the maker believed.
@@ -228,7 +230,7 @@ fn the_hidden_finger_is_fitted_within_3_per_cent() {
 }
 
 /// A file of a strip's points, as `palpate calibrate --points` takes them.
-fn write_points(folder: &Path, name: &str, record: &palpate_core::sensing::calibration::Record) {
+fn write_points(folder: &Path, name: &str, record: &palpate_tactile::calibration::Record) {
     let column = if record.kind == Kind::Flex { "angle_deg" } else { "load_kg" };
     let rows = record.points.iter().map(|p| format!("{},{}\n", record.kind.shown(p.stimulus), p.counts));
     std::fs::write(folder.join(name), format!("{column},counts\n{}", rows.collect::<String>())).unwrap();
@@ -372,7 +374,7 @@ pub(crate) fn stored(
     object: &str,
     closing_s: f64,
 ) -> TrialId {
-    let mut info = palpate_core::grasping::prepare(scene, None, 0).info().clone();
+    let mut info = palpate_lab::grasping::prepare(scene, None, 0).info().clone();
     (info.rig, info.object) = ("serial".to_owned(), object.to_owned());
     let phases = vec![PhaseMark { from_s: closing_s, phase: Phase::Close, line_bar: None }];
     let about = BoardInfo { board: board.clone(), phases, ..BoardInfo::default() };
@@ -515,7 +517,7 @@ fn the_window_calibrates_step_by_step() {
     bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
     // A pad, and what bending does to it.
     begin_calibration(&mut bench, Sensor::PadRight, "P3");
-    let plan = palpate_core::sensing::calibration::plan(Kind::Pad);
+    let plan = palpate_tactile::calibration::plan(Kind::Pad);
     let asked: Vec<(String, f64)> = plan
         .iter()
         .map(|force| match *force {

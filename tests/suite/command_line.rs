@@ -1,9 +1,9 @@
 //! What the program prints and how it exits, run as a user would run it.
 
 use crate::program::{json, palpate, ran, refused, run};
-use palpate_core::objects::catalogue;
-use palpate_core::recording::Store;
-use palpate_core::scene::Effect;
+use palpate_sim::objects::catalogue;
+use palpate_store::Store;
+use palpate_sim::scene::Effect;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Stdio;

@@ -9,9 +9,9 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::{Mode, ViewAction};
-use palpate_core::recording::Store;
-use palpate_core::rig::serial::Control;
-use palpate_core::workers::{GripperWish, LabellingAction};
+use palpate_store::Store;
+use palpate_tactile::trial::Control;
+use palpate_lab::workers::{GripperWish, LabellingAction};
 
 fn desk() -> Bench {
     let fill = |store: &mut Store| {

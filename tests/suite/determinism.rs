@@ -2,11 +2,12 @@
 //! dates are what differs between two trials, and are left out.
 
 use crate::program::palpate;
-use palpate_core::grasping::{grasp, jittered};
-use palpate_core::recording::{Store, encode_frames, write_contacts_csv, write_trial_csv};
-use palpate_core::scene::Scene;
-use palpate_core::sensing::{PressureArea, SensorLayout, Sensors};
-use palpate_core::trial::Trial;
+use palpate_lab::grasping::grasp;
+use palpate_sim::poses::jittered;
+use palpate_store::{Store, encode_frames, write_contacts_csv, write_trial_csv};
+use palpate_sim::scene::Scene;
+use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::trial::Trial;
 use std::path::Path;
 
 /// A mesh that is baked in parallel, a union of primitives, and a primitive.

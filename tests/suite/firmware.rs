@@ -1,8 +1,8 @@
 //! The firmware, compiled from the header that goes onto the board, against a stand-in for its pins; and the same script
 //! through the board that `palpate emulate` pretends to be: both print the same bytes.
 
-use palpate_core::pretended::{BoardSetup, FirmwareBoard};
-use palpate_core::wire::{Decoder, Heard};
+use palpate_device::pretended::{BoardSetup, FirmwareBoard};
+use palpate_device::wire::{Decoder, Heard};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use std::fmt::Write as _;

@@ -5,10 +5,10 @@
 //! A second or two of it run with every test. `PALPATE_FUZZ_S=3600 cargo test --test suite fuzz` runs for an hour, from
 //! `PALPATE_FUZZ_SEED` on, and tells every find with its seed.
 
-use palpate_core::grasping::grasp;
-use palpate_core::objects::catalogue;
-use palpate_core::scene::{Scene, SceneError, SceneKey};
-use palpate_core::trial::Trial;
+use palpate_lab::grasping::grasp;
+use palpate_sim::objects::catalogue;
+use palpate_sim::scene::{Scene, SceneError, SceneKey};
+use palpate_tactile::trial::Trial;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -4,17 +4,14 @@
 use crate::calibration::{calibrated, parts};
 use crate::scripted;
 use crate::streams::Pretended;
-use palpate_core::board::Sensor;
-use palpate_core::gripper::Phase;
-use palpate_core::objects::EMPTY;
-use palpate_core::pretended::{HandPlan, HiddenParts, PretendedSetup};
-use palpate_core::recording::Store;
-use palpate_core::rig::serial::Control;
-use palpate_core::scene::{Accuracy, Scene};
-use palpate_core::workers::{
-    CalibrationPlan, CalibrationWish, Examine, ExamineRequest, GripperSetup, GripperView, GripperWish, GripperWorker,
-    Listen, NotOpened, Notice, TraceRow, TrialPart, TrialRequest,
-};
+use palpate_tactile::board::Sensor;
+use palpate_sim::gripper::Phase;
+use palpate_sim::objects::EMPTY;
+use palpate_device::pretended::{HandPlan, HiddenParts, PretendedSetup};
+use palpate_store::Store;
+use palpate_tactile::trial::Control;
+use palpate_sim::scene::{Accuracy, Scene};
+use palpate_lab::workers::{CalibrationPlan, CalibrationWish, Examine, ExamineRequest, GripperSetup, GripperView, GripperWish, GripperWorker, Listen, NotOpened, Notice, TraceRow, TrialPart, TrialRequest};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -197,7 +194,7 @@ fn stop_vents_ends_the_trial_and_says_so() {
     let ended = view.ended.clone().unwrap();
     assert!(!ended.discarded && ended.warnings.iter().any(|text| text.contains("vented by the user")), "{ended:?}");
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
-    let released = |mark: &palpate_core::trial::PhaseMark| mark.phase == Phase::Release;
+    let released = |mark: &palpate_tactile::trial::PhaseMark| mark.phase == Phase::Release;
     assert!(!desk.store().board_info(ended.id).unwrap().unwrap().phases.iter().any(released));
 }
 

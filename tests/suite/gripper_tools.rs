@@ -11,18 +11,18 @@ use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::ALL_PANELS;
-use palpate_core::board::{Board, Reading, Sensor};
-use palpate_core::doctor::{Observations, Traces};
-use palpate_core::gripper::Side;
-use palpate_core::palette::Theme;
-use palpate_core::recording::{BOARD_RIG, BoardInfo, Store, TrialId};
-use palpate_core::rig::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
-use palpate_core::scene::Scene;
-use palpate_core::study::{Course, Estimate, FingerFit, Known, Remainder};
-use palpate_core::wire::{Cadence, Rail};
-use palpate_core::workers::{
-    CalibrationPlan, CalibrationWish, Examine, FitTrials, FittedFinger, GripperWish, Listen, NotOpened,
-};
+use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_device::doctor::{Observations, Traces};
+use palpate_sim::gripper::Side;
+use palpate_geometry::palette::Theme;
+use palpate_store::{BOARD_RIG, BoardInfo, Store};
+use palpate_tactile::trial::TrialId;
+use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
+use palpate_sim::scene::Scene;
+use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
+use palpate_device::wire::Rail;
+use palpate_tactile::cadence::Cadence;
+use palpate_lab::workers::{CalibrationPlan, CalibrationWish, Examine, FitTrials, FittedFinger, GripperWish, Listen, NotOpened};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -340,7 +340,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
 /// Two empty closes and two grasps of the real gripper, without a reading.
 fn recorded(store: &mut Store) {
     for object in ["empty", "bigball", "bigball", "empty"] {
-        let mut info = palpate_core::grasping::prepare(&Scene::default(), None, 0).info().clone();
+        let mut info = palpate_lab::grasping::prepare(&Scene::default(), None, 0).info().clone();
         (info.rig, info.object) = (BOARD_RIG.to_owned(), object.to_owned());
         let id = store.begin_board(&info, &BoardInfo::default()).unwrap();
         store.finish_board(id, &BoardInfo::default(), &[]).unwrap();

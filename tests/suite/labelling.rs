@@ -3,12 +3,12 @@
 
 use crate::calibration::{calibrated, parts, readings, scenes, stored};
 use crate::program::{json, refused, run};
-use palpate_core::objects::EMPTY;
-use palpate_core::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
-use palpate_core::recognition::{Source, View};
-use palpate_core::recording::{ExportError, Store, export_labelled};
-use palpate_core::scene::{Accuracy, Scene};
-use palpate_core::wire::{CAPTURE_MAGIC, Captured};
+use palpate_sim::objects::EMPTY;
+use palpate_device::pretended::{HandPlan, HiddenParts, PretendedGripper, PretendedSetup, parse_faults, parse_script};
+use palpate_lab::datasets::{Source, View};
+use palpate_store::{ExportError, Store, export_labelled};
+use palpate_sim::scene::{Accuracy, Scene};
+use palpate_tactile::capture::{Captured, MAGIC};
 use std::path::Path;
 
 /// The bytes of five seconds of a pretended gripper that does a script.

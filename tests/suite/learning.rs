@@ -2,10 +2,10 @@
 
 use crate::allocations::allocations_in;
 use crate::program::{json, refused, run};
-use palpate_core::objects::catalogue;
-use palpate_core::recognition::Source;
-use palpate_core::recognition::network::{LiveMacroLayer, MacroLayer, MacroShape};
-use palpate_core::recording::Store;
+use palpate_sim::objects::catalogue;
+use palpate_lab::datasets::Source;
+use palpate_learn::network::{LiveMacroLayer, MacroLayer, MacroShape};
+use palpate_store::Store;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write as _;

@@ -9,11 +9,11 @@ use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Mode, SimulationAction};
-use palpate_core::objects::{EMPTY, catalogue};
-use palpate_core::palette::Theme;
-use palpate_core::scene::{Accuracy, Effect, Setting};
-use palpate_core::units::three_digits;
-use palpate_core::workers::{Command, MeasuredAccuracy};
+use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_geometry::palette::Theme;
+use palpate_sim::scene::{Accuracy, Effect, Setting};
+use palpate_geometry::units::three_digits;
+use palpate_lab::workers::{Command, MeasuredAccuracy};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

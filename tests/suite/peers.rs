@@ -1,10 +1,11 @@
 //! Palpate against other engines on the same scenes. What the others found is stored under `tests/peers/results`, with
 //! the scripts that made it one folder up; no Python runs here.
 
-use palpate_core::grasping::grasp;
-use palpate_core::gripper::{BentFinger, Side};
-use palpate_core::scene::Scene;
-use palpate_core::trial::{Frame, Trial};
+use palpate_lab::grasping::grasp;
+use palpate_sim::gripper::{BentFinger, Side};
+use palpate_sim::scene::Scene;
+use palpate_sim::frame::Frame;
+use palpate_tactile::trial::Trial;
 use std::path::{Path, PathBuf};
 
 fn folder() -> PathBuf {
@@ -38,7 +39,7 @@ fn palpate(scene: &str) -> (Scene, Trial) {
 fn squeeze(scene: &Scene, frame: &Frame) -> f64 {
     let (grid, finger) = (scene.gripper.taxels(), &scene.gripper.finger);
     let bent = BentFinger::new(finger, frame.joints(Side::Left));
-    let across = |(taxel, load): (usize, palpate_core::trial::TaxelLoad)| {
+    let across = |(taxel, load): (usize, palpate_sim::frame::TaxelLoad)| {
         let along = bent.segments[grid.place(taxel, finger).0].along;
         f64::from(load.normal) * along.y - f64::from(load.along) * along.x
     };

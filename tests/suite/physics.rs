@@ -2,11 +2,11 @@
 //! stand beside the solver, in `physics::closed_form`.
 
 use crate::allocations::allocations_in;
-use palpate_core::grasping::{GraspSummary, grasp};
-use palpate_core::gripper::Phase;
-use palpate_core::objects::{EMPTY, ObjectModel, catalogue};
-use palpate_core::physics::{Placement, Simulation};
-use palpate_core::scene::{Accuracy, Effect, EngineKind, Scene, Setting};
+use palpate_lab::grasping::{GraspSummary, grasp};
+use palpate_sim::gripper::Phase;
+use palpate_sim::objects::{EMPTY, ObjectModel, catalogue};
+use palpate_sim::physics::{Placement, Simulation};
+use palpate_sim::scene::{Accuracy, Effect, EngineKind, Scene, Setting};
 
 fn scene_of(name: &str) -> (Scene, Option<ObjectModel>) {
     let mut scene = Scene::default();

@@ -7,12 +7,12 @@ use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
 use glam::Vec2;
 use image::RgbaImage;
 use palpate::app::ViewAction;
-use palpate_core::drawing::{Camera, StandardView};
-use palpate_core::grasping::grasp;
-use palpate_core::objects::{EMPTY, catalogue};
-use palpate_core::palette::Theme;
-use palpate_core::picture::{PictureView, Stage};
-use palpate_core::scene::{Scene, SupportKind};
+use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_lab::grasping::grasp;
+use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_geometry::palette::Theme;
+use palpate_lab::picture::{PictureView, Stage};
+use palpate_sim::scene::{Scene, SupportKind};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, wanted_limits, wgpu};
 use std::sync::Arc;
 

@@ -5,8 +5,8 @@
 
 use crate::program::{palpate, ran, refused};
 use crate::serial::start;
-use palpate_core::recording::{BoardTrial, Store};
-use palpate_core::rig::serial::{LinkOptions, SerialLink};
+use palpate_store::{BoardTrial, Store};
+use palpate_device::serial::{LinkOptions, SerialLink};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -93,7 +93,7 @@ fn recorded(emulated: &Emulated, seconds: &str) -> (Value, BoardTrial) {
 /// Finds every recorded reading among what was sent, in its order: which of the sent ones they are.
 fn among(sent: &[Vec<f32>], trial: &BoardTrial) -> Vec<usize> {
     let mut from = 0;
-    let find = |reading: &palpate_core::board::Reading| {
+    let find = |reading: &palpate_tactile::board::Reading| {
         let same =
             |sent: &Vec<f32>| sent.iter().zip(&reading.counts).all(|(sent, got)| got.is_none_or(|got| got == *sent));
         let at = from + sent[from..].iter().position(same).unwrap_or_else(|| panic!("nobody sent {reading:?}"));
@@ -245,11 +245,11 @@ fn a_host_drives_the_fingers_through_a_programme() {
     let output = start(command).wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let trial = Store::open(&store).unwrap().board_trial(1).unwrap().unwrap();
-    let most = |of: &dyn Fn(&palpate_core::board::Reading) -> Option<f64>| {
+    let most = |of: &dyn Fn(&palpate_tactile::board::Reading) -> Option<f64>| {
         trial.readings.iter().filter_map(of).fold(0.0, f64::max)
     };
     assert_eq!(most(&|reading| reading.line_bar), 1.0);
-    let flex = |reading: &palpate_core::board::Reading| reading.counts[0].map(f64::from);
+    let flex = |reading: &palpate_tactile::board::Reading| reading.counts[0].map(f64::from);
     let rest = trial.readings.iter().find_map(flex).unwrap();
     assert!(most(&flex) > rest + 250.0, "{rest}");
     let events = emulated.end();

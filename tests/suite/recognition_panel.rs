@@ -8,9 +8,9 @@ use egui::{Key, Rect};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, PanelKind, SimulationAction};
-use palpate_core::palette::Theme;
-use palpate_core::recognition::StopReason;
-use palpate_core::workers::{Command, Snapshot};
+use palpate_geometry::palette::Theme;
+use palpate_learn::StopReason;
+use palpate_lab::workers::{Command, Snapshot};
 
 fn panel() -> &'static PanelKind {
     ALL_PANELS.iter().find(|panel| panel.name == "recognition").unwrap()

@@ -1,10 +1,8 @@
 //! A recogniser that says what its script says, whatever it is given: the window can be tested without depending on
 //! what a trained model happens to answer.
 
-use palpate_core::recognition::{
-    Arrays, DataCard, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser, Sequence, StopRule, Verdict,
-    labels_of_catalogue,
-};
+use palpate_lab::datasets::labels_of_catalogue;
+use palpate_learn::{Arrays, DataCard, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser, Sequence, StopRule, Verdict};
 use std::sync::Arc;
 
 /// Says lemon, a little surer with time and with each grasp: 61 % after the first one, 92 % after the second.

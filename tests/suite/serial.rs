@@ -2,8 +2,8 @@
 #![cfg(unix)]
 
 use crate::program::{palpate, refused};
-use palpate_core::board::Reading;
-use palpate_core::recording::Store;
+use palpate_tactile::board::Reading;
+use palpate_store::Store;
 use serialport::{SerialPort, TTYPort};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
 //! The store when things go wrong around it: killed programs, two programs at once, files that are no stores.
 
 use crate::program::{palpate, run};
-use palpate_core::grasping::grasp;
-use palpate_core::objects::ObjectModel;
-use palpate_core::recording::Store;
-use palpate_core::scene::Scene;
-use palpate_core::trial::Trial;
+use palpate_lab::grasping::grasp;
+use palpate_sim::objects::ObjectModel;
+use palpate_store::Store;
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::Trial;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Stdio};

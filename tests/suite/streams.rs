@@ -1,11 +1,13 @@
 //! Boards without a port, for what listens to one: readings that a test makes up, and the pretended gripper on a clock
 //! that runs as fast as it is asked.
 
-use palpate_core::board::{Board, Gap, Reading};
-use palpate_core::pretended::{PretendedGripper, PretendedSetup};
-use palpate_core::rig::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
-use palpate_core::wire::{Cadence, Captured, ConsoleLine, Decoder, Heard};
-use palpate_core::workers::BoardStream;
+use palpate_tactile::board::{Board, Gap, Reading};
+use palpate_device::pretended::{PretendedGripper, PretendedSetup};
+use palpate_device::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
+use palpate_device::wire::{ConsoleLine, Decoder, Heard};
+use palpate_tactile::cadence::Cadence;
+use palpate_tactile::capture::Captured;
+use palpate_lab::workers::BoardStream;
 use std::time::Duration;
 
 /// How a link stands that listens.

@@ -7,15 +7,15 @@ use crate::gripper_tools::{bench, press};
 use crate::panels::side_by_side;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::RecognitionAction;
-use palpate_core::board::{Board, Reading, Sensor};
-use palpate_core::gripper::Phase;
-use palpate_core::palette::Theme;
-use palpate_core::recognition::Model;
-use palpate_core::recording::{BOARD_RIG, BoardChunk, BoardInfo, Store};
-use palpate_core::scene::Scene;
-use palpate_core::sensing::calibration::{Input, Kind, Point, Record, plan};
-use palpate_core::trial::PhaseMark;
-use palpate_core::workers::{TrainRequest, TrainWish, Trainer, TrainerView};
+use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_sim::gripper::Phase;
+use palpate_geometry::palette::Theme;
+use palpate_learn::Model;
+use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Store};
+use palpate_sim::scene::Scene;
+use palpate_tactile::calibration::{Input, Kind, Point, Record, plan};
+use palpate_tactile::trial::PhaseMark;
+use palpate_lab::workers::{TrainRequest, TrainWish, Trainer, TrainerView};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -53,7 +53,7 @@ const OBJECTS: [(&str, f64, f64); 4] =
 
 /// A trial: the fingers close for a second and hold for one.
 fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32) {
-    let mut info = palpate_core::grasping::prepare(&Scene::default(), None, 0).info().clone();
+    let mut info = palpate_lab::grasping::prepare(&Scene::default(), None, 0).info().clone();
     (info.rig, info.object) = (BOARD_RIG.to_owned(), object.to_owned());
     let mark = |from_s, phase| PhaseMark { from_s, phase, line_bar: None };
     let phases = vec![mark(0.0, Phase::Close), mark(2.0, Phase::Release)];

@@ -3,11 +3,12 @@
 
 use crate::program::{json, refused, run};
 use glam::DVec3;
-use palpate_core::grasping::{grasp, prepare};
-use palpate_core::recognition::{DatasetError, Source, View};
-use palpate_core::recording::Store;
-use palpate_core::scene::Scene;
-use palpate_core::trial::{Quality, Trial};
+use palpate_lab::grasping::{grasp, prepare};
+use palpate_lab::datasets::{DatasetError, Source, View};
+use palpate_store::Store;
+use palpate_sim::scene::Scene;
+use palpate_sim::frame::Quality;
+use palpate_tactile::trial::Trial;
 use std::path::Path;
 
 fn scene() -> Scene {

@@ -13,9 +13,9 @@ use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use crate::app::widgets::stop_button;
 use egui::{Align, Layout, RichText, Ui};
-use palpate_core::palette::{Theme, Trace};
-use palpate_core::rig::serial::LinkState;
-use palpate_core::workers::{Command, GripperView, Status};
+use palpate_geometry::palette::{Theme, Trace};
+use palpate_device::serial::LinkState;
+use palpate_lab::workers::{Command, GripperView, Status};
 
 /// A speed: ¼× is 0.25×.
 fn speed_text(speed: f64) -> String {

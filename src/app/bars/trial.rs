@@ -5,9 +5,9 @@ use crate::app::context::PanelContext;
 use crate::app::features::gripper::instruction;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
-use palpate_core::gripper::Phase;
-use palpate_core::palette::Rgb;
-use palpate_core::workers::{GripperView, GripperWish, LEAD_S, LabellingAction, TrialPart, TrialView};
+use palpate_sim::gripper::Phase;
+use palpate_geometry::palette::Rgb;
+use palpate_lab::workers::{GripperView, GripperWish, LEAD_S, LabellingAction, TrialPart, TrialView};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let trial = context.gripper.and_then(|gripper| gripper.trial.as_ref());

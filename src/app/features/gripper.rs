@@ -5,10 +5,10 @@ use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
-use palpate_core::gripper::Phase;
-use palpate_core::rig::serial::Control;
-use palpate_core::scene::Scene;
-use palpate_core::workers::{Command, GripperWish, GripperWorker, Notice, TrialPart, TrialRequest, TrialView};
+use palpate_sim::gripper::Phase;
+use palpate_tactile::trial::Control;
+use palpate_sim::scene::Scene;
+use palpate_lab::workers::{Command, GripperWish, GripperWorker, Notice, TrialPart, TrialRequest, TrialView};
 
 /// Action on the real gripper.
 #[derive(Clone)]

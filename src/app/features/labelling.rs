@@ -5,10 +5,7 @@ use crate::app::features::simulation::SimulationFeature;
 use crate::app::features::view::ViewState;
 use crate::app::modes::mode::Mode;
 use crate::app::notices::Notices;
-use palpate_core::workers::{
-    Command, GripperView, GripperWish, LabelView, LabelWish, Labeller, LabellingAction, LabellingEffect,
-    LabellingSession, SessionContext,
-};
+use palpate_lab::workers::{Command, GripperView, GripperWish, LabelView, LabelWish, Labeller, LabellingAction, LabellingEffect, LabellingSession, SessionContext};
 use std::path::PathBuf;
 
 /// State of labelling in the window.

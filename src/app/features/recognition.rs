@@ -6,8 +6,8 @@ use crate::app::features::tools::{GripperTools, ToolAction};
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
-use palpate_core::recognition::Model;
-use palpate_core::workers::{Command, GripperWish, TrainWish, TrainedModel};
+use palpate_learn::Model;
+use palpate_lab::workers::{Command, GripperWish, TrainWish, TrainedModel};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -3,11 +3,11 @@
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::traces::TraceHistory;
-use palpate_core::grasping::ObjectDeck;
-use palpate_core::objects::{EMPTY, anchored, catalogue};
-use palpate_core::scene::Scene;
-use palpate_core::trial::Frame;
-use palpate_core::workers::{Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SimWorker, Snapshot};
+use palpate_lab::grasping::ObjectDeck;
+use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_sim::scene::Scene;
+use palpate_sim::frame::Frame;
+use palpate_lab::workers::{Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SimWorker, Snapshot};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -2,10 +2,7 @@
 
 use crate::app::notices::Notices;
 use crate::app::startup::ThreadError;
-use palpate_core::workers::{
-    Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish,
-    TrainedModel, Trainer, Wake,
-};
+use palpate_lab::workers::{Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish, TrainedModel, Trainer, Wake};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -13,8 +13,8 @@ use crate::app::modes;
 use crate::app::modes::mode::Mode;
 use binding::{Binding, key};
 use egui::{Key, Modifiers};
-use palpate_core::drawing::{Camera, StandardView};
-use palpate_core::workers::{Command, GripperWish, LabelWish, LabellingAction};
+use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_lab::workers::{Command, GripperWish, LabelWish, LabellingAction};
 
 /// Ctrl and Shift.
 const COMMAND_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };

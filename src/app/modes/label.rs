@@ -10,7 +10,7 @@ use crate::app::features::view::ViewAction;
 use crate::app::keys::binding::{Binding, key};
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
-use palpate_core::workers::LabellingAction;
+use palpate_lab::workers::LabellingAction;
 
 pub(super) const KIND: ModeKind = ModeKind {
     mode: Mode::Label,

@@ -7,11 +7,11 @@ use crate::app::theme::colour;
 use crate::app::widgets::{ANY_PORT, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
-use palpate_core::board::Sensor;
-use palpate_core::palette::Theme;
-use palpate_core::sensing::calibration::{Calibration, Curve, Kind, Point};
-use palpate_core::units::three_digits;
-use palpate_core::workers::{CalibrationPlan, CalibrationView, CalibrationWish, GripperWish, RunningCalibration};
+use palpate_tactile::board::Sensor;
+use palpate_geometry::palette::Theme;
+use palpate_tactile::calibration::{Calibration, Curve, Kind, Point};
+use palpate_geometry::units::three_digits;
+use palpate_lab::workers::{CalibrationPlan, CalibrationView, CalibrationWish, GripperWish, RunningCalibration};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {

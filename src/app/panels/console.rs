@@ -3,7 +3,7 @@
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use egui::{RichText, ScrollArea, TextWrapMode, Ui};
-use palpate_core::wire::Verdict;
+use palpate_device::wire::Verdict;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
     let lines = context.gripper.map(|gripper| &gripper.console).filter(|lines| !lines.is_empty());

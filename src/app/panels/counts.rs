@@ -4,8 +4,8 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::plots::{PlotCurve, TimePlot, show};
 use crate::app::view_source::ViewSource;
-use palpate_core::board::Sensor;
-use palpate_core::palette::Trace;
+use palpate_tactile::board::Sensor;
+use palpate_geometry::palette::Trace;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let link = context.gripper.and_then(|gripper| gripper.link.as_ref());

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::channel_curves::channel_curves;
 use crate::app::context::PanelContext;
 use crate::app::plots::{TimePlot, show};
-use palpate_core::sensing::Quantity;
+use palpate_tactile::Quantity;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let curves = channel_curves(context, Quantity::Curvature, 1.0);

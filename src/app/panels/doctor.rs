@@ -9,11 +9,9 @@ use crate::app::theme::colour;
 use crate::app::widgets::{command_ui, port_field, wrapped};
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
-use palpate_core::doctor::{
-    Bleed, CHECKS, Finding, SKETCH, USUAL_LISTEN_S, Verdict, WIRING_RULES, is_sound, summary, wires,
-};
-use palpate_core::palette::Theme;
-use palpate_core::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
+use palpate_device::doctor::{Bleed, CHECKS, Finding, SKETCH, USUAL_LISTEN_S, Verdict, WIRING_RULES, is_sound, summary, wires};
+use palpate_geometry::palette::Theme;
+use palpate_lab::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let view = context.tools.examiner.view().unwrap_or_default();

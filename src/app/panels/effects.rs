@@ -6,12 +6,12 @@ use crate::app::context::PanelContext;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
-use palpate_core::palette::Theme;
-use palpate_core::scene::{Effect, Scene, Setting};
-use palpate_core::study::{ExplainedEffect, Explanation};
-use palpate_core::trial::PlannedEffect;
-use palpate_core::units::three_digits;
-use palpate_core::workers::{EffectsState, EffectsView};
+use palpate_geometry::palette::Theme;
+use palpate_sim::scene::{Effect, Scene, Setting};
+use palpate_lab::study::{ExplainedEffect, Explanation};
+use palpate_sim::frame::PlannedEffect;
+use palpate_geometry::units::three_digits;
+use palpate_lab::workers::{EffectsState, EffectsView};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if context.effects.asked() != Some(context.scene) {

@@ -12,14 +12,15 @@ use crate::app::theme::{colour, veil};
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{Align, Button, Layout, ProgressBar, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
-use palpate_core::gripper::Side;
-use palpate_core::objects::EMPTY;
-use palpate_core::palette::{Theme, Trace};
-use palpate_core::recording::{TrialId, TrialRow};
-use palpate_core::scene::Scene;
-use palpate_core::study::{Course, Estimate, FingerFit, Known, MOST_STEPS, Remainder};
-use palpate_core::units::three_digits;
-use palpate_core::workers::{FitWish, FittedFinger};
+use palpate_sim::gripper::Side;
+use palpate_sim::objects::EMPTY;
+use palpate_geometry::palette::{Theme, Trace};
+use palpate_store::TrialRow;
+use palpate_tactile::trial::TrialId;
+use palpate_sim::scene::Scene;
+use palpate_lab::study::{Course, Estimate, FingerFit, Known, MOST_STEPS, Remainder};
+use palpate_geometry::units::three_digits;
+use palpate_lab::workers::{FitWish, FittedFinger};
 use std::collections::BTreeSet;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {

@@ -3,10 +3,10 @@
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use egui::{Grid, RichText, ScrollArea, Ui};
-use palpate_core::gripper::Side;
-use palpate_core::sensing::Quantity;
-use palpate_core::units::{mm, three_digits};
-use palpate_core::workers::{FinishedGrasp, ObjectCard, Snapshot};
+use palpate_sim::gripper::Side;
+use palpate_tactile::Quantity;
+use palpate_geometry::units::{mm, three_digits};
+use palpate_lab::workers::{FinishedGrasp, ObjectCard, Snapshot};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
     let Some(snapshot) = context.snapshot else {

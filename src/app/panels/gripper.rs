@@ -6,12 +6,13 @@ use crate::app::features::gripper::{CONTROLS, GripperAction, control_title};
 use crate::app::theme::{accented, colour, veil};
 use crate::app::widgets::{command_ui, stop_button, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
-use palpate_core::board::Sensor;
-use palpate_core::palette::Theme;
-use palpate_core::rig::serial::{Control, LinkState, LinkStatus, PortInfo};
-use palpate_core::sensing::calibration::{Drift, DriftLevel};
-use palpate_core::units::three_digits;
-use palpate_core::workers::{GripperView, GripperWish, LatestReading};
+use palpate_tactile::board::Sensor;
+use palpate_geometry::palette::Theme;
+use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
+use palpate_tactile::trial::Control;
+use palpate_tactile::calibration::{Drift, DriftLevel};
+use palpate_geometry::units::three_digits;
+use palpate_lab::workers::{GripperView, GripperWish, LatestReading};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {

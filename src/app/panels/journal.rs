@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Ui};
-use palpate_core::workers::LabelWish;
+use palpate_lab::workers::LabelWish;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {

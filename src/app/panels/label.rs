@@ -7,11 +7,9 @@ use crate::app::theme::{accented, colour, veil};
 use crate::app::widgets::wrapped;
 use egui::text_edit::TextEditState;
 use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
-use palpate_core::labelling::{LabelledTrial, NextTrial};
-use palpate_core::objects::catalogue;
-use palpate_core::workers::{
-    GripperView, LabelView, LabelWish, LabellingAction, NUMBERED_OBJECTS, TrialView, object_title, parse_tags,
-};
+use palpate_store::labels::{LabelledTrial, NextTrial};
+use palpate_sim::objects::catalogue;
+use palpate_lab::workers::{GripperView, LabelView, LabelWish, LabellingAction, NUMBERED_OBJECTS, TrialView, object_title, parse_tags};
 
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;

@@ -3,7 +3,7 @@
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::plots::{PlotCurve, TimePlot, show};
-use palpate_core::palette::Trace;
+use palpate_geometry::palette::Trace;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let curve = PlotCurve {

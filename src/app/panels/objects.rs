@@ -6,7 +6,7 @@ use crate::app::features::files::FileAction;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
-use palpate_core::objects::{EMPTY, catalogue};
+use palpate_sim::objects::{EMPTY, catalogue};
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;

@@ -4,9 +4,9 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::theme::{colour, veil};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
-use palpate_core::labelling::{MOST_WANTED, ObjectProgress};
-use palpate_core::palette::Theme;
-use palpate_core::workers::{LabelWish, object_title};
+use palpate_store::labels::{MOST_WANTED, ObjectProgress};
+use palpate_geometry::palette::Theme;
+use palpate_lab::workers::{LabelWish, object_title};
 
 /// Trials wanted of an added object (paper, section IV-B: 40 to 55).
 const WANTED: u32 = 50;

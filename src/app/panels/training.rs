@@ -8,11 +8,11 @@ use crate::app::features::tools::{DEFAULT_METHOD, TRAINING_SEED, ToolAction};
 use crate::app::theme::colour;
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
-use palpate_core::palette::{Rgb, Theme};
-use palpate_core::recognition::metrics::Confusion;
-use palpate_core::recognition::{Labels, METHODS, method};
-use palpate_core::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
-use palpate_core::workers::{FinishedTraining, TrainRequest, TrainWish, TrainerView};
+use palpate_geometry::palette::{Rgb, Theme};
+use palpate_learn::metrics::Confusion;
+use palpate_learn::{Labels, METHODS, method};
+use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
+use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainWish, TrainerView};
 use std::path::Path;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {

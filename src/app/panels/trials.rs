@@ -4,10 +4,10 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
-use palpate_core::labelling::LabelledTrial;
-use palpate_core::palette::Trace;
-use palpate_core::recording::TrialId;
-use palpate_core::workers::{LabelView, LabelWish, LabellingAction, TrialFilter, object_title};
+use palpate_store::labels::LabelledTrial;
+use palpate_geometry::palette::Trace;
+use palpate_tactile::trial::TrialId;
+use palpate_lab::workers::{LabelView, LabelWish, LabellingAction, TrialFilter, object_title};
 
 /// Height of a row (points).
 const ROW: f32 = 38.0;

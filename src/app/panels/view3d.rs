@@ -10,9 +10,9 @@ use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
-use palpate_core::drawing::{Camera, StandardView};
-use palpate_core::picture::PictureView;
-use palpate_core::workers::{Command, Snapshot};
+use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_lab::picture::PictureView;
+use palpate_lab::workers::{Command, Snapshot};
 
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;

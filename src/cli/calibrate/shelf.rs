@@ -3,9 +3,9 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
 use super::{parse_sensor, tell, zero};
-use palpate_core::board::Sensor;
-use palpate_core::recording::{CalibrationId, Store, StoredCalibration};
-use palpate_core::sensing::calibration::Calibration;
+use palpate_tactile::board::Sensor;
+use palpate_store::{CalibrationId, Store, StoredCalibration};
+use palpate_tactile::calibration::Calibration;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -3,9 +3,10 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
 use super::guided;
-use palpate_core::board::Sensor;
-use palpate_core::recording::{BOARD_RIG, Store, StoredTare, TrialId};
-use palpate_core::sensing::calibration::{Drift, DriftLevel, Readout};
+use palpate_tactile::board::Sensor;
+use palpate_store::{BOARD_RIG, Store, StoredTare};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::calibration::{Drift, DriftLevel, Readout};
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -3,9 +3,7 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_core::study::stability::{
-    ACCURACIES, CASES, CaseRow, Limit, QUICK_ACCURACIES, RandomReport, random_scenes,
-};
+use palpate_lab::study::stability::{ACCURACIES, CASES, CaseRow, Limit, QUICK_ACCURACIES, RandomReport, random_scenes};
 use serde::Serialize;
 
 /// Arguments of `palpate study stability`.

@@ -3,8 +3,9 @@
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
-use palpate_core::labelling::class_name;
-use palpate_core::recording::{JournalEntry, Store, TrialId, export_labelled};
+use palpate_store::labels::class_name;
+use palpate_store::{JournalEntry, Store, export_labelled};
+use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -79,7 +80,7 @@ fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(),
     let known = planned || store.labelled_trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
     store.label_trial(id, &name)?;
     store.set_unsure(id, unsure)?;
-    if !known && name != palpate_core::objects::EMPTY {
+    if !known && name != palpate_sim::objects::EMPTY {
         warn(&format!(
             "\"{name}\" is a new class: it is not in the plan and no trial has it (`trials undo` takes it back)"
         ));

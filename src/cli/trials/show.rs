@@ -3,12 +3,13 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, warn};
 use super::scene_of;
-use palpate_core::board::Gap;
-use palpate_core::grasping::GraspSummary;
-use palpate_core::labelling::{LabelledTrial, cadence_line, shown_name};
-use palpate_core::recording::{BoardInfo, BoardTrial, Store, TrialId};
-use palpate_core::sensing::Signals;
-use palpate_core::trial::Plan;
+use palpate_tactile::board::Gap;
+use palpate_lab::grasping::GraspSummary;
+use palpate_store::labels::{LabelledTrial, cadence_line, shown_name};
+use palpate_store::{BoardInfo, BoardTrial, Store};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::Signals;
+use palpate_sim::frame::Plan;
 use serde::Serialize;
 
 /// What `trials show --json` prints.

@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::super::terminal::say;
-use palpate_core::wire::{FuzzListener, FuzzStream};
+use palpate_device::wire::{FuzzListener, FuzzStream};
 use std::time::{Duration, Instant};
 
 /// A listener hears this many chunks; then another begins, with the next seed.

@@ -4,12 +4,13 @@
 use crate::cli::Failure;
 use crate::cli::learning::progress_bar;
 use crate::cli::terminal::say;
-use palpate_core::grasping::{CollectionPlan, Shard, all_objects, collect};
-use palpate_core::recognition::evaluation::prefix_calibration;
-use palpate_core::recognition::{Dataset, Fitting, Source, StopRule, View, method};
-use palpate_core::recording::Store;
-use palpate_core::scene::{PosePreset, Scene};
-use palpate_core::study::Comparison;
+use palpate_lab::grasping::{CollectionPlan, Shard, all_objects, collect};
+use palpate_learn::evaluation::prefix_calibration;
+use palpate_lab::datasets::{Source, View};
+use palpate_learn::{Dataset, Fitting, StopRule, method};
+use palpate_store::Store;
+use palpate_sim::scene::{PosePreset, Scene};
+use palpate_lab::study::Comparison;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 

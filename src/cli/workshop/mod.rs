@@ -13,8 +13,8 @@ mod tools;
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::say;
-use palpate_core::geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
-use palpate_core::objects::{ShapeClass, SizeClass};
+use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
+use palpate_sim::objects::{ShapeClass, SizeClass};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use tools::Parts;
@@ -196,7 +196,7 @@ fn primitive_tag(shape: &Primitive) -> String {
 
 fn body_mass(body: &Body) -> MassProperties {
     use glam::DVec3;
-    use palpate_core::geometry::Pose;
+    use palpate_geometry::Pose;
     match body {
         Body::Mesh(mesh) => mass_properties(mesh, 1.0),
         Body::Primitives(shapes) => shapes.iter().fold(MassProperties::ZERO, |sum, (shape, xyz, rpy)| {

@@ -3,9 +3,9 @@
 use super::tools::{Parts, at, disc, facing, lying, ribbon, sticker, turned, turned_soft};
 use super::{Body, Thing};
 use glam::{DVec2, DVec3};
-use palpate_core::geometry::{Pose, Primitive, TriMesh, cube_sphere, rounded_box};
-use palpate_core::objects::{ShapeClass, SizeClass};
-use palpate_core::palette::Rgb;
+use palpate_geometry::{Pose, Primitive, TriMesh, cube_sphere, rounded_box};
+use palpate_sim::objects::{ShapeClass, SizeClass};
+use palpate_geometry::palette::Rgb;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// All of them, in order of name.

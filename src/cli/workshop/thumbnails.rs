@@ -2,10 +2,10 @@
 
 use super::super::Failure;
 use glam::{Mat4, Vec3};
-use palpate_core::drawing::{Camera, DrawList, Ground, Overlay, Solid, StandardView};
-use palpate_core::objects::{ObjectModel, catalogue};
-use palpate_core::palette::Rgb;
-use palpate_core::scene::Scene;
+use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid, StandardView};
+use palpate_sim::objects::{ObjectModel, catalogue};
+use palpate_geometry::palette::Rgb;
+use palpate_sim::scene::Scene;
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use std::path::Path;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! Tools for modelling small things: turned parts, rounded boxes, stickers, ribbons, and paint.
 
 use glam::{DVec2, DVec3};
-use palpate_core::geometry::{ColouredPart, Pose, TriMesh};
-use palpate_core::palette::Rgb;
+use palpate_geometry::{ColouredPart, Pose, TriMesh};
+use palpate_geometry::palette::Rgb;
 use std::f64::consts::{PI, TAU};
 
 /// Parts of an object as they are added, each with a material name.
@@ -73,7 +73,7 @@ pub(super) fn facing(mut mesh: TriMesh, normal: DVec3, position: DVec3) -> TriMe
 /// A turned profile in millimetres, (radius, height) from the axis at the bottom to the axis at the top.
 pub(super) fn turned(profile_mm: &[(f64, f64)]) -> TriMesh {
     let profile: Vec<DVec2> = profile_mm.iter().map(|(r, z)| DVec2::new(*r, *z) * 1e-3).collect();
-    palpate_core::geometry::lathe(&profile)
+    palpate_geometry::lathe(&profile)
 }
 
 /// A turned profile with every corner rounded by `radius` mm.

@@ -9,10 +9,10 @@
 
 use super::gripper::{GripperView, TrialRequest};
 use super::labeller::{LabelView, LabelWish};
-use crate::labelling::LabelledTrial;
-use crate::objects::{EMPTY, catalogue};
-use crate::recording::TrialId;
-use crate::rig::serial::Control;
+use palpate_store::labels::LabelledTrial;
+use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::Control;
 use std::path::{Path, PathBuf};
 
 /// Objects that have a number key.
@@ -443,7 +443,8 @@ fn new_export_folder(store: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::labelling::{Disagreement, LabelPlan};
+    use crate::labelling::Disagreement;
+    use palpate_store::labels::LabelPlan;
     use crate::workers::{EndedTrial, TrialPart, TrialView};
     use std::sync::Arc;
 

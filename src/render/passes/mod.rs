@@ -10,7 +10,7 @@ mod skin;
 mod solid;
 
 use super::frame::FrameBindings;
-use palpate_core::drawing::DrawList;
+use palpate_geometry::drawing::DrawList;
 use wgpu::{Device, Queue, RenderPass};
 
 /// What a pass is made from.

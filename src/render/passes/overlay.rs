@@ -5,8 +5,8 @@ use super::{Pass, PassSetup, Prepare};
 use crate::text::{Glyphs, PlacedGlyph};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
-use palpate_core::drawing::Shape2;
-use palpate_core::palette::Rgb;
+use palpate_geometry::drawing::Shape2;
+use palpate_geometry::palette::Rgb;
 use wgpu::{BindGroup, BufferUsages, RenderPass, RenderPipeline, VertexBufferLayout, VertexStepMode};
 
 #[repr(C)]

@@ -7,8 +7,8 @@ use super::{Pass, PassSetup, Prepare};
 use crate::text::upload_texels;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
-use palpate_core::drawing::{FingerFrame, Section, SoftFinger};
-use palpate_core::palette::{PRESSURE_MAP, Rgb};
+use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger};
+use palpate_geometry::palette::{PRESSURE_MAP, Rgb};
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPass, RenderPipeline};
 use wgpu::{Texture, VertexBufferLayout, VertexStepMode};
 

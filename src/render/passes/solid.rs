@@ -4,8 +4,8 @@
 use super::build::{Depth, PictureShape, StreamBuffer, fixed_buffer, module, picture_pipeline, shadow_pipeline};
 use super::{Pass, PassSetup, Prepare};
 use bytemuck::{Pod, Zeroable};
-use palpate_core::drawing::{DrawList, Solid};
-use palpate_core::geometry::{SurfaceMesh, SurfaceVertex};
+use palpate_geometry::drawing::{DrawList, Solid};
+use palpate_geometry::{SurfaceMesh, SurfaceVertex};
 use std::sync::Arc;
 use wgpu::{Buffer, BufferUsages, RenderPass, RenderPipeline, VertexBufferLayout, VertexStepMode};
 

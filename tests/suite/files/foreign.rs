@@ -2,10 +2,10 @@
 //! shapes of thousands of triangles.
 
 use glam::{DQuat, DVec2, DVec3};
-use palpate_core::geometry::{ColouredPart, Pose, Primitive, TriMesh, lathe, write_obj};
-use palpate_core::grasping::{GraspSummary, grasp};
-use palpate_core::objects::ObjectModel;
-use palpate_core::scene::Scene;
+use palpate_geometry::{ColouredPart, Pose, Primitive, TriMesh, lathe, write_obj};
+use palpate_lab::grasping::{GraspSummary, grasp};
+use palpate_sim::objects::ObjectModel;
+use palpate_sim::scene::Scene;
 use std::fmt::Write as _;
 use std::path::Path;
 

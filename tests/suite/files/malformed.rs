@@ -2,10 +2,10 @@
 //! time and without a panic.
 
 use glam::DVec3;
-use palpate_core::geometry::{ColouredPart, Primitive, TriMesh, write_obj};
-use palpate_core::grasping::grasp;
-use palpate_core::objects::{LoadOptions, ObjectModel, load};
-use palpate_core::scene::Scene;
+use palpate_geometry::{ColouredPart, Primitive, TriMesh, write_obj};
+use palpate_lab::grasping::grasp;
+use palpate_sim::objects::{LoadOptions, ObjectModel, load};
+use palpate_sim::scene::Scene;
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::mpsc::channel;

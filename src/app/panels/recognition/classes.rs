@@ -5,8 +5,8 @@ use super::{LEAST_LETTERS, Part, eased, fitted, labelled, put};
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
-use palpate_core::recognition::Pmf;
-use palpate_core::workers::THRESHOLDS;
+use palpate_learn::Pmf;
+use palpate_lab::workers::THRESHOLDS;
 
 /// Size of letters where there is room (points).
 const LETTERS: f32 = 12.5;

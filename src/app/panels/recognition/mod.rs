@@ -14,9 +14,9 @@ use crate::app::icons::{self, Icon};
 use crate::app::theme::{accented, colour};
 use crate::app::view_source::{Recognised, ViewSource};
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_core::grasping::IdentificationView;
-use palpate_core::palette::ThemeColours;
-use palpate_core::workers::THRESHOLDS;
+use palpate_lab::grasping::IdentificationView;
+use palpate_geometry::palette::ThemeColours;
+use palpate_lab::workers::THRESHOLDS;
 use std::sync::Arc;
 use words::{Headline, percent, reason};
 

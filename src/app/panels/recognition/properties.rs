@@ -4,7 +4,7 @@ use super::words::{newest, whole_percent};
 use super::{Part, eased, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_core::recognition::Pmf;
+use palpate_learn::Pmf;
 
 /// Height of the line that shows the probability of an answer (points).
 const UNDERLINE: f32 = 4.0;

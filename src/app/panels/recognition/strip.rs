@@ -4,7 +4,7 @@ use super::words::{percent, ranked, title};
 use super::{Part, eased, fitted, put};
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
-use palpate_core::recognition::Pmf;
+use palpate_learn::Pmf;
 
 /// Most grasps shown; of more, the last ones.
 const MOST_CELLS: usize = 8;

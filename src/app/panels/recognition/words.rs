@@ -1,9 +1,9 @@
 //! Texts of the recognition panel.
 
 use crate::app::view_source::Recognised;
-use palpate_core::grasping::IdentificationView;
-use palpate_core::recognition::{Labels, Pmf, StopReason};
-use palpate_core::workers::object_title;
+use palpate_lab::grasping::IdentificationView;
+use palpate_learn::{Labels, Pmf, StopReason};
+use palpate_lab::workers::object_title;
 
 /// Least probability at which a running first grasp names its leader.
 const WORTH_NAMING: f64 = 0.4;
@@ -120,7 +120,8 @@ pub(super) fn ranked(pmf: &Pmf) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_core::recognition::{StopRule, Verdict, labels_of_catalogue};
+    use palpate_lab::datasets::labels_of_catalogue;
+    use palpate_learn::{StopRule, Verdict};
     use std::sync::Arc;
 
     fn pmf(lemon: f64) -> Pmf {

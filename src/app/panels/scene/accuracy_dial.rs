@@ -4,9 +4,9 @@ use super::choice;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use egui::{RichText, Slider, Ui};
-use palpate_core::scene::{Accuracy, Integrator, Scene};
-use palpate_core::units::{three_digits, two_digits};
-use palpate_core::workers::Command;
+use palpate_sim::scene::{Accuracy, Integrator, Scene};
+use palpate_geometry::units::{three_digits, two_digits};
+use palpate_lab::workers::Command;
 
 /// First tolerance.
 const FIRST_TOLERANCE: f64 = 1e-4;

@@ -7,8 +7,8 @@ use crate::app::context::PanelContext;
 use crate::app::features::files::FileAction;
 use crate::app::features::simulation::SimulationAction;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
-use palpate_core::gripper::{Finger, PadLaw};
-use palpate_core::scene::{Auto, EngineKind, Scene, SupportKind};
+use palpate_sim::gripper::{Finger, PadLaw};
+use palpate_sim::scene::{Auto, EngineKind, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let mut scene = context.scene.clone();
