@@ -2,7 +2,7 @@
 
 use egui::{Color32, Rect, Response, Sense, Shape, Stroke, Ui, Vec2, vec2};
 
-/// What an icon shows.
+/// An icon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Icon {
     Play,
@@ -16,12 +16,12 @@ pub(super) enum Icon {
     Cross,
 }
 
-/// An icon by itself, in the middle of a place.
+/// Draws an icon in the middle of a place.
 pub(super) fn sign(ui: &Ui, icon: Icon, place: Rect, ink: Color32) {
     paint(ui, icon, place, ink, Color32::TRANSPARENT);
 }
 
-/// A button that bears an icon, and a name for screen readers and tests.
+/// Button with an icon, and a name for screen readers and tests.
 pub(super) fn button(ui: &mut Ui, icon: Icon, name: &str, hint: &str) -> Response {
     let (rect, response) = ui.allocate_exact_size(vec2(34.0, 28.0), Sense::click());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, ui.is_enabled(), name));
@@ -35,7 +35,7 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, ink: Color32, ground: Color32) {
     let middle = rect.center();
     let painter = ui.painter();
     let bar = |x: f32| painter.rect_filled(Rect::from_center_size(middle + vec2(x, 0.0), vec2(3.0, 11.0)), 0.5, ink);
-    // A triangle whose base stands at x, pointing right (+1) or left (-1).
+    // A triangle with its base at x, pointing right (+1) or left (-1).
     let triangle = |x: f32, to: f32| {
         let corner = |dx: f32, dy: f32| middle + vec2(x + dx, dy);
         let points = vec![corner(0.0, -5.5), corner(9.0 * to, 0.0), corner(0.0, 5.5)];

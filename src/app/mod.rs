@@ -1,34 +1,71 @@
-//! The window. [`Workbench`] is all of it but the window itself, so that tests can drive it; this file opens the window
-//! around it and puts whatever the system lacks into words.
+//! The window. [`Workbench`] is its contents, so that tests can drive it without a window; this file opens the window around
+//! it.
 //!
-//! Panels are given a read-only [`PanelContext`] and push [`Action`]s; [`Workbench`] alone applies them. The
-//! simulation runs in its own thread (see [`palpate_lab::workers`]); nothing here steps physics or waits for a disk.
+//! Panels, bars and keys read a [`PanelContext`] and push [`Action`]s. The workbench hands each action to the feature that
+//! owns it. Simulation, gripper, store and tools run in threads of their own (see `workers` in the core): nothing here
+//! steps physics or waits for a disk.
+//!
+//! # Layers
+//!
+//! A file imports only from rows above its own; a test reads this table. A folder stands for its files that have no row.
+//!
+//! | layer | files | content |
+//! |---|---|---|
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `notices.rs` `modes/mode.rs` | look, graphics, messages |
+//! | source | `view_source.rs` `files.rs` | simulated or real data, file dialogs |
+//! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
+//! | simulation | `features/simulation.rs` | simulated gripper and its scene |
+//! | gripper | `features/gripper.rs` `features/files.rs` | real gripper; opening and saving |
+//! | workflow | `features/labelling.rs` `features/recognition.rs` | labelling session; recognition by both grippers |
+//! | actions | `actions.rs` `features/` | actions of all features |
+//! | context | `context.rs` | read-only context of panels |
+//! | parts | `widgets.rs` `plots.rs` `keys/binding.rs` | building blocks of panels and modes |
+//! | curves | `channel_curves.rs` `modes/` | curves of channels; layout and keys of each mode |
+//! | panels | `panels/` `bars/` `keys/` | one file per panel |
+//! | tiles | `tiling.rs` | panels beside each other |
+//! | workbench | `workbench.rs` | owner of all features |
+//! | window | `mod.rs` | the window |
+//!
+//! | to add | write | and register in |
+//! |---|---|---|
+//! | a panel | a file in `panels/` | `panels/mod.rs`, and the layout of a mode |
+//! | a mode | its name in `modes/mode.rs`, its layout and keys in a file of `modes/` | `modes/mod.rs` |
+//! | a feature | its state, actions and their application in a file of `features/` | `actions.rs`, `workbench.rs` |
 
-mod accuracy_dial;
 mod actions;
 mod bars;
+mod channel_curves;
+mod context;
+mod features;
 mod files;
-mod gripper_tools;
 mod icons;
 mod keys;
-mod labelling;
 mod modes;
+mod notices;
 mod panels;
 mod plots;
 mod startup;
 mod theme;
 mod tiling;
 mod traces;
-mod view_state;
+mod view_source;
 mod viewport;
+mod widgets;
 mod workbench;
 
-pub use actions::{Action, DeskAction};
-pub use gripper_tools::{GripperTools, GripperToolsSetup, ToolWish};
-pub use modes::Mode;
-pub use panels::{ALL as ALL_PANELS, PanelContext, PanelKind, Source};
-pub use startup::{Surroundings, check_surroundings};
-pub use view_state::ViewState;
+pub use actions::{Action, Actions};
+pub use context::PanelContext;
+pub use features::files::FileAction;
+pub use features::gripper::GripperAction;
+pub use features::recognition::RecognitionAction;
+pub use features::simulation::SimulationAction;
+pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
+pub use features::view::{ViewAction, ViewState};
+pub use modes::mode::Mode;
+pub use notices::UserMessage;
+pub use panels::{ALL as ALL_PANELS, PanelKind};
+pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
+pub use view_source::ViewSource;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
@@ -36,29 +73,30 @@ use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::listen_to_port;
 use palpate_lab::workers::{GripperWish, examine_port, explain_scene, fit_trials};
 use palpate_learn::shipped_model;
+use palpate_render::wgpu;
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What the window opens with.
+/// Options that the window opens with.
 #[derive(Clone, Debug)]
 pub struct WindowOptions {
-    /// The first scene.
+    /// First scene.
     pub scene: Scene,
-    /// Where trials are stored.
+    /// Store of trials.
     pub store: PathBuf,
-    /// The port of a real gripper to connect to.
+    /// Port of a real gripper to connect to.
     pub port: Option<PathBuf>,
-    /// The model that listens to the real gripper; the one of last time where none is named.
+    /// Recognition model for the real gripper; the last one used where none is named.
     pub model: Option<PathBuf>,
 }
 
-/// Size of the window when it is opened for the first time, and the smallest it can be made (points).
+/// First and smallest size of the window (points).
 const FIRST_SIZE: [f32; 2] = [1280.0, 820.0];
 const LEAST_SIZE: [f32; 2] = [720.0, 480.0];
 
-/// Opens the window and returns when it is closed. The error is a text for the user.
-pub fn open_window(options: WindowOptions) -> Result<(), String> {
+/// Opens the window and returns when it is closed.
+pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
     let surroundings = check_surroundings()?;
     surroundings.apply();
     let native = eframe::NativeOptions {
@@ -94,14 +132,14 @@ pub fn open_window(options: WindowOptions) -> Result<(), String> {
         };
         let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
         if let Some(port) = options.port {
-            workbench.act(&creation.egui_ctx, Action::Gripper(GripperWish::Connect(Some(port))));
+            workbench.act(&creation.egui_ctx, GripperWish::Connect(Some(port)));
         }
         Ok(Box::new(Window { workbench }))
     });
     eframe::run_native("palpate", native, creator).map_err(|error| surroundings.explain(&error))
 }
 
-/// The window asks for no more of the graphics driver than the renderer needs.
+/// Requests no more of the graphics driver than the renderer needs.
 fn wgpu_options() -> egui_wgpu::WgpuConfiguration {
     let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
     setup.device_descriptor = Arc::new(|adapter| wgpu::DeviceDescriptor {
@@ -112,9 +150,7 @@ fn wgpu_options() -> egui_wgpu::WgpuConfiguration {
     egui_wgpu::WgpuConfiguration { wgpu_setup: setup.into(), ..Default::default() }
 }
 
-use palpate_render::wgpu;
-
-/// Where the view state lies in eframe's storage.
+/// Key of the view state in eframe's storage.
 const VIEW_KEY: &str = "view";
 
 struct Window {
@@ -130,7 +166,7 @@ impl eframe::App for Window {
         eframe::set_value(storage, VIEW_KEY, self.workbench.view());
     }
 
-    /// Widths of panels and scroll positions come from the layout, not from egui's memory.
+    /// The layout is stored in the view state, not in egui's memory.
     fn persist_egui_memory(&self) -> bool {
         false
     }

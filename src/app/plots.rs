@@ -1,10 +1,12 @@
-//! Plots of traces over time. All plots show one stretch of time; the mouse moves it for all of them: drag to shift,
-//! wheel to zoom about the pointer, double click for the whole grasp.
+//! Plots of traces over time. All show the same time; the mouse moves it in all of them: drag to move, wheel to zoom about
+//! the pointer, double click for the whole grasp.
 
-use super::actions::Action;
-use super::panels::{PanelContext, Source};
-use super::theme::{colour, veil};
-use super::traces::GraspTrace;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::view::ViewAction;
+use crate::app::theme::{colour, veil};
+use crate::app::traces::GraspTrace;
+use crate::app::view_source::ViewSource;
 use egui::{Color32, Ui};
 use egui_plot::{
     AxisHints, FilledArea, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform,
@@ -13,45 +15,45 @@ use egui_plot::{
 use palpate_geometry::palette::{Theme, Trace};
 use palpate_geometry::units::three_digits;
 
-/// Takes the value of one row out of a trace; `None` where it is undefined.
+/// Value of one row of a trace; `None` where it is undefined.
 pub(super) type TraceValue = Box<dyn Fn(&GraspTrace, usize) -> Option<f64>>;
 
 /// One curve of a plot.
-pub(super) struct Curve {
-    /// Its name in the legend.
+pub(super) struct PlotCurve {
+    /// Name in the legend.
     pub(super) name: String,
-    /// What it shows, for its colour.
+    /// Its colour.
     pub(super) trace: Trace,
     /// Dashed for the right finger.
     pub(super) dashed: bool,
-    /// Takes its values out of a trace.
+    /// Its values.
     pub(super) values: TraceValue,
-    /// Half the width of the numerical error band about it, in the same unit; `None` where there is none.
+    /// Half the width of its error band, in the same unit; `None` without one.
     pub(super) half_width: TraceValue,
 }
 
-/// A plot of some curves.
+/// Plot of curves over time.
 pub(super) struct TimePlot<'a> {
     /// Name for egui and for screen readers.
     pub(super) id: &'a str,
     /// Unit of the values, shown at the axis.
     pub(super) unit: &'a str,
-    /// The curves.
-    pub(super) curves: Vec<Curve>,
-    /// The least range of values shown, so that noise does not fill a plot.
+    /// Curves.
+    pub(super) curves: Vec<PlotCurve>,
+    /// Least range of values, so that noise does not fill a plot.
     pub(super) least: [f64; 2],
 }
 
-/// Faintness of the grasps before the current one.
+/// Opacity of the grasps before the current one.
 const EARLIER: f32 = 0.28;
 /// Opacity of an error band.
 const BAND: f32 = 0.3;
-/// Narrowest stretch of time that can be shown (s).
+/// Shortest time that can be shown (s).
 const NARROWEST: f64 = 0.05;
 
-pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>, plot: &TimePlot<'_>) {
-    let span = context.time_span();
-    // A window from before the trial became shorter shows nothing that is there.
+pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, plot: &TimePlot<'_>) {
+    let span = context.shown().time_span();
+    // A time window of a longer trial may show nothing of this one.
     let fits = |[from, to]: &[f64; 2]| *from >= span[0] && to - from >= 0.5 * NARROWEST && *to <= span[1] + 1e-9;
     let [from, to] = context.view.time_window.filter(fits).unwrap_or(span);
     let theme = context.view.theme;
@@ -116,19 +118,19 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Ac
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, format!("{} over time", plot.id)));
     if let Some(window) = moved_window(ui, &response.response, &response.inner, [from, to], span) {
-        actions.push(Action::SetTimeWindow(window));
+        actions.push(ViewAction::SetTimeWindow(window));
     }
 }
 
-/// What to say where a connected gripper gives no curve to draw.
+/// Text where a connected gripper gives no curve to draw.
 fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
-    let trace = context.traces.current().filter(|_| context.source == Source::Gripper)?;
+    let trace = context.traces.current().filter(|_| context.source == ViewSource::Gripper)?;
     let number = |k: usize| plot.curves.iter().any(|c| (c.values)(trace, k).is_some_and(f64::is_finite));
     let nothing = trace.t.len() > 5 && !(0..trace.t.len()).any(number);
     nothing.then_some(if plot.id == "line pressure" {
-        "The board does not report its line pressure."
+        "The board does not report line pressure."
     } else {
-        "These sensors are not calibrated: panel Calibration, in the mode Label. Raw counts are in the panel Counts there."
+        "Sensors not calibrated: see panel Calibration in the mode Label. Raw counts: panel Counts."
     })
 }
 
@@ -138,7 +140,7 @@ struct TimeDrag {
     width: f64,
 }
 
-/// The new time window where the mouse asks for one.
+/// New time window, where the mouse changes it.
 fn moved_window(
     ui: &Ui,
     response: &egui::Response,
@@ -168,14 +170,14 @@ fn moved_window(
     None
 }
 
-/// A time at the axis; none so close to its end that it would be cut off there.
+/// Time at the axis; empty near its end, where it would be cut off.
 fn seconds_at(value: f64, shown: &std::ops::RangeInclusive<f64>) -> String {
     let left = (shown.end() - value) / (shown.end() - shown.start());
     if left < 0.02 { String::new() } else { format!("{}\u{2009}s", plain(value)) }
 }
 
-/// A plot of what does not move: no mouse, its axes as wide as those of the others.
-pub(super) fn still(
+/// Plot without interaction, its axes as wide as those of the others.
+pub(super) fn static_plot(
     theme: Theme,
     id: &str,
     height: f32,
@@ -199,15 +201,15 @@ pub(super) fn still(
         .set_margin_fraction(egui::vec2(air_beside, 0.12))
 }
 
-/// A number at an axis, without trailing zeros.
+/// Number at an axis, without trailing zeros.
 fn plain(value: f64) -> String {
     let text = three_digits(value);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Shades the hold, so that it can be told from closing and release.
+/// Shades the hold.
 fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, height: f64) {
-    let Some([closed, released]) = context.hold() else { return };
+    let Some([closed, released]) = context.shown().hold() else { return };
     let quiet = context.view.theme.colours().quiet_text;
     plot_ui.add(Span::new("", closed..=released).fill(veil(quiet, 0.09)).border_width(0.0));
     let place = PlotPoint::new(closed, height);
@@ -215,28 +217,28 @@ fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, hei
     plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
 }
 
-/// Stretches of the current grasp in which readings are missing (s).
+/// Times of the current grasp without readings (s).
 fn gaps(context: &PanelContext<'_>) -> Vec<[f64; 2]> {
     context.traces.current().map(GraspTrace::gaps).unwrap_or_default()
 }
 
-/// Distance between the strokes of a hatching.
+/// Distance between the strokes of a hatching (points).
 const STROKES: f32 = 7.0;
 
-/// Stretches narrower than this are not hatched.
+/// Narrower gaps are not hatched (points).
 const NARROW: f32 = 3.0;
 
-/// Strokes across a stretch of time, which then looks like none in which something was read.
+/// Hatches a time without readings.
 fn hatch(ui: &Ui, transform: &PlotTransform, [from, to]: [f64; 2], shade: Color32) {
     let frame = *transform.frame();
     let [left, right] = [from, to].map(|t| transform.position_from_point_x(t));
     let rect = egui::Rect::from_x_y_ranges(left..=right, frame.y_range()).intersect(frame);
-    // What is narrower shows by its colour.
+    // A narrow gap shows by its colour.
     if rect.width() < NARROW || rect.height() <= 0.0 {
         return;
     }
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-    // Strokes belong to the plot and not to the gap, so that they stand still while it grows.
+    // Strokes are fixed to the plot, so that they do not move while the gap grows.
     let first = ((rect.left() - frame.left() - rect.height()) / STROKES).floor() as i32;
     let last = ((rect.right() - frame.left()) / STROKES).ceil() as i32;
     for k in first..=last {
@@ -246,7 +248,7 @@ fn hatch(ui: &Ui, transform: &PlotTransform, [from, to]: [f64; 2], shade: Color3
     }
 }
 
-/// Shades the stretches in which readings are missing, so that nobody takes them for quiet ones.
+/// Shades times without readings, so that nobody takes them for quiet ones.
 fn add_gaps(plot_ui: &mut egui_plot::PlotUi<'_>, gaps: &[[f64; 2]], theme: Theme) {
     let error = theme.colours().error;
     for [from, to] in gaps {
@@ -259,7 +261,7 @@ fn add_curves(
     plot_ui: &mut egui_plot::PlotUi<'_>,
     trace: &GraspTrace,
     plot: &TimePlot<'_>,
-    shade: impl Fn(&Curve) -> Color32,
+    shade: impl Fn(&PlotCurve) -> Color32,
     width: f32,
     named: bool,
 ) {
@@ -279,9 +281,9 @@ fn add_curves(
     }
 }
 
-/// The stretches of a curve in which it is defined (the legend hides all that have one name and one id), points of time (s) and value. Between them nothing is drawn: a line
-/// of which one point is not a number is broken off there by some styles and forbidden by others.
-fn runs(trace: &GraspTrace, curve: &Curve) -> Vec<Vec<[f64; 2]>> {
+/// Parts of a curve where it is defined, as points of time (s) and value. Nothing is drawn between them: some line styles
+/// break off at a point that is not a number, others forbid it. The legend hides all parts, since they share name and id.
+fn runs(trace: &GraspTrace, curve: &PlotCurve) -> Vec<Vec<[f64; 2]>> {
     let mut runs = vec![Vec::new()];
     for (k, t) in trace.t.iter().enumerate() {
         match ((curve.values)(trace, k).filter(|value| value.is_finite()), runs.last_mut()) {
@@ -294,7 +296,7 @@ fn runs(trace: &GraspTrace, curve: &Curve) -> Vec<Vec<[f64; 2]>> {
     runs
 }
 
-/// Shades the numerical error band about each curve.
+/// Shades the error band about each curve.
 fn add_bands(plot_ui: &mut egui_plot::PlotUi<'_>, trace: &GraspTrace, plot: &TimePlot<'_>, theme: Theme) {
     for curve in &plot.curves {
         let points: Vec<[f64; 3]> = (0..trace.t.len())
@@ -310,7 +312,7 @@ fn add_bands(plot_ui: &mut egui_plot::PlotUi<'_>, trace: &GraspTrace, plot: &Tim
     }
 }
 
-/// What the curves reach within the time shown, with some air, and no less than the plot's least range.
+/// Range of the curves within the time shown, with a margin, and at least the plot's least range.
 fn value_range(context: &PanelContext<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2]) -> [f64; 2] {
     let [mut low, mut high] = plot.least;
     for trace in context.traces.earlier().chain(context.traces.current()) {
@@ -321,12 +323,12 @@ fn value_range(context: &PanelContext<'_>, plot: &TimePlot<'_>, [from, to]: [f64
             }
         }
     }
-    // Air above, so that the word "hold" has a place of its own.
+    // The word "hold" has a place of its own above the curves.
     let air = 0.06 * (high - low);
     [low - air, high + 3.5 * air]
 }
 
-/// Some four marks at round values.
+/// About four marks at round values.
 fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
     let rough = (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
@@ -349,7 +351,7 @@ mod tests {
         let channels = vec![vec![nan, 1.0, 2.0, nan, nan, 3.0, nan]];
         let t: Vec<f64> = (0..7).map(f64::from).collect();
         let trace = GraspTrace { t, channels, ..GraspTrace::default() };
-        let curve = Curve {
+        let curve = PlotCurve {
             name: String::new(),
             trace: Trace::Pressure,
             dashed: true,

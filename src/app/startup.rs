@@ -1,31 +1,71 @@
-//! Before the window opens: is there a display, are its libraries here, is there a graphics driver? Whatever is missing
-//! is said all at once, with the one line that mends it, instead of one library's error after another.
+//! Checks before the window opens: display, its libraries, graphics driver. Everything missing is reported at once, with the
+//! command that installs it.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// What the program finds around itself.
+/// Display that the window opens on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Surroundings {
-    /// Which windowing system will be used.
+    /// Windowing system.
     pub display: Display,
-    /// Something worth knowing, though it does not stop anything.
+    /// Remark that does not stop the window.
     pub note: Option<String>,
 }
 
-/// The windowing systems.
+/// Windowing system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Display {
-    /// A Wayland compositor answers.
+    /// Wayland compositor that answers.
     Wayland,
-    /// An X server is named.
+    /// X server.
     X11,
-    /// Windows or macOS, which bring everything.
+    /// Windows or macOS.
     Native,
 }
 
-/// A library that is loaded while the window opens, and the packages that hold it.
-struct Needed {
+/// Reason why the window does not open.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// There is no display.
+    #[error("no display to open a window on (neither Wayland nor X11); {hint}", hint = WITHOUT_DISPLAY)]
+    NoDisplay,
+    /// The display is named but does not answer.
+    #[error("the display \"{0}\" does not answer; {hint}", hint = WITHOUT_DISPLAY)]
+    DeadDisplay(String),
+    /// Libraries are missing.
+    #[error("the window needs {hint}", hint = install_hint(.0))]
+    Missing(Vec<Needed>),
+    /// No driver can draw into the window.
+    #[error("no graphics driver can draw into the window ({0}); it needs {hint}", hint = install_hint(&[DRIVER]))]
+    NoDriver(String),
+    /// Anything else.
+    #[error("cannot open the window: {0}")]
+    Other(String),
+}
+
+/// Thread that could not be started.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot start {thread}: {source}")]
+pub struct ThreadError {
+    /// Purpose of the thread.
+    pub thread: &'static str,
+    /// Cause.
+    pub source: std::io::Error,
+}
+
+impl ThreadError {
+    /// Names the thread of an error.
+    pub(super) fn of(thread: &'static str) -> impl FnOnce(std::io::Error) -> Self {
+        move |source| Self { thread, source }
+    }
+}
+
+const WITHOUT_DISPLAY: &str = "without one, `palpate demo` grasps and writes pictures";
+
+/// Library that the window loads, and the packages that contain it.
+#[derive(Clone, Copy, Debug)]
+pub struct Needed {
     library: &'static str,
     debian: &'static str,
     fedora: &'static str,
@@ -58,11 +98,8 @@ const DRIVER: Needed = needed(
     "vulkan-icd-loader vulkan-swrast",
 );
 
-const NO_DISPLAY: &str = "there is no display to open a window on (neither Wayland nor X11); \
-                          without one, `palpate demo` grasps, tells the story and writes pictures";
-
-/// Checks everything that opening a window takes. The error is a text for the user.
-pub fn check_surroundings() -> Result<Surroundings, String> {
+/// Checks display, libraries and graphics driver.
+pub fn check_surroundings() -> Result<Surroundings, WindowError> {
     if !cfg!(target_os = "linux") {
         return Ok(Surroundings { display: Display::Native, note: None });
     }
@@ -72,24 +109,21 @@ pub fn check_surroundings() -> Result<Surroundings, String> {
         Display::X11 => &X11,
         Display::Native => &[],
     };
-    let mut missing: Vec<&Needed> = libraries.iter().filter(|n| !can_load(n.library)).collect();
+    let mut missing: Vec<Needed> = libraries.iter().filter(|n| !can_load(n.library)).copied().collect();
     if !keyboards_folder().join("rules/evdev").exists() {
-        missing.push(&KEYBOARDS);
+        missing.push(KEYBOARDS);
     }
     if !has_driver() {
-        missing.push(&DRIVER);
+        missing.push(DRIVER);
     }
-    if missing.is_empty() {
-        return Ok(surroundings);
-    }
-    Err(shopping_list(&missing, &std::fs::read_to_string("/etc/os-release").unwrap_or_default()))
+    if missing.is_empty() { Ok(surroundings) } else { Err(WindowError::Missing(missing)) }
 }
 
-/// A live Wayland socket, else X11, else a message.
+/// Finds a live Wayland socket, else X11.
 fn find_display(
     variable: &dyn Fn(&str) -> Option<String>,
     answers: &dyn Fn(&Path) -> bool,
-) -> Result<Surroundings, String> {
+) -> Result<Surroundings, WindowError> {
     let set = |name: &str| variable(name).filter(|value| !value.is_empty());
     let socket = set("WAYLAND_DISPLAY").map(|name| {
         let folder = set("XDG_RUNTIME_DIR").unwrap_or_default();
@@ -100,7 +134,7 @@ fn find_display(
         return Ok(Surroundings { display: Display::Wayland, note: None });
     }
     if set("DISPLAY").is_none() {
-        return Err(NO_DISPLAY.to_owned());
+        return Err(WindowError::NoDisplay);
     }
     let note = socket.map(|path| format!("the Wayland display {} does not answer; X11 is used", path.display()));
     Ok(Surroundings { display: Display::X11, note })
@@ -130,7 +164,7 @@ fn keyboards_folder() -> PathBuf {
     env::var_os("XKB_CONFIG_ROOT").map_or_else(|| PathBuf::from("/usr/share/X11/xkb"), PathBuf::from)
 }
 
-/// Looks for what a driver leaves on the disk: asking the drivers themselves takes a second on software rendering.
+/// Looks for a driver's files: asking the drivers takes a second on software rendering.
 fn has_driver() -> bool {
     let named = ["VK_ICD_FILENAMES", "VK_DRIVER_FILES", "VK_ADD_DRIVER_FILES"].iter().any(|v| env::var_os(v).is_some());
     let holds_files = |folder: &str| std::fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some());
@@ -138,8 +172,12 @@ fn has_driver() -> bool {
     (vulkan && can_load("libvulkan.so.1")) || can_load("libEGL.so.1")
 }
 
-/// The sentence that lists what is missing and the command that brings it.
-fn shopping_list(missing: &[&Needed], os_release: &str) -> String {
+/// Missing libraries, and the command that installs them on this system.
+fn install_hint(missing: &[Needed]) -> String {
+    install_hint_for(missing, &std::fs::read_to_string("/etc/os-release").unwrap_or_default())
+}
+
+fn install_hint_for(missing: &[Needed], os_release: &str) -> String {
     let ids: String = os_release.lines().filter(|l| l.starts_with("ID=") || l.starts_with("ID_LIKE=")).collect();
     let (command, package): (&str, fn(&Needed) -> &'static str) = if ids.contains("debian") || ids.contains("ubuntu") {
         ("sudo apt install", |n| n.debian)
@@ -150,21 +188,21 @@ fn shopping_list(missing: &[&Needed], os_release: &str) -> String {
     } else {
         ("install the packages that Debian calls", |n| n.debian)
     };
-    let mut packages: Vec<&str> = missing.iter().map(|n| package(n)).collect();
+    let mut packages: Vec<&str> = missing.iter().map(package).collect();
     packages.dedup();
     let names: Vec<&str> = missing.iter().map(|n| n.library).collect();
-    format!("the window needs {}; to get it:\n  {command} {}", names.join(", "), packages.join(" "))
+    format!("{}. To install it:\n  {command} {}", names.join(", "), packages.join(" "))
 }
 
 impl Surroundings {
-    /// Makes the windowing library use the display that was found, and mentions what is odd.
+    /// Logs the remark.
     pub(super) fn apply(&self) {
         if let Some(note) = &self.note {
             tracing::warn!("{note}");
         }
     }
 
-    /// X11 has to be asked for where it was chosen, because the library would try a dead Wayland socket first.
+    /// Selects X11 where it was found: the library would try a dead Wayland socket first.
     pub(super) fn event_loop_hook(&self) -> Option<eframe::EventLoopBuilderHook> {
         #[cfg(target_os = "linux")]
         if self.display == Display::X11 {
@@ -175,23 +213,19 @@ impl Surroundings {
         None
     }
 
-    /// What still came out of the windowing library, in our words.
-    pub(super) fn explain(&self, error: &eframe::Error) -> String {
+    /// Explains an error of the windowing library.
+    pub(super) fn explain(&self, error: &eframe::Error) -> WindowError {
         let text = error.to_string();
         let dead = text.contains("XOpenDisplayFailed")
             || text.contains("NoCompositor")
             || text.contains("Connection")
             || text.contains("X server");
         if dead {
-            let display = env::var("DISPLAY").unwrap_or_default();
-            return format!("the display \"{display}\" does not answer; {NO_DISPLAY}");
+            return WindowError::DeadDisplay(env::var("DISPLAY").unwrap_or_default());
         }
         match error {
-            eframe::Error::Wgpu(_) => {
-                let os = std::fs::read_to_string("/etc/os-release").unwrap_or_default();
-                format!("no graphics driver can draw into the window ({text}); {}", shopping_list(&[&DRIVER], &os))
-            }
-            _ => format!("the window could not be opened: {text}"),
+            eframe::Error::Wgpu(_) => WindowError::NoDriver(text),
+            _ => WindowError::Other(text),
         }
     }
 }
@@ -200,13 +234,13 @@ impl Surroundings {
 mod tests {
     use super::*;
 
-    fn display(variables: &[(&str, &str)], live: bool) -> Result<Surroundings, String> {
+    fn display(variables: &[(&str, &str)], live: bool) -> Result<Surroundings, WindowError> {
         let variable = |name: &str| variables.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned());
         find_display(&variable, &|_| live)
     }
 
     #[test]
-    fn wayland_first_then_x11_then_a_word_about_the_demo() {
+    fn wayland_comes_before_x11_and_without_either_the_demo_is_named() {
         let both = [("WAYLAND_DISPLAY", "wayland-0"), ("XDG_RUNTIME_DIR", "/run/user/1"), ("DISPLAY", ":0")];
         assert_eq!(display(&both, true).unwrap().display, Display::Wayland);
         let fallen_back = display(&both, false).unwrap();
@@ -214,18 +248,18 @@ mod tests {
         assert!(fallen_back.note.unwrap().contains("/run/user/1/wayland-0"));
         assert_eq!(display(&[("DISPLAY", ":0")], false).unwrap().note, None);
         for nothing in [&[][..], &[("DISPLAY", ""), ("WAYLAND_DISPLAY", "")][..]] {
-            assert!(display(nothing, false).unwrap_err().contains("palpate demo"));
+            assert!(display(nothing, false).unwrap_err().to_string().contains("palpate demo"));
         }
     }
 
     #[test]
     fn everything_missing_is_one_line_to_type() {
-        let missing: Vec<&Needed> = X11[1..3].iter().chain([&DRIVER]).collect();
-        let debian = shopping_list(&missing, "NAME=x\nID=debian\n");
+        let missing = [X11[1], X11[2], DRIVER];
+        let debian = install_hint_for(&missing, "NAME=x\nID=debian\n");
         assert!(debian.ends_with("sudo apt install libxcursor1 libx11-xcb1 mesa-vulkan-drivers"), "{debian}");
-        assert!(shopping_list(&missing, "ID=ubuntu\nID_LIKE=debian").contains("apt"));
-        assert!(shopping_list(&missing, "ID=fedora").contains("dnf install libXcursor"));
-        assert!(shopping_list(&missing, "ID=arch").contains("pacman -S libxcursor"));
-        assert!(shopping_list(&missing, "").contains("Debian calls"));
+        assert!(install_hint_for(&missing, "ID=ubuntu\nID_LIKE=debian").contains("apt"));
+        assert!(install_hint_for(&missing, "ID=fedora").contains("dnf install libXcursor"));
+        assert!(install_hint_for(&missing, "ID=arch").contains("pacman -S libxcursor"));
+        assert!(install_hint_for(&missing, "").contains("Debian calls"));
     }
 }

@@ -13,7 +13,13 @@ pub(super) fn veil(Rgb(r, g, b): Rgb, opacity: f32) -> Color32 {
     Color32::from_rgba_unmultiplied(r, g, b, (opacity.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
-/// Makes the whole window look like `theme`.
+/// Fill of the button that a panel proposes.
+pub(super) fn accented(theme: Theme) -> Color32 {
+    let colours = theme.colours();
+    colour(colours.raised.mix(colours.accent, 0.35))
+}
+
+/// Applies a theme to the whole window.
 pub(super) fn apply(ctx: &egui::Context, theme: Theme) {
     ctx.set_theme(match theme {
         Theme::Dark => egui::Theme::Dark,

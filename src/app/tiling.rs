@@ -1,22 +1,23 @@
-//! How panels stand beside each other.
+//! Tiles: the panels of a mode beside each other.
 
-use super::actions::Action;
-use super::panels::{self, PanelContext, PanelKind};
-use super::theme::colour;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::panels::{self, PanelKind};
+use crate::app::theme::colour;
 use egui::{Frame, Margin, Ui};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 use palpate_geometry::palette::Theme;
 
-/// Ground and margin of a panel.
+/// Background and margin of a panel.
 pub(super) fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {
     let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
     Frame::new().fill(colour(theme.colours().background)).inner_margin(margin)
 }
 
-/// What panels may read and where they put what they ask for, while all of them are drawn.
+/// Drawing of all panels: their context, and where their actions go.
 pub(super) struct Tiling<'a, 'b> {
     pub(super) context: &'a PanelContext<'b>,
-    pub(super) actions: &'a mut Vec<Action>,
+    pub(super) actions: &'a mut Actions,
 }
 
 impl Tiling<'_, '_> {

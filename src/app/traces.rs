@@ -1,17 +1,17 @@
-//! Traces as the plots show them: the samples of the grasp that is going on, and of the few before it.
+//! Traces of the current grasp and of the few before it, for the plots.
 
 use palpate_lab::workers::TraceRow;
 use std::collections::VecDeque;
 
-/// Grasps that are kept: the current one and some to compare it with.
+/// Grasps that are kept.
 const KEPT: usize = 4;
 
-/// All samples of one grasp, column by column.
+/// Samples of one grasp, column by column.
 #[derive(Clone, Debug, Default)]
 pub struct GraspTrace {
-    /// Which grasp.
+    /// Number of the grasp.
     pub grasp: u64,
-    /// It belongs to no grasp: only its last seconds are kept.
+    /// Live stream outside of grasps: only its last seconds are kept.
     pub rolling: bool,
     /// Times (s).
     pub t: Vec<f64>,
@@ -19,17 +19,17 @@ pub struct GraspTrace {
     pub line_bar: Vec<f64>,
     /// Channel by channel, NaN where undefined.
     pub channels: Vec<Vec<f32>>,
-    /// Estimated numerical errors, channel by channel; empty without a companion.
+    /// Estimated numerical errors, channel by channel; empty without an error band.
     pub errors: Vec<Vec<f32>>,
 }
 
-/// What is kept of a trace that belongs to no grasp (s), and how much more may gather before it is cut.
+/// Length kept of a live stream (s), and how much more may gather before it is cut (s).
 const ROLLING_S: [f64; 2] = [12.0, 4.0];
-/// The same of a grasp: a recording without an end must not fill the memory.
+/// The same of a grasp: an endless recording must not fill the memory.
 const GRASP_S: [f64; 2] = [120.0, 30.0];
 
 impl GraspTrace {
-    /// Stretches of time without readings (s): a row without any number marks where one begins.
+    /// Times without readings (s); a row without any number marks the beginning of each.
     pub fn gaps(&self) -> Vec<[f64; 2]> {
         let empty = |k: &usize| !self.channels.is_empty() && self.channels.iter().all(|channel| channel[*k].is_nan());
         let end = |k: usize| self.t.get(k + 1).copied();
@@ -37,7 +37,7 @@ impl GraspTrace {
         marks.filter_map(|k| Some([self.t[k], end(k)?])).filter(|[from, to]| to > from).collect()
     }
 
-    /// Forgets what is long ago.
+    /// Forgets old samples.
     fn cut(&mut self) {
         let [kept, more] = if self.rolling { ROLLING_S } else { GRASP_S };
         let Some(last) = self.t.last().copied() else { return };
@@ -53,19 +53,19 @@ impl GraspTrace {
     }
 }
 
-/// The traces of the last grasps, oldest first.
+/// Traces of the last grasps, oldest first.
 #[derive(Clone, Debug, Default)]
-pub struct Traces {
+pub struct TraceHistory {
     grasps: VecDeque<GraspTrace>,
-    /// The last grasp is shown rather than what has been watched since.
+    /// The last grasp is shown rather than the stream since.
     held: bool,
 }
 
-impl Traces {
+impl TraceHistory {
     /// Adds a sample; a new grasp begins a new trace and pushes out the oldest.
     pub fn push(&mut self, row: &TraceRow) {
         if self.grasps.back().is_none_or(|last| last.grasp != row.grasp) {
-            // What was watched before a grasp is nothing to compare it with.
+            // A stream before a grasp is nothing to compare it with.
             self.grasps.retain(|trace| !trace.rolling);
             if self.grasps.len() == KEPT {
                 self.grasps.pop_front();
@@ -98,12 +98,12 @@ impl Traces {
         self.grasps.clear();
     }
 
-    /// Whether the last grasp stays in sight, while what comes after it is only watched.
+    /// Shows the last grasp rather than the stream after it, or the newest of either.
     pub fn hold_grasp(&mut self, held: bool) {
         self.held = held;
     }
 
-    /// The current grasp, or what is watched.
+    /// Current grasp or stream.
     pub fn current(&self) -> Option<&GraspTrace> {
         self.place().and_then(|place| self.grasps.get(place))
     }
@@ -113,7 +113,7 @@ impl Traces {
         grasp.or(self.grasps.len().checked_sub(1))
     }
 
-    /// The grasps before it, oldest first; none beside what belongs to no grasp.
+    /// Grasps before it, oldest first; none beside a stream.
     pub fn earlier(&self) -> impl Iterator<Item = &GraspTrace> {
         let rolling = self.current().is_some_and(|current| current.rolling);
         let many = if rolling { 0 } else { self.place().unwrap_or(0) };
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn the_last_few_grasps_are_kept_apart() {
-        let mut traces = Traces::default();
+        let mut traces = TraceHistory::default();
         for grasp in 1..=6 {
             for k in 0..3 {
                 let t = f64::from(k) * 0.1;
@@ -149,8 +149,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_only_watched_is_bounded_and_has_gaps() {
-        let mut traces = Traces::default();
+    fn a_live_stream_is_bounded_and_has_gaps() {
+        let mut traces = TraceHistory::default();
         let mut push = |t: f64, value: f32| {
             let line_bar = if value.is_nan() { f64::NAN } else { 0.0 };
             let values = Box::new([value]);

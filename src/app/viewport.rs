@@ -12,7 +12,7 @@ use palpate_render::{Blit, Renderer};
 pub struct Viewport {
     renderer: Renderer,
     blit: Blit,
-    shown: Option<Key>,
+    shown: Option<PictureKey>,
 }
 
 impl Viewport {
@@ -27,9 +27,9 @@ impl Viewport {
     }
 }
 
-/// What a picture shows; while it stays the same nothing is drawn again.
+/// Contents of a picture; while they stay the same nothing is drawn again.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Key {
+pub(super) struct PictureKey {
     pub(super) grasp: u64,
     pub(super) sample: f64,
     /// Time of the ghost's frame, where one is drawn (s).
@@ -43,7 +43,7 @@ pub(super) struct Key {
 
 /// Draws one list.
 pub(super) struct Paint {
-    pub(super) key: Key,
+    pub(super) key: PictureKey,
     pub(super) list: DrawList,
 }
 
@@ -59,7 +59,7 @@ impl CallbackTrait for Paint {
         if let Some(viewport) = resources.get_mut::<Viewport>()
             && viewport.shown.as_ref() != Some(&self.key)
         {
-            let Key { pixels, pixels_per_point, .. } = &self.key;
+            let PictureKey { pixels, pixels_per_point, .. } = &self.key;
             viewport.renderer.render(device, queue, encoder, &self.list, *pixels, *pixels_per_point);
             if let Some(picture) = viewport.renderer.picture_view() {
                 viewport.blit.set_source(device, picture);

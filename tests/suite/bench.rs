@@ -142,7 +142,7 @@ impl Bench {
         self.harness.state().as_ref().expect("made in the first frame")
     }
 
-    pub(crate) fn tell(&mut self, action: Action) {
+    pub(crate) fn tell(&mut self, action: impl Into<Action>) {
         let ctx = self.harness.ctx.clone();
         self.harness.state_mut().as_mut().expect("made in the first frame").act(&ctx, action);
     }
@@ -207,7 +207,7 @@ impl Bench {
             if now > t - 1e-9 {
                 return;
             }
-            self.tell(Action::Simulation(Command::Step));
+            self.tell(Command::Step);
             self.until(|snapshot| snapshot.frame.t > now);
         }
     }

@@ -461,7 +461,7 @@ fn begin_calibration(bench: &mut Bench, sensor: Sensor, part: &str) {
     }
     bench.harness.get_by_label("Part").type_text(part);
     bench.harness.step();
-    bench.harness.get_by_label("Begin calibration").click();
+    bench.harness.get_by_label("Start calibration").click();
     bench.harness.step();
 }
 
@@ -512,7 +512,7 @@ fn the_window_calibrates_step_by_step() {
     bench.until_shown(true, "counts, settled");
     assert!(bench.harness.query_by_label("Empty close").is_none(), "a strip has no such zero");
     compare("calibration_done", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
-    bench.harness.get_by_label("Keep").click();
+    bench.harness.get_by_label("Save").click();
     bench.harness.step();
     bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
     // A pad, and what bending does to it.
@@ -530,13 +530,13 @@ fn the_window_calibrates_step_by_step() {
     *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: Some(0.0) };
     bench.harness.get_by_label("Empty close").click();
     bench.harness.step();
-    bench.until_shown(true, "what bending alone shows, up to");
+    bench.until_shown(true, "zero shift by bending, up to");
     *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None };
     bench.until_shown(true, "0 counts, settled");
     // A plot knows the width of its labels after it has been drawn.
     bench.harness.run_steps(4);
     compare("calibration_pad", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
-    bench.harness.get_by_label("Keep").click();
+    bench.harness.get_by_label("Save").click();
     bench.harness.step();
     bench.until_shown(true, "version 1 of \"P3\", the right pad");
     let store = bench.store();

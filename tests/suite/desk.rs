@@ -8,8 +8,8 @@ use crate::gripper::board;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{Action, DeskAction, Mode};
-use palpate_lab::workers::GripperWish;
+use palpate::app::{Mode, ViewAction};
+use palpate_lab::workers::{GripperWish, LabellingAction};
 use palpate_store::Store;
 use palpate_tactile::trial::Control;
 
@@ -22,7 +22,7 @@ fn desk() -> Bench {
     };
     let setup = BenchSetup { fill, listen: board(&parts(1, false)), size: [1400.0, 1000.0], ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
-    bench.tell(Action::SetMode(Mode::Label));
+    bench.tell(ViewAction::SetMode(Mode::Label));
     bench.until_shown(true, "0 of 800 trials");
     bench
 }
@@ -49,7 +49,7 @@ impl Bench {
         self.press(Key::R);
         self.until_shown(true, "Time in the trial");
         self.until_shown(false, "Time in the trial");
-        self.until_shown(true, "what was it?");
+        self.until_shown(true, "which object?");
     }
 
     fn labels(&self) -> Vec<(i64, Option<String>, bool)> {
@@ -89,7 +89,7 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::Enter);
     desk.until_labelled(&[(1, Some(&next), false)]);
     desk.until_shown(true, "1 of 800 trials");
-    desk.until_shown(true, "The model says lemon");
+    desk.until_shown(true, "The model predicts lemon");
     // The next one is not the same again; it is recorded twice, because the first went wrong.
     assert_ne!(desk.next_object(), next);
     desk.record();
@@ -103,13 +103,13 @@ fn an_afternoon_by_keys_alone() {
     desk.until_shown(true, "2 of 800 trials");
     desk.record();
     desk.press(Key::Escape);
-    desk.tell(Action::Desk(DeskAction::Search(String::new())));
-    desk.tell(Action::Desk(DeskAction::Discard));
+    desk.tell(LabellingAction::Search(String::new()));
+    desk.tell(LabellingAction::Discard);
     desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     // The first is called something new after all: the arrows pick it.
     desk.press(Key::ArrowDown);
     desk.press(Key::ArrowDown);
-    desk.until_shown(true, "Trial 1 is called");
+    desk.until_shown(true, "Trial 1: labelled");
     desk.press(Key::Slash);
     desk.type_text("garlic");
     desk.press(Key::Enter);
@@ -125,7 +125,7 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::D);
     desk.until_shown(false, "Time in the trial");
     desk.press(Key::ArrowDown);
-    desk.until_shown(true, "Trial 3 is called");
+    desk.until_shown(true, "Trial 3: labelled");
     desk.press(Key::D);
     let with_third_gone = |gone: bool| {
         [(1, Some("garlic"), false), (2, None, true), (3, Some("button"), gone), (4, None, true), (5, None, true)]
@@ -140,7 +140,7 @@ fn an_afternoon_by_keys_alone() {
     desk.until_told("export-2");
     // Too few to learn from: that is said, and what is missing.
     desk.press_with(Modifiers::COMMAND, Key::T);
-    desk.until_told("nothing was trained: 0 of the objects have");
+    desk.until_told("Training failed: 0 of the objects have");
 }
 
 #[test]
@@ -201,7 +201,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     desk.until_shown(true, "Time in the trial");
     desk.press(Key::Slash);
     desk.type_text("cu");
-    desk.until_shown(true, "what was it?");
+    desk.until_shown(true, "which object?");
     desk.type_text("be");
     desk.press(Key::Enter);
     desk.until_labelled(&[&typed[..], &[(4, Some("cube"), false)]].concat());
@@ -209,7 +209,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     desk.press(Key::Slash);
     assert!(desk.harness.query_by_role_and_label(Role::SearchInput, "Find an object").is_none());
     // Elsewhere a further grasp gives up nothing.
-    desk.tell(Action::SetMode(Mode::Demo));
+    desk.tell(ViewAction::SetMode(Mode::Demo));
     for _ in 0..2 {
         desk.press(Key::R);
         desk.until_shown(true, "Time in the trial");
@@ -222,7 +222,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
 #[test]
 fn stop_works_while_something_is_typed() {
     let mut desk = desk();
-    desk.tell(Action::Gripper(GripperWish::Connect(None)));
+    desk.tell(GripperWish::Connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.press(Key::M);
     desk.record();
@@ -239,17 +239,17 @@ fn stop_works_while_something_is_typed() {
 #[test]
 fn blind_hides_the_models_guess_until_the_label_is_given() {
     let mut desk = desk();
-    desk.tell(Action::Gripper(GripperWish::Connect(None)));
+    desk.tell(GripperWish::Connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.press(Key::M);
     desk.record();
     desk.harness.get_by_label("Recognition").click();
     desk.harness.step();
-    desk.until_shown(true, "is hidden until you have said what it is");
+    desk.until_shown(true, "is hidden until you label the trial");
     desk.press(Key::B);
-    desk.until_shown(false, "is hidden until you have said what it is");
+    desk.until_shown(false, "is hidden until you label the trial");
     desk.press(Key::B);
-    desk.until_shown(true, "is hidden until you have said what it is");
+    desk.until_shown(true, "is hidden until you label the trial");
     desk.press(Key::N);
-    desk.until_shown(false, "is hidden until you have said what it is");
+    desk.until_shown(false, "is hidden until you label the trial");
 }

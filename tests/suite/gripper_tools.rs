@@ -10,7 +10,7 @@ use crate::streams::{alike, once_with_a_gap};
 use egui::Key;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, Action};
+use palpate::app::ALL_PANELS;
 use palpate_device::doctor::{ChannelTraces, Observations};
 use palpate_device::protocol::Saturation;
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
@@ -183,7 +183,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         bench.until_shown(true, "Press the left pad firmly");
         bench.harness.run_steps(3);
         pictures.push(bench.harness.render().unwrap());
-        bench.harness.get_by_label("Leave out").click();
+        bench.harness.get_by_label("Skip").click();
         bench.harness.step();
         bench.until_shown(true, "sensor 4 of 4");
         bench.harness.get_by_label("Stop").click();
@@ -206,7 +206,7 @@ fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
         let listen: Listen = Arc::new(|_| Ok(Box::new(once_with_a_gap())));
         let setup = BenchSetup { size: [480.0, 220.0], listen, ..BenchSetup::default() };
         let mut bench = bench("counts", theme, setup);
-        bench.tell(Action::Gripper(GripperWish::Connect(None)));
+        bench.tell(GripperWish::Connect(None));
         // It is silent then, and wakes the window now and then.
         for _ in 0..20 {
             bench.wait();
@@ -231,7 +231,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     let mut bench = bench("doctor", Theme::Dark, BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() });
     let calibrate = || {
         let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A".to_owned(), port: None };
-        Action::Gripper(GripperWish::Calibrate(CalibrationWish::Begin(plan)))
+        GripperWish::Calibrate(CalibrationWish::Begin(plan))
     };
     // What has the fingers is not disturbed.
     bench.tell(calibrate());
@@ -239,7 +239,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
     bench.until_shown(true, "a calibration goes on: end it first");
-    bench.tell(Action::Gripper(GripperWish::Calibrate(CalibrationWish::Stop)));
+    bench.tell(GripperWish::Calibrate(CalibrationWish::Stop));
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
     for (asked, moved) in [("Bend the left", 0), ("Bend the right", 1), ("Press the left", 2), ("Press the right", 3)] {
@@ -275,7 +275,7 @@ fn wiring_and_sketch_come_with_the_program() {
     let [dark, light] = Theme::ALL.map(|theme| {
         let setup = BenchSetup { size: [320.0, 680.0], ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
-        bench.harness.get_by_label("Wiring, and the sketch for the board").click();
+        bench.harness.get_by_label("Wiring and firmware").click();
         bench.harness.run_steps(30);
         assert_eq!(bench.harness.query_all_by_label("4.7 kΩ").count(), 2);
         bench.harness.get_by_label("Copy the command for the sketch").click();
@@ -303,7 +303,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         });
         let setup = BenchSetup { size: [320.0, 820.0], examine, ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
-        assert!(bench.harness.query_by_label_contains("It checks that there is a board").is_some());
+        assert!(bench.harness.query_by_label_contains("Checks that there is a board").is_some());
         bench.harness.get_by_label("Examine").click();
         bench.harness.step();
         bench.until_shown(true, "Nothing is wrong");
@@ -440,7 +440,7 @@ fn a_finger_is_fitted_and_used_without_the_mouse() {
         press(&mut bench, "Use this finger");
         let scene = bench.until(|s| s.scene.gripper.finger.bending_stiffness == 3.36e-3).scene.clone();
         assert_eq!(scene.object.source, "lemon", "what is grasped stays");
-        bench.until_shown(true, "This finger is in use");
+        bench.until_shown(true, "Finger in use");
         picture
     });
     compare("fit_done", &side_by_side(&dark, &light), "the CPU renderer of the tests");

@@ -1,6 +1,7 @@
 //! Everything that takes more than one module to test, in one binary because linking is slow.
 //!
 //! - `architecture`: the layers and the homes of third-party crates, read off the sources.
+//! - `architecture_app`: the layers of the window's files.
 //! - `physics`: whole grasps of every object; no allocation in a step.
 //! - `determinism`: the same seed gives the same bytes.
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
@@ -28,6 +29,7 @@
 
 mod allocations;
 mod architecture;
+mod architecture_app;
 mod bench;
 mod calibration;
 mod command_line;

@@ -8,7 +8,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, Action, Mode};
+use palpate::app::{ALL_PANELS, Mode, SimulationAction};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
@@ -35,8 +35,8 @@ fn every_panel_in_both_themes() {
             match panel.name {
                 "effects" => bench.until_effects_are_measured(),
                 "plan" => bench.until_shown(true, "0 of 800 trials"),
-                "trials" => bench.until_shown(true, "No trial of the real gripper yet"),
-                "label" => bench.until_shown(true, "Connect the gripper first"),
+                "trials" => bench.until_shown(true, "No trials of the real gripper yet"),
+                "label" => bench.until_shown(true, "Connect the gripper:"),
                 _ => {}
             }
             bench.harness.render().unwrap()
@@ -142,7 +142,7 @@ fn values_beyond_a_field_s_range_are_left_alone() {
                 <box size='0.05 0.1 0.05'/></geometry></collision></link></robot>";
     std::fs::write(&path, text).unwrap();
     let mut bench = whole_window();
-    bench.tell(Action::OpenObject(path.to_str().unwrap().to_owned()));
+    bench.tell(SimulationAction::OpenObject(path.to_str().unwrap().to_owned()));
     let loaded = bench.until(|s| s.object.as_ref().is_some_and(|o| o.name == "anvil"));
     bench.harness.run_steps(4);
     let after = bench.workbench().snapshot().unwrap();
@@ -181,7 +181,7 @@ fn turning_the_accuracy_dial_moves_both_numbers() {
     let standard = measured(&mut bench);
     bench.harness.get_by_role_and_label(Role::ComboBox, "time step").click();
     bench.harness.run_steps(3);
-    bench.harness.get_by_label("to a tolerance").click();
+    bench.harness.get_by_label("by tolerance").click();
     bench.until(|s| s.scene.solver.accuracy == Accuracy::Tolerance(1e-4));
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_role_and_label(Role::Slider, "tolerance").is_some());
@@ -213,7 +213,7 @@ fn error_bands_are_drawn_about_the_traces() {
     let panel = ALL_PANELS.iter().find(|panel| panel.name == "force").unwrap();
     let [dark, light] = Theme::ALL.map(|theme| {
         let mut bench = bench(BenchSetup { theme, size: [300.0, 240.0], panel: Some(panel), ..BenchSetup::default() });
-        bench.tell(Action::Simulation(Command::SetErrorBand(true)));
+        bench.tell(Command::SetErrorBand(true));
         bench.until(|s| s.status.error_band);
         bench.advance_to(2.6);
         bench.harness.render().unwrap()
@@ -224,7 +224,7 @@ fn error_bands_are_drawn_about_the_traces() {
 #[test]
 fn effects_are_switched_and_both_numbers_move() {
     let mut bench = whole_window();
-    bench.tell(Action::OpenObject(EMPTY.to_owned()));
+    bench.tell(SimulationAction::OpenObject(EMPTY.to_owned()));
     bench.until(|s| s.object.is_none());
     bench.harness.get_by_label("Effects").click();
     bench.harness.run_steps(2);

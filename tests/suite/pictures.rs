@@ -6,7 +6,7 @@ use crate::golden::compare;
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
 use glam::Vec2;
 use image::RgbaImage;
-use palpate::app::Action;
+use palpate::app::ViewAction;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
@@ -134,7 +134,7 @@ fn the_window_in_both_themes_and_small() {
         bench.advance_to(2.6);
         compare(name, &bench.harness.render().unwrap(), &by);
         if name == "window_small" {
-            bench.tell(Action::ShowKeys(true));
+            bench.tell(ViewAction::ShowKeys(true));
             bench.harness.run_steps(3);
             compare("window_keys", &bench.harness.render().unwrap(), &by);
         }

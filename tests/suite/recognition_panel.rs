@@ -7,7 +7,7 @@ use egui::accesskit::Role;
 use egui::{Key, Rect};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, Action, PanelKind};
+use palpate::app::{ALL_PANELS, PanelKind, SimulationAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, Snapshot};
 use palpate_learn::StopReason;
@@ -31,8 +31,8 @@ fn beliefs(snapshot: &Snapshot) -> usize {
 
 /// Lets a round of grasps run to its end.
 fn run_out(bench: &mut Bench) {
-    bench.tell(Action::Simulation(Command::SetSpeed(64.0)));
-    bench.tell(Action::Simulation(Command::Play));
+    bench.tell(Command::SetSpeed(64.0));
+    bench.tell(Command::Play);
     bench.until(|snapshot| snapshot.status.finished);
     bench.harness.run_steps(3);
 }
@@ -44,20 +44,20 @@ fn says(bench: &Bench, label: &str) -> bool {
 #[test]
 fn a_grasp_is_followed_until_it_is_sure() {
     let mut bench = alone(Theme::Dark);
-    assert!(says(&bench, "Ready") && says(&bench, "it begins with the grasp: press play"));
+    assert!(says(&bench, "Ready") && says(&bench, "press play to start a grasp"));
     bench.advance_to(0.5);
-    assert!(says(&bench, "Feeling .."));
+    assert!(says(&bench, "Sensing .."));
     bench.advance_to(2.6);
-    assert!(says(&bench, "Lemon, 61 %") && says(&bench, "grasp 1 of at most 4; it is sure from 90 % on"));
+    assert!(says(&bench, "Lemon, 61 %") && says(&bench, "grasp 1 of at most 4; threshold 90 %"));
     assert!(says(&bench, "large 95 %") && says(&bench, "spherical 86 %"));
     assert!(says(&bench, "Tomato 24 %") && says(&bench, "Empty hand 0 %"));
-    assert!(says(&bench, "Grasp 1, going on: Lemon 61 %") && says(&bench, "Grasp 2: to come"));
-    assert!(says(&bench, "Truth: told once it has decided"));
-    bench.tell(Action::Simulation(Command::SetSpeed(64.0)));
-    bench.tell(Action::Simulation(Command::Play));
+    assert!(says(&bench, "Grasp 1, running: Lemon 61 %") && says(&bench, "Grasp 2: not yet"));
+    assert!(says(&bench, "Truth: shown after the decision"));
+    bench.tell(Command::SetSpeed(64.0));
+    bench.tell(Command::Play);
     bench.until(|s| beliefs(s) == 1 && s.identification.as_ref().is_some_and(|view| !view.listening));
     assert!(
-        says(&bench, "one more grasp: lemon 61 %, tomato 24 %") || beliefs(&bench.workbench().snapshot().unwrap()) > 1
+        says(&bench, "grasping again: lemon 61 %, tomato 24 %") || beliefs(&bench.workbench().snapshot().unwrap()) > 1
     );
     run_out(&mut bench);
     let end = bench.workbench().snapshot().unwrap();
@@ -75,7 +75,7 @@ fn the_panel_in_every_state_and_both_themes() {
         ("first", |bench| bench.advance_to(2.6)),
         ("right", run_out),
         ("wrong", |bench| {
-            bench.tell(Action::OpenObject("case".to_owned()));
+            bench.tell(SimulationAction::OpenObject("case".to_owned()));
             bench.until(|s| s.truth() == "case");
             run_out(bench);
         }),
@@ -107,7 +107,7 @@ fn the_threshold_follows_its_line_and_its_number() {
     let threshold = |s: &Snapshot| s.identification.as_ref().unwrap().rule.threshold;
     let lower = threshold(&bench.until(|s| threshold(s) < 0.89));
     assert!(lower > 0.5 && (lower * 100.0).fract().min(1.0 - (lower * 100.0).fract()) < 1e-6, "{lower}");
-    let number = bench.harness.get_by_label("sure from");
+    let number = bench.harness.get_by_label("threshold");
     assert!(number.accesskit_node().role() == Role::Label || number.accesskit_node().role() == Role::SpinButton);
 }
 
@@ -137,7 +137,7 @@ fn without_a_model_everything_else_works_and_it_says_so() {
     let mut bench = bench(BenchSetup { model: Err("it is broken".to_owned()), ..BenchSetup::default() });
     assert!(bench.workbench().messages().iter().any(|text| text.contains("it is broken")));
     assert!(says(&bench, "Recognition is off"));
-    bench.tell(Action::Simulation(Command::SetGrasps(2)));
+    bench.tell(Command::SetGrasps(2));
     run_out(&mut bench);
     assert_eq!(bench.workbench().snapshot().unwrap().grasp, 2);
 }
@@ -162,7 +162,7 @@ fn nothing_is_cut_off_or_covered_in_the_smallest_window() {
         "cubic 4 %",
         "cylindrical 8 %",
         "spherical 86 %",
-        "sure from",
+        "threshold",
         "Grasp 1: Lemon 61 %",
         "Grasp 4: not needed",
         "Next object",

@@ -6,7 +6,7 @@ use crate::golden::compare;
 use crate::gripper_tools::{bench, press};
 use crate::panels::side_by_side;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use palpate::app::Action;
+use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{TrainRequest, TrainWish, Trainer, TrainerView};
 use palpate_learn::Model;
@@ -193,7 +193,7 @@ fn the_window_trains_and_uses_what_it_trained() {
     let [dark, light] = Theme::ALL.map(|theme| {
         let setup = BenchSetup { size: [320.0, 760.0], fill: labelled, ..BenchSetup::default() };
         let mut bench: Bench = bench("training", theme, setup);
-        bench.until_shown(true, "63 of 5 objects");
+        bench.until_shown(true, "63 trials of 5 objects");
         assert!(bench.harness.query_by_label("cube: 3, needs 5").is_some());
         press(&mut bench, "Method");
         bench.harness.run_steps(3);
@@ -201,9 +201,9 @@ fn the_window_trains_and_uses_what_it_trained() {
         bench.harness.run_steps(3);
         press(&mut bench, "Train");
         bench.until_shown(true, "Macro F1");
-        assert!(bench.harness.query_by_label_contains("judged by 12 others").is_some());
+        assert!(bench.harness.query_by_label_contains("evaluated on 12 others").is_some());
         let confused = |text: &str| bench.harness.query_by_label_contains(text).is_some();
-        assert!(confused("lemon taken for tomato") || confused("tomato taken for lemon"));
+        assert!(confused("lemon predicted as tomato") || confused("tomato predicted as lemon"));
         // Without the list of files, in whose names the time stands.
         let picture = bench.harness.render().unwrap();
         let end = bench.harness.get_by_label("Models for the real gripper").rect().top() as u32 - 8;
@@ -219,9 +219,9 @@ fn the_window_trains_and_uses_what_it_trained() {
         }
         let used = bench.workbench().view().gripper_model.clone().unwrap();
         assert!(used.extension().is_some_and(|extension| extension == "safetensors"), "{used:?}");
-        assert!(bench.workbench().messages().iter().any(|text| text.contains("is recognised by KNN")));
-        bench.tell(Action::UseModel(Some("/nowhere.safetensors".into())));
-        while !bench.workbench().messages().iter().any(|text| text.contains("the real gripper keeps its model")) {
+        assert!(bench.workbench().messages().iter().any(|text| text.contains("Model for the real gripper: KNN")));
+        bench.tell(RecognitionAction::UseModel(Some("/nowhere.safetensors".into())));
+        while !bench.workbench().messages().iter().any(|text| text.contains("Model not changed")) {
             bench.harness.step();
             std::thread::sleep(Duration::from_millis(5));
         }

@@ -1,18 +1,18 @@
-//! The lower bar while the real gripper is shown: the keys of a trial, what is to be done now, and how much of it is left.
+//! Lower bar while the real gripper is shown: keys of a trial, instruction, and time left.
 
-use crate::app::actions::{Action, DeskAction};
-use crate::app::panels::PanelContext;
+use crate::app::actions::{Action, Actions};
+use crate::app::context::PanelContext;
+use crate::app::features::gripper::instruction;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
 use palpate_geometry::palette::Rgb;
 use palpate_lab::grasping::{GraspStage, LEAD_S};
-use palpate_lab::workers::{GripperWish, TrialView};
+use palpate_lab::workers::{GripperView, GripperWish, LabellingAction, TrialView};
 use palpate_sim::gripper::Phase;
-use palpate_tactile::trial::Control;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let trial = context.gripper.and_then(|gripper| gripper.trial.as_ref());
-    let connected = context.gripper.is_some_and(palpate_lab::workers::GripperView::is_connected);
+    let connected = context.gripper.is_some_and(GripperView::is_connected);
     ui.horizontal_centered(|ui| {
         let mut button = |on: bool, text: &str, about: &str, action: Action| {
             if ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about).clicked() {
@@ -23,12 +23,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         button(
             connected,
             record,
-            "Record a grasp; while one goes on, give it up and begin anew (R)",
-            Action::Desk(DeskAction::Record),
+            "Record a grasp; during a trial, discard it and start again (R)",
+            LabellingAction::Record.into(),
         );
-        let end = Action::Gripper(GripperWish::End);
-        button(trial.is_some(), "End  Q", "End the trial now, and keep it (Q)", end);
-        button(trial.is_some(), "Discard  D", "Give the trial up (D)", Action::Desk(DeskAction::Discard));
+        let end = GripperWish::End.into();
+        button(trial.is_some(), "End  Q", "End the trial and keep it (Q)", end);
+        button(trial.is_some(), "Discard  D", "Discard the trial (D)", LabellingAction::Discard.into());
         ui.separator();
         let colours = context.view.theme.colours();
         match trial {
@@ -41,27 +41,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
                 ui.weak("ready");
             }
             None => {
-                ui.weak("no gripper is connected");
+                ui.weak("no gripper connected");
             }
         }
     });
-}
-
-/// What is to be done now, as whoever stands at the control box wants to hear it.
-pub(in crate::app) fn instruction(trial: &TrialView) -> String {
-    let by_hand = trial.request.control == Control::ByHand;
-    match trial.stage {
-        GraspStage::Lead if by_hand => "Ready to close".to_owned(),
-        GraspStage::Lead => "At rest".to_owned(),
-        GraspStage::Phase(Phase::Close) if by_hand => "CLOSE: turn the pressure up".to_owned(),
-        GraspStage::Phase(Phase::Close) => "Closing".to_owned(),
-        GraspStage::Phase(Phase::Hold) if by_hand => "HOLD: leave it".to_owned(),
-        GraspStage::Phase(Phase::Hold) => "Holding".to_owned(),
-        GraspStage::Phase(Phase::Release) if by_hand => "RELEASE: turn the pressure down".to_owned(),
-        GraspStage::Phase(Phase::Release) => "Releasing".to_owned(),
-        GraspStage::Settle => "Coming to rest".to_owned(),
-        GraspStage::Free => "Recording".to_owned(),
-    }
 }
 
 fn part_colour(context: &PanelContext<'_>, part: GraspStage) -> Rgb {
@@ -73,7 +56,7 @@ fn part_colour(context: &PanelContext<'_>, part: GraspStage) -> Rgb {
     }
 }
 
-/// How far the trial is, and what is left of this part.
+/// Progress of the trial, and time left of this part.
 fn progress_ui(ui: &mut Ui, trial: &TrialView, ink: Rgb, ground: Rgb) {
     let left = trial.left_s.map_or_else(String::new, |left_s| format!("{left_s:.1} s"));
     ui.add_sized([52.0, 20.0], egui::Label::new(RichText::new(left).monospace()));

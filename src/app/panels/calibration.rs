@@ -1,10 +1,10 @@
-//! Calibrating the sensors of the real gripper, step by step: what to set next, the reading as it settles, the points with
-//! the curve through them, and what is left between.
+//! Calibration of the real gripper's sensors, step by step: instruction, reading, points with the fitted curve, residuals.
 
-use super::{PanelContext, wrapped};
-use crate::app::actions::Action;
-use crate::app::plots::still;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::plots::static_plot;
 use crate::app::theme::colour;
+use crate::app::widgets::{ANY_PORT, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
@@ -14,7 +14,7 @@ use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Curve, Kind, Point};
 use std::path::PathBuf;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let view = context.gripper.and_then(|gripper| gripper.calibration.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match view {
         Some(CalibrationView { running: Some(running), .. }) => running_ui(ui, context, running, actions),
@@ -23,7 +23,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     });
 }
 
-/// What is typed before a calibration begins.
+/// Form before a calibration.
 #[derive(Clone, Debug)]
 struct Form {
     sensor: Sensor,
@@ -37,12 +37,7 @@ impl Default for Form {
     }
 }
 
-fn begin_ui(
-    ui: &mut Ui,
-    context: &PanelContext<'_>,
-    ended: Option<&Result<String, String>>,
-    actions: &mut Vec<Action>,
-) {
+fn begin_ui(ui: &mut Ui, context: &PanelContext<'_>, ended: Option<&Result<String, String>>, actions: &mut Actions) {
     let id = egui::Id::unique("calibration form");
     let mut form = ui.data_mut(|data| data.get_temp::<Form>(id)).unwrap_or_default();
     match ended {
@@ -52,7 +47,7 @@ fn begin_ui(
     }
     wrapped(
         ui,
-        RichText::new("Readings of the real gripper become angles and forces by what its parts read at known ones.")
+        RichText::new("Calibrate each sensor at known angles or forces, to turn its counts into angles and forces.")
             .weak(),
     );
     ui.add_space(4.0);
@@ -69,7 +64,7 @@ fn begin_ui(
         });
         ui.end_row();
         let label = ui.label("Part");
-        let hint = "its number, such as A7";
+        let hint = "name or number, such as A7";
         ui.add(TextEdit::singleline(&mut form.part).hint_text(hint).char_limit(80)).labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Port");
@@ -78,22 +73,22 @@ fn begin_ui(
                 ui.add(egui::Label::new(link.port.path.display().to_string()).truncate());
             }
             None => {
-                ui.add(TextEdit::singleline(&mut form.port).hint_text("the only one there is")).labelled_by(label.id);
+                ui.add(TextEdit::singleline(&mut form.port).hint_text(ANY_PORT)).labelled_by(label.id);
             }
         }
         ui.end_row();
     });
     let named = !form.part.trim().is_empty();
-    let begin = ui.add_enabled(named, Button::new("Begin calibration"));
-    if begin.on_disabled_hover_text("Calibrations belong to parts: give this one a name").clicked() {
+    let begin = ui.add_enabled(named, Button::new("Start calibration"));
+    if begin.on_disabled_hover_text("Name the part: calibrations belong to parts").clicked() {
         let port = Some(form.port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
         let plan = CalibrationPlan { sensor: form.sensor, part: form.part.trim().to_owned(), port };
-        actions.push(Action::Gripper(GripperWish::Calibrate(CalibrationWish::Begin(plan))));
+        actions.push(GripperWish::Calibrate(CalibrationWish::Begin(plan)));
     }
     ui.data_mut(|data| data.insert_temp(id, form));
 }
 
-fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibration, actions: &mut Vec<Action>) {
+fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibration, actions: &mut Actions) {
     wrapped(ui, RichText::new(format!("\"{}\", {}", running.plan.part, running.plan.sensor.label())).weak());
     wrapped(ui, RichText::new(&running.instruction).strong());
     let counts = running.latest.map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
@@ -122,30 +117,37 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
     }
 }
 
-fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Vec<Action>) {
+fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
     let mut button = |ready: bool, text: &str, about: &str, wish: Option<CalibrationWish>| {
         let clicked = ui.add_enabled(ready && wish.is_some(), Button::new(text)).on_hover_text(about).clicked();
-        actions.extend(wish.filter(|_| clicked).map(|wish| Action::Gripper(GripperWish::Calibrate(wish))));
+        if let Some(wish) = wish.filter(|_| clicked) {
+            actions.push(GripperWish::Calibrate(wish));
+        }
     };
     let take = running.next.map(CalibrationWish::Take);
-    button(running.settled.is_ok(), "Take point", "Once the reading has settled", take);
+    button(running.settled.is_ok(), "Take point", "Take the settled reading", take);
     let free = !running.closing;
-    button(free && running.next.is_some(), "Leave out", "Go on without this one", Some(CalibrationWish::Skip));
+    button(free && running.next.is_some(), "Skip", "Leave this point out", Some(CalibrationWish::Skip));
     button(
         running.closing || !running.points.is_empty(),
-        "Take back",
-        "Measure the last one again",
+        "Undo",
+        "Measure the last point again",
         Some(CalibrationWish::Undo),
     );
     if Kind::of(running.plan.sensor) == Kind::Pad {
-        let about = "Watch the empty hand close for 15 s: how the pad's zero moves with bending";
+        let about = "Watch the empty hand close for 15 s, to correct the pad's zero for bending";
         button(running.can_close, "Empty close", about, Some(CalibrationWish::EmptyClose));
     }
-    button(free && running.fit.is_ok(), "Keep", "Store it; old trials are read by it too", Some(CalibrationWish::Keep));
-    button(true, "Stop", "Forget it", Some(CalibrationWish::Stop));
+    button(
+        free && running.fit.is_ok(),
+        "Save",
+        "Store the calibration; it applies to earlier trials too",
+        Some(CalibrationWish::Keep),
+    );
+    button(true, "Cancel", "Discard the calibration", Some(CalibrationWish::Stop));
 }
 
-/// What is read of a part, in the unit of the plot: kilohms of a strip, microsiemens of a pad.
+/// Reading of a part in the unit of the plot: kilohms of a strip, microsiemens of a pad.
 fn shown(kind: Kind, ohm: f64) -> f64 {
     match kind {
         Kind::Flex => ohm * 1e-3,
@@ -153,7 +155,7 @@ fn shown(kind: Kind, ohm: f64) -> f64 {
     }
 }
 
-/// The points, and the curve through them.
+/// Points and fitted curve.
 fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibration>, theme: Theme) {
     let Some(calibration) = fit else { return };
     let accent = colour(theme.colours().accent);
@@ -178,7 +180,7 @@ fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibratio
     });
 }
 
-/// What is left between curve and points.
+/// Residuals of the points.
 fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, theme: Theme) {
     let accent = colour(theme.colours().accent);
     let factor = if kind == Kind::Flex { 1f64.to_degrees() } else { 100.0 };
@@ -186,7 +188,7 @@ fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, theme: Them
     let off: Vec<[f64; 2]> = residuals.filter_map(|(p, off)| Some([kind.shown(p.stimulus), factor * off?])).collect();
     let worst = off.iter().map(|[_, off]| off.abs()).fold(0.0, f64::max);
     let unit = if kind == Kind::Flex { "degrees" } else { "%" };
-    ui.weak(format!("off the curve, at most {} {unit}", three_digits(worst)));
+    ui.weak(format!("residuals, at most {} {unit}", three_digits(worst)));
     plot(theme, "calibration residuals", 90.0, unit, kind.unit()).include_y(-0.5).include_y(0.5).show(ui, |plot| {
         for [at, off] in &off {
             plot.line(Line::new("off", vec![[*at, 0.0], [*at, *off]]).color(accent).width(1.5));
@@ -195,12 +197,12 @@ fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, theme: Them
     });
 }
 
-/// What bending alone shows on a pad, as if it were a force.
+/// Force that bending alone simulates on a pad.
 fn bending_plot(ui: &mut Ui, calibration: &Calibration, theme: Theme) {
     let accent = colour(theme.colours().accent);
     let (Curve::Pad(curve), Some(bending)) = (&calibration.curve, &calibration.record.bending) else { return };
     let reaches = bending.reaches();
-    ui.weak(format!("what bending alone shows, up to {} 1/m", three_digits(reaches)));
+    ui.weak(format!("zero shift by bending, up to {} 1/m", three_digits(reaches)));
     let line: PlotPoints<'_> = (0..=60)
         .map(|k| {
             let kappa = reaches * f64::from(k) / 60.0;
@@ -213,5 +215,5 @@ fn bending_plot(ui: &mut Ui, calibration: &Calibration, theme: Theme) {
 }
 
 fn plot(theme: Theme, id: &str, height: f32, axis: &str, stimulus: &str) -> Plot<'static> {
-    still(theme, id, height, axis, AxisHints::new_x().label(stimulus.to_owned()), 0.06)
+    static_plot(theme, id, height, axis, AxisHints::new_x().label(stimulus.to_owned()), 0.06)
 }

@@ -1,19 +1,19 @@
-//! The lines of the real gripper's board as they come, with what was made of them.
+//! Lines of the real gripper's board as they arrive, decoded.
 
-use super::PanelContext;
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
 use egui::{RichText, ScrollArea, TextWrapMode, Ui};
 use palpate_device::protocol::LineKind;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
     let lines = context.gripper.map(|gripper| &gripper.console).filter(|lines| !lines.is_empty());
     let Some(lines) = lines else {
-        ui.weak("What the board says, line by line: connect it in the panel Gripper.");
+        ui.weak("Lines of the board. Connect it in the panel Gripper.");
         return;
     };
     ui.horizontal_wrapped(|ui| {
-        ui.weak(format!("the last {} lines, newest last; marked: what could not be read", lines.len()));
-        if ui.small_button("Copy").on_hover_text("Copy them all").clicked() {
+        ui.weak(format!("last {} lines; unreadable ones in red", lines.len()));
+        if ui.small_button("Copy").on_hover_text("Copy all lines").clicked() {
             let text: Vec<String> =
                 lines.iter().map(|line| format!("{:.3} {}", 1e-3 * line.arrived_ms as f64, line.text)).collect();
             ui.ctx().copy_text(text.join("\n"));

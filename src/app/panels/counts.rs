@@ -1,22 +1,23 @@
-//! What the board of the real gripper counts, channel by channel, before any calibration.
+//! Raw ADC counts of the real gripper's board, channel by channel.
 
-use super::{PanelContext, Source};
-use crate::app::actions::Action;
-use crate::app::plots::{Curve, TimePlot, show};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::plots::{PlotCurve, TimePlot, show};
+use crate::app::view_source::ViewSource;
 use palpate_geometry::palette::Trace;
 use palpate_tactile::board::Sensor;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let link = context.gripper.and_then(|gripper| gripper.link.as_ref());
-    let Some(link) = link.filter(|_| context.source == Source::Gripper) else {
-        ui.weak("Counts of the real gripper's board: connect it in the panel Gripper.");
+    let Some(link) = link.filter(|_| context.source == ViewSource::Gripper) else {
+        ui.weak("Raw ADC counts. Connect the board in the panel Gripper.");
         return;
     };
-    let derived = context.channels().len();
+    let derived = context.shown().channels().len();
     let curves = link.board.channels.iter().enumerate().map(|(place, name)| {
         let sensor = Sensor::ALL.into_iter().find(|sensor| link.board.channel_of(*sensor) == Some(place));
         let (trace, dashed) = look(sensor, place);
-        Curve {
+        PlotCurve {
             name: if dashed { format!("{name}, dashed") } else { name.clone() },
             trace,
             dashed,
@@ -32,7 +33,7 @@ pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Ve
     );
 }
 
-/// Sensors look as everywhere; channels that are wired to something else take turns.
+/// Colour and dash: those of the sensor; other channels take turns.
 fn look(sensor: Option<Sensor>, place: usize) -> (Trace, bool) {
     match sensor {
         Some(Sensor::FlexLeft) => (Trace::Curvature, false),

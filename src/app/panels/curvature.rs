@@ -1,11 +1,12 @@
 //! Curvature of both fingers over time.
 
-use super::PanelContext;
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::channel_curves::channel_curves;
+use crate::app::context::PanelContext;
 use crate::app::plots::{TimePlot, show};
 use palpate_tactile::Quantity;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let curves = super::pressure::curves_of(context, Quantity::Curvature, 1.0);
+pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let curves = channel_curves(context, Quantity::Curvature, 1.0);
     show(ui, context, actions, &TimePlot { id: "curvature", unit: "1/m", curves, least: [0.0, 8.0] });
 }

@@ -1,11 +1,12 @@
-//! What is wrong between the gripper's board and this computer: the same list as `palpate doctor` prints, with cause, fix and
-//! a command to copy.
+//! Doctor: diagnostics of the gripper's board, wiring and port, as `palpate doctor` prints them, with cause, fix and a
+//! command to copy.
 
-use super::{PanelContext, command_ui, port_field, wrapped};
-use crate::app::actions::Action;
-use crate::app::gripper_tools::ToolWish;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::tools::ToolAction;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
+use crate::app::widgets::{command_ui, port_field, wrapped};
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
 use palpate_device::doctor::{
@@ -14,7 +15,7 @@ use palpate_device::doctor::{
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let view = context.tools.examiner.view().unwrap_or_default();
     let crosstalk = context.gripper.and_then(|gripper| gripper.crosstalk.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -33,31 +34,31 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
             None => {
                 ui.add_space(6.0);
                 let about: Vec<&str> = CHECKS.iter().map(|check| check.about).collect();
-                wrapped(ui, RichText::new(format!("It checks that {}.", about.join(", "))).weak());
+                wrapped(ui, RichText::new(format!("Checks that {}.", about.join(", "))).weak());
             }
         }
         ui.add_space(6.0);
-        CollapsingHeader::new("Wiring, and the sketch for the board").show(ui, wiring_ui);
+        CollapsingHeader::new("Wiring and firmware").show(ui, wiring_ui);
     });
 }
 
-fn begin_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
+fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
     let port = port_field(ui, egui::Id::unique("doctor port"));
-    let hint = "Bend a finger and press each pad meanwhile: more can be seen then.";
+    let hint = "Meanwhile, bend a finger and press each pad: more can be checked then.";
     ui.horizontal_wrapped(|ui| {
         if ui.button("Examine").on_hover_text(format!("Listen for {USUAL_LISTEN_S} s")).clicked() {
             let port = port.clone();
-            actions.push(Action::Tool(ToolWish::Examine(ExamineRequest { port, seconds: USUAL_LISTEN_S })));
+            actions.push(ToolAction::Examine(ExamineRequest { port, seconds: USUAL_LISTEN_S }));
         }
-        let about = "Each sensor in turn is moved alone, while those of the other finger are watched";
+        let about = "Move each sensor in turn; those of the other finger must not follow";
         if ui.button("Test for crosstalk").on_hover_text(about).clicked() {
-            actions.push(Action::Gripper(GripperWish::Crosstalk(CrosstalkWish::Begin(port))));
+            actions.push(GripperWish::Crosstalk(CrosstalkWish::Begin(port)));
         }
     });
     wrapped(ui, RichText::new(hint).weak());
 }
 
-/// How the board is wired.
+/// Wiring of the board.
 fn wiring_ui(ui: &mut Ui) {
     let [volt, bleeding] = WIRING_RULES;
     wrapped(ui, RichText::new(volt).color(ui.visuals().warn_fg_color));
@@ -77,7 +78,7 @@ fn wiring_ui(ui: &mut Ui) {
     wrapped(
         ui,
         RichText::new(
-            "Ports, pressure output and lines are told in full by the first of these; the second writes the sketch.",
+            "The first command prints the full wiring and the line format, the second writes the Arduino sketch.",
         )
         .weak(),
     );
@@ -88,18 +89,18 @@ fn wiring_ui(ui: &mut Ui) {
     }
 }
 
-fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCrosstalk, actions: &mut Vec<Action>) {
+fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCrosstalk, actions: &mut Actions) {
     if let Some([step, of]) = running.step {
         wrapped(ui, RichText::new(format!("Crosstalk test, sensor {step} of {of}")).weak());
     }
     wrapped(ui, RichText::new(format!("{}.", sentence(&running.instruction))).strong());
     ui.horizontal_wrapped(|ui| {
         for (text, about, wish) in [
-            ("Leave out", "Go on with the next sensor", CrosstalkWish::Skip),
-            ("Stop", "Say what was seen so far", CrosstalkWish::Stop),
+            ("Skip", "Continue with the next sensor", CrosstalkWish::Skip),
+            ("Stop", "End the test and report so far", CrosstalkWish::Stop),
         ] {
             if ui.button(text).on_hover_text(about).clicked() {
-                actions.push(Action::Gripper(GripperWish::Crosstalk(wish)));
+                actions.push(GripperWish::Crosstalk(wish));
             }
         }
     });
@@ -111,8 +112,8 @@ fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<Stri
     let bleeds = view.found.iter().any(|bleed| bleed.bleeds);
     match ended {
         Err(cause) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
-        Ok(told) => {
-            for (k, text) in told.iter().enumerate() {
+        Ok(report) => {
+            for (k, text) in report.iter().enumerate() {
                 let text = RichText::new(format!("{text}."));
                 wrapped(ui, if k == 0 && !bleeds { text.strong() } else { text });
             }
@@ -121,14 +122,14 @@ fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<Stri
     bleeds_ui(ui, &view.found);
 }
 
-/// What each sensor that was moved did to those that were watched.
+/// Influence of each moved sensor on the watched ones.
 fn bleeds_ui(ui: &mut Ui, found: &[Bleed]) {
     if found.is_empty() {
         return;
     }
     ui.add_space(4.0);
     Grid::new("crosstalk").num_columns(3).spacing([12.0, 3.0]).striped(true).show(ui, |ui| {
-        for title in ["moved", "watched", "shows"] {
+        for title in ["moved", "watched", "follows by"] {
             ui.weak(title);
         }
         ui.end_row();
@@ -137,19 +138,19 @@ fn bleeds_ui(ui: &mut Ui, found: &[Bleed]) {
             ui.label(bleed.into.label());
             let share = RichText::new(format!("{:5.1} %", 100.0 * bleed.share)).monospace();
             let share = if bleed.bleeds { share.color(ui.visuals().error_fg_color) } else { share };
-            ui.label(share).on_hover_text(format!("{:+.0} counts at most", bleed.counts));
+            ui.label(share).on_hover_text(format!("at most {:+.0} counts", bleed.counts));
             ui.end_row();
         }
     });
 }
 
-fn running_ui(ui: &mut Ui, request: &ExamineRequest, listened_s: f64, actions: &mut Vec<Action>) {
+fn running_ui(ui: &mut Ui, request: &ExamineRequest, listened_s: f64, actions: &mut Actions) {
     let of = request.seconds;
     let share = (listened_s / of.max(1e-9)) as f32;
     ui.add(ProgressBar::new(share).text(format!("listening, {listened_s:.0} of {of:.0} s")));
-    wrapped(ui, RichText::new("Now bend a finger, and press each pad.").strong());
-    if ui.button("Stop").on_hover_text("Say what was seen so far").clicked() {
-        actions.push(Action::Tool(ToolWish::StopExamining));
+    wrapped(ui, RichText::new("Now bend a finger and press each pad.").strong());
+    if ui.button("Stop").on_hover_text("End and report so far").clicked() {
+        actions.push(ToolAction::StopExamining);
     }
 }
 
@@ -160,11 +161,11 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &Examination) {
     wrapped(ui, RichText::new(sentence(&summary(&examination.findings))).heading().color(ink));
     if let Some(port) = &examination.port {
         let early = if examination.cut_short { ", then stopped" } else { "" };
-        let text = format!("{port}, listened to for {:.0} s{early}", examination.listened_s);
+        let text = format!("{port}, {:.0} s of readings{early}", examination.listened_s);
         wrapped(ui, RichText::new(text).weak());
     }
     ui.add_space(2.0);
-    // What is to be done comes first; among equals, the order of the checks.
+    // Problems first; among equals, the order of the checks.
     let mut findings: Vec<&CheckFinding> = examination.findings.iter().collect();
     findings.sort_by_key(|finding| match finding.verdict {
         CheckStatus::Failed => 0,
@@ -177,7 +178,7 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &Examination) {
     }
 }
 
-/// With a capital letter.
+/// Capitalises the first letter.
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
@@ -189,7 +190,7 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
         ui.vertical(|ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             headline_ui(ui, theme, finding);
-            for (word, text) in [("Why: ", &finding.cause), ("Do: ", &finding.fix)] {
+            for (word, text) in [("Cause: ", &finding.cause), ("Fix: ", &finding.fix)] {
                 if let Some(text) = text {
                     wrapped(ui, RichText::new(format!("{word}{text}.")));
                 }
@@ -201,7 +202,7 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     });
 }
 
-/// What was checked and what was seen, in one line where there is room.
+/// Check and observation, in one line where there is room.
 fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let colours = theme.colours();
     let (name, seen) = match finding.verdict {
@@ -217,7 +218,7 @@ fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     ui.add(Label::new(line).wrap());
 }
 
-/// A sign for the verdict, and its words for screen readers and pointers.
+/// Sign of the verdict, with its words for screen readers and pointers.
 fn mark_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let (rect, response) = ui.allocate_exact_size(egui::vec2(18.0, 18.0), Sense::hover());
     let label = format!("{}: {}", finding.check, finding.verdict.name());

@@ -1,8 +1,9 @@
-//! Which effects are simulated: each with its setting, why it is on or off, what it costs, and what the grasp would be
-//! with it left out or put in. The last two are measured in the background while the panel is in view.
+//! Physical effects: setting, reason, cost, and influence on the grasp. Cost and influence are measured in the background
+//! while the panel is open.
 
-use super::PanelContext;
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::simulation::SimulationAction;
 use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_geometry::palette::Theme;
@@ -12,9 +13,9 @@ use palpate_lab::workers::{EffectsState, EffectsView};
 use palpate_sim::frame::PlannedEffect;
 use palpate_sim::scene::{Effect, Scene, Setting};
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if context.effects.asked() != Some(context.scene) {
-        actions.push(Action::MeasureEffects);
+        actions.push(SimulationAction::MeasureEffects);
     }
     let view = context.effects.view().filter(|view| *view.scene == *context.scene);
     let explanation = match view.as_deref().map(|view| &view.state) {
@@ -26,20 +27,20 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         state_ui(ui, view.as_deref());
         for effect in Effect::ALL {
             let explained = explanation.and_then(|e| e.effects.iter().find(|e| e.planned.name == effect.name()));
-            // Until all is measured, what the grasp that is going on has made of it.
-            let going_on = context.snapshot.and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
-            let planned = explained.map(|explained| &explained.planned).or(going_on);
+            // Until all is measured, the plan of the current grasp.
+            let current = context.snapshot.and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
+            let planned = explained.map(|explained| &explained.planned).or(current);
             effect_ui(ui, context.view.theme, &mut scene, *effect, planned);
             details_ui(ui, planned, explained.zip(explanation));
             ui.add_space(7.0);
         }
     });
     if scene != *context.scene {
-        actions.push(Action::SetScene(Box::new(scene)));
+        actions.push(SimulationAction::SetScene(Box::new(scene)));
     }
 }
 
-/// One line on the measurement as a whole.
+/// State of the measurement.
 fn state_ui(ui: &mut Ui, view: Option<&EffectsView>) {
     let text = match view.map(|view| &view.state) {
         None | Some(EffectsState::Measuring(_, 0)) => "measuring ..".to_owned(),
@@ -53,7 +54,7 @@ fn state_ui(ui: &mut Ui, view: Option<&EffectsView>) {
     ui.add_space(4.0);
 }
 
-/// Lamp, name and the three settings.
+/// Lamp, name and settings.
 fn effect_ui(ui: &mut Ui, theme: Theme, scene: &mut Scene, effect: Effect, planned: Option<&PlannedEffect>) {
     let name = effect.name();
     ui.horizontal(|ui| {
@@ -74,7 +75,7 @@ fn effect_ui(ui: &mut Ui, theme: Theme, scene: &mut Scene, effect: Effect, plann
     });
 }
 
-/// Lit where the effect is on.
+/// Lamp, lit where the effect is on.
 fn lamp_ui(ui: &mut Ui, theme: Theme, name: &str, on: bool) {
     let (rect, response) = ui.allocate_exact_size(egui::vec2(12.0, 12.0), Sense::hover());
     let label = format!("{name} is {}", if on { "on" } else { "off" });
@@ -89,7 +90,7 @@ fn lamp_ui(ui: &mut Ui, theme: Theme, name: &str, on: bool) {
     response.on_hover_text(label);
 }
 
-/// Why, and what of it.
+/// Reason, cost and influence.
 fn details_ui(ui: &mut Ui, planned: Option<&PlannedEffect>, explained: Option<(&ExplainedEffect, &Explanation)>) {
     let quiet = |ui: &mut Ui, text: String| ui.add(egui::Label::new(RichText::new(text).small().weak()).wrap());
     if let Some(planned) = planned {
@@ -98,7 +99,7 @@ fn details_ui(ui: &mut Ui, planned: Option<&PlannedEffect>, explained: Option<(&
         let text = format!("{} ({number} {relation} {})", planned.reason, planned.threshold);
         let response = quiet(ui, text);
         if let Some((explained, _)) = explained {
-            response.on_hover_text(format!("{}\nThe number is {}.", explained.about, explained.number_is));
+            response.on_hover_text(format!("{}\nNumber: {}.", explained.about, explained.number_is));
         }
     }
     if let Some((explained, explanation)) = explained {

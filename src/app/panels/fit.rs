@@ -1,11 +1,15 @@
-//! Fit my finger: choose recorded trials, fit the simulated finger to them, see how well each parameter is known and how the
-//! twin lies on the recordings, and use it.
+//! Finger fit: choose recorded trials, fit the simulated finger to them, see confidence intervals and residuals, and use
+//! the fitted finger.
 
-use super::{PanelContext, just_opened, wrapped};
-use crate::app::actions::{Action, Message};
-use crate::app::gripper_tools::ToolWish;
-use crate::app::plots::still;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::files::FileAction;
+use crate::app::features::simulation::SimulationAction;
+use crate::app::features::tools::ToolAction;
+use crate::app::notices::UserMessage;
+use crate::app::plots::static_plot;
 use crate::app::theme::{colour, veil};
+use crate::app::widgets::{just_opened, wrapped};
 use egui::{Align, Button, Layout, ProgressBar, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
@@ -19,19 +23,19 @@ use palpate_store::TrialRow;
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "fit") {
-        actions.push(Action::Tool(ToolWish::Fit(FitWish::List)));
+        actions.push(ToolAction::Fit(FitWish::List));
     }
     let view = context.tools.fitter.view().unwrap_or_default();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let hint = "The simulated finger is laid over the real one: by a few empty closes, and presses against something \
-                    held in place.";
+        let hint =
+            "Fits the simulated finger to trials of the real one: a few empty closes, and grasps of a fixed object.";
         wrapped(ui, RichText::new(hint).weak());
         match view.running {
             Some(steps) => running_ui(ui, steps, actions),
             None => match &view.trials {
-                None => wrapped(ui, RichText::new("looking for recorded trials ..").weak()),
+                None => wrapped(ui, RichText::new("loading trials ..").weak()),
                 Some(Ok(rows)) => choice_ui(ui, rows, actions),
                 Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
             },
@@ -47,10 +51,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
 /// Height of the list of trials (points).
 const LIST: f32 = 132.0;
 
-/// The trials with a box to tick each, and the button that begins.
-fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Vec<Action>) {
+/// Trials to choose from, and the button that starts.
+fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Actions) {
     if rows.is_empty() {
-        let text = "There are no trials of the real gripper yet: record some, or run `palpate record`.";
+        let text = "No trials of the real gripper yet. Record some, here or with `palpate record`.";
         wrapped(ui, RichText::new(text));
     }
     let id = egui::Id::unique("fit trials");
@@ -64,7 +68,7 @@ fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Vec<Action>) {
         |ui, shown| {
             for row in rows.iter().skip(shown.start).take(shown.len()) {
                 let mut ticked = chosen.contains(&row.id);
-                if ui.checkbox(&mut ticked, trial_text(row)).on_hover_text("When it began is in UTC").changed() {
+                if ui.checkbox(&mut ticked, trial_text(row)).on_hover_text("Time in UTC").changed() {
                     if ticked {
                         chosen.insert(row.id)
                     } else {
@@ -76,11 +80,11 @@ fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Vec<Action>) {
     );
     ui.horizontal_wrapped(|ui| {
         let fit = ui.add_enabled(!chosen.is_empty(), Button::new("Fit"));
-        if fit.on_disabled_hover_text("Tick at least one trial").clicked() {
-            actions.push(Action::Tool(ToolWish::Fit(FitWish::Fit(chosen.iter().copied().collect()))));
+        if fit.on_disabled_hover_text("Choose at least one trial").clicked() {
+            actions.push(ToolAction::Fit(FitWish::Fit(chosen.iter().copied().collect())));
         }
-        if ui.button("Refresh").on_hover_text("Look for trials again").clicked() {
-            actions.push(Action::Tool(ToolWish::Fit(FitWish::List)));
+        if ui.button("Refresh").on_hover_text("Reload the trials").clicked() {
+            actions.push(ToolAction::Fit(FitWish::List));
         }
     });
     ui.data_mut(|data| data.insert_temp(id, chosen));
@@ -92,15 +96,15 @@ fn trial_text(row: &TrialRow) -> String {
     format!("{}  {object}  {began}", row.id)
 }
 
-fn running_ui(ui: &mut Ui, steps: f64, actions: &mut Vec<Action>) {
+fn running_ui(ui: &mut Ui, steps: f64, actions: &mut Actions) {
     let text = format!("step {:.0} of at most {MOST_STEPS}", steps.floor() + 1.0);
     ui.add(ProgressBar::new((steps / f64::from(MOST_STEPS)) as f32).text(text));
-    if ui.button("Stop").on_hover_text("Give it up; nothing is changed").clicked() {
-        actions.push(Action::Tool(ToolWish::StopFitting));
+    if ui.button("Stop").on_hover_text("Cancel; nothing changes").clicked() {
+        actions.push(ToolAction::StopFitting);
     }
 }
 
-fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, actions: &mut Vec<Action>) {
+fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, actions: &mut Actions) {
     let FittedFinger { trials, fit, scene, warnings } = fitted;
     ui.add_space(6.0);
     let names: Vec<String> = trials.iter().map(ToString::to_string).collect();
@@ -108,15 +112,15 @@ fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, act
     wrapped(ui, RichText::new(format!("Fitted to {plural} {}", names.join(", "))).heading());
     ui.horizontal_wrapped(|ui| {
         let in_use = context.scene.gripper == fit.gripper;
-        let text = if in_use { "This finger is in use" } else { "Use this finger" };
-        let hint = "Simulate the gripper with it from now on";
+        let text = if in_use { "Finger in use" } else { "Use this finger" };
+        let hint = "Simulate with the fitted finger from now on";
         if ui.add_enabled(!in_use, Button::new(text)).on_hover_text(hint).clicked() {
             let scene = Scene { gripper: fit.gripper.clone(), ..context.scene.clone() };
-            actions.push(Action::SetScene(Box::new(scene)));
-            actions.push(Action::Tell(Message::Info("the simulated gripper has the fitted fingers".to_owned())));
+            actions.push(SimulationAction::SetScene(Box::new(scene)));
+            actions.push(UserMessage::Info("Fitted finger in use.".to_owned()));
         }
-        if ui.button("Save as scene ..").on_hover_text("The first trial's scene with this gripper, as TOML").clicked() {
-            actions.push(Action::SaveSceneAs(Box::new(scene.clone())));
+        if ui.button("Save as scene ..").on_hover_text("Scene of the first trial with this finger, as TOML").clicked() {
+            actions.push(FileAction::SaveSceneAs(Box::new(scene.clone())));
         }
     });
     for remark in fit.remarks.iter().chain(warnings) {
@@ -126,18 +130,18 @@ fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, act
     courses_ui(ui, context.view.theme, fit);
 }
 
-/// Least and largest share of the value at which error bars end.
+/// Least and largest share of the value at which the bars end.
 const BAR_ENDS: [f64; 2] = [0.02, 0.5];
 
-/// Every parameter with its interval, in numbers and as a bar about its value.
+/// Each parameter with its interval, in numbers and as a bar about its value.
 fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
     let share = |estimate: &Estimate| [estimate.low, estimate.high].map(|end| end / estimate.value.max(1e-12) - 1.0);
-    // What the data do not tell reaches beyond.
-    let told = estimates.iter().filter(|estimate| estimate.known != Known::Hardly);
-    let widest = told.flat_map(share).map(f64::abs).fold(0.0, f64::max);
+    // Unidentified parameters reach beyond.
+    let identified = estimates.iter().filter(|estimate| estimate.known != Known::Hardly);
+    let widest = identified.flat_map(share).map(f64::abs).fold(0.0, f64::max);
     let end = widest.clamp(BAR_ENDS[0], BAR_ENDS[1]);
     ui.add_space(4.0);
-    let text = format!("95 % intervals; the bars end {:.0} % from the value", 100.0 * end);
+    let text = format!("95 % intervals; bars span ±{:.0} % of the value", 100.0 * end);
     wrapped(ui, RichText::new(text).weak());
     ui.spacing_mut().interact_size.y = 16.0;
     for estimate in estimates {
@@ -157,9 +161,9 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
         ui.horizontal(|ui| {
             bar_ui(ui, share(estimate).map(|share| (share / end) as f32), colour(known), estimate);
             let words = match estimate.known {
-                Known::Well => "well known",
-                Known::Roughly => "roughly known",
-                Known::Hardly => "hardly known",
+                Known::Well => "well identified",
+                Known::Roughly => "roughly identified",
+                Known::Hardly => "hardly identified",
             };
             let [low, high] = [estimate.low, estimate.high].map(three_digits);
             ui.label(RichText::new(format!("{low} to {high}, {words}")).small().weak());
@@ -168,14 +172,14 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
     }
 }
 
-/// The last word of a scene's key in plain letters; ratios as they are.
+/// Last part of a scene's key, in plain letters.
 fn name_of(estimate: &Estimate) -> String {
     let name = estimate.name.rsplit_once("gripper.").map_or(estimate.name.as_str(), |(_, name)| name);
     let name = name.split_once('.').filter(|(group, _)| !group.contains(' ')).map_or(name, |(_, key)| key);
     name.replace('_', " ").replace("/ bending stiffness", "/ stiffness")
 }
 
-/// An interval about the middle: ends in shares of half the width, cut where they go beyond.
+/// Interval about the middle: ends as shares of half the width, cut where they go beyond.
 fn bar_ui(ui: &mut Ui, [low, high]: [f32; 2], ink: egui::Color32, estimate: &Estimate) {
     let (rect, response) = ui.allocate_exact_size(egui::vec2(96.0, 14.0), Sense::hover());
     let label = format!("{}: {} to {}", name_of(estimate), three_digits(estimate.low), three_digits(estimate.high));
@@ -190,10 +194,10 @@ fn bar_ui(ui: &mut Ui, [low, high]: [f32; 2], ink: egui::Color32, estimate: &Est
     painter.circle_filled(egui::pos2(x(0.0), rect.center().y), 3.5, ink);
 }
 
-/// Recorded and fitted curvature over time, and what is left between them, recording by recording.
+/// Recorded and fitted curvature over time, and residuals, trial by trial.
 fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
     ui.add_space(6.0);
-    wrapped(ui, RichText::new("Thick: recorded; thin: fitted; the right finger is dashed.").weak());
+    wrapped(ui, RichText::new("Thick: recorded. Thin: fitted. Dashed: right finger.").weak());
     for (number, left) in fit.remainders.iter().enumerate() {
         wrapped(ui, RichText::new(remainder_text(left)));
         let own = |course: &&Course| course.name == left.name;
@@ -206,7 +210,7 @@ fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
                 plot.line(line(course, &course.fitted, "fitted").color(thin).width(1.2));
             }
         });
-        wrapped(ui, RichText::new("recorded less fitted").small().weak());
+        wrapped(ui, RichText::new("residual: recorded less fitted").small().weak());
         plot(theme, &format!("residuals {number}"), 70.0).include_y(-0.1).include_y(0.1).show(ui, |plot| {
             for course in &courses {
                 let off: Vec<f64> = course.recorded.iter().zip(&course.fitted).map(|(seen, fit)| seen - fit).collect();
@@ -218,7 +222,7 @@ fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
 
 fn remainder_text(left: &Remainder) -> String {
     let force = left.force_share.map_or_else(String::new, |share| format!(", force within {:.1} %", 100.0 * share));
-    format!("{}: curvature within {} 1/m{force} (rms)", left.name, three_digits(left.curvature_per_m))
+    format!("{}: curvature within {} 1/m{force} (RMS)", left.name, three_digits(left.curvature_per_m))
 }
 
 fn line<'a>(course: &Course, values: &[f64], name: &str) -> Line<'a> {
@@ -232,5 +236,5 @@ fn line<'a>(course: &Course, values: &[f64], name: &str) -> Line<'a> {
 
 fn plot(theme: Theme, id: &str, height: f32) -> Plot<'static> {
     let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value));
-    still(theme, id, height, "1/m", seconds, 0.0)
+    static_plot(theme, id, height, "1/m", seconds, 0.0)
 }

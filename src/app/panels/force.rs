@@ -1,11 +1,12 @@
 //! Normal force on both pads over time.
 
-use super::PanelContext;
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::channel_curves::channel_curves;
+use crate::app::context::PanelContext;
 use crate::app::plots::{TimePlot, show};
 use palpate_tactile::Quantity;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let curves = super::pressure::curves_of(context, Quantity::Force, 1.0);
+pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let curves = channel_curves(context, Quantity::Force, 1.0);
     show(ui, context, actions, &TimePlot { id: "force", unit: "N", curves, least: [0.0, 0.5] });
 }

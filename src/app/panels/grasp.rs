@@ -1,14 +1,14 @@
-//! This grasp in numbers: what is in the hand, what the sensors read now, and what the last grasp came to.
+//! This grasp in numbers: object, present readings, and result of the last grasp.
 
-use super::PanelContext;
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
 use egui::{Grid, RichText, ScrollArea, Ui};
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::workers::{FinishedGrasp, ObjectCard, Snapshot};
 use palpate_sim::gripper::Side;
 use palpate_tactile::Quantity;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
     let Some(snapshot) = context.snapshot else {
         ui.weak("Waiting for the first grasp ..");
         return;
@@ -26,7 +26,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Vec<Act
         match &snapshot.last {
             Some(last) => last_ui(ui, last),
             None => {
-                ui.weak("What the grasp came to stands here when it is over.");
+                ui.weak("The result appears when the grasp ends.");
             }
         }
     });
@@ -43,7 +43,7 @@ fn object_ui(ui: &mut Ui, object: &ObjectCard) {
     }
 }
 
-/// The newest values of the channels, left and right.
+/// Newest values of the channels, left and right.
 fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
     let newest = |quantity: Quantity, side: Side| -> Option<f64> {
         let trace = context.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
@@ -63,7 +63,7 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
         ] {
             ui.label(name);
             for side in Side::BOTH {
-                // A fixed width keeps the columns still while digits change.
+                // A fixed width: columns do not move while digits change.
                 let text = newest(quantity, side).map_or("–".to_owned(), |v| three_digits(v * factor));
                 ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(text).monospace()));
             }
@@ -79,7 +79,7 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
 
 fn last_ui(ui: &mut Ui, last: &FinishedGrasp) {
     let summary = &last.summary;
-    ui.weak(format!("grasp {} came to", last.grasp));
+    ui.weak(format!("result of grasp {}", last.grasp));
     Grid::new("summary").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
         let mut line = |name: &str, value: String| {
             ui.label(name);

@@ -1,21 +1,21 @@
-//! The real gripper: its port, how well its board keeps time, what its sensors show, where their zeros are, and the key
-//! that stops everything.
+//! The real gripper: port, timing of its board, sensor readings and zeros, actuation, and the stop button.
 
-use super::{PanelContext, command_ui, wrapped};
-use crate::app::actions::Action;
-use crate::app::theme::{colour, veil};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::gripper::{CONTROLS, GripperAction, control_title};
+use crate::app::theme::{accented, colour, veil};
+use crate::app::widgets::{command_ui, stop_button, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{GripperView, GripperWish, LatestReading};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
 use std::path::PathBuf;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let connected = context.gripper.and_then(|gripper| Some((gripper, gripper.link.as_ref()?)));
         match connected {
@@ -25,24 +25,24 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     });
 }
 
-/// What can be connected to.
-fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Ports to connect to.
+fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if let Some(refused) = context.gripper.and_then(|gripper| gripper.refused.as_ref()) {
         wrapped(ui, RichText::new(&refused.text).color(ui.visuals().error_fg_color));
         if let Some(command) = &refused.command {
             command_ui(ui, "the port", command);
         }
-        wrapped(ui, RichText::new("The panel Doctor, in the mode Label, examines port and board.").weak());
+        wrapped(ui, RichText::new("The panel Doctor in the mode Label examines port and board.").weak());
     } else {
-        wrapped(ui, RichText::new("No gripper is connected. Everything works without one, simulated.").weak());
+        wrapped(ui, RichText::new("No gripper connected. Everything works with the simulated one too.").weak());
     }
     ui.horizontal_wrapped(|ui| {
-        let connect = Button::new("Connect").fill(colour(accented(context.view.theme)));
-        if ui.add(connect).on_hover_text("To the only port that looks like the gripper's board").clicked() {
-            actions.push(Action::Gripper(GripperWish::Connect(None)));
+        let connect = Button::new("Connect").fill(accented(context.view.theme));
+        if ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)").clicked() {
+            actions.push(GripperWish::Connect(None));
         }
-        if ui.button("Look for ports").clicked() {
-            actions.push(Action::Gripper(GripperWish::ListPorts));
+        if ui.button("List ports").clicked() {
+            actions.push(GripperWish::ListPorts);
         }
     });
     let ports: &[PortInfo] = context.gripper.map_or(&[], |gripper| &gripper.ports);
@@ -50,7 +50,7 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) 
         let path = port.path.display().to_string();
         let button = Button::new(format!("{path}\n{}", port.title)).wrap();
         if ui.add_sized([ui.available_width(), 40.0], button).on_hover_text("Connect to this port").clicked() {
-            actions.push(Action::Gripper(GripperWish::Connect(Some(port.path.clone()))));
+            actions.push(GripperWish::Connect(Some(port.path.clone())));
         }
     }
     let id = egui::Id::unique("port path");
@@ -58,31 +58,13 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) 
     ui.horizontal(|ui| {
         let label = ui.label("Port or file");
         let field =
-            TextEdit::singleline(&mut path).hint_text("/dev/ttyACM0, or captured bytes").desired_width(f32::INFINITY);
+            TextEdit::singleline(&mut path).hint_text("/dev/ttyACM0 or captured bytes").desired_width(f32::INFINITY);
         let response = ui.add(field).labelled_by(label.id);
         if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-            actions.push(Action::Gripper(GripperWish::Connect(Some(PathBuf::from(path.trim())))));
+            actions.push(GripperWish::Connect(Some(PathBuf::from(path.trim()))));
         }
     });
     ui.data_mut(|data| data.insert_temp(id, path));
-}
-
-fn accented(theme: Theme) -> palpate_geometry::palette::Rgb {
-    let colours = theme.colours();
-    colours.raised.mix(colours.accent, 0.35)
-}
-
-/// The key that stops everything: the same wherever it stands.
-pub(in crate::app) fn stop_button(ui: &mut Ui, theme: Theme, actions: &mut Vec<Action>) {
-    let colours = theme.colours();
-    let text = RichText::new("STOP  Esc").strong().color(colour(colours.background));
-    let button = Button::new(text).fill(colour(colours.error));
-    let response =
-        ui.add_sized([84.0, 26.0], button).on_hover_text("Vent the fingers at once, and end the trial (Esc)");
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Stop and vent"));
-    if response.clicked() {
-        actions.push(Action::Gripper(GripperWish::Vent));
-    }
 }
 
 fn connected_ui(
@@ -90,19 +72,19 @@ fn connected_ui(
     context: &PanelContext<'_>,
     gripper: &GripperView,
     link: &LinkStatus,
-    actions: &mut Vec<Action>,
+    actions: &mut Actions,
 ) {
     ui.horizontal_wrapped(|ui| {
         stop_button(ui, context.view.theme, actions);
         if ui
             .button("Tare")
-            .on_hover_text("What the sensors show now is zero: nothing may touch the fingers (T)")
+            .on_hover_text("Set the present readings as zero; nothing may touch the fingers (T)")
             .clicked()
         {
-            actions.push(Action::Gripper(GripperWish::Tare));
+            actions.push(GripperWish::Tare);
         }
-        if ui.button("Disconnect").on_hover_text("Give the port back").clicked() {
-            actions.push(Action::Gripper(GripperWish::Disconnect));
+        if ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)").clicked() {
+            actions.push(GripperWish::Disconnect);
         }
     });
     health_ui(ui, link);
@@ -115,7 +97,7 @@ fn connected_ui(
     control_ui(ui, context, gripper, actions);
 }
 
-/// Port, board, and how well it keeps time.
+/// Port, board and timing.
 fn health_ui(ui: &mut Ui, link: &LinkStatus) {
     let port = format!("{}, {}", link.port.path.display(), link.port.title);
     wrapped(ui, RichText::new(port).small());
@@ -130,27 +112,21 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
             let text = if bad { text.color(ui.visuals().error_fg_color) } else { text };
             ui.label(text).on_hover_text(about);
         };
-        pair(ui, "rate", format!("{:.1} Hz", cadence.rate_hz), false, "Readings a second");
+        pair(ui, "rate", format!("{:.1} Hz", cadence.rate_hz), false, "Readings per second");
         pair(
             ui,
             "jitter",
             format!("{:.1} ms", cadence.jitter_p95_ms),
             false,
-            "95 % of the intervals are no farther off",
+            "95th percentile of the deviation between readings",
         );
         ui.end_row();
-        pair(
-            ui,
-            "lost",
-            cadence.lost.to_string(),
-            cadence.lost > 0,
-            "Readings that are missing, since it was connected",
-        );
-        pair(ui, "bad lines", cadence.bad_lines.to_string(), cadence.troubled, "Lines that could not be read");
+        pair(ui, "lost", cadence.lost.to_string(), cadence.lost > 0, "Readings lost since connecting");
+        pair(ui, "bad lines", cadence.bad_lines.to_string(), cadence.troubled, "Unreadable lines");
         ui.end_row();
-        pair(ui, "reconnects", link.reconnects.to_string(), false, "How often the connection was taken up again");
+        pair(ui, "reconnects", link.reconnects.to_string(), false, "Reconnections since connecting");
         let firmware = link.board.firmware.clone().unwrap_or_else(|| "–".to_owned());
-        pair(ui, "firmware", firmware, false, "What the board says of itself; – where it says nothing");
+        pair(ui, "firmware", firmware, false, "Firmware that the board reports");
         ui.end_row();
     });
     wrapped(ui, RichText::new(link.heard_as()).small().weak());
@@ -162,7 +138,7 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
     }
 }
 
-/// Each sensor: counts, what they come to, and where its zero is.
+/// Counts, calibrated value and zero of each sensor.
 fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, link: &LinkStatus) {
     let Some(latest) = &gripper.latest else {
         ui.weak("no readings yet");
@@ -174,13 +150,13 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, l
             ui.label(sensor.label());
             let counts = latest.counts.get(column).copied().flatten();
             let counts = counts.map_or_else(|| "–".to_owned(), |counts| format!("{counts:4.0}"));
-            ui.label(RichText::new(counts).monospace().weak()).on_hover_text("counts of the converter");
-            let felt = RichText::new(felt_text(latest, sensor)).monospace();
+            ui.label(RichText::new(counts).monospace().weak()).on_hover_text("ADC counts");
+            let value = RichText::new(value_text(latest, sensor)).monospace();
             if latest.beyond[sensor as usize] {
-                let about = "Beyond what it was calibrated with: read off the curve's extension";
-                ui.label(felt.color(ui.visuals().warn_fg_color)).on_hover_text(about);
+                let about = "Outside the calibrated range: extrapolated";
+                ui.label(value.color(ui.visuals().warn_fg_color)).on_hover_text(about);
             } else {
-                ui.label(felt);
+                ui.label(value);
             }
             match gripper.drift.iter().find(|drift| drift.sensor == sensor) {
                 Some(drift) => drift_badge(ui, context.view.theme, drift),
@@ -193,13 +169,13 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, l
         ui.label("line pressure");
         ui.label("");
         let bar = latest.line_bar.map_or_else(|| "–".to_owned(), |bar| format!("{bar:.2} bar"));
-        ui.label(RichText::new(bar).monospace()).on_hover_text("As commanded, or as the board reports it");
+        ui.label(RichText::new(bar).monospace()).on_hover_text("Commanded, or reported by the board");
         ui.end_row();
     });
 }
 
-/// What a sensor feels, with its unit.
-fn felt_text(latest: &LatestReading, sensor: Sensor) -> String {
+/// Calibrated value with its unit.
+fn value_text(latest: &LatestReading, sensor: Sensor) -> String {
     let side = sensor as usize % 2;
     let text = if sensor.is_flex() {
         latest.felt.angle[side].map(|angle| format!("{:6.1}°", angle.to_degrees()))
@@ -209,46 +185,37 @@ fn felt_text(latest: &LatestReading, sensor: Sensor) -> String {
     text.unwrap_or_else(|| "–".to_owned())
 }
 
-/// How far a zero has moved since the calibration.
+/// Drift of a zero since the calibration.
 fn drift_badge(ui: &mut Ui, theme: Theme, drift: &Drift) {
     let colours = theme.colours();
     let (word, ink) = match drift.level {
-        DriftLevel::Steady => ("steady", colours.quiet_text),
-        DriftLevel::Moved => ("moved", colours.warning),
-        DriftLevel::TooFar => ("too far", colours.error),
+        DriftLevel::Steady => ("stable", colours.quiet_text),
+        DriftLevel::Moved => ("drifted", colours.warning),
+        DriftLevel::TooFar => ("too large", colours.error),
     };
     let text = format!("{word} {}", drift.told());
     let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(5, 1));
-    let about = drift.remark().unwrap_or_else(|| "The zero is where the calibration has it".to_owned());
+    let about = drift.remark().unwrap_or_else(|| "Zero as calibrated".to_owned());
     frame.show(ui, |ui| ui.label(RichText::new(text).small().color(colour(ink)))).response.on_hover_text(about);
 }
 
-/// Who moves the fingers, in words.
-pub(in crate::app) fn control_title(control: Control) -> &'static str {
-    match control {
-        Control::ByHand => "by hand, as told",
-        Control::Driven => "by the board",
-        Control::Free => "as they like",
-    }
-}
-
-/// Who moves the fingers, and trials that begin by themselves.
-fn control_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, actions: &mut Vec<Action>) {
-    ui.label("The fingers are moved  (M)");
+/// Actuation, and automatic detection of trials.
+fn control_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, actions: &mut Actions) {
+    ui.label("Actuation  (M)");
     let mut control = context.view.control;
-    for (kind, about) in [
-        (Control::ByHand, "You turn the pressure up and down when the trial's phases say so"),
-        (Control::Driven, "The board passes on the pressures of the programme, as our firmware does"),
-        (Control::Free, "Nobody says when: a trial lasts until Q, and its phases are not known"),
-    ] {
+    for kind in CONTROLS {
+        let about = match kind {
+            Control::ByHand => "You set the pressure at the control box, as instructed",
+            Control::Driven => "The board sets the pressure of the programme; needs our firmware",
+            Control::Free => "Untimed: recording runs until Q, phases are unknown",
+        };
         if ui.radio_value(&mut control, kind, control_title(kind)).on_hover_text(about).changed() {
-            actions.push(Action::SetControl(control));
+            actions.push(GripperAction::SetControl(control));
         }
     }
     let mut watching = gripper.watching.is_some();
-    let about = "A trial begins when the pressure rises or the fingers move, and ends when they are back at rest";
-    if ui.checkbox(&mut watching, "Trials begin and end by themselves  (W)").on_hover_text(about).changed() {
-        let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
-        actions.push(Action::Gripper(GripperWish::Watch(watching.then_some(request))));
+    let about = "A trial starts when the pressure rises or the fingers move, and ends when they are at rest again";
+    if ui.checkbox(&mut watching, "Detect trials automatically  (W)").on_hover_text(about).changed() {
+        actions.push(GripperAction::ToggleWatch);
     }
 }

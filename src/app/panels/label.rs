@@ -1,30 +1,31 @@
-//! The card of the object in the hand: what to take next and how, what goes on, and what the trial is of. Everything on it
-//! has a key.
+//! Label card: the next object and its pose, the running trial, or the question for a label. Everything on it has a key.
 
-use super::{PanelContext, title_of, wrapped};
-use crate::app::actions::{Action, DeskAction};
-use crate::app::bars::instruction;
-use crate::app::labelling::{LISTED, tags_of};
-use crate::app::theme::{colour, veil};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::gripper::instruction;
+use crate::app::theme::{accented, colour, veil};
+use crate::app::widgets::wrapped;
 use egui::text_edit::TextEditState;
 use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
-use palpate_lab::workers::{GripperView, LabelView, LabelWish, TrialView};
+use palpate_lab::workers::{
+    GripperView, LabelView, LabelWish, LabellingAction, NUMBERED_OBJECTS, TrialView, object_title, parse_tags,
+};
 use palpate_sim::objects::catalogue;
 use palpate_store::labels::{LabelledTrial, NextTrial};
 
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(view) = context.labels else {
-        ui.weak("Looking into the store ..");
+        ui.weak("Reading the store ..");
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let going_on = context.gripper.and_then(|gripper| gripper.trial.as_ref());
-        match (going_on, context.view.draft.trial(view)) {
+        let running = context.gripper.and_then(|gripper| gripper.trial.as_ref());
+        match (running, context.draft.trial(view)) {
             (Some(trial), _) => {
-                going_on_ui(ui, context, view, trial);
+                running_ui(ui, context, view, trial);
                 answer_ahead_ui(ui, context, actions);
             }
             (None, Some(trial)) => question_ui(ui, context, view, trial, actions),
@@ -42,7 +43,7 @@ fn object_ui(ui: &mut Ui, context: &PanelContext<'_>, name: &str, below: &str) {
         let (rect, _) = ui.allocate_exact_size(vec2(PICTURE, PICTURE), Sense::hover());
         picture(ui, context, name, rect);
         ui.vertical(|ui| {
-            ui.label(RichText::new(title_of(name)).size(24.0).strong());
+            ui.label(RichText::new(object_title(name)).size(24.0).strong());
             if let Some(built_in) = catalogue().iter().find(|built_in| built_in.name == name) {
                 ui.weak(built_in.class().to_string());
             }
@@ -63,8 +64,8 @@ fn picture(ui: &Ui, context: &PanelContext<'_>, name: &str, place: Rect) {
     }
 }
 
-/// What to put between the fingers.
-fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &mut Vec<Action>) {
+/// Next object of the plan.
+fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &mut Actions) {
     last_ui(ui, context, view);
     match &view.next {
         Some(next) => {
@@ -72,48 +73,43 @@ fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &
             object_ui(ui, context, &next.object, &cue(next));
         }
         None => {
-            ui.heading("The plan is done");
+            ui.heading("Plan complete");
             wrapped(
                 ui,
-                RichText::new("Export with Ctrl+E, train in the panel Training, or want more in the panel Plan.")
-                    .weak(),
+                RichText::new("Export with Ctrl+E, train in the panel Training, or extend the panel Plan.").weak(),
             );
         }
     }
     ui.add_space(4.0);
     let connected = context.gripper.is_some_and(GripperView::is_connected);
-    let colours = context.view.theme.colours();
-    let fill = colour(colours.raised.mix(colours.accent, 0.35));
     if connected {
-        let button = Button::new("Record  R").fill(fill);
-        if ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp of it (R)").clicked() {
-            actions.push(Action::Desk(DeskAction::Record));
+        let button = Button::new("Record  R").fill(accented(context.view.theme));
+        if ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp (R)").clicked() {
+            actions.push(LabellingAction::Record);
         }
     } else {
         wrapped(
             ui,
-            RichText::new("Connect the gripper first: Ctrl+G, or the panel Gripper below.")
-                .color(ui.visuals().warn_fg_color),
+            RichText::new("Connect the gripper: Ctrl+G, or the panel Gripper below.").color(ui.visuals().warn_fg_color),
         );
     }
 }
 
-/// How the object is to be held, in words.
+/// Pose of the object, in words.
 fn cue(next: &NextTrial) -> String {
-    let turn = format!("turn it by {:.0}°", next.cue.turn_deg);
+    let turn = format!("turn by {:.0}°", next.cue.turn_deg);
     let [along, across] = next.cue.shift_mm;
     let part = |by: f64, positive: &str, negative: &str| match by.round() {
         by if by > 0.0 => format!(", {by:.0} mm {positive}"),
         by if by < 0.0 => format!(", {:.0} mm {negative}", -by),
         _ => String::new(),
     };
-    let shifts =
-        part(along, "towards the right finger", "towards the left finger") + &part(across, "backwards", "forwards");
-    format!("trial {} of it: {turn}{shifts}", next.number)
+    let shifts = part(along, "to the right finger", "to the left finger") + &part(across, "back", "forward");
+    format!("trial {}: {turn}{shifts}", next.number)
 }
 
-/// What goes on, large enough for whoever stands at the control box.
-fn going_on_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial: &TrialView) {
+/// Instruction, large enough to be read at the control box.
+fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial: &TrialView) {
     let accent = colour(context.view.theme.colours().accent);
     ui.label(RichText::new(instruction(trial)).size(26.0).strong().color(accent));
     if let Some(left_s) = trial.left_s {
@@ -125,19 +121,19 @@ fn going_on_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial:
     }
 }
 
-/// How the last label was received: the model's guess is shown now, and where it differs.
+/// Last label, with the model's prediction.
 fn last_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView) {
     let last = view.trials.iter().find(|trial| !trial.discarded && trial.object.is_some());
     let Some((trial, label)) = last.and_then(|trial| Some((trial, trial.object.as_ref()?))) else { return };
     let colours = context.view.theme.colours();
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
-            (format!("trial {}: {label}. The model agrees, {:.0} %", trial.id, 100.0 * guess.p), colours.accent)
+            (format!("trial {}: {label}. The model agrees ({:.0} %)", trial.id, 100.0 * guess.p), colours.accent)
         }
         Some(guess) => {
             let (class, p) = (&guess.class, 100.0 * guess.p);
             (
-                format!("trial {}: {label}. The model says {class}, {p:.0} %: to be looked at again", trial.id),
+                format!("trial {}: {label}. The model predicts {class} ({p:.0} %): please review", trial.id),
                 colours.warning,
             )
         }
@@ -156,18 +152,18 @@ fn last_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView) {
     });
 }
 
-/// What was it?
+/// Question for a label.
 fn question_ui(
     ui: &mut Ui,
     context: &PanelContext<'_>,
     view: &LabelView,
     trial: &LabelledTrial,
-    actions: &mut Vec<Action>,
+    actions: &mut Actions,
 ) {
-    let draft = &context.view.draft;
+    let draft = &context.draft;
     let question = match &trial.object {
-        Some(label) => format!("Trial {} is called {}. What is it?", trial.id, title_of(label)),
-        None => format!("Trial {}: what was it?", trial.id),
+        Some(label) => format!("Trial {}: labelled {}. Change it?", trial.id, object_title(label)),
+        None => format!("Trial {}: which object?", trial.id),
     };
     ui.label(RichText::new(question).heading().strong());
     wrapped(ui, RichText::new(&trial.cadence).small().weak());
@@ -177,43 +173,38 @@ fn question_ui(
     }
     search_ui(ui, context, actions);
     ui.horizontal_wrapped(|ui| {
-        let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
-        if ui.add(Button::new("Label  N, Enter").fill(fill)).clicked() {
-            actions.push(Action::Desk(DeskAction::Give));
+        if ui.add(Button::new("Label  N, Enter").fill(accented(context.view.theme))).clicked() {
+            actions.push(LabellingAction::GiveLabel);
         }
         let again = if trial.object.is_none() { "Again  R" } else { "Record  R" };
-        if ui
-            .button(again)
-            .on_hover_text("Throw this one away and record it again, where it has no label yet")
-            .clicked()
-        {
-            actions.push(Action::Desk(DeskAction::Record));
+        if ui.button(again).on_hover_text("Record again; an unlabelled trial is discarded").clicked() {
+            actions.push(LabellingAction::Record);
         }
         if ui.button("Discard  D").clicked() {
-            actions.push(Action::Desk(DeskAction::Discard));
+            actions.push(LabellingAction::Discard);
         }
         let mut unsure = trial.unsure;
         if ui.checkbox(&mut unsure, "unsure  U").changed() {
-            actions.push(Action::Label(LabelWish::Unsure(trial.id, unsure)));
+            actions.push(LabelWish::Unsure(trial.id, unsure));
         }
     });
     let (names, chosen) = (draft.objects(view), draft.chosen.unwrap_or(0));
-    for (place, name) in names.iter().take(LISTED).enumerate() {
+    for (place, name) in names.iter().take(NUMBERED_OBJECTS).enumerate() {
         let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
         if object_row(ui, context, place, name, place == chosen, !known).clicked() {
-            actions.push(Action::Desk(DeskAction::Choose(place)));
-            actions.push(Action::Desk(DeskAction::Give));
+            actions.push(LabellingAction::ChooseObject(place));
+            actions.push(LabellingAction::GiveLabel);
         }
     }
-    if names.len() > LISTED {
-        ui.weak(format!("and {} more: type to find them (/)", names.len() - LISTED));
+    if names.len() > NUMBERED_OBJECTS {
+        ui.weak(format!("and {} more: type to find them (/)", names.len() - NUMBERED_OBJECTS));
     }
     remarks_ui(ui, context, trial, actions);
 }
 
-/// Whoever knows what it is before the question is asked says so: the field is there as soon as it is wanted.
-fn answer_ahead_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let draft = &context.view.draft;
+/// Search field before the question, to answer ahead.
+fn answer_ahead_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let draft = &context.draft;
     if draft.focus_search || !draft.search.is_empty() || ui.memory(|memory| memory.has_focus(search_id())) {
         ui.add_space(4.0);
         search_ui(ui, context, actions);
@@ -224,13 +215,13 @@ fn search_id() -> egui::Id {
     egui::Id::unique("label search")
 }
 
-/// The field that finds objects.
-fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let draft = &context.view.draft;
+/// Search field for objects.
+fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let draft = &context.draft;
     let mut search = draft.search.clone();
-    let hint = "find an object, or name a new one ( / )";
+    let hint = "find or name an object ( / )";
     if draft.focus_search {
-        // It goes to the end of what was typed on its way, and not to where it stood in the last answer.
+        // At the end of the text typed ahead, not where it was in the last answer.
         let mut state = TextEditState::load(ui.ctx(), search_id()).unwrap_or_default();
         state.cursor.set_char_range(None);
         state.store(ui.ctx(), search_id());
@@ -240,22 +231,22 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>)
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
     if draft.focus_search {
         response.request_focus();
-        actions.push(Action::Desk(DeskAction::SearchFocused));
+        actions.push(LabellingAction::SearchFocused);
     }
-    // The arrows choose among what was found while the cursor stays in the field.
+    // Arrows choose among the matches while the cursor stays in the field.
     let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));
     if response.has_focus() && step != 0 {
-        let place = draft.chosen.unwrap_or(0).saturating_add_signed(step as isize).min(LISTED - 1);
-        actions.push(Action::Desk(DeskAction::Choose(place)));
+        let place = draft.chosen.unwrap_or(0).saturating_add_signed(step as isize).min(NUMBERED_OBJECTS - 1);
+        actions.push(LabellingAction::ChooseObject(place));
     }
     if search != draft.search {
-        actions.push(Action::Desk(DeskAction::Search(search)));
+        actions.push(LabellingAction::Search(search));
     } else if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
-        actions.push(Action::Desk(DeskAction::Give));
+        actions.push(LabellingAction::GiveLabel);
     }
 }
 
-/// An object that can be chosen: its key, its picture, its name.
+/// Object to choose: key, picture, name.
 fn object_row(
     ui: &mut Ui,
     context: &PanelContext<'_>,
@@ -266,7 +257,7 @@ fn object_row(
 ) -> egui::Response {
     let colours = context.view.theme.colours();
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 23.0), Sense::click());
-    let title = if new { format!("{name} (new)") } else { title_of(name) };
+    let title = if new { format!("{name} (new)") } else { object_title(name) };
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, format!("Label {title}")));
     if chosen || response.hovered() || response.has_focus() {
         let share = if chosen { 0.30 } else { 0.10 };
@@ -282,9 +273,9 @@ fn object_row(
     response
 }
 
-/// Notes and tags.
-fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, actions: &mut Vec<Action>) {
-    let draft = &context.view.draft;
+/// Note and tags.
+fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, actions: &mut Actions) {
+    let draft = &context.draft;
     let own = |written: &Option<(i64, String)>, stored: String| match written {
         Some((id, text)) if *id == trial.id => text.clone(),
         _ => stored,
@@ -295,23 +286,25 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
         let response =
             ui.add(TextEdit::singleline(&mut note).desired_width(f32::INFINITY).char_limit(500)).labelled_by(label.id);
         if response.changed() {
-            actions.push(Action::Desk(DeskAction::WriteNote(trial.id, note.clone())));
+            actions.push(LabellingAction::WriteNote(trial.id, note.clone()));
         }
         if response.lost_focus() && note != trial.note {
-            actions.push(Action::Label(LabelWish::Note(trial.id, note)));
+            actions.push(LabelWish::Note(trial.id, note));
         }
         ui.end_row();
         let mut tags = own(&draft.tags, trial.tags.join(", "));
         let label = ui.label("Tags");
-        let field =
-            TextEdit::singleline(&mut tags).hint_text("with commas").desired_width(f32::INFINITY).char_limit(200);
+        let field = TextEdit::singleline(&mut tags)
+            .hint_text("separated by commas")
+            .desired_width(f32::INFINITY)
+            .char_limit(200);
         let response = ui.add(field).labelled_by(label.id);
         if response.changed() {
-            actions.push(Action::Desk(DeskAction::WriteTags(trial.id, tags.clone())));
+            actions.push(LabellingAction::WriteTags(trial.id, tags.clone()));
         }
-        let list = tags_of(&tags);
+        let list = parse_tags(&tags);
         if response.lost_focus() && list != trial.tags {
-            actions.push(Action::Label(LabelWish::Tags(trial.id, list)));
+            actions.push(LabelWish::Tags(trial.id, list));
         }
         ui.end_row();
     });

@@ -1,12 +1,12 @@
-//! Commanded line pressure over time.
+//! Line pressure over time.
 
-use super::PanelContext;
-use crate::app::actions::Action;
-use crate::app::plots::{Curve, TimePlot, show};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::plots::{PlotCurve, TimePlot, show};
 use palpate_geometry::palette::Trace;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let curve = Curve {
+pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let curve = PlotCurve {
         name: "line".to_owned(),
         trace: Trace::Line,
         dashed: false,

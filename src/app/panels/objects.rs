@@ -1,7 +1,9 @@
-//! What can be grasped: the sixteen, an empty hand, and any file.
+//! Objects to grasp: built-in ones, the empty hand, and files.
 
-use super::PanelContext;
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::files::FileAction;
+use crate::app::features::simulation::SimulationAction;
 use crate::app::theme::colour;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_sim::objects::{EMPTY, catalogue};
@@ -9,7 +11,7 @@ use palpate_sim::objects::{EMPTY, catalogue};
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     open_row(ui, actions);
     ui.add_space(2.0);
     let chosen = context.scene.object.source.as_str();
@@ -17,7 +19,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         for path in &context.view.recent {
             let name = std::path::Path::new(path).file_name().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
             if row(ui, context, chosen == path, None, name, path).clicked() {
-                actions.push(Action::OpenObject(path.clone()));
+                actions.push(SimulationAction::OpenObject(path.clone()));
             }
         }
         for built_in in catalogue() {
@@ -26,33 +28,33 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
                 row(ui, context, chosen == built_in.name, texture, &built_in.title, &built_in.class().to_string())
                     .clicked();
             if clicked {
-                actions.push(Action::OpenObject(built_in.name.clone()));
+                actions.push(SimulationAction::OpenObject(built_in.name.clone()));
             }
         }
         if row(ui, context, chosen == EMPTY, None, "Empty hand", "nothing to grasp").clicked() {
-            actions.push(Action::OpenObject(EMPTY.to_owned()));
+            actions.push(SimulationAction::OpenObject(EMPTY.to_owned()));
         }
     });
 }
 
-/// The button and the field for files.
-fn open_row(ui: &mut Ui, actions: &mut Vec<Action>) {
+/// Button and field for files.
+fn open_row(ui: &mut Ui, actions: &mut Actions) {
     let open = ui.add_sized([ui.available_width(), 28.0], egui::Button::new("Open URDF, OBJ, STL .."));
     if open.on_hover_text("Ctrl+O, or drop a file anywhere on the window").clicked() {
-        actions.push(Action::PickFile);
+        actions.push(FileAction::Open);
     }
     let id = ui.scope_id().with("path");
     let mut path = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
     let field = egui::TextEdit::singleline(&mut path).hint_text(".. or paste a path").desired_width(f32::INFINITY);
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-        actions.push(Action::OpenObject(path.trim().trim_matches(['"', '\'']).to_owned()));
+        actions.push(SimulationAction::OpenObject(path.trim().trim_matches(['"', '\'']).to_owned()));
         path.clear();
     }
     ui.data_mut(|data| data.insert_temp(id, path));
 }
 
-/// A row to click: picture, title, and a quiet line below.
+/// Row of an object: picture, title, and a line below.
 fn row(
     ui: &mut Ui,
     context: &PanelContext<'_>,

@@ -1,26 +1,26 @@
-//! The plan of a labelling afternoon: how many trials of each object there are and are wanted, and which comes next.
+//! Labelling plan: trials recorded and wanted of each object, and the next one.
 
-use super::{PanelContext, title_of};
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
 use crate::app::theme::{colour, veil};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::LabelWish;
+use palpate_lab::workers::{LabelWish, object_title};
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
 
-/// Trials of an object that is added: as of the others (paper, section IV-B: 40 to 55).
+/// Trials wanted of an added object (paper, section IV-B: 40 to 55).
 const WANTED: u32 = 50;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(view) = context.labels else {
-        ui.weak("Looking into the store ..");
+        ui.weak("Reading the store ..");
         return;
     };
     let (done, wanted) = (view.progress.done(), view.progress.wanted());
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(format!("{done} of {wanted} trials")).strong());
         if let Some(next) = &view.next {
-            ui.weak(format!("next: {}", title_of(&next.object)));
+            ui.weak(format!("next: {}", object_title(&next.object)));
         }
     });
     add_ui(ui, actions);
@@ -33,8 +33,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     });
 }
 
-/// The field for an object that is not in the plan yet.
-fn add_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
+/// Field that adds an object.
+fn add_ui(ui: &mut Ui, actions: &mut Actions) {
     let id = egui::Id::unique("plan addition");
     let mut name = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
     let field =
@@ -42,21 +42,21 @@ fn add_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
     let response = ui.add(field);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
-        actions.push(Action::Label(LabelWish::Want(name.trim().to_owned(), WANTED)));
+        actions.push(LabelWish::Want(name.trim().to_owned(), WANTED));
         name.clear();
     }
     ui.data_mut(|data| data.insert_temp(id, name));
 }
 
-/// Name, a bar of what there is, and how many are wanted.
-fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, actions: &mut Vec<Action>) {
+/// Name, progress, and trials wanted.
+fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, actions: &mut Actions) {
     let colours = theme.colours();
     let ObjectProgress { name, wanted, done, flagged } = object;
     ui.horizontal(|ui| {
         let size = vec2((ui.available_width() - 84.0).max(60.0), 22.0);
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-        let flags = if *flagged > 0 { format!(", {flagged} with a flag") } else { String::new() };
-        let spoken = format!("{}: {done} of {wanted}{flags}", title_of(name));
+        let flags = if *flagged > 0 { format!(", {flagged} flagged") } else { String::new() };
+        let spoken = format!("{}: {done} of {wanted}{flags}", object_title(name));
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, &spoken));
         response.on_hover_text(&spoken);
         let painter = ui.painter_at(rect);
@@ -74,21 +74,27 @@ fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, action
             painter.rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Inside);
         }
         let (font, ink) = (egui::FontId::proportional(12.5), colour(colours.text));
-        painter.text(rect.left_center() + vec2(6.0, 0.0), egui::Align2::LEFT_CENTER, title_of(name), font.clone(), ink);
+        painter.text(
+            rect.left_center() + vec2(6.0, 0.0),
+            egui::Align2::LEFT_CENTER,
+            object_title(name),
+            font.clone(),
+            ink,
+        );
         painter.text(rect.right_center() - vec2(6.0, 0.0), egui::Align2::RIGHT_CENTER, done.to_string(), font, ink);
         let mut new = *wanted;
         let drag = DragValue::new(&mut new).range(0..=MOST_WANTED).speed(0.2);
-        let response = ui.add_sized([40.0, 22.0], drag).on_hover_text("How many are wanted");
-        // While it is dragged it has not been decided.
+        let response = ui.add_sized([40.0, 22.0], drag).on_hover_text("Trials wanted");
+        // Dragging has not ended.
         if new != *wanted && new > 0 && !response.dragged() {
-            actions.push(Action::Label(LabelWish::Want(name.clone(), new)));
+            actions.push(LabelWish::Want(name.clone(), new));
         }
         let remove = ui.add_enabled(*wanted > 0, egui::Button::new("–").small());
         remove.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Take {name} out of the plan"))
+            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Remove {name} from the plan"))
         });
-        if remove.on_hover_text("Take it out of the plan; its trials stay").clicked() {
-            actions.push(Action::Label(LabelWish::Unplan(name.clone())));
+        if remove.on_hover_text("Remove it from the plan; its trials stay").clicked() {
+            actions.push(LabelWish::Unplan(name.clone()));
         }
     });
 }

@@ -1,10 +1,12 @@
-//! Training on what was labelled: how many trials there are of each object, the method, how the new model does on trials that
-//! were held back, and which model listens to the real gripper.
+//! Training on labelled trials: trials of each object, method, result on held-back trials, and the model in use for the
+//! real gripper.
 
-use super::{PanelContext, just_opened, wrapped};
-use crate::app::actions::Action;
-use crate::app::gripper_tools::ToolWish;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::recognition::RecognitionAction;
+use crate::app::features::tools::{DEFAULT_METHOD, TRAINING_SEED, ToolAction};
 use crate::app::theme::colour;
+use crate::app::widgets::{just_opened, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
@@ -13,15 +15,9 @@ use palpate_learn::metrics::Confusion;
 use palpate_learn::{Labels, METHODS, method};
 use std::path::Path;
 
-/// What is trained where nobody chooses: quick to fit, and good with few trials.
-pub(in crate::app) const USUAL_METHOD: &str = "macro-layer";
-
-/// Seed of fits and of which trials are held back: the same data give the same model.
-const SEED: u64 = 1;
-
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "training") {
-        actions.push(Action::Tool(ToolWish::Train(TrainWish::Look)));
+        actions.push(ToolAction::Train(TrainWish::Look));
     }
     let view = context.tools.trainer.view().unwrap_or_default();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -37,16 +33,16 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         match &view.classes {
             Some(Ok(classes)) => classes_ui(ui, context.view.theme, classes),
             Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
-            None => wrapped(ui, RichText::new("looking for labelled trials ..").weak()),
+            None => wrapped(ui, RichText::new("loading labelled trials ..").weak()),
         }
         models_ui(ui, context, &view, actions);
     });
 }
 
-/// The method and the button that begins.
-fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Vec<Action>) {
+/// Method, and the button that starts.
+fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Actions) {
     let id = egui::Id::unique("training method");
-    let mut chosen = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_else(|| USUAL_METHOD.to_owned());
+    let mut chosen = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_else(|| DEFAULT_METHOD.to_owned());
     let title = method(&chosen).map_or("", |method| method.title);
     ui.horizontal_wrapped(|ui| {
         let label = ui.label("Method");
@@ -59,16 +55,17 @@ fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Vec<Action>) {
         shown.response.labelled_by(label.id);
         let too_little = view.too_little();
         let ready = matches!(&view.classes, Some(Ok(_))) && too_little.is_none();
-        let train =
-            ui.add_enabled(ready, Button::new("Train")).on_hover_text("On all labelled trials of the real gripper");
+        let train = ui
+            .add_enabled(ready, Button::new("Train"))
+            .on_hover_text("Train on all labelled trials of the real gripper");
         if train.on_disabled_hover_text(too_little.unwrap_or_default()).clicked() {
-            let request = TrainRequest { method: chosen.clone(), seed: SEED, quick: false };
-            actions.push(Action::Tool(ToolWish::Train(TrainWish::Train(request))));
+            let request = TrainRequest { method: chosen.clone(), seed: TRAINING_SEED, quick: false };
+            actions.push(ToolAction::Train(TrainWish::Train(request)));
         }
     });
     if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
         let share = 100.0 * HELD_BACK;
-        let text = format!("{about}. {share:.0} % of each object's trials are held back to judge it by.");
+        let text = format!("{about}. {share:.0} % of each object's trials are held back for evaluation.");
         wrapped(ui, RichText::new(text).weak());
     }
     if let Some(why) = view.too_little() {
@@ -77,20 +74,20 @@ fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Vec<Action>) {
     ui.data_mut(|data| data.insert_temp(id, chosen));
 }
 
-fn running_ui(ui: &mut Ui, request: &TrainRequest, stage: TrainingStage, actions: &mut Vec<Action>) {
+fn running_ui(ui: &mut Ui, request: &TrainRequest, stage: TrainingStage, actions: &mut Actions) {
     let title = method(&request.method).map_or(request.method.as_str(), |method| method.title);
     let (share, text) = match stage {
         TrainingStage::Reading(done, of) => (done as f64 / of.max(1) as f64, format!("reading trials, {done} of {of}")),
         TrainingStage::Fitting(share) => (share, format!("training {title}, {:.0} %", 100.0 * share)),
-        TrainingStage::Judging => (1.0, "judging".to_owned()),
+        TrainingStage::Judging => (1.0, "evaluating".to_owned()),
     };
     ui.add(ProgressBar::new(share as f32).text(text));
-    if ui.button("Stop").on_hover_text("Give it up; nothing is saved").clicked() {
-        actions.push(Action::Tool(ToolWish::StopTraining));
+    if ui.button("Stop").on_hover_text("Cancel; nothing is saved").clicked() {
+        actions.push(ToolAction::StopTraining);
     }
 }
 
-fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTraining, actions: &mut Vec<Action>) {
+fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTraining, actions: &mut Actions) {
     let FinishedTraining { trained, judged } = finished;
     let [low, high] = judged.evaluation.ci95;
     ui.add_space(6.0);
@@ -98,34 +95,33 @@ fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTrain
     wrapped(ui, RichText::new(format!("Macro F1 {f1:.2} ({low:.2} to {high:.2})")).heading());
     let [learned, held_back] = judged.trials;
     let title = method(&trained.model.card.method).map_or("", |method| method.title);
-    let text = format!("{title}, learned from {learned} trials, judged by {held_back} others; 95 % interval");
+    let text = format!("{title}: trained on {learned} trials, evaluated on {held_back} others; 95 % interval");
     wrapped(ui, RichText::new(text).weak());
     for class in &judged.too_few {
-        let text = format!("\"{}\" was left out: it has {} usable trials of {LEAST_TRIALS}", class.name, class.trials);
+        let text = format!("\"{}\" left out: {} usable trials, {LEAST_TRIALS} needed", class.name, class.trials);
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
     }
     if judged.left_out > 0 {
-        let text =
-            format!("{} trials were left out: the sensors they were recorded with are not calibrated", judged.left_out);
+        let text = format!("{} trials left out: their sensors are not calibrated", judged.left_out);
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
     }
     if trained.model.card.rejection.is_none() {
-        let text = "Whatever is in the hand, it names one of these: networks learn to say unknown from more trials.";
+        let text = "This model cannot answer \"unknown\": that takes more trials.";
         wrapped(ui, RichText::new(text).weak());
     }
     confusion_ui(ui, context.view.theme, &judged.evaluation.confusion, &trained.model.card.labels);
     use_ui(ui, context, Some(&trained.path), "Use for the real gripper", actions);
 }
 
-/// A button that lets a model listen, or that it does.
-fn use_ui(ui: &mut Ui, context: &PanelContext<'_>, path: Option<&Path>, text: &str, actions: &mut Vec<Action>) {
+/// Button that uses a model, or shows that it is in use.
+fn use_ui(ui: &mut Ui, context: &PanelContext<'_>, path: Option<&Path>, text: &str, actions: &mut Actions) {
     let in_use = context.view.gripper_model.as_deref() == path;
     let button = ui.add_enabled(!in_use, Button::new(if in_use { "in use" } else { text }));
     let name = path.map_or("the shipped model".into(), name_of);
     let label = if in_use { format!("{name} is in use") } else { format!("Use {name}") };
     button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, !in_use, &label));
-    if button.on_hover_text("Let it listen to the real gripper").clicked() {
-        actions.push(Action::UseModel(path.map(Path::to_owned)));
+    if button.on_hover_text("Use it to recognise objects in the real gripper").clicked() {
+        actions.push(RecognitionAction::UseModel(path.map(Path::to_owned)));
     }
 }
 
@@ -133,16 +129,16 @@ fn name_of(path: &Path) -> std::borrow::Cow<'_, str> {
     path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy()
 }
 
-/// How many trials there are of each object.
+/// Trials of each object.
 fn classes_ui(ui: &mut Ui, theme: Theme, classes: &[LabelledClass]) {
     ui.add_space(6.0);
     let all: usize = classes.iter().map(|class| class.trials).sum();
     wrapped(ui, RichText::new("Labelled trials").strong());
     if classes.is_empty() {
-        wrapped(ui, RichText::new("There are none yet: record grasps of the real gripper and label them.").weak());
+        wrapped(ui, RichText::new("None yet. Record trials of the real gripper and label them.").weak());
         return;
     }
-    wrapped(ui, RichText::new(format!("{all} of {} objects", classes.len())).weak());
+    wrapped(ui, RichText::new(format!("{all} trials of {} objects", classes.len())).weak());
     let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
     ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {
@@ -157,7 +153,7 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
         true => (class.trials.to_string(), colours.accent, colours.text),
         false => (format!("{}, needs {LEAST_TRIALS}", class.trials), colours.warning, colours.warning),
     };
-    // Some room for the scroll bar.
+    // Room for the scroll bar.
     let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - 10.0).max(120.0), 18.0), Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, format!("{}: {number}", class.name)));
     let painter = ui.painter_at(rect);
@@ -175,19 +171,19 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
 /// Room for the button beside a model, and for the scroll bar (points).
 const BUTTON: f32 = 72.0;
 
-/// Models that were saved, and the one that comes with the program.
-fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, actions: &mut Vec<Action>) {
+/// Saved models and the shipped one.
+fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, actions: &mut Actions) {
     ui.add_space(8.0);
     ui.horizontal(|ui| {
         ui.strong("Models for the real gripper");
-        if ui.button("Refresh").on_hover_text("Look for trials and models again").clicked() {
-            actions.push(Action::Tool(ToolWish::Train(TrainWish::Look)));
+        if ui.button("Refresh").on_hover_text("Reload trials and models").clicked() {
+            actions.push(ToolAction::Train(TrainWish::Look));
         }
     });
-    let shipped = ("The one that comes with Palpate".to_owned(), "learned from simulated grasps".to_owned(), None);
+    let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);
     let saved = view.models.iter();
     let saved = saved.map(|model| (name_of(&model.path).into_owned(), model.about.clone(), Some(model.path.as_path())));
-    // One from elsewhere, which the folder does not hold.
+    // A model from outside the folder.
     let other = context.view.gripper_model.as_deref().filter(|own| view.models.iter().all(|m| m.path != *own));
     let other = other.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
     for (name, about, path) in std::iter::once(shipped).chain(other).chain(saved) {
@@ -208,7 +204,7 @@ fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, action
 /// Cells of a confusion matrix: largest and least side (points).
 const CELLS: [f32; 2] = [26.0, 9.0];
 
-/// Rows are what it was, columns what it was taken for; a cell is as strong as its share of the row.
+/// Confusion matrix; a cell is as strong as its share of the row.
 fn confusion_ui(ui: &mut Ui, theme: Theme, confusion: &Confusion, labels: &Labels) {
     let count = confusion.classes().max(1);
     let colours = theme.colours();
@@ -216,7 +212,7 @@ fn confusion_ui(ui: &mut Ui, theme: Theme, confusion: &Confusion, labels: &Label
     let cell = ((ui.available_width() - names - 8.0) / count as f32).clamp(CELLS[1], CELLS[0]);
     let heading = if cell > 12.0 { 18.0 } else { 0.0 };
     ui.add_space(4.0);
-    wrapped(ui, RichText::new("Rows: what it was; columns: what it was taken for, in the same order").small().weak());
+    wrapped(ui, RichText::new("Rows: true class. Columns: predicted.").small().weak());
     let size = vec2(names + cell * count as f32, heading + cell * count as f32);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let name = |class: usize| labels.classes.get(class).map_or("", |class| class.name.as_str());
@@ -249,34 +245,34 @@ fn confusion_ui(ui: &mut Ui, theme: Theme, confusion: &Confusion, labels: &Label
             }
         }
     }
-    let told = ui.input(|input| input.pointer.hover_pos()).filter(|at| rect.contains(*at)).and_then(|at| {
+    let hint = ui.input(|input| input.pointer.hover_pos()).filter(|at| rect.contains(*at)).and_then(|at| {
         let [column, row] = [(at.x - corner.x) / cell, (at.y - corner.y) / cell];
         (row >= 0.0 && column >= 0.0).then(|| {
             let (row, column) = ((row as usize).min(count - 1), (column as usize).min(count - 1));
             let (here, all) = (confusion.count(row, Some(column)), confusion.class(row).trials);
-            format!("{} taken for {}: {here} of {all}", name(row), name(column))
+            format!("{} predicted as {}: {here} of {all}", name(row), name(column))
         })
     });
-    if let Some(told) = told {
-        response.on_hover_text_at_pointer(told);
+    if let Some(hint) = hint {
+        response.on_hover_text_at_pointer(hint);
     }
 }
 
-/// The text colour that stands out more.
+/// Text colour with more contrast.
 fn readable(behind: Rgb, theme: Theme) -> Rgb {
     let colours = theme.colours();
     let stands_out = |ink: &Rgb| (100.0 * ink.contrast(behind)) as u32;
     [colours.text, colours.background].into_iter().max_by_key(stands_out).unwrap_or(colours.text)
 }
 
-/// What was taken for something else, in words.
+/// Confusions in words.
 fn confusions(confusion: &Confusion, labels: &Labels) -> String {
     let classes = &labels.classes;
     let pairs = (0..classes.len()).flat_map(|row| (0..classes.len()).map(move |column| (row, column)));
     let wrong = pairs.filter(|(row, column)| row != column).filter_map(|(row, column)| {
         let count = confusion.count(row, Some(column));
-        (count > 0).then(|| format!("{} taken for {}: {count}", classes[row].name, classes[column].name))
+        (count > 0).then(|| format!("{} predicted as {}: {count}", classes[row].name, classes[column].name))
     });
     let wrong: Vec<String> = wrong.collect();
-    if wrong.is_empty() { "No trial was taken for another object".to_owned() } else { wrong.join("; ") }
+    if wrong.is_empty() { "No confusions".to_owned() } else { wrong.join("; ") }
 }

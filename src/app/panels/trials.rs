@@ -1,49 +1,47 @@
-//! Trials of the real gripper, newest first: a small picture of each, its label, what is wrong with it, and where the model
-//! sees something else.
+//! Trials of the real gripper, newest first: sparkline, label, flags, and disagreement of the model.
 
-use super::{PanelContext, title_of};
-use crate::app::actions::{Action, DeskAction};
-use crate::app::labelling::ShownTrials;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Trace;
-use palpate_lab::workers::{LabelView, LabelWish};
+use palpate_lab::workers::{LabelView, LabelWish, LabellingAction, TrialFilter, object_title};
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::TrialId;
 
 /// Height of a row (points).
 const ROW: f32 = 38.0;
-/// Width of the small picture (points).
+/// Width of the sparkline (points).
 const PICTURE: f32 = 74.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(view) = context.labels else {
-        ui.weak("Looking into the store ..");
+        ui.weak("Reading the store ..");
         return;
     };
-    let draft = &context.view.draft;
+    let draft = &context.draft;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for shown in ShownTrials::ALL {
+        for shown in TrialFilter::ALL {
             let text = format!("{} {}", shown.title(), shown.of(view).len());
-            if ui.selectable_label(draft.shown == shown, RichText::new(text).small()).clicked() {
-                actions.push(Action::Desk(DeskAction::Show(shown)));
+            if ui.selectable_label(draft.filter == shown, RichText::new(text).small()).clicked() {
+                actions.push(LabellingAction::Filter(shown));
             }
         }
     });
-    let listed = draft.shown.of(view);
+    let listed = draft.filter.of(view);
     if listed.is_empty() {
-        let text = match draft.shown {
-            ShownTrials::Kept => "No trial of the real gripper yet: connect it, and press R.",
-            ShownTrials::Disagreeing => "No label differs from what the model saw.",
-            ShownTrials::Unlabelled | ShownTrials::Flagged | ShownTrials::Discarded => "None.",
+        let text = match draft.filter {
+            TrialFilter::Kept => "No trials of the real gripper yet. Connect it and press R.",
+            TrialFilter::Disagreeing => "The model agrees with all labels.",
+            TrialFilter::Unlabelled | TrialFilter::Flagged | TrialFilter::Discarded => "None.",
         };
         ui.weak(text);
         return;
     }
     let current = draft.trial(view).map(|trial| trial.id);
     let mut list = ScrollArea::vertical().auto_shrink(false);
-    if let Some(offset) = to_be_seen(ui, &listed, current) {
+    if let Some(offset) = scroll_offset(ui, &listed, current) {
         list = list.vertical_scroll_offset(offset);
     }
     let height = ROW - ui.spacing().item_spacing.y;
@@ -54,8 +52,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     });
 }
 
-/// Where the list must stand for a trial that was picked just now, by the arrows, to be seen in the middle.
-fn to_be_seen(ui: &Ui, listed: &[&LabelledTrial], current: Option<TrialId>) -> Option<f32> {
+/// Scroll offset that shows a newly selected trial in the middle.
+fn scroll_offset(ui: &Ui, listed: &[&LabelledTrial], current: Option<TrialId>) -> Option<f32> {
     let seen = ui.scope_id().with("seen");
     let before = ui.data(|data| data.get_temp::<Option<TrialId>>(seen)).flatten();
     if before == current {
@@ -73,12 +71,12 @@ fn row_ui(
     view: &LabelView,
     trial: &LabelledTrial,
     current: bool,
-    actions: &mut Vec<Action>,
+    actions: &mut Actions,
 ) {
     let colours = context.view.theme.colours();
     let (rect, response) =
         ui.allocate_exact_size(vec2(ui.available_width(), ROW - ui.spacing().item_spacing.y), Sense::click());
-    let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), title_of);
+    let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), object_title);
     response.widget_info(|| {
         egui::WidgetInfo::selected(egui::Role::Button, true, current, format!("Trial {}, {name}", trial.id))
     });
@@ -116,19 +114,19 @@ fn row_ui(
         )
     };
     response.on_hover_text(about()).context_menu(|ui| {
-        if disagrees.is_some() && ui.button("Keep its label: looked at again").clicked() {
-            actions.push(Action::Label(LabelWish::Reviewed(trial.id)));
+        if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
+            actions.push(LabelWish::Reviewed(trial.id));
         }
         if ui.button("Discard").clicked() {
-            actions.push(Action::Label(LabelWish::Discard(trial.id)));
+            actions.push(LabelWish::Discard(trial.id));
         }
     });
     if clicked {
-        actions.push(Action::Desk(DeskAction::Select(Some(trial.id))));
+        actions.push(LabellingAction::Select(Some(trial.id)));
     }
 }
 
-/// The counts of both fingers' pads, small.
+/// Sparkline of the counts of both pads.
 fn sparkline(ui: &Ui, context: &PanelContext<'_>, trial: &LabelledTrial, place: Rect) {
     let theme = context.view.theme;
     let painter = ui.painter_at(place);

@@ -1,10 +1,13 @@
-//! The 3-D view: drag turns, the right or middle button shifts, the wheel zooms, a double click shows everything,
-//! Ctrl and drag pulls at the object.
+//! 3-D view: drag turns, the right or middle button moves, the wheel zooms, a double click shows everything, Ctrl and drag
+//! pulls at the object.
 
-use super::{PanelContext, Source};
-use crate::app::actions::Action;
-use crate::app::theme::colour;
-use crate::app::viewport::{Key, Paint};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::simulation::SimulationAction;
+use crate::app::features::view::ViewAction;
+use crate::app::theme::{colour, veil};
+use crate::app::view_source::ViewSource;
+use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Camera, StandardView};
@@ -14,10 +17,10 @@ use palpate_lab::workers::{Command, Snapshot};
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
 
-/// Change of curvature that can be seen (1/m): a quarter of a millimetre at the tip of a finger of a decimetre.
+/// Smallest visible change of curvature (1/m): 0.25 mm at the tip of a 100 mm finger.
 const SEEN_PER_M: f64 = 0.05;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let rect = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3-D view"));
@@ -26,7 +29,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         return;
     };
     if context.driver.is_none() {
-        message(ui, rect, context, "The 3-D view needs a graphics driver; plots and trials work without.");
+        message(ui, rect, context, "The 3-D view needs a graphics driver. Everything else works without.");
         return;
     }
     steer(ui, &response, context, actions);
@@ -51,39 +54,39 @@ fn message(ui: &Ui, rect: Rect, context: &PanelContext<'_>, text: &str) {
     ui.painter().galley(rect.center() - 0.5 * galley.size(), galley, ink);
 }
 
-/// What the mouse does to the camera and to the object.
-fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Moves the camera or pulls at the object by the mouse.
+fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, actions: &mut Actions) {
     let height = response.rect.height().max(1.0);
     let moved = response.drag_delta() / height;
     let drag = Vec2::new(moved.x, moved.y);
     let camera = context.view.camera;
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
-    // Letting go of the button or of Ctrl lets go of the object.
+    // Releasing the button or Ctrl releases the object.
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
     let pulled = ui.data(|data| data.get_temp::<bool>(response.id)).unwrap_or(false);
     if pulled && !pulling {
-        actions.push(Action::Simulation(Command::Pull(DVec3::ZERO)));
+        actions.push(Command::Pull(DVec3::ZERO));
     }
     ui.data_mut(|data| data.insert_temp(response.id, pulling));
     if pulling {
-        actions.push(Action::Simulation(Command::Pull(pull(response, &camera, height))));
+        actions.push(Command::Pull(pull(response, &camera, height)));
     } else if response.dragged_by(PointerButton::Primary) && !shift {
-        actions.push(Action::SetCamera(camera.orbited(drag)));
+        actions.push(ViewAction::SetCamera(camera.orbited(drag)));
     } else if response.dragged() && drag != Vec2::ZERO {
-        actions.push(Action::SetCamera(camera.panned(drag)));
+        actions.push(ViewAction::SetCamera(camera.panned(drag)));
     }
     if response.hovered() {
         let wheel = ui.input(|i| i.smooth_scroll_delta().y + 60.0 * i.zoom_delta().ln());
         if wheel != 0.0 {
-            actions.push(Action::SetCamera(camera.zoomed((-wheel * 0.0025).exp())));
+            actions.push(ViewAction::SetCamera(camera.zoomed((-wheel * 0.0025).exp())));
         }
     }
     if response.double_clicked() {
-        actions.push(Action::FrameAll);
+        actions.push(ViewAction::FrameAll);
     }
 }
 
-/// A force in the plane of the picture, in proportion to how far the mouse has been dragged.
+/// Force in the plane of the picture, in proportion to the drag.
 fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     let Some(total) = response.total_drag_delta() else { return DVec3::ZERO };
     let [right, up, _] = camera.axes();
@@ -101,7 +104,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
         ..PictureView::default()
     };
     let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
-    let key = Key {
+    let key = PictureKey {
         grasp: snapshot.grasp,
         sample: snapshot.frame.t,
         ghost: context.ghost.map(|ghost| ghost.t),
@@ -120,7 +123,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
     let reconstructed = key.real.is_some();
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
     if reconstructed {
-        let text = "Translucent: the real fingers, reconstructed from their flex strips as arcs. Solid: simulated.";
+        let text = "Translucent: real fingers, reconstructed from the flex strips. Solid: simulation.";
         let ink = colour(context.view.theme.colours().text);
         let galley = ui.painter().layout(
             text.to_owned(),
@@ -130,21 +133,21 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
         );
         let place = rect.left_bottom() + egui::vec2(12.0, -60.0 - galley.size().y);
         let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
-        ui.painter().rect_filled(ground, 4.0, crate::app::theme::veil(context.view.theme.colours().background, 0.7));
+        ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
         ui.painter().galley(place, galley, ink);
     }
 }
 
-/// Curvature of the real fingers (1/m), while they are shown and read.
+/// Curvature of the real fingers (1/m), while they are shown.
 fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
     let felt = context.gripper?.latest.as_ref()?.felt;
-    // In steps that cannot be seen, so that noise alone is not drawn again and again.
+    // In invisible steps, so that noise alone does not redraw the picture.
     let curvature = felt.curvature.map(|side| side.map(|kappa| (kappa / SEEN_PER_M).round() * SEEN_PER_M));
-    (context.source == Source::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
+    (context.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 
-/// Standard views and switches, in the upper left corner of the picture.
-fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Standard views and switches, in the upper left corner.
+fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {
     if rect.width() < 620.0 || rect.height() < 160.0 {
         return;
     }
@@ -159,26 +162,26 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ve
         (StandardView::Right, "Right", "Alt+3"),
         (StandardView::Top, "Top", "Alt+7"),
     ] {
-        if bar.small_button(name).on_hover_text(format!("Look from here ({key})")).clicked() {
-            actions.push(Action::SetCamera(camera.turned_to(view)));
+        if bar.small_button(name).on_hover_text(format!("{name} view ({key})")).clicked() {
+            actions.push(ViewAction::SetCamera(camera.turned_to(view)));
             if view == StandardView::Home {
-                actions.push(Action::FrameAll);
+                actions.push(ViewAction::FrameAll);
             }
         }
     }
     let parallel = bar.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
     if parallel.clicked() {
-        actions.push(Action::SetCamera(Camera { parallel: !camera.parallel, ..camera }));
+        actions.push(ViewAction::SetCamera(Camera { parallel: !camera.parallel, ..camera }));
     }
     let forces = bar.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
     if forces.clicked() {
-        actions.push(Action::SetForces(!context.view.forces));
+        actions.push(ViewAction::SetForces(!context.view.forces));
     }
     let other = context.scene.solver.engine.other().name();
     let ghost = bar
         .selectable_label(context.view.ghost, format!("Ghost: {other}"))
-        .on_hover_text("Fingers and object as the other engine computes them, translucent (G)");
+        .on_hover_text("Result of the other engine, translucent (G)");
     if ghost.clicked() {
-        actions.push(Action::SetGhost(!context.view.ghost));
+        actions.push(SimulationAction::SetGhost(!context.view.ghost));
     }
 }

@@ -216,18 +216,18 @@ impl Writer {
     }
 
     fn flush_if_due(&mut self) -> Result<(), StoreError> {
-        let OpenTrial::Board(mut board, written) = std::mem::replace(&mut self.trial, OpenTrial::None) else {
+        if !matches!(&self.trial, OpenTrial::Board(_, written) if written.elapsed() >= FLUSH_AFTER) {
             return Ok(());
-        };
-        let due = written.elapsed() >= FLUSH_AFTER;
-        if due {
-            self.with_store(|store| board.flush(store))?;
         }
-        self.trial = OpenTrial::Board(board, if due { Instant::now() } else { written });
+        if let OpenTrial::Board(mut board, _) = std::mem::replace(&mut self.trial, OpenTrial::None) {
+            self.with_store(|store| board.flush(store))?;
+            self.trial = OpenTrial::Board(board, Instant::now());
+        }
         Ok(())
     }
 
     fn finish_board(&mut self, end: &BoardTrialEnd) -> Result<(), StoreError> {
+        // After a failure there is nothing to end.
         let OpenTrial::Board(mut board, _) = std::mem::replace(&mut self.trial, OpenTrial::None) else {
             return Ok(());
         };

@@ -31,6 +31,7 @@ mod ghost;
 mod gripper;
 mod held_object;
 mod labeller;
+mod labelling_session;
 mod latest;
 mod listener;
 #[cfg(test)]
@@ -54,6 +55,10 @@ pub use gripper::{
     TrialView,
 };
 pub use labeller::{LabelView, LabelWish, Labeller, start_labeller};
+pub use labelling_session::{
+    LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
+    object_title, parse_tags,
+};
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{

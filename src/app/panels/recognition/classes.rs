@@ -1,8 +1,8 @@
-//! A bar for each class, always in the same order, and the threshold as a line across all of them that can be dragged.
+//! A bar for each class, always in the same order, and the threshold as a line across them that can be dragged.
 
 use super::words::{newest, percent, ranked, title};
 use super::{LEAST_LETTERS, Part, eased, fitted, labelled, put};
-use crate::app::actions::Action;
+use crate::app::features::recognition::RecognitionAction;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_lab::workers::THRESHOLDS;
@@ -10,19 +10,19 @@ use palpate_learn::Pmf;
 
 /// Size of letters where there is room (points).
 const LETTERS: f32 = 12.5;
-/// Distance from the line of the threshold within which it can be taken hold of (points).
+/// Distance within which the line of the threshold can be dragged (points).
 const GRIP: f32 = 6.0;
 
-/// Where things stand within a line (points).
+/// Columns of a line (points).
 #[derive(Clone, Copy)]
 struct Columns {
     bars: [f32; 2],
     line: f32,
-    /// Size of letters, the same for all names.
+    /// Size of letters of all names.
     letters: f32,
 }
 
-/// Draws so many lines, each so high.
+/// Draws this many lines of this height.
 pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f32)) {
     let labels = &part.view.labels;
     let pmf = newest(part.view);
@@ -45,7 +45,7 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f3
         let left_over: f64 = pmf.map_or(0.0, |pmf| 1.0 - shown.iter().map(|k| pmf.probabilities()[*k]).sum::<f64>());
         let text = format!("and {rest} others, {}", percent(left_over));
         let (rect, response) = labelled(ui, vec2(width, line), &text);
-        response.on_hover_text("Make the panel larger to see all of them");
+        response.on_hover_text("Enlarge the panel to see all");
         let quiet = colour(part.colours().quiet_text);
         put(ui, fitted(ui, text, 11.5, width, quiet), rect, Align2::LEFT_CENTER);
     }
@@ -53,7 +53,7 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f3
     threshold_ui(ui, part, columns, [top, bottom]);
 }
 
-/// All classes or, where there are fewer lines, the most likely ones, with one line left for how many are missing.
+/// All classes or, with fewer lines, the most likely ones; one line is left for the number of the others.
 fn shown_classes(classes: usize, lines: usize, pmf: Option<&Pmf>) -> Vec<usize> {
     if classes <= lines {
         return (0..classes).collect();
@@ -88,19 +88,19 @@ fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, c
     if share > 0.003 {
         ui.painter().rect_filled(track.with_max_x(from + (to - from) * share), 2.0, colour(fill));
     }
-    // A column of "0 %" says nothing that the empty bars do not.
+    // An empty bar says "0 %" already.
     if p >= 0.01 {
         put(ui, fitted(ui, percent(p), LETTERS, rect.right() - to - 4.0, ink), rect, Align2::RIGHT_CENTER);
     }
 }
 
-/// The line across the bars.
+/// Line of the threshold across the bars.
 fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom]: [f32; 2]) {
     let [from, to] = columns.bars;
     let threshold = part.view.rule.threshold;
     let x = from + (to - from) * threshold as f32;
     let grip = Rect::from_min_max(pos2(x - GRIP, top), pos2(x + GRIP, bottom));
-    // Reached by keyboard through the number below; here for the mouse.
+    // For the mouse; the number below is for the keyboard.
     let response =
         ui.interact(grip, ui.scope_id().with("threshold"), Sense::DRAG).on_hover_cursor(CursorIcon::ResizeHorizontal);
     response.widget_info(|| WidgetInfo::labeled(Role::Splitter, true, "Threshold"));
@@ -111,12 +111,12 @@ fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
         let wanted = stepped(f64::from((pointer.x - from) / (to - from)));
         if wanted != threshold {
-            part.actions.push(Action::SetThreshold(wanted));
+            part.actions.push(RecognitionAction::SetThreshold(wanted));
         }
     }
 }
 
-/// A threshold in whole percents or, where the next one would be out of reach, in tenths.
+/// Threshold in whole percent, above 99 % in tenths.
 pub(super) fn stepped(threshold: f64) -> f64 {
     let within = threshold.clamp(*THRESHOLDS.start(), *THRESHOLDS.end());
     let steps = if within > 0.99 { 1e3 } else { 1e2 };

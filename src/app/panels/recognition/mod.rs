@@ -1,24 +1,28 @@
-//! What is in the hand, as far as can be felt: the answer in large letters and why it stands, size and shape, a bar for
-//! each class with the threshold across them, and the grasps so far.
+//! Recognition: the answer and its reason, size and shape, a bar for each class with the threshold across them, and the
+//! grasps so far.
 
 mod classes;
 mod properties;
 mod strip;
 mod words;
 
-use super::{PanelContext, Recognised, Source};
-use crate::app::actions::Action;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::recognition::RecognitionAction;
+use crate::app::features::view::ViewAction;
 use crate::app::icons::{self, Icon};
-use crate::app::theme::colour;
+use crate::app::theme::{accented, colour};
+use crate::app::view_source::{Recognised, ViewSource};
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::THRESHOLDS;
 use std::sync::Arc;
 use words::{Headline, percent, reason};
 
-/// Time that bars take to follow a new answer (s).
+/// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
-/// Numbers that change faster than this cannot be read (s).
+/// Least time between two answers on the screen (s): faster ones cannot be read.
 const CALM_S: f64 = 0.1;
 /// Smallest letters (points).
 const LEAST_LETTERS: f32 = 8.5;
@@ -48,7 +52,7 @@ const ROOMY: Measures = Measures {
     gap: 7.0,
 };
 
-/// For a panel in a small window.
+/// Measures in a small window.
 const TIGHT: Measures = Measures {
     headline: 30.0,
     reason: 44.0,
@@ -63,7 +67,7 @@ const TIGHT: Measures = Measures {
 
 /// Height of the line with the threshold (points).
 const THRESHOLD_LINE: f32 = 24.0;
-/// Classes that are shown however little room there is; beyond that the panel scrolls.
+/// Least number of classes; with less room the panel scrolls.
 const LEAST_CLASSES: usize = 4;
 
 impl Measures {
@@ -71,26 +75,26 @@ impl Measures {
         if room.x < 250.0 || room.y < 560.0 { &TIGHT } else { &ROOMY }
     }
 
-    /// How many lines there are for classes, and how high each is.
+    /// Number of lines for classes, and the height of each.
     fn lines(&self, height: f32, classes: usize, has_stage_one: bool) -> (usize, f32) {
         let properties = if has_stage_one { 2.0 * self.properties + self.gap } else { 0.0 };
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
         let room = height - parts - properties - 7.0 * self.gap;
-        // All of them, if need be in lines as low as those of a small window.
+        // All of them, if necessary in lines of a small window.
         let line = (room / classes.max(1) as f32).floor().clamp(TIGHT.class, self.class);
         let lines = (room / line).floor().max(0.0) as usize;
         (lines.clamp(LEAST_CLASSES + 1, classes.max(LEAST_CLASSES + 1)), line)
     }
 }
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    let Some(recognised) = context.recognised() else {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let Some(recognised) = context.shown().recognised() else {
         ui.weak("Waiting for the first grasp ..");
         return;
     };
     if context.blind {
         ui.heading("Blind");
-        ui.label("What the model takes it for is hidden until you have said what it is.");
+        ui.label("The model's prediction is hidden until you label the trial.");
         return;
     }
     let room = ui.available_size();
@@ -117,25 +121,25 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
     });
 }
 
-/// The button that ends with this object and goes on with another.
-fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Vec<Action>) {
-    let fill = colour(context.view.theme.colours().raised.mix(context.view.theme.colours().accent, 0.35));
+/// Button for another object.
+fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Actions) {
+    let fill = accented(context.view.theme);
     let hint = match context.source {
-        Source::Simulation => "Grasp another of the sixteen, drawn at random (N)",
-        Source::Gripper => "Another object is in the hand: begin anew (N)",
+        ViewSource::Simulation => "Grasp another built-in object at random (N)",
+        ViewSource::Gripper => "Start over with another object in the hand (N)",
     };
     let next = egui::Button::new("Next object").fill(fill);
     if ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint).clicked() {
-        actions.push(Action::NextObject);
+        actions.push(RecognitionAction::NextObject);
     }
 }
 
 fn off_ui(ui: &mut Ui, why: Option<&str>) {
     ui.heading("Recognition is off");
-    ui.label(why.unwrap_or("There is no model to recognise with. Grasps are recorded all the same."));
+    ui.label(why.unwrap_or("No recognition model. Grasps are still recorded."));
 }
 
-/// The newest answer, but no more than ten different ones a second.
+/// Newest answer, at most ten different ones per second.
 fn calmed(ui: &Ui, view: &Arc<IdentificationView>) -> Arc<IdentificationView> {
     let (id, now) = (ui.scope_id().with("calmed"), ui.input(|i| i.time));
     let shown: Option<(f64, Arc<IdentificationView>)> = ui.data(|data| data.get_temp(id));
@@ -150,21 +154,21 @@ fn calmed(ui: &Ui, view: &Arc<IdentificationView>) -> Arc<IdentificationView> {
     Arc::clone(view)
 }
 
-/// What every part of the panel draws from.
+/// Data of all parts of the panel.
 struct Part<'a, 'b> {
     context: &'a PanelContext<'b>,
     recognised: &'a Recognised<'a>,
     view: &'a IdentificationView,
     measures: &'static Measures,
-    actions: &'a mut Vec<Action>,
+    actions: &'a mut Actions,
 }
 
 impl Part<'_, '_> {
-    fn colours(&self) -> palpate_geometry::palette::ThemeColours {
+    fn colours(&self) -> ThemeColours {
         self.context.view.theme.colours()
     }
 
-    /// The picture of a class where there is one, else an empty frame.
+    /// Picture of a class, or an empty frame.
     fn thumbnail(&self, ui: &Ui, class: &str, place: Rect) {
         match self.context.thumbnails.get(class) {
             Some(texture) => egui::Image::new(texture).corner_radius(3.0).paint_at(ui, place),
@@ -175,7 +179,7 @@ impl Part<'_, '_> {
         }
     }
 
-    /// The answer, its probability, and why it goes on or has stopped.
+    /// Answer, probability and reason.
     fn headline_ui(&self, ui: &mut Ui) {
         let (colours, measures) = (self.colours(), self.measures);
         let headline = Headline::of(self.view);
@@ -186,7 +190,7 @@ impl Part<'_, '_> {
             Headline::Decided(..) => colours.accent,
             Headline::Unknown => colours.warning,
             Headline::Leading(..) => colours.text,
-            Headline::Waiting | Headline::Feeling => colours.quiet_text,
+            Headline::Waiting | Headline::Sensing => colours.quiet_text,
         });
         let mut left = rect.left();
         if let Headline::Leading(class, _) | Headline::Decided(class, _) = headline {
@@ -205,12 +209,12 @@ impl Part<'_, '_> {
         let why = reason(self.view, self.recognised);
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
         let font = FontId::proportional(measures.reason_letters);
-        // A number keeps its unit.
+        // No line break between number and unit.
         let lines = ui.painter().layout(why.replace(" %", "\u{a0}%"), font, colour(colours.quiet_text), rect.width());
         put(ui, lines, rect, Align2::LEFT_CENTER);
     }
 
-    /// Whether it is right: the simulation knows. Set apart from everything that was felt.
+    /// True object, which the simulation knows; set apart from what was recognised.
     fn truth_ui(&mut self, ui: &mut Ui, (truth, title): &(&str, String)) {
         let colours = self.colours();
         let shown = self.context.view.truth_shown;
@@ -219,7 +223,7 @@ impl Part<'_, '_> {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
             None => {
-                let text = if shown { "told once it has decided" } else { "hidden" };
+                let text = if shown { "shown after the decision" } else { "hidden" };
                 (text.to_owned(), format!("Truth: {text}"), None)
             }
         };
@@ -244,7 +248,7 @@ impl Part<'_, '_> {
         }
         let ink = if sign.is_some() { colours.text } else { colours.quiet_text };
         put(ui, fitted(ui, text, 13.5, row.right() - left, colour(ink)), row.with_min_x(left), Align2::LEFT_CENTER);
-        let hint = "Tell, or keep hidden, what is in the hand in truth";
+        let hint = "Show or hide the true object";
         let toggle = ui.interact(eye, ui.scope_id().with("show the truth"), Sense::click()).on_hover_text(hint);
         toggle.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, "Show the truth"));
         focus_ring(ui, &toggle, eye);
@@ -255,16 +259,16 @@ impl Part<'_, '_> {
                 .line_segment([eye.center() + vec2(-7.0, 6.0), eye.center() + vec2(7.0, -6.0)], (2.0, colour(lit)));
         }
         if toggle.clicked() {
-            self.actions.push(Action::ShowTruth(!shown));
+            self.actions.push(ViewAction::ShowTruth(!shown));
         }
     }
 
-    /// The threshold as a number, for those who do not drag its line.
+    /// Threshold as a number.
     fn threshold_ui(&mut self, ui: &mut Ui) {
         let size = vec2(ui.available_width(), THRESHOLD_LINE);
         ui.allocate_ui_with_layout(size, egui::Layout::left_to_right(egui::Align::Center), |ui| {
             ui.set_min_size(size);
-            let label = ui.weak("sure from");
+            let label = ui.weak("threshold");
             let [least, most] = [THRESHOLDS.start(), THRESHOLDS.end()].map(|p| p * 100.0);
             let mut threshold = self.view.rule.threshold * 100.0;
             let plain =
@@ -275,22 +279,22 @@ impl Part<'_, '_> {
                 .max_decimals(1)
                 .custom_formatter(plain)
                 .suffix(" %");
-            let hint = "Probability from which on a class is taken as certain; its line can be dragged, too";
+            let hint = "Probability from which a class counts as certain; drag the line or the number";
             if ui.add(drag).labelled_by(label.id).on_hover_text(hint).changed() {
-                self.actions.push(Action::SetThreshold(classes::stepped(threshold / 100.0)));
+                self.actions.push(RecognitionAction::SetThreshold(classes::stepped(threshold / 100.0)));
             }
         });
     }
 }
 
-/// Room for something drawn, with the words that a screen reader reads.
+/// Room for a drawing, with its text for screen readers.
 fn labelled(ui: &mut Ui, size: egui::Vec2, spoken: &str) -> (Rect, Response) {
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, spoken));
     (rect, response)
 }
 
-/// A line of text as large as wanted, or as much smaller as the width asks; what is still too long is cut off with dots.
+/// Line of text, made smaller to fit the width and cut off with dots below the least size.
 fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
     let lay = |text: String, letters: f32| ui.painter().layout_no_wrap(text, FontId::proportional(letters), ink);
     let whole = lay(text.clone(), letters);
@@ -303,21 +307,20 @@ fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<
     ui.painter().layout_job(job)
 }
 
-/// A share as it is drawn: it follows what is said within [`EASE_S`]. It jumps where nothing is said, and where pictures
-/// come so seldom that it would only lag.
+/// Share as drawn: it follows the answer within [`EASE_S`], but jumps without an answer and at low frame rates.
 fn eased(ui: &Ui, id: egui::Id, p: Option<f64>) -> f32 {
     let seldom = ui.input(|i| i.unstable_dt) > 0.5 * EASE_S;
     let time = if p.is_none() || seldom { 0.0 } else { EASE_S };
     ui.ctx().animate_value_with_time(id, p.unwrap_or(0.0) as f32, time)
 }
 
-/// Paints a text at the given side of a place.
+/// Paints a text aligned within a place.
 fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
     let at = align.align_size_within_rect(text.size(), place).min;
     ui.painter().galley(at, text, Color32::PLACEHOLDER);
 }
 
-/// Shows where the keyboard is.
+/// Marks the widget with keyboard focus.
 fn focus_ring(ui: &Ui, response: &Response, place: Rect) {
     if response.has_focus() {
         let stroke = ui.visuals().selection.stroke;

@@ -1,4 +1,4 @@
-//! Stage one: size and shape, as bars with as many equal segments as there are answers.
+//! Stage one: size and shape, as bars with one segment for each answer.
 
 use super::words::{newest, whole_percent};
 use super::{Part, eased, fitted, put};
@@ -6,9 +6,9 @@ use crate::app::theme::colour;
 use egui::{Align2, Color32, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_learn::Pmf;
 
-/// Height of the line that shows how probable an answer is (points).
+/// Height of the line that shows the probability of an answer (points).
 const UNDERLINE: f32 = 4.0;
-/// Room for the name of a property (points); in a narrow panel its answers speak for themselves.
+/// Room for the name of a property, which narrow panels leave out (points).
 const NAME: f32 = 36.0;
 const NARROW: f32 = 250.0;
 /// Size of letters (points).
@@ -19,7 +19,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     if !part.view.has_stage_one {
         return;
     }
-    // An empty hand has neither, but that is not known before the grasp is over.
+    // An empty hand has neither, but that is known only after the grasp.
     let leader = newest(part.view).map(|pmf| &labels.classes[pmf.top().0]);
     let has_any = part.view.listening || leader.is_some_and(|class| class.size.is_some() || class.shape.is_some());
     let properties = part.view.verdict.as_ref().and_then(|v| v.properties.as_ref()).filter(|_| has_any);
@@ -35,7 +35,7 @@ fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String],
         put(ui, fitted(ui, name.to_owned(), 11.5, named, quiet), rect, Align2::LEFT_CENTER);
     }
     let width = (rect.width() - named) / answers.len().max(1) as f32;
-    // All of them bear their numbers, or none does.
+    // All have numbers, or none has.
     let needed =
         |answer: &String| fitted(ui, format!("{answer} 99 %"), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let numbered = answers.iter().map(needed).fold(0.0, f32::max) <= width - 10.0;
@@ -56,9 +56,9 @@ fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String],
 struct Segment<'a> {
     answer: &'a str,
     p: Option<f64>,
-    /// The probability as it is drawn.
+    /// Probability as drawn.
     share: f32,
-    /// Has room for a number.
+    /// There is room for a number.
     numbered: bool,
     leads: bool,
 }

@@ -1,4 +1,4 @@
-//! The grasps so far, side by side: what each led to, how sure it was, and the one that goes on.
+//! Grasps so far, side by side: answer and confidence after each, and the running one.
 
 use super::words::{percent, ranked, title};
 use super::{Part, eased, fitted, put};
@@ -6,16 +6,16 @@ use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 use palpate_learn::Pmf;
 
-/// Grasps that are shown; of more, the last ones.
+/// Most grasps shown; of more, the last ones.
 const MOST_CELLS: usize = 8;
 /// Widest cell (points).
 const WIDEST: f32 = 130.0;
 
-/// What a cell stands for.
+/// Grasp of a cell.
 #[derive(Clone, Copy)]
 enum Grasp<'a> {
     Over(&'a Pmf),
-    GoingOn(Option<&'a Pmf>),
+    Running(Option<&'a Pmf>),
     ToCome,
     NotNeeded,
 }
@@ -31,7 +31,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     for number in first..last {
         let grasp = match view.beliefs.get(number) {
             Some(belief) => Grasp::Over(belief),
-            None if number == over && view.listening => Grasp::GoingOn(view.verdict.as_ref().map(|v| &v.pmf)),
+            None if number == over && view.listening => Grasp::Running(view.verdict.as_ref().map(|v| &v.pmf)),
             None if view.decision.is_some() => Grasp::NotNeeded,
             None => Grasp::ToCome,
         };
@@ -48,9 +48,9 @@ fn cell_ui(ui: &Ui, part: &Part<'_, '_>, number: usize, grasp: Grasp<'_>, cell: 
     let count = number + 1;
     let (spoken, pmf, border) = match grasp {
         Grasp::Over(pmf) => (format!("Grasp {count}: {}", named(pmf)), Some(pmf), colours.border),
-        Grasp::GoingOn(Some(pmf)) => (format!("Grasp {count}, going on: {}", named(pmf)), Some(pmf), colours.accent),
-        Grasp::GoingOn(None) => (format!("Grasp {count}, going on"), None, colours.accent),
-        Grasp::ToCome => (format!("Grasp {count}: to come"), None, colours.border),
+        Grasp::Running(Some(pmf)) => (format!("Grasp {count}, running: {}", named(pmf)), Some(pmf), colours.accent),
+        Grasp::Running(None) => (format!("Grasp {count}, running"), None, colours.accent),
+        Grasp::ToCome => (format!("Grasp {count}: not yet"), None, colours.border),
         Grasp::NotNeeded => (format!("Grasp {count}: not needed"), None, colours.border),
     };
     ui.interact(cell, ui.scope_id().with(("grasp", number)), Sense::hover())
@@ -83,7 +83,7 @@ fn cell_ui(ui: &Ui, part: &Part<'_, '_>, number: usize, grasp: Grasp<'_>, cell: 
     }
 }
 
-/// The two largest shares as levels, one on the other.
+/// The two largest shares, stacked.
 fn shares_ui(ui: &Ui, part: &Part<'_, '_>, number: usize, pmf: &Pmf, cell: Rect) {
     let colours = part.colours();
     let fills = [veil(colours.accent, 0.38), veil(colours.quiet_text, 0.22)];

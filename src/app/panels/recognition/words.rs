@@ -1,24 +1,25 @@
-//! What recognition has to say, in words. Nothing is drawn here.
+//! Texts of the recognition panel.
 
-use crate::app::panels::{Recognised, title_of};
+use crate::app::view_source::Recognised;
 use palpate_lab::grasping::IdentificationView;
+use palpate_lab::workers::object_title;
 use palpate_learn::{Labels, Pmf, StopReason};
 
-/// Below this probability a first grasp that still goes on has no leader worth naming.
+/// Least probability at which a running first grasp names its leader.
 const WORTH_NAMING: f64 = 0.4;
 
-/// What stands large at the top.
+/// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Headline {
-    /// Nothing has been felt yet.
+    /// No answer yet.
     Waiting,
     /// Too early to say.
-    Feeling,
-    /// A class, by its index, and its probability; others may still overtake it.
+    Sensing,
+    /// Leading class by index, and its probability.
     Leading(usize, f64),
-    /// The class that was decided on, and its probability.
+    /// Decided class by index, and its probability.
     Decided(usize, f64),
-    /// It is none of the known classes.
+    /// None of the known classes.
     Unknown,
 }
 
@@ -28,32 +29,32 @@ impl Headline {
         match view.decision {
             Some(StopReason::Unknown) => Self::Unknown,
             Some(StopReason::Sure | StopReason::GraspLimit) => Self::Decided(class, p),
-            None if view.listening && view.beliefs.is_empty() && p < WORTH_NAMING => Self::Feeling,
+            None if view.listening && view.beliefs.is_empty() && p < WORTH_NAMING => Self::Sensing,
             None => Self::Leading(class, p),
         }
     }
 
-    /// What it says, and how probable that is.
+    /// Text and probability.
     pub(super) fn text(self, labels: &Labels) -> (String, Option<f64>) {
         match self {
             Self::Waiting => ("Ready".to_owned(), None),
-            Self::Feeling => ("Feeling ..".to_owned(), None),
+            Self::Sensing => ("Sensing ..".to_owned(), None),
             Self::Unknown => ("Unknown".to_owned(), None),
             Self::Leading(class, p) | Self::Decided(class, p) => (title(labels, class), Some(p)),
         }
     }
 }
 
-/// What is believed at the moment: of the grasp that goes on or, before it says anything, after the one before.
+/// Newest answer: of the running grasp or, before its first one, of the grasp before.
 pub(super) fn newest(view: &IdentificationView) -> Option<&Pmf> {
     view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())
 }
 
-/// Why it goes on, or why it has stopped.
+/// Reason for another grasp, or for the decision.
 pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let (threshold, most) = (percent(view.rule.threshold), view.rule.most_grasps);
     let Some(now) = newest(view) else {
-        let failed = "the grasp failed, so there is nothing to go by";
+        let failed = "grasp failed: no answer";
         return if recognised.finished { failed } else { recognised.waiting }.to_owned();
     };
     let p = now.top().1;
@@ -61,42 +62,41 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
     let grasp = format!("grasp {} of at most {most}", view.beliefs.len() + 1);
     match view.decision {
         Some(StopReason::Sure) if certain => format!("{} reaches the threshold of {threshold}", percent(p)),
-        Some(StopReason::Sure) => format!("{} reached the threshold that was set then", percent(p)),
-        Some(StopReason::GraspLimit) => format!("grasp limit of {} reached, best guess", view.beliefs.len()),
-        Some(StopReason::Unknown) => "the grasps agree on none of the known objects".to_owned(),
+        Some(StopReason::Sure) => format!("{} reached the former threshold", percent(p)),
+        Some(StopReason::GraspLimit) => format!("grasp limit reached ({}): best guess", view.beliefs.len()),
+        Some(StopReason::Unknown) => "the grasps agree on no known object".to_owned(),
         None if view.listening => match view.beliefs.last() {
-            Some(before) => format!("{grasp}; before it: {}", leaders(&view.labels, before)),
-            None => format!("{grasp}; it is sure from {threshold} on"),
+            Some(before) => format!("{grasp}; before: {}", leaders(&view.labels, before)),
+            None => format!("{grasp}; threshold {threshold}"),
         },
-        None if recognised.finished => format!("stopped before it was sure: {}", leaders(&view.labels, now)),
+        None if recognised.finished => format!("stopped below the threshold: {}", leaders(&view.labels, now)),
         None if certain && view.beliefs.len() == 1 => {
-            format!("{}, but less sure than it is of what it knows: one more", percent(p))
+            format!("{}, but unlike any known object: grasping again", percent(p))
         }
-        None if certain => format!("{}, but the grasps do not agree yet: one more", percent(p)),
-        None => format!("one more grasp: {}", leaders(&view.labels, now)),
+        None if certain => format!("{}, but the grasps disagree: grasping again", percent(p)),
+        None => format!("grasping again: {}", leaders(&view.labels, now)),
     }
 }
 
-/// Whether the decision is right, once there is one. An object that is no class is rightly called unknown.
+/// True where the decision is right; none before it. "Unknown" is right for an object that is no class.
 pub(super) fn is_right(view: &IdentificationView, truth: &str) -> Option<bool> {
     let decided = view.decided()?;
     let named = view.decision != Some(StopReason::Unknown);
     Some(if named { decided == truth } else { view.labels.class(truth).is_none() })
 }
 
-/// What people call a class.
+/// Title of a class.
 pub(super) fn title(labels: &Labels, class: usize) -> String {
-    labels.classes.get(class).map_or_else(String::new, |class| title_of(&class.name))
+    labels.classes.get(class).map_or_else(String::new, |class| object_title(&class.name))
 }
 
-/// A probability as a percentage, rounded down so that what falls short of a threshold never looks as if it reached
-/// it; with a decimal where whole steps are too coarse.
+/// Percentage, rounded down so that a probability below a threshold never seems to reach it; above 99 % with a decimal.
 pub(super) fn percent(p: f64) -> String {
     let tenths = (p * 1e3 + 1e-6).floor().clamp(0.0, 999.0);
     if tenths > 990.0 { format!("{:.1} %", tenths / 10.0) } else { format!("{:.0} %", (tenths / 10.0).floor()) }
 }
 
-/// The same without decimals, where there is little room.
+/// The same without decimals.
 pub(super) fn whole_percent(p: f64) -> String {
     percent(p.min(0.99))
 }
@@ -148,7 +148,7 @@ mod tests {
 
     fn said(view: &IdentificationView) -> (String, String) {
         let text = Headline::of(view).text(&view.labels).0;
-        let waiting = "the fingers close";
+        let waiting = "fingers closing";
         (text, reason(view, &Recognised { view: None, off: None, truth: None, waiting, finished: false }))
     }
 
@@ -157,21 +157,17 @@ mod tests {
         let listening =
             |now: f64, beliefs: &[f64]| IdentificationView { listening: true, ..view(Some(now), beliefs, None) };
         let cases = [
-            (view(None, &[], None), "Ready", "the fingers close"),
-            (listening(0.35, &[]), "Tomato", "grasp 1 of at most 4; it is sure from 90 % on"),
-            (listening(0.61, &[]), "Lemon", "grasp 1 of at most 4; it is sure from 90 % on"),
-            (listening(0.7, &[0.61]), "Lemon", "grasp 2 of at most 4; before it: lemon 61 %, tomato 35 %"),
-            (view(Some(0.61), &[0.61], None), "Lemon", "one more grasp: lemon 61 %, tomato 35 %"),
-            (view(Some(0.92), &[0.92], None), "Lemon", "92 %, but less sure than it is of what it knows: one more"),
-            (view(Some(0.92), &[0.5, 0.92], None), "Lemon", "92 %, but the grasps do not agree yet: one more"),
+            (view(None, &[], None), "Ready", "fingers closing"),
+            (listening(0.35, &[]), "Tomato", "grasp 1 of at most 4; threshold 90 %"),
+            (listening(0.61, &[]), "Lemon", "grasp 1 of at most 4; threshold 90 %"),
+            (listening(0.7, &[0.61]), "Lemon", "grasp 2 of at most 4; before: lemon 61 %, tomato 35 %"),
+            (view(Some(0.61), &[0.61], None), "Lemon", "grasping again: lemon 61 %, tomato 35 %"),
+            (view(Some(0.92), &[0.92], None), "Lemon", "92 %, but unlike any known object: grasping again"),
+            (view(Some(0.92), &[0.5, 0.92], None), "Lemon", "92 %, but the grasps disagree: grasping again"),
             (view(Some(0.92), &[0.92], Some(StopReason::Sure)), "Lemon", "92 % reaches the threshold of 90 %"),
-            (view(Some(0.8), &[0.8], Some(StopReason::Sure)), "Lemon", "80 % reached the threshold that was set then"),
-            (view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)), "Lemon", "grasp limit of 4 reached, best guess"),
-            (
-                view(Some(0.6), &[0.6], Some(StopReason::Unknown)),
-                "Unknown",
-                "the grasps agree on none of the known objects",
-            ),
+            (view(Some(0.8), &[0.8], Some(StopReason::Sure)), "Lemon", "80 % reached the former threshold"),
+            (view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)), "Lemon", "grasp limit reached (4): best guess"),
+            (view(Some(0.6), &[0.6], Some(StopReason::Unknown)), "Unknown", "the grasps agree on no known object"),
         ];
         for (view, headline, reason) in cases {
             assert_eq!(said(&view), (headline.to_owned(), reason.to_owned()));
@@ -180,11 +176,11 @@ mod tests {
             verdict: Some(Verdict { pmf: Pmf::uniform(17), properties: None }),
             ..listening(0.5, &[])
         };
-        assert_eq!(Headline::of(&torn), Headline::Feeling);
+        assert_eq!(Headline::of(&torn), Headline::Sensing);
     }
 
     #[test]
-    fn it_is_right_about_what_it_knows_and_about_what_nobody_told_it() {
+    fn unknown_is_right_for_an_object_that_is_no_class() {
         let decided = |reason| view(Some(0.95), &[0.95], Some(reason));
         assert_eq!(is_right(&view(Some(0.95), &[], None), "lemon"), None);
         assert_eq!(is_right(&decided(StopReason::Sure), "lemon"), Some(true));

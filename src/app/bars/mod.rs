@@ -1,24 +1,24 @@
-//! The bar above the panels (what this is, where data come from) and the bar below (time, or the trial that goes on).
+//! Bar above the panels (modes and data source) and below (time, or the running trial).
 
 mod trial;
 
-pub(super) use trial::instruction;
-
-use super::actions::Action;
-use super::icons::{self, Icon};
-use super::modes::{self, Mode};
-use super::panels::{PanelContext, Source, stop_button};
-use super::theme::{colour, veil};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::simulation::SPEEDS;
+use crate::app::features::view::ViewAction;
+use crate::app::icons::{self, Icon};
+use crate::app::modes;
+use crate::app::modes::mode::Mode;
+use crate::app::theme::{colour, veil};
+use crate::app::view_source::ViewSource;
+use crate::app::widgets::stop_button;
 use egui::{Align, Layout, RichText, Ui};
 use palpate_device::serial::LinkState;
-use palpate_geometry::palette::Theme;
+use palpate_geometry::palette::{Theme, Trace};
 use palpate_lab::workers::{Command, GripperView, Status};
 
-/// Speeds that can be chosen, as multiples of real time.
-pub(super) const SPEEDS: [f64; 8] = [1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-
-/// A speed as people write it: ¼× is 0.25×.
-pub(super) fn speed_text(speed: f64) -> String {
+/// A speed: ¼× is 0.25×.
+fn speed_text(speed: f64) -> String {
     if speed >= 1.0 || (speed * 100.0).fract() == 0.0 {
         format!("{speed}×")
     } else {
@@ -26,28 +26,28 @@ pub(super) fn speed_text(speed: f64) -> String {
     }
 }
 
-pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let colours = context.view.theme.colours();
     ui.horizontal_centered(|ui| {
         ui.label(RichText::new("Palpate").heading().strong());
         modes_ui(ui, context, actions);
         sources_ui(ui, context, actions);
-        if context.source == Source::Simulation {
+        if context.source == ViewSource::Simulation {
             simulated_ui(ui, context);
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui.button("?").on_hover_text("Keys (F1)").clicked() {
-                actions.push(Action::ShowKeys(!context.view.keys_shown));
+                actions.push(ViewAction::ShowKeys(!context.view.keys_shown));
             }
             let (icon, other) = match context.view.theme {
                 Theme::Dark => (Icon::Sun, Theme::Light),
                 Theme::Light => (Icon::Moon, Theme::Dark),
             };
-            if icons::button(ui, icon, "Theme", &format!("Change to the {} theme", other.name())).clicked() {
-                actions.push(Action::SetTheme(other));
+            if icons::button(ui, icon, "Theme", &format!("Change to {} theme", other.name())).clicked() {
+                actions.push(ViewAction::SetTheme(other));
             }
-            if ui.button("Reset layout").on_hover_text("Put all panels back").clicked() {
-                actions.push(Action::ResetLayout);
+            if ui.button("Reset layout").on_hover_text("Restore the default layout of all modes").clicked() {
+                actions.push(ViewAction::ResetLayout);
             }
             if context.gripper.is_some_and(GripperView::is_connected) {
                 stop_button(ui, context.view.theme, actions);
@@ -60,20 +60,20 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Act
     });
 }
 
-/// The tabs of the modes.
-fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Tabs of the modes.
+fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.spacing_mut().item_spacing.x = 2.0;
     for kind in &modes::ALL {
         let chosen = context.view.mode == kind.mode;
         if ui.selectable_label(chosen, kind.title).on_hover_text(kind.about).clicked() && !chosen {
-            actions.push(Action::SetMode(kind.mode));
+            actions.push(ViewAction::SetMode(kind.mode));
         }
     }
     ui.spacing_mut().item_spacing.x = 8.0;
 }
 
-/// Where the data come from. While a gripper is connected, a click on the other source shows that one.
-fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Source of the data. While a gripper is connected, a click changes it.
+fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let colours = context.view.theme.colours();
     let link = context.gripper.and_then(|gripper| gripper.link.as_ref());
     let Some(link) = link else {
@@ -82,7 +82,7 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>
     let listening = link.state == LinkState::Listening;
     let cadence = &link.cadence;
     let real = match (listening, cadence.troubled) {
-        (true, true) => format!("REAL GRIPPER {:.0} Hz: many lines cannot be read", cadence.rate_hz),
+        (true, true) => format!("REAL GRIPPER {:.0} Hz: many unreadable lines", cadence.rate_hz),
         (true, false) => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
         (false, _) => "REAL GRIPPER: no readings".to_owned(),
     };
@@ -91,23 +91,23 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>
     let about = format!("{}: {}", link.port.path.display(), link.state.sentence());
     let about = std::iter::once(about).chain(remarks.iter().cloned()).collect::<Vec<_>>().join("\n");
     for (source, text, about) in [
-        (Source::Gripper, real, about),
-        (Source::Simulation, "SIMULATED".to_owned(), "Show the simulation instead".to_owned()),
+        (ViewSource::Gripper, real, about),
+        (ViewSource::Simulation, "SIMULATED".to_owned(), "Show the simulation".to_owned()),
     ] {
         let chosen = context.source == source;
         let ink = match source {
-            Source::Gripper if trouble => colours.error,
-            Source::Gripper if !remarks.is_empty() => colours.warning,
-            Source::Gripper | Source::Simulation => colours.text,
+            ViewSource::Gripper if trouble => colours.error,
+            ViewSource::Gripper if !remarks.is_empty() => colours.warning,
+            ViewSource::Gripper | ViewSource::Simulation => colours.text,
         };
         let text = RichText::new(text).small().color(colour(ink));
         if ui.selectable_label(chosen, text).on_hover_text(about).clicked() {
-            actions.push(Action::Show(source));
+            actions.push(ViewAction::Show(source));
         }
     }
 }
 
-/// What the simulation has in the hand, and how far its round is.
+/// Object in the simulated hand, and grasps made.
 fn simulated_ui(ui: &mut Ui, context: &PanelContext<'_>) {
     let object = context.snapshot.and_then(|s| s.object.as_deref());
     if let Some(object) = object.filter(|_| context.view.truth_shown) {
@@ -115,7 +115,7 @@ fn simulated_ui(ui: &mut Ui, context: &PanelContext<'_>) {
     }
     if let Some(snapshot) = context.snapshot {
         let status = &snapshot.status;
-        // With a model a round ends as soon as it is clear what is in the hand.
+        // With a model, grasping ends as soon as the object is recognised.
         let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
         ui.weak(format!("grasp {} {of} {}", status.grasp_of_round.max(1), status.grasps));
     }
@@ -127,8 +127,8 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
     });
 }
 
-pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    if context.source == Source::Gripper || context.view.mode == Mode::Label {
+pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    if context.source == ViewSource::Gripper || context.view.mode == Mode::Label {
         return trial::ui(ui, context, actions);
     }
     let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
@@ -144,32 +144,32 @@ pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<
     });
 }
 
-fn transport(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
+fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
     let mut button = |icon: Icon, name: &str, hint: &str, command: Command| {
         if icons::button(ui, icon, name, hint).clicked() {
-            actions.push(Action::Simulation(command));
+            actions.push(command);
         }
     };
     button(Icon::Reset, "Reset", "Back to the start (Backspace)", Command::Reset);
     if status.playing {
-        button(Icon::Pause, "Pause", "Stand still (Space)", Command::Pause);
+        button(Icon::Pause, "Pause", "Pause (Space)", Command::Pause);
     } else {
-        let hint = if status.finished { "Grasp again (Space)" } else { "Go on (Space)" };
+        let hint = if status.finished { "Grasp again (Space)" } else { "Play (Space)" };
         button(Icon::Play, "Play", hint, Command::Play);
     }
-    button(Icon::Step, "Step", "One sample further (Ctrl+→)", Command::Step);
+    button(Icon::Step, "Step", "One sample forward (Ctrl+→)", Command::Step);
 }
 
-fn speeds(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
+fn speeds(ui: &mut Ui, status: &Status, actions: &mut Actions) {
     let combo = egui::ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_text(status.target_speed));
     let shown = combo.show_ui(ui, |ui| {
         for speed in SPEEDS {
             if ui.selectable_label(status.target_speed == speed, speed_text(speed)).clicked() {
-                actions.push(Action::Simulation(Command::SetSpeed(speed)));
+                actions.push(Command::SetSpeed(speed));
             }
         }
     });
-    shown.response.on_hover_text("Wanted speed (- and =)");
+    shown.response.on_hover_text("Speed (- and =)");
     let actual = if status.playing && status.actual_speed > 0.0 {
         format!("{:.2}×", status.actual_speed)
     } else {
@@ -179,19 +179,19 @@ fn speeds(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
         .on_hover_text("Actual speed, as a multiple of real time");
 }
 
-fn recording(ui: &mut Ui, status: &Status, actions: &mut Vec<Action>) {
+fn recording(ui: &mut Ui, status: &Status, actions: &mut Actions) {
     let mut on = status.recording;
-    if ui.checkbox(&mut on, "Record").on_hover_text("Keep every finished grasp in the store").changed() {
-        actions.push(Action::Simulation(Command::SetRecording(on)));
+    if ui.checkbox(&mut on, "Record").on_hover_text("Store every finished grasp").changed() {
+        actions.push(Command::SetRecording(on));
     }
     let mut grasps = status.grasps.max(1);
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
-    if ui.add(drag).on_hover_text("Most grasps before it stops; all but the first in random poses").changed() {
-        actions.push(Action::Simulation(Command::SetGrasps(grasps)));
+    if ui.add(drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
+        actions.push(Command::SetGrasps(grasps));
     }
 }
 
-/// Time and line pressure as one strip.
+/// Time and line pressure.
 fn progress(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, t: f64) {
     let colours = context.view.theme.colours();
     let duration = status.duration.max(1e-9);
@@ -203,7 +203,7 @@ fn progress(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, t: f64) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, "Time in the grasp"));
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, colour(colours.raised));
-    // Line pressure as the height of the filled part: closing, hold and release can be seen at a glance.
+    // The filled height is the line pressure.
     if let Some(trace) = context.traces.current() {
         let top = context.scene.programme.peak_bar.max(1e-9);
         let place = |k: usize| {
@@ -211,7 +211,7 @@ fn progress(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, t: f64) {
             let y = rect.bottom() - rect.height() * (trace.line_bar[k] / top).clamp(0.0, 1.0) as f32;
             egui::pos2(x, y)
         };
-        let fill = veil(palpate_geometry::palette::Trace::Line.colour(context.view.theme), 0.45);
+        let fill = veil(Trace::Line.colour(context.view.theme), 0.45);
         for k in 1..trace.t.len() {
             let (a, b) = (place(k - 1), place(k));
             let column = egui::Rect::from_min_max(egui::pos2(a.x, b.y.min(a.y)), egui::pos2(b.x, rect.bottom()));
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speeds_are_written_as_people_do() {
+    fn speeds_are_short() {
         let texts: Vec<String> = SPEEDS.iter().map(|s| speed_text(*s)).collect();
         assert_eq!(texts, ["1/16×", "1/8×", "0.25×", "0.5×", "1×", "2×", "4×", "8×"]);
     }

@@ -1,13 +1,16 @@
-//! The scene's main settings. Each change begins the grasp anew; everything else can be set in a scene file.
+//! Main settings of the scene. Each change restarts the grasp; a scene file can set all of them.
 
-use super::PanelContext;
-use crate::app::accuracy_dial::{self, choice};
-use crate::app::actions::Action;
+mod accuracy_dial;
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::files::FileAction;
+use crate::app::features::simulation::SimulationAction;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_sim::gripper::{Finger, PadLaw};
 use palpate_sim::scene::{Auto, EngineKind, Scene, SupportKind};
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let mut scene = context.scene.clone();
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         section(ui, "Object", true, |ui| object_ui(ui, &mut scene, context));
@@ -20,9 +23,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         ui.add_space(4.0);
         ui.horizontal_wrapped(|ui| {
             if ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)").clicked() {
-                actions.push(Action::SaveScene);
+                actions.push(FileAction::SaveScene);
             }
-            if ui.button("Defaults").on_hover_text("All settings back, the same object").clicked() {
+            if ui.button("Defaults").on_hover_text("Restore all settings, keep the object").clicked() {
                 let source = std::mem::take(&mut scene.object.source);
                 scene = Scene::default();
                 scene.object.source = source;
@@ -30,7 +33,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Acti
         });
     });
     if scene != *context.scene {
-        actions.push(Action::SetScene(Box::new(scene)));
+        actions.push(SimulationAction::SetScene(Box::new(scene)));
     }
 }
 
@@ -40,8 +43,8 @@ fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui))
     });
 }
 
-/// A number in another unit than the scene holds it in. The range binds what the user enters; a value from outside,
-/// be it out of this range, is shown as it is and left alone.
+/// Number in another unit than the scene's. The range limits what the user enters; a value outside of it is shown and
+/// kept.
 struct Number<'a> {
     name: &'a str,
     unit: &'a str,
@@ -68,13 +71,13 @@ impl Number<'_> {
     }
 }
 
-/// A number that may be left to Palpate.
+/// Number that defaults to the object's own.
 fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
     let label = ui.label(number.name);
     ui.horizontal(|ui| {
         let mut own = value.value().is_some();
         let tick = ui.add(egui::Checkbox::without_text(&mut own)).labelled_by(label.id);
-        if tick.on_hover_text("Set it, instead of taking the object's own").changed() {
+        if tick.on_hover_text("Override the object's own value").changed() {
             *value = if own { Auto::Value(known) } else { Auto::Auto };
         }
         let mut shown = value.value().unwrap_or(known) * number.factor;
@@ -138,7 +141,7 @@ fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
         .ui(ui, &mut scene.timing.duration_s);
 }
 
-fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Actions) {
     let engines = EngineKind::ALL.map(|engine| (engine, engine.name()));
     choice(ui, "engine", &mut scene.solver.engine, &engines);
     accuracy_dial::rows(ui, scene, context, actions);
@@ -181,4 +184,22 @@ fn support_ui(ui: &mut Ui, scene: &mut Scene) {
         .ui(ui, &mut scene.support.radius);
     Number { name: "gravity", unit: "m/s²", factor: 1.0, range: [0.0, 30.0], speed: 0.02 }
         .ui(ui, &mut scene.world.gravity);
+}
+
+/// Choice by name, as a row of a grid.
+fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
+    let label = ui.label(name);
+    // Explanations after a comma are shown in the list only.
+    let text = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
+    let shown = text.split(", ").next().unwrap_or(text);
+    egui::ComboBox::from_id_salt(name)
+        .selected_text(shown)
+        .show_ui(ui, |ui| {
+            for (each, text) in all {
+                ui.selectable_value(value, *each, *text);
+            }
+        })
+        .response
+        .labelled_by(label.id);
+    ui.end_row();
 }

@@ -1,20 +1,21 @@
-//! The accuracy dial: a named time step or a tolerance, and beside it what it costs and what error it leaves.
+//! Accuracy: a named time step or a tolerance, with its measured cost and error.
 
-use super::actions::Action;
-use super::panels::PanelContext;
+use super::choice;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
 use egui::{RichText, Slider, Ui};
 use palpate_geometry::units::{three_digits, two_digits};
 use palpate_lab::workers::Command;
 use palpate_sim::scene::{Accuracy, Integrator, Scene};
 
-/// Where the slider stands when a tolerance is first asked for.
+/// First tolerance.
 const FIRST_TOLERANCE: f64 = 1e-4;
-/// What the slider spans: above, the longest step is as far as from sample to sample; below, a grasp takes longer to
-/// compute than it lasts.
+/// Range of the slider. Above it, the longest step is the time between samples; below it, a grasp takes longer to compute
+/// than it lasts.
 const SLIDER: std::ops::RangeInclusive<f64> = 1e-7..=1e-2;
 
-/// The rows of the dial, in a grid of two columns.
-pub(super) fn rows(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Rows of a grid of two columns.
+pub(super) fn rows(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Actions) {
     steps_row(ui, scene);
     tolerance_row(ui, scene);
     method_row(ui, scene);
@@ -29,7 +30,7 @@ fn steps_row(ui: &mut Ui, scene: &mut Scene) {
         (Accuracy::Draft, "draft, 1/150 s"),
         (Accuracy::Standard, "standard, 1/300 s"),
         (Accuracy::Reference, "reference, 1/9600 s"),
-        (Accuracy::Tolerance(tolerance), "to a tolerance"),
+        (Accuracy::Tolerance(tolerance), "by tolerance"),
     ];
     choice(ui, "time step", accuracy, &all);
 }
@@ -37,18 +38,17 @@ fn steps_row(ui: &mut Ui, scene: &mut Scene) {
 fn tolerance_row(ui: &mut Ui, scene: &mut Scene) {
     let Some(mut tolerance) = scene.solver.accuracy.tolerance() else { return };
     let label = ui.label("tolerance").on_hover_text(
-        "Largest estimated error of one step: joint angles and turn of the object in radians, fingertips and object as \
-         shares of the finger's length",
+        "Largest estimated error of a step: angles in radians, positions as a share of the finger's length",
     );
     let slider = Slider::new(&mut tolerance, SLIDER)
         .logarithmic(true)
         .clamping(egui::SliderClamping::Edits)
         .custom_formatter(|value, _| format!("{value:.0e}"))
         .custom_parser(|text| text.trim().parse().ok());
-    // Narrow, so that a narrow panel holds it with its number.
+    // Fits a narrow panel together with its number.
     ui.spacing_mut().slider_width = 60.0;
     if ui.add(slider).labelled_by(label.id).changed() {
-        // One digit is as fine as a tolerance is meant.
+        // A tolerance has one digit.
         let rounded = format!("{tolerance:.0e}").parse().unwrap_or(tolerance);
         scene.solver.accuracy = Accuracy::Tolerance(rounded);
     }
@@ -64,19 +64,18 @@ fn method_row(ui: &mut Ui, scene: &mut Scene) {
     choice(ui, "method", &mut scene.solver.integrator, &all);
 }
 
-fn band_row(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Vec<Action>) {
+fn band_row(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let mut shown = context.snapshot.is_some_and(|snapshot| snapshot.status.error_band);
     let label = ui.label("error band").on_hover_text(
-        "A finer simulation runs along; the plots show how far the curves may be from the exact solution. Begins the \
-         grasp anew",
+        "Estimate the numerical error from a finer simulation, and show it in the plots. Restarts the grasp",
     );
     if ui.add(egui::Checkbox::without_text(&mut shown)).labelled_by(label.id).changed() {
-        actions.push(Action::Simulation(Command::SetErrorBand(shown)));
+        actions.push(Command::SetErrorBand(shown));
     }
     ui.end_row();
 }
 
-/// What the accuracy costs and leaves, once it has been measured.
+/// Cost and error of the accuracy, once measured.
 fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
     let measured = context.accuracy.filter(|measured| measured.scene == *context.scene);
     let mut row = |name: &str, value: Option<String>, hover: &str| {
@@ -88,35 +87,13 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
         ui.end_row();
     };
     let cost = measured.map(|m| &m.cost);
-    row(
-        "cost",
-        cost.map(|c| format!("{} ms CPU", three_digits(c.cpu_ms))),
-        "CPU time of one whole grasp on one thread",
-    );
+    row("cost", cost.map(|c| format!("{} ms CPU", three_digits(c.cpu_ms))), "CPU time of a grasp on one thread");
     row("", cost.map(|c| format!("{}× real time", three_digits(c.times_real_time))), "Simulated time over CPU time");
-    let hover = "Estimated numerical error over the grasp, root mean square of the band's half-width";
+    let hover = "Estimated numerical error over the grasp (RMS)";
     let error =
         |size: f64, unit: &str, share: f64| format!("{} {unit}, {} %", two_digits(size), two_digits(share * 100.0));
     let errors = cost.map(|c| &c.error);
     row("± curvature", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
     row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
     row("± force", errors.map(|e| error(e.force_n, "N", e.force_share)), hover);
-}
-
-/// A choice by name, as a row of a grid.
-pub(super) fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
-    let label = ui.label(name);
-    // What comes after a comma explains the choice while choosing; a narrow panel has no room for it afterwards.
-    let text = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
-    let shown = text.split(", ").next().unwrap_or(text);
-    egui::ComboBox::from_id_salt(name)
-        .selected_text(shown)
-        .show_ui(ui, |ui| {
-            for (each, text) in all {
-                ui.selectable_value(value, *each, *text);
-            }
-        })
-        .response
-        .labelled_by(label.id);
-    ui.end_row();
 }

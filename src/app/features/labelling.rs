@@ -1,0 +1,122 @@
+//! Labelling in the window: hands actions to the [`LabellingSession`] and carries out its effects.
+
+use crate::app::features::gripper::GripperFeature;
+use crate::app::features::simulation::SimulationFeature;
+use crate::app::features::view::ViewState;
+use crate::app::modes::mode::Mode;
+use crate::app::notices::Notices;
+use palpate_lab::workers::{
+    Command, GripperView, GripperWish, LabelView, LabelWish, Labeller, LabellingAction, LabellingEffect,
+    LabellingSession, SessionContext,
+};
+use std::path::PathBuf;
+
+/// State of labelling in the window.
+pub(in crate::app) struct LabellingFeature {
+    labeller: Labeller,
+    session: LabellingSession,
+}
+
+impl LabellingFeature {
+    pub(in crate::app) fn new(labeller: Labeller, store: PathBuf) -> Self {
+        labeller.ask(LabelWish::Refresh);
+        Self { labeller, session: LabellingSession::new(store) }
+    }
+
+    pub(in crate::app) fn labeller(&self) -> &Labeller {
+        &self.labeller
+    }
+
+    pub(in crate::app) fn session(&self) -> &LabellingSession {
+        &self.session
+    }
+
+    /// Reads the store again.
+    pub(in crate::app) fn refresh(&self) {
+        self.labeller.ask(LabelWish::Refresh);
+    }
+
+    /// True while the model's prediction is hidden.
+    pub(in crate::app) fn hides_prediction(
+        &self,
+        gripper: Option<&GripperView>,
+        labels: Option<&LabelView>,
+        view: &ViewState,
+    ) -> bool {
+        self.session.hides_prediction(&context(&self.labeller, gripper, labels, view))
+    }
+
+    /// Updates the session with gripper and labels.
+    pub(in crate::app) fn gather(
+        &mut self,
+        gripper: &mut GripperFeature,
+        simulation: &mut SimulationFeature,
+        view: &mut ViewState,
+        notices: &mut Notices,
+    ) {
+        let (seen, labels) = (gripper.worker().view(), self.labeller.view());
+        let now = context(&self.labeller, seen.as_deref(), labels.as_deref(), view);
+        let effects = self.session.observe(&now);
+        let next = self.session.next_known_object(&now);
+        gripper.keep_trial_in_sight(self.session.keeps_trial_in_sight(&now));
+        self.carry_out(effects, gripper, view, notices);
+        // The simulation shows the next object of the plan.
+        if let Some(next) = next.filter(|name| *name != simulation.scene().object.source) {
+            simulation.open(&next, notices);
+            simulation.send(Command::Pause, notices);
+        }
+    }
+
+    pub(in crate::app) fn apply(
+        &mut self,
+        action: LabellingAction,
+        gripper: &GripperFeature,
+        view: &mut ViewState,
+        notices: &mut Notices,
+    ) {
+        let (seen, labels) = (gripper.worker().view(), self.labeller.view());
+        let now = context(&self.labeller, seen.as_deref(), labels.as_deref(), view);
+        let effects = self.session.apply(action, &now);
+        self.carry_out(effects, gripper, view, notices);
+    }
+
+    fn carry_out(
+        &mut self,
+        effects: Vec<LabellingEffect>,
+        gripper: &GripperFeature,
+        view: &mut ViewState,
+        notices: &mut Notices,
+    ) {
+        for effect in effects {
+            match effect {
+                LabellingEffect::Edit(wish) => self.labeller.ask(wish),
+                LabellingEffect::BeginTrial(request) => {
+                    let number = gripper.worker().wish(GripperWish::Begin(request));
+                    self.session.trial_requested(number);
+                }
+                LabellingEffect::DiscardRunning => {
+                    gripper.worker().wish(GripperWish::Discard);
+                }
+                LabellingEffect::SetBlind(blind) => view.blind = blind,
+                LabellingEffect::Inform(text) => notices.info(text),
+                LabellingEffect::Fail(cause) => notices.error(cause),
+            }
+        }
+    }
+}
+
+fn context<'a>(
+    labeller: &Labeller,
+    gripper: Option<&'a GripperView>,
+    labels: Option<&'a LabelView>,
+    view: &ViewState,
+) -> SessionContext<'a> {
+    SessionContext {
+        gripper,
+        labels,
+        settled: labeller.is_settled(),
+        labelling: view.mode == Mode::Label,
+        blind: view.blind,
+        control: view.control,
+    }
+}

@@ -1,0 +1,197 @@
+//! The simulated gripper: its thread, its scene and its traces.
+
+use crate::app::features::view::ViewState;
+use crate::app::notices::Notices;
+use crate::app::traces::TraceHistory;
+use palpate_lab::grasping::ObjectDeck;
+use palpate_lab::workers::{Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SimWorker, Snapshot};
+use palpate_sim::frame::Frame;
+use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_sim::scene::Scene;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Speeds that can be chosen, as multiples of real time.
+pub(in crate::app) const SPEEDS: [f64; 8] = [1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+
+/// Seed of the sequence of objects.
+const DECK_SEED: u64 = 1;
+
+/// Action on the simulated gripper.
+#[derive(Clone)]
+pub enum SimulationAction {
+    /// Send a command to the simulation.
+    Send(Command),
+    /// Grasp this scene.
+    SetScene(Box<Scene>),
+    /// Grasp this object: a built-in name or a file.
+    OpenObject(String),
+    /// Draw the other engine's fingers and object, or do not.
+    SetGhost(bool),
+    /// Measure cost and influence of the scene's effects.
+    MeasureEffects,
+}
+
+/// State of the simulated gripper in the window.
+pub(in crate::app) struct SimulationFeature {
+    worker: SimWorker,
+    effects: EffectsWorker,
+    scene: Scene,
+    traces: TraceHistory,
+    /// The busy worker has not taken the scene yet.
+    unsent: bool,
+    /// Object last seen in the hand: a built-in name or a file.
+    seen: Option<String>,
+    deck: ObjectDeck,
+}
+
+impl SimulationFeature {
+    pub(in crate::app) fn new(worker: SimWorker, effects: EffectsWorker, scene: Scene) -> Self {
+        let deck = ObjectDeck::new(DECK_SEED);
+        Self { worker, effects, scene, traces: TraceHistory::default(), unsent: false, seen: None, deck }
+    }
+
+    pub(in crate::app) fn worker(&self) -> &SimWorker {
+        &self.worker
+    }
+
+    pub(in crate::app) fn effects(&self) -> &EffectsWorker {
+        &self.effects
+    }
+
+    /// Scene as set by the user.
+    pub(in crate::app) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    pub(in crate::app) fn traces(&self) -> &TraceHistory {
+        &self.traces
+    }
+
+    /// Last grasp of the other engine, where it is to be drawn.
+    pub(in crate::app) fn ghost(&self, view: &ViewState) -> Option<Arc<GhostGrasp>> {
+        self.worker.ghost().filter(|_| view.ghost)
+    }
+
+    /// Takes in rows and notices since the last frame.
+    pub(in crate::app) fn gather(&mut self, view: &mut ViewState, notices: &mut Notices) {
+        if self.worker.take_rows_lost() {
+            self.traces.clear();
+        }
+        for row in self.worker.rows() {
+            self.traces.push(&row);
+        }
+        let news: Vec<Notice> = self.worker.notices().collect();
+        for notice in news {
+            match notice {
+                Notice::SceneRefused(refusal) => self.take_refusal(*refusal, notices),
+                other => show_notice(other, notices),
+            }
+        }
+        if self.unsent {
+            self.send_scene();
+        }
+        if let Some(snapshot) = self.worker.snapshot() {
+            self.take_note_of_object(&snapshot, view);
+        }
+    }
+
+    pub(in crate::app) fn apply(&mut self, action: SimulationAction, view: &mut ViewState, notices: &mut Notices) {
+        match action {
+            SimulationAction::Send(command) => self.send(command, notices),
+            SimulationAction::SetScene(scene) => self.set_scene(*scene, notices),
+            SimulationAction::OpenObject(source) => self.open(&source, notices),
+            SimulationAction::SetGhost(ghost) => {
+                view.ghost = ghost;
+                self.send(Command::SetGhost(ghost), notices);
+            }
+            SimulationAction::MeasureEffects => self.effects.ask(&self.scene),
+        }
+    }
+
+    pub(in crate::app) fn send(&mut self, command: Command, notices: &mut Notices) {
+        if let Err(cause) = self.worker.send(command) {
+            notices.warning(cause.to_string());
+        }
+    }
+
+    /// Grasps a built-in object, a file, or the scene in a scene file.
+    pub(in crate::app) fn open(&mut self, source: &str, notices: &mut Notices) {
+        if source.to_ascii_lowercase().ends_with(".toml") {
+            match Scene::from_file(Path::new(source)) {
+                Ok(scene) => self.set_scene(scene, notices),
+                Err(error) => notices.error(error.to_string()),
+            }
+            return;
+        }
+        let mut scene = self.scene.clone();
+        scene.object.source = anchored(source);
+        // Mass and size belong to the object before.
+        let fresh = Scene::default().object;
+        scene.object.mass = fresh.mass;
+        scene.object.friction = fresh.friction;
+        scene.object.scale = fresh.scale;
+        scene.object.rotation_deg = fresh.rotation_deg;
+        self.set_scene(scene, notices);
+    }
+
+    /// Grasps another built-in object, drawn at random.
+    pub(in crate::app) fn open_next(&mut self, notices: &mut Notices) {
+        let next = self.deck.next(&self.scene.object.source);
+        self.open(next, notices);
+        self.send(Command::Play, notices);
+    }
+
+    fn set_scene(&mut self, scene: Scene, notices: &mut Notices) {
+        if let Err(error) = scene.check() {
+            return notices.error(error.to_string());
+        }
+        self.scene = scene;
+        self.effects.give_up();
+        self.send_scene();
+    }
+
+    fn send_scene(&mut self) {
+        self.unsent = self.worker.send(Command::SetScene(Box::new(self.scene.clone()))) == Err(NotSent::Busy);
+    }
+
+    /// Shows the scene that stays, unless the user has set another one since.
+    fn take_refusal(&mut self, refusal: Refusal, notices: &mut Notices) {
+        if self.scene == refusal.refused {
+            self.scene = refusal.kept;
+        }
+        notices.error(refusal.cause);
+    }
+
+    /// Frames a new object and, where it came from a file, remembers that.
+    fn take_note_of_object(&mut self, snapshot: &Snapshot, view: &mut ViewState) {
+        let source = &snapshot.scene.object.source;
+        if self.seen.as_ref() == Some(source) {
+            return;
+        }
+        if view.framed.is_none_or(|camera| camera == view.camera) {
+            view.frame_all(snapshot);
+        }
+        if source != EMPTY && !catalogue().iter().any(|b| b.name == *source) {
+            view.remember_file(source);
+        }
+        self.seen = Some(source.clone());
+    }
+}
+
+/// Shows a notice of a gripper's thread.
+pub(in crate::app) fn show_notice(notice: Notice, notices: &mut Notices) {
+    match notice {
+        Notice::Told(text) => notices.info(text),
+        Notice::Warning(text) => notices.warning(text),
+        Notice::Failed(text) => notices.error(text),
+        Notice::SceneRefused(refusal) => notices.error(refusal.cause),
+        Notice::Stored(id) => notices.info(format!("Trial {id} stored.")),
+    }
+}
+
+/// Frame of the other engine at the snapshot's time, if it belongs to the same grasp.
+pub(in crate::app) fn ghost_frame<'a>(snapshot: Option<&Snapshot>, ghost: Option<&'a GhostGrasp>) -> Option<&'a Frame> {
+    let (snapshot, ghost) = (snapshot?, ghost?);
+    ghost.at(snapshot.frame.t).filter(|_| ghost.grasp == snapshot.grasp)
+}

@@ -1,0 +1,144 @@
+//! View state: camera, theme, layout and settings of the window. Remembered between runs, never written into a trial.
+
+use crate::app::modes::mode::Mode;
+use crate::app::theme;
+use crate::app::view_source::ViewSource;
+use egui_tiles::Tree;
+use palpate_geometry::drawing::Camera;
+use palpate_geometry::palette::Theme;
+use palpate_lab::workers::Snapshot;
+use palpate_tactile::trial::Control;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Camera, theme, layout and settings.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ViewState {
+    /// Dark or light.
+    pub theme: Theme,
+    /// Camera of the 3-D view.
+    pub camera: Camera,
+    /// Camera as last framed; while the user leaves it there, it follows the objects.
+    #[serde(skip)]
+    pub framed: Option<Camera>,
+    /// Force arrows are drawn.
+    pub forces: bool,
+    /// Fingers and object of the other engine are drawn.
+    pub ghost: bool,
+    /// The true object is shown beside the recognised one.
+    pub truth_shown: bool,
+    /// Mode of the window.
+    pub mode: Mode,
+    /// Layout of each mode; panes are the names of panels.
+    pub layouts: BTreeMap<Mode, Tree<String>>,
+    /// Gripper whose data are shown.
+    #[serde(skip)]
+    pub source: ViewSource,
+    /// Actuation of the real gripper.
+    pub control: Control,
+    /// Port of the last connection.
+    pub port: Option<PathBuf>,
+    /// The model's prediction is hidden until the label is given.
+    pub blind: bool,
+    /// Recognition model for the real gripper; the shipped one where none is named.
+    pub gripper_model: Option<PathBuf>,
+    /// Time shown by all plots (s); `None` for the whole grasp.
+    #[serde(skip)]
+    pub time_window: Option<[f64; 2]>,
+    /// The key sheet is open.
+    #[serde(skip)]
+    pub keys_shown: bool,
+    /// Files opened last, newest first.
+    pub recent: Vec<String>,
+}
+
+/// Change of the view state.
+#[derive(Clone, Copy, Debug)]
+pub enum ViewAction {
+    /// Change to another mode.
+    SetMode(Mode),
+    /// Show the data of this gripper.
+    Show(ViewSource),
+    /// Move the camera.
+    SetCamera(Camera),
+    /// Show everything in the 3-D view.
+    FrameAll,
+    /// Change the theme.
+    SetTheme(Theme),
+    /// Show or hide force arrows.
+    SetForces(bool),
+    /// Time shown by all plots (s); `None` for the whole grasp.
+    SetTimeWindow(Option<[f64; 2]>),
+    /// Show or hide the true object.
+    ShowTruth(bool),
+    /// Show or hide the key sheet.
+    ShowKeys(bool),
+    /// Restore the default layouts.
+    ResetLayout,
+}
+
+/// Files that are remembered.
+const MOST_RECENT: usize = 6;
+
+impl Default for ViewState {
+    fn default() -> Self {
+        Self {
+            theme: Theme::Dark,
+            camera: Camera::default(),
+            framed: None,
+            forces: true,
+            ghost: false,
+            truth_shown: true,
+            mode: Mode::default(),
+            layouts: BTreeMap::new(),
+            source: ViewSource::default(),
+            control: Control::ByHand,
+            port: None,
+            blind: true,
+            gripper_model: None,
+            time_window: None,
+            keys_shown: false,
+            recent: Vec::new(),
+        }
+    }
+}
+
+impl ViewState {
+    pub(in crate::app) fn apply(&mut self, ctx: &egui::Context, action: ViewAction, snapshot: Option<&Snapshot>) {
+        match action {
+            ViewAction::SetMode(mode) => self.mode = mode,
+            ViewAction::Show(source) => self.source = source,
+            ViewAction::SetCamera(camera) => self.camera = camera,
+            ViewAction::FrameAll => {
+                if let Some(snapshot) = snapshot {
+                    self.frame_all(snapshot);
+                }
+            }
+            ViewAction::SetTheme(theme) => {
+                self.theme = theme;
+                theme::apply(ctx, theme);
+            }
+            ViewAction::SetForces(forces) => self.forces = forces,
+            ViewAction::SetTimeWindow(window) => self.time_window = window,
+            ViewAction::ShowTruth(shown) => self.truth_shown = shown,
+            ViewAction::ShowKeys(shown) => self.keys_shown = shown,
+            ViewAction::ResetLayout => self.layouts.clear(),
+        }
+    }
+
+    /// Shows the whole scene.
+    pub(in crate::app) fn frame_all(&mut self, snapshot: &Snapshot) {
+        let (centre, radius) = snapshot.stage.bounds();
+        self.camera = self.camera.framing(centre, radius);
+        self.framed = Some(self.camera);
+    }
+
+    /// Puts a file in front of the recent ones.
+    pub(in crate::app) fn remember_file(&mut self, path: &str) {
+        self.recent.retain(|known| known != path);
+        self.recent.insert(0, path.to_owned());
+        self.recent.truncate(MOST_RECENT);
+    }
+}

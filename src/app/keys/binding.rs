@@ -1,0 +1,36 @@
+//! A key and its action.
+
+use crate::app::actions::Action;
+use crate::app::context::PanelContext;
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+/// Key, its line in the sheet, and its action.
+pub(in crate::app) struct Binding {
+    pub(in crate::app) shortcut: KeyboardShortcut,
+    /// Text in the sheet; empty where another line covers it.
+    pub(in crate::app) does: &'static str,
+    pub(in crate::app) act: fn(&PanelContext<'_>) -> Option<Action>,
+}
+
+/// A binding.
+pub(in crate::app) const fn key(
+    modifiers: Modifiers,
+    key: Key,
+    does: &'static str,
+    act: fn(&PanelContext<'_>) -> Option<Action>,
+) -> Binding {
+    Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, act }
+}
+
+impl Binding {
+    /// Shift beyond what is bound is ignored: some keyboards need it to reach the key.
+    pub(in crate::app) fn is(&self, key: Key, modifiers: Modifiers) -> bool {
+        let KeyboardShortcut { modifiers: wanted, logical_key } = self.shortcut;
+        logical_key == key && modifiers.alt == wanted.alt && modifiers.matches_logically(wanted)
+    }
+
+    /// Acts repeatedly while held down.
+    pub(in crate::app) fn repeats(&self) -> bool {
+        matches!(self.shortcut.logical_key, Key::ArrowUp | Key::ArrowDown | Key::ArrowRight | Key::Minus | Key::Equals)
+    }
+}

@@ -1,0 +1,14 @@
+//! Name of a mode, as it is remembered between runs.
+
+use serde::{Deserialize, Serialize};
+
+/// Mode of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// Grasp and recognise, live.
+    #[default]
+    Demo,
+    /// Record and label trials of the real gripper.
+    Label,
+}
