@@ -35,13 +35,27 @@ pub struct Sensors {
 impl Sensors {
     /// Places a layout on a gripper. Pressure is force over the participation area unless said otherwise.
     pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
-        Ok(Self { channels: layout.channels(gripper)?, finger: gripper.finger.clone(), grid: gripper.taxels(), area })
+        Ok(Self::of(layout.channels(gripper)?, gripper, area))
+    }
+
+    /// Reads these channels of a gripper.
+    pub fn of(channels: Vec<Channel>, gripper: &Gripper, area: PressureArea) -> Self {
+        Self { channels, finger: gripper.finger.clone(), grid: gripper.taxels(), area }
     }
 
     /// Layout C1+F, which suits any gripper.
     pub fn whole_fingers(gripper: &Gripper) -> Self {
         let (finger, grid) = (gripper.finger.clone(), gripper.taxels());
         Self { channels: whole_fingers(), finger, grid, area: PressureArea::Participation }
+    }
+
+    /// Adds channels that it lacks, after those it has.
+    pub fn add(&mut self, channels: &[Channel]) {
+        for channel in channels {
+            if !self.channels.contains(channel) {
+                self.channels.push(channel.clone());
+            }
+        }
     }
 
     /// The channels, in the order in which [`Sensors::read`] gives values.

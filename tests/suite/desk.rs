@@ -231,7 +231,7 @@ fn stop_works_while_something_is_typed() {
     // A letter in the field begins no trial.
     assert!(desk.harness.query_by_label_contains("Time in the trial").is_none());
     desk.press(Key::Escape);
-    desk.until_told("told to vent");
+    desk.until_told("Vent sent");
     let field = desk.harness.get_by_role_and_label(Role::SearchInput, "Find an object");
     assert_eq!(field.value().as_deref(), Some("r"));
 }

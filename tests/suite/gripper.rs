@@ -3,7 +3,7 @@
 
 use crate::calibration::{calibrated, parts};
 use crate::scripted;
-use crate::streams::Pretended;
+use crate::streams::Emulated;
 use palpate_device::emulator::{EmulatorSetup, HandPlan, HiddenParts};
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::gripper::{Listen, NotOpened};
@@ -25,7 +25,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 /// A worker on the emulated gripper, and what it has said.
-struct Desk {
+pub(crate) struct Desk {
     worker: GripperWorker,
     woken: Receiver<()>,
     store: PathBuf,
@@ -38,11 +38,11 @@ struct Desk {
 const MOST_VIEWS: u32 = 3000;
 
 /// A look at the emulated gripper takes this long in truth.
-const FAST: Duration = Duration::from_micros(100);
+pub(crate) const FAST: Duration = Duration::from_micros(100);
 /// A look when its time is the time of the clock.
 const TRUE_TO_TIME: Duration = Duration::from_millis(10);
 
-fn scene() -> Scene {
+pub(crate) fn scene() -> Scene {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     scene
@@ -75,12 +75,12 @@ fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, mos
             faults: vec![],
             seed: 1,
         };
-        Ok(Box::new(Pretended::new(setup, look)))
+        Ok(Box::new(Emulated::new(setup, look)))
     })
 }
 
 impl Desk {
-    fn on(listen: Listen) -> Self {
+    pub(crate) fn on(listen: Listen) -> Self {
         Self::with(listen, "trials.sqlite")
     }
 
@@ -102,12 +102,12 @@ impl Desk {
         Self { worker: worker.unwrap(), woken, store, notices: Vec::new(), rows: Vec::new(), folder }
     }
 
-    fn wish(&self, wish: GripperWish) {
+    pub(crate) fn wish(&self, wish: GripperWish) {
         self.worker.wish(wish);
     }
 
     /// Waits until everything stands as wanted.
-    fn until(&mut self, wanted: impl Fn(&GripperView) -> bool) -> Arc<GripperView> {
+    pub(crate) fn until(&mut self, wanted: impl Fn(&GripperView) -> bool) -> Arc<GripperView> {
         // The thread wakes whoever listens thirty times a second: this many are minutes.
         for _ in 0..MOST_VIEWS {
             self.notices.extend(self.worker.notices());
@@ -135,7 +135,7 @@ impl Desk {
         panic!("never said: {text}; {:?}", self.notices)
     }
 
-    fn connect(&mut self) {
+    pub(crate) fn connect(&mut self) {
         self.wish(GripperWish::Connect(None));
         self.until(|view| view.latest.is_some());
     }
@@ -149,7 +149,7 @@ impl Desk {
         ended.ended.as_ref().unwrap().id
     }
 
-    fn store(&self) -> Store {
+    pub(crate) fn store(&self) -> Store {
         Store::open(&self.store).unwrap()
     }
 }

@@ -19,6 +19,7 @@
 //! - `gripper_tools`: doctor and fit in the window.
 //! - `training`: training on labelled trials of the board, in the window.
 //! - `desk`: a labelling afternoon in the window, by keys alone.
+//! - `one_path`: the same fault recorded from the command line and from the window.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -45,6 +46,7 @@ mod gripper;
 mod gripper_tools;
 mod labelling;
 mod learning;
+mod one_path;
 mod panels;
 mod peers;
 mod physics;

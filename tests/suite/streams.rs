@@ -104,7 +104,7 @@ impl<F: FnMut(Duration) -> (f64, Vec<LinkEvent>)> BoardStream for MadeUp<F> {
 }
 
 /// The emulated gripper. Each look at it lets 10 ms of its time pass.
-pub(crate) struct Pretended {
+pub(crate) struct Emulated {
     gripper: EmulatedGripper,
     decoder: Decoder,
     t_s: f64,
@@ -115,14 +115,14 @@ pub(crate) struct Pretended {
 /// Time that passes with each look (s).
 const LOOK_S: f64 = 0.01;
 
-impl Pretended {
+impl Emulated {
     pub(crate) fn new(setup: EmulatorSetup, look: Duration) -> Self {
         let gripper = EmulatedGripper::new(setup).unwrap();
         Self { gripper, decoder: Decoder::default(), t_s: 0.0, look }
     }
 }
 
-impl BoardStream for Pretended {
+impl BoardStream for Emulated {
     fn take(&mut self, _: Duration) -> Vec<LinkEvent> {
         std::thread::sleep(self.look);
         self.t_s += LOOK_S;

@@ -1,11 +1,11 @@
 //! Recognising an object grasp by grasp: what the model says while the fingers close, what is believed after each
 //! grasp, and whether that is enough. The same for a window, a command and the real gripper.
 
+use super::row::Row;
 use palpate_learn::{Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, StopReason, StopRule, Verdict};
-use palpate_sim::frame::Frame;
-use palpate_sim::gripper::Phase;
-use palpate_sim::scene::Scene;
-use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors};
+use palpate_sim::gripper::{Gripper, Phase};
+use palpate_tactile::{Channel, LayoutError, SensorLayout};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Why a model cannot recognise what a gripper feels.
@@ -30,7 +30,10 @@ pub struct Identification {
     model: Arc<Model>,
     labels: Arc<Labels>,
     rule: StopRule,
-    sensors: Option<Sensors>,
+    /// Which column of a row each channel of the model is.
+    columns: Vec<usize>,
+    /// The newest row in the model's channels.
+    columned: Vec<f32>,
     live: Option<Box<dyn LiveRecogniser>>,
     /// Readings of the grasp that is going on, for the answer to it by itself.
     readings: Sequence,
@@ -86,7 +89,8 @@ impl Identification {
             labels: Arc::new(model.card.labels.clone()),
             model,
             rule,
-            sensors: None,
+            columns: Vec::new(),
+            columned: Vec::new(),
             live,
             readings: Sequence::default(),
             belief: Belief::default(),
@@ -117,25 +121,27 @@ impl Identification {
         }
     }
 
-    /// Another grasp of the same object begins, on a gripper that is modelled; frames follow with [`Self::push`].
-    pub fn begin_grasp(&mut self, scene: &Scene) -> Result<(), IdentifyError> {
-        self.closed = true;
+    /// The channels that the model reads, on this gripper.
+    pub fn channels_on(&self, gripper: &Gripper) -> Result<Vec<Channel>, IdentifyError> {
         let layout = self.model.card.data.layout.as_deref().unwrap_or("C1+F");
-        let sensors = SensorLayout::named(layout)
-            .and_then(|layout| Sensors::new(&layout, &scene.gripper, PressureArea::Participation))
-            .map_err(|cause| IdentifyError::Layout { cause })?;
-        let names: Vec<String> = sensors.channels().iter().map(Channel::name).collect();
-        self.begin_grasp_of(&names)?;
-        self.sensors = Some(sensors);
-        Ok(())
+        SensorLayout::named(layout)
+            .and_then(|layout| layout.channels(gripper))
+            .map_err(|cause| IdentifyError::Layout { cause })
     }
 
-    /// Another grasp of the same object begins, on a gripper whose readings have these channels; rows of them follow with
-    /// [`Self::push_row`].
-    pub fn begin_grasp_of(&mut self, channels: &[String]) -> Result<(), IdentifyError> {
+    /// Begins another grasp of the same object, on a gripper whose rows have these channels in these columns; rows follow
+    /// with [`Self::push`].
+    pub fn begin_grasp<'a>(
+        &mut self,
+        columns: impl IntoIterator<Item = (usize, &'a Channel)>,
+    ) -> Result<(), IdentifyError> {
         self.closed = true;
-        self.model.check_channels(channels).map_err(|cause| IdentifyError::Channels { cause })?;
-        self.sensors = None;
+        let named: BTreeMap<String, usize> =
+            columns.into_iter().map(|(place, channel)| (channel.name(), place)).collect();
+        let wanted = &self.model.card.channels;
+        self.columns = wanted.iter().filter_map(|name| named.get(name).copied()).collect();
+        let found: Vec<String> = wanted.iter().filter(|name| named.contains_key(*name)).cloned().collect();
+        self.model.check_channels(&found).map_err(|cause| IdentifyError::Channels { cause })?;
         self.readings = Sequence::default();
         self.verdict = None;
         self.closed = false;
@@ -145,28 +151,24 @@ impl Identification {
         Ok(())
     }
 
-    /// Takes in a frame of the grasp; true when there is a new answer.
-    pub fn push(&mut self, frame: &Frame) -> bool {
+    /// Takes in a row of the grasp, `t` seconds after its closing began; true when there is a new answer. The release ends
+    /// the grasp. A row in which a channel is undefined is skipped.
+    pub fn push(&mut self, t: f64, row: &Row) -> bool {
         if self.closed {
             return false;
         }
-        if frame.phase == Phase::Release {
+        if row.phase == Some(Phase::Release) {
             self.end_grasp();
             return true;
         }
-        let Some(sensors) = &self.sensors else { return false };
-        let row: Vec<f32> = sensors.read(frame).into_iter().map(|v| v.unwrap_or_default() as f32).collect();
-        self.push_row(frame.t as f32, &row)
-    }
-
-    /// Takes in a row of channels at a time since the closing began (s); true when there is a new answer.
-    pub fn push_row(&mut self, t: f32, row: &[f32]) -> bool {
-        if self.closed {
+        self.columned.clear();
+        self.columned.extend(self.columns.iter().map(|column| row.values[*column]));
+        if self.columned.iter().any(|value| value.is_nan()) {
             return false;
         }
-        self.readings.t_s.push(t);
-        self.readings.values.extend_from_slice(row);
-        let answer = self.live.as_mut().and_then(|live| live.push(t, row));
+        self.readings.t_s.push(t as f32);
+        self.readings.values.extend_from_slice(&self.columned);
+        let answer = self.live.as_mut().and_then(|live| live.push(t as f32, &self.columned));
         let new = answer.is_some();
         self.verdict = answer.or_else(|| self.verdict.take());
         new

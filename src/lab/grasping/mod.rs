@@ -6,6 +6,7 @@ mod controller;
 mod deck;
 mod error_band;
 mod identify;
+mod row;
 mod run;
 mod summary;
 
@@ -14,5 +15,6 @@ pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCom
 pub use deck::ObjectDeck;
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use identify::{Identification, IdentificationView, IdentifyError};
+pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use summary::{GraspSummary, HoldSummary};

@@ -14,6 +14,8 @@ const KEEP_ALIVE_S: f64 = 0.4;
 pub struct SerialGripper {
     stream: Box<dyn BoardStream>,
     waiting: VecDeque<LinkEvent>,
+    /// The last event of a batch was delivered.
+    tick_due: bool,
     bar: f64,
     sent_s: f64,
 }
@@ -21,7 +23,7 @@ pub struct SerialGripper {
 impl SerialGripper {
     /// Wraps an open stream.
     pub fn new(stream: Box<dyn BoardStream>) -> Self {
-        Self { stream, waiting: VecDeque::new(), bar: 0.0, sent_s: 0.0 }
+        Self { stream, waiting: VecDeque::new(), tick_due: false, bar: 0.0, sent_s: 0.0 }
     }
 
     /// The stream: status, console.
@@ -50,11 +52,17 @@ impl Gripper for SerialGripper {
     }
 
     fn next_event(&mut self, patience: Duration) -> Result<GripperEvent, GripperError> {
+        // A tick follows each batch, so that a fast board cannot hold up the pressure.
+        if std::mem::take(&mut self.tick_due) {
+            return Ok(GripperEvent::Tick);
+        }
         if self.waiting.is_empty() {
             self.keep_alive()?;
             self.waiting = self.stream.take(patience).into();
         }
-        Ok(match self.waiting.pop_front() {
+        let event = self.waiting.pop_front();
+        self.tick_due = event.is_some() && self.waiting.is_empty();
+        Ok(match event {
             Some(event) => GripperEvent::Board(event),
             None if self.stream.is_over() => GripperEvent::Finished,
             None => GripperEvent::Tick,

@@ -1,13 +1,12 @@
 //! The grasp that is going on in the simulation's thread.
 
 use super::companion::Companion;
-use crate::grasping::GraspRun;
+use crate::grasping::{FrameReader, GraspRun};
 use crate::gripper::SimulatedGripper;
 use crate::picture::Stage;
 use glam::DVec3;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::scene::Scene;
-use palpate_tactile::Sensors;
 use std::sync::Arc;
 
 /// The grasp that is going on.
@@ -18,7 +17,7 @@ pub(super) struct Current {
     pub(super) plan: Arc<Plan>,
     pub(super) scene: Arc<Scene>,
     pub(super) stage: Arc<Stage>,
-    pub(super) sensors: Sensors,
+    pub(super) reader: FrameReader,
     pub(super) frame: Arc<Frame>,
     /// Warnings at its beginning; those that come later are told at its end.
     pub(super) told: usize,

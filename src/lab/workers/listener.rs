@@ -1,10 +1,10 @@
 //! Recognition beside the simulation: it listens to the frames that are sampled, changes nothing about them, and says
 //! when a round of grasps is enough.
 
-use crate::grasping::{Identification, IdentificationView, IdentifyError};
+use crate::grasping::{Identification, IdentificationView, IdentifyError, Row};
 use palpate_learn::{Model, StopReason, StopRule};
-use palpate_sim::frame::Frame;
-use palpate_sim::scene::Scene;
+use palpate_sim::gripper::Gripper;
+use palpate_tactile::Channel;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -44,18 +44,20 @@ impl Listener {
         self.refresh();
     }
 
-    /// A grasp begins. The text, which comes once for each scene, says why nothing will be recognised.
-    pub(super) fn begin_grasp(&mut self, scene: &Scene) -> Option<String> {
-        let begun = self.identification.begin_grasp(scene);
-        self.begun(begun, "in this scene")
+    /// The channels that the model reads on this gripper; none where it cannot.
+    pub(super) fn channels_on(&self, gripper: &Gripper) -> Vec<Channel> {
+        self.identification.channels_on(gripper).unwrap_or_default()
     }
 
-    /// The same on a gripper whose readings have these channels, or more than the model reads.
-    pub(super) fn begin_grasp_of(&mut self, channels: &[String]) -> Option<String> {
-        let own = self.channels();
-        let known: Vec<String> = own.iter().filter(|name| channels.contains(name)).cloned().collect();
-        let begun = self.identification.begin_grasp_of(&known);
-        self.begun(begun, "on the gripper: the model reads more than is calibrated")
+    /// Begins a grasp whose rows have these channels in these columns. The text, which comes once for each scene, says why nothing will be
+    /// recognised; `place` says where.
+    pub(super) fn begin_grasp<'a>(
+        &mut self,
+        columns: impl IntoIterator<Item = (usize, &'a Channel)>,
+        place: &str,
+    ) -> Option<String> {
+        let begun = self.identification.begin_grasp(columns);
+        self.begun(begun, place)
     }
 
     fn begun(&mut self, begun: Result<(), IdentifyError>, place: &str) -> Option<String> {
@@ -69,21 +71,9 @@ impl Listener {
         (!std::mem::replace(&mut self.told, true)).then_some(text)
     }
 
-    /// The channels that the model reads, in its order.
-    pub(super) fn channels(&self) -> &[String] {
-        &self.identification.model().card.channels
-    }
-
-    /// Listens to a frame.
-    pub(super) fn push(&mut self, frame: &Frame) {
-        if self.off.is_none() && self.identification.push(frame) {
-            self.refresh();
-        }
-    }
-
-    /// Listens to a row of the model's channels, at a time since the closing began (s).
-    pub(super) fn push_row(&mut self, t: f32, row: &[f32]) {
-        if self.off.is_none() && self.identification.push_row(t, row) {
+    /// Listens to a row, `t` seconds after the closing began.
+    pub(super) fn push(&mut self, t: f64, row: &Row) {
+        if self.off.is_none() && self.identification.push(t, row) {
             self.refresh();
         }
     }

@@ -1,6 +1,6 @@
 //! What travels between the simulation's thread and whoever watches it: commands in, snapshots, rows and notices out.
 
-use crate::grasping::{GraspSummary, IdentificationView};
+use crate::grasping::{GraspSummary, IdentificationView, Row};
 use crate::picture::Stage;
 use crate::study::AccuracyCost;
 use glam::DVec3;
@@ -97,6 +97,13 @@ pub struct TraceRow {
     pub values: Box<[f32]>,
     /// Estimated numerical error of each value, in its unit; empty without a companion.
     pub errors: Box<[f32]>,
+}
+
+impl TraceRow {
+    /// A row of a board in its place: time counts from `from_s`.
+    pub(super) fn placed(row: Row, grasp: u64, from_s: f64, rolling: bool) -> Self {
+        Self { grasp, rolling, t: row.t_s - from_s, line_bar: row.line_bar, values: row.values, errors: Box::default() }
+    }
 }
 
 /// What the accuracy of a scene costs and leaves.

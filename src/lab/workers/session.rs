@@ -12,13 +12,13 @@ use super::messages::{
 };
 use super::pace::Pace;
 use super::sim::SimWorkerSetup;
-use crate::grasping::{GraspSummary, prepare};
+use crate::grasping::{FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
 use crate::recording::{Recorder, RecorderNotice};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
-use palpate_tactile::{Channel, PressureArea, SensorLayout, Sensors};
+use palpate_tactile::{Channel, SensorLayout};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError};
@@ -316,8 +316,9 @@ impl Session {
         } else {
             (self.nominal.clone(), 0)
         };
-        let sensors = match Sensors::new(&self.layout, &scene.gripper, PressureArea::Participation) {
-            Ok(sensors) => sensors,
+        let more = self.listener.as_ref().map(|listener| listener.channels_on(&scene.gripper)).unwrap_or_default();
+        let reader = match FrameReader::new(&self.layout, &scene.gripper, &more) {
+            Ok(reader) => reader,
             Err(error) => return self.outlets.tell(Notice::Failed(error.to_string())),
         };
         if let Some(gauge) = self.gauge.as_mut().filter(|_| !again) {
@@ -335,20 +336,26 @@ impl Session {
             recorder.begin(run.info());
             self.recorder_busy = true;
         }
-        if let Some(warning) = self.listener.as_mut().and_then(|listener| listener.begin_grasp(&scene)) {
+        if let Some(warning) = self
+            .listener
+            .as_mut()
+            .and_then(|listener| listener.begin_grasp(reader.channels().iter().enumerate(), "in this scene"))
+        {
             self.outlets.tell(Notice::Warning(warning));
         }
         self.grasp += 1;
         self.status.duration = scene.timing.duration_s;
-        self.channels = sensors.channels().into();
+        // What the recogniser reads beyond the layout is not plotted.
+        let plotted = self.layout.channels(&scene.gripper).map_or(0, |channels| channels.len());
+        self.channels = reader.channels()[..plotted].into();
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
         let frame = Arc::new(run.gripper_mut().run_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
         let (told, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
-        let channels = sensors.channels().len();
+        let channels = reader.channels().len();
         let companion = self.status.error_band.then(|| Companion::new(&scene, model.as_deref(), seed, channels));
         self.current =
-            Some(Current { run, companion, plan, scene, stage, sensors, frame, told, pulled: false, ended: false });
+            Some(Current { run, companion, plan, scene, stage, reader, frame, told, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
         self.begin_ghost();
         self.publish();
@@ -428,13 +435,22 @@ impl Session {
         {
             recorder.frame(&frame);
         }
+        let read = current.reader.sensors().read(&frame);
+        let row = FrameReader::row_of(&frame, &read);
         if let Some(listener) = &mut self.listener {
-            listener.push(&frame);
+            listener.push(row.t_s, &row);
         }
-        let read = current.sensors.read(&frame);
-        let errors = current.companion.as_mut().map(|c| c.errors(frame.t, &read, &current.sensors)).unwrap_or_default();
-        let values = read.into_iter().map(|v| v.map_or(f32::NAN, |v| v as f32)).collect();
-        let row = TraceRow { grasp: self.grasp, rolling: false, t: frame.t, line_bar: frame.line_bar, values, errors };
+        let plotted = self.channels.len();
+        let errors = current.companion.as_mut().map(|c| c.errors(frame.t, &read, current.reader.sensors()));
+        let errors: Box<[f32]> = errors.unwrap_or_default().into_iter().take(plotted).collect();
+        let row = TraceRow {
+            grasp: self.grasp,
+            rolling: false,
+            t: row.t_s,
+            line_bar: row.line_bar,
+            values: row.values[..plotted].into(),
+            errors,
+        };
         current.frame = Arc::new(frame);
         if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
             self.outlets.rows_lost.store(true, Ordering::Relaxed);

@@ -8,8 +8,9 @@ use super::calibrating::{Calibrating, CalibrationView};
 use super::crosstalk::{Crossing, CrosstalkView};
 use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading};
 use super::observing::Observing;
-use super::plotted::{Plotted, Row};
+use super::plotted::Plotted;
 use super::worker::GripperSetup;
+use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
@@ -178,6 +179,12 @@ impl Desk {
                     Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => break,
                 },
+                // The recorder still has to report the end of a trial.
+                None if !self.ending.is_empty() => match inbox.recv_timeout(PATIENCE) {
+                    Ok(wish) => Some(wish),
+                    Err(RecvTimeoutError::Timeout) => None,
+                    Err(RecvTimeoutError::Disconnected) => break,
+                },
                 None => match inbox.recv() {
                     Ok(wish) => Some(wish),
                     Err(_closed) => break,
@@ -191,7 +198,10 @@ impl Desk {
                     self.obey(wish);
                     self.publish();
                 }
-                None if self.connection.is_none() => self.try_again(),
+                None if self.connection.is_none() => {
+                    self.take_recorded();
+                    self.try_again();
+                }
                 None => self.listen_on(),
             }
         }
@@ -376,12 +386,13 @@ impl Desk {
         // A board that tells its pressure knows better than whoever commands it.
         let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
-        let rows = connection.plotted.push(reading, &felt, line_bar);
+        let row = connection.plotted.row(reading, &felt, line_bar);
+        let rows = connection.plotted.push(row.clone());
         let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&felt));
         connection.latest = Some(LatestReading { counts, felt, beyond, line_bar });
         self.plot(rows);
         self.watch(reading);
-        self.recognise(reading.t_s, &felt);
+        self.recognise(&row);
         if let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection)
             && let Err(cause) = calibrating.feed(reading, &connection.board)
         {
@@ -394,7 +405,9 @@ impl Desk {
         let (grasp, from_s) = self.stretch;
         let rolling = self.recording.is_none();
         for row in rows {
-            if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row.placed(grasp, from_s, rolling)) {
+            if let Err(TrySendError::Full(_)) =
+                self.outlets.rows.try_send(TraceRow::placed(row, grasp, from_s, rolling))
+            {
                 self.outlets.rows_lost.store(true, Ordering::Relaxed);
             }
         }

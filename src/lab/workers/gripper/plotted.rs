@@ -1,6 +1,6 @@
 //! Readings as plots need them: at most a hundred rows a second, however fast the board is, without losing an extreme.
 
-use crate::workers::TraceRow;
+use crate::grasping::Row;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::Felt;
@@ -25,32 +25,10 @@ struct Bin {
     from_s: f64,
     last_s: f64,
     line_bar: f64,
-    least: Vec<f32>,
-    largest: Vec<f32>,
+    least: Box<[f32]>,
+    largest: Box<[f32]>,
     /// Readings in it.
     many: u32,
-}
-
-/// A row without its place in a grasp.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Row {
-    pub(super) t_s: f64,
-    pub(super) line_bar: f64,
-    pub(super) values: Vec<f32>,
-}
-
-impl Row {
-    /// As a window takes it; time counts from `from_s`.
-    pub(super) fn placed(self, grasp: u64, from_s: f64, rolling: bool) -> TraceRow {
-        TraceRow {
-            grasp,
-            rolling,
-            t: self.t_s - from_s,
-            line_bar: self.line_bar,
-            values: self.values.into(),
-            errors: Box::default(),
-        }
-    }
 }
 
 impl Plotted {
@@ -59,12 +37,17 @@ impl Plotted {
         Self { channels, counts, bin: None, last_s: None }
     }
 
-    /// Takes in a reading; what it completes.
-    pub(super) fn push(&mut self, reading: &Reading, felt: &Felt, line_bar: Option<f64>) -> Vec<Row> {
+    /// The row of a reading: derived channels, then counts of the board.
+    pub(super) fn row(&self, reading: &Reading, felt: &Felt, line_bar: Option<f64>) -> Row {
         let derived = self.channels.iter().map(|channel| felt.of(channel).map_or(f32::NAN, |value| value as f32));
         let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
-        let values: Vec<f32> = derived.chain((0..self.counts).map(count)).collect();
-        let (t_s, line_bar) = (reading.t_s, line_bar.unwrap_or(f64::NAN));
+        let values = derived.chain((0..self.counts).map(count)).collect();
+        Row { t_s: reading.t_s, line_bar: line_bar.unwrap_or(f64::NAN), phase: None, values }
+    }
+
+    /// Takes in a row; the rows to plot.
+    pub(super) fn push(&mut self, row: Row) -> Vec<Row> {
+        let Row { t_s, line_bar, phase, values } = row;
         let fast = self.last_s.is_some_and(|last| t_s - last < 1.0 / MOST_HZ);
         self.last_s = Some(t_s);
         let done = self.bin.as_ref().is_some_and(|bin| !fast || !(bin.from_s..bin.from_s + BIN_S).contains(&t_s));
@@ -75,7 +58,7 @@ impl Plotted {
                 self.bin =
                     Some(Bin { from_s: t_s, last_s: t_s, line_bar, least: values.clone(), largest: values, many: 1 });
             }
-            None => rows.push(Row { t_s, line_bar, values }),
+            None => rows.push(Row { t_s, line_bar, phase, values }),
         }
         rows
     }
@@ -84,16 +67,16 @@ impl Plotted {
     pub(super) fn gap(&mut self, from_s: f64) -> Vec<Row> {
         let mut rows = self.flush();
         let values = vec![f32::NAN; self.channels.len() + self.counts];
-        rows.push(Row { t_s: from_s + 1e-6, line_bar: f64::NAN, values });
+        rows.push(Row { t_s: from_s + 1e-6, line_bar: f64::NAN, phase: None, values: values.into() });
         rows
     }
 
     /// What is gathered so far.
     pub(super) fn flush(&mut self) -> Vec<Row> {
         let Some(Bin { from_s, last_s, line_bar, least, largest, many }) = self.bin.take() else { return Vec::new() };
-        let mut rows = vec![Row { t_s: from_s, line_bar, values: least }];
+        let mut rows = vec![Row { t_s: from_s, line_bar, phase: None, values: least }];
         if many > 1 {
-            rows.push(Row { t_s: 0.5 * (from_s + last_s), line_bar, values: largest });
+            rows.push(Row { t_s: 0.5 * (from_s + last_s), line_bar, phase: None, values: largest });
         }
         rows
     }
@@ -123,7 +106,8 @@ mod tests {
     fn slow_boards_are_plotted_reading_by_reading() {
         let mut plotted = Plotted::new(Vec::new(), 2);
         for k in 0..10u8 {
-            let rows = plotted.push(&reading(0.02 * f64::from(k), f32::from(k)), &Felt::default(), Some(0.5));
+            let rows =
+                plotted.push(plotted.row(&reading(0.02 * f64::from(k), f32::from(k)), &Felt::default(), Some(0.5)));
             assert_eq!(rows.len(), 1);
             assert_eq!((rows[0].values[0], rows[0].line_bar), (f32::from(k), 0.5));
             assert!(rows[0].values[1].is_nan());
@@ -136,7 +120,7 @@ mod tests {
         let mut rows = Vec::new();
         for k in 0..10_000u32 {
             let spike = if k == 5003 { 4095.0 } else { 100.0 };
-            rows.extend(plotted.push(&reading(1e-3 * f64::from(k), spike), &Felt::default(), None));
+            rows.extend(plotted.push(plotted.row(&reading(1e-3 * f64::from(k), spike), &Felt::default(), None)));
         }
         assert!((980..=1010).contains(&rows.len()), "{}", rows.len());
         assert!(rows.windows(2).all(|pair| pair[0].t_s < pair[1].t_s));

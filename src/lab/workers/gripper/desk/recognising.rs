@@ -1,11 +1,11 @@
-//! The model at the desk: it hears what the calibrated sensors feel while the fingers close and hold.
+//! Recognition of the real gripper: the model listens to calibrated rows while the fingers close and hold.
 
 use super::Desk;
+use crate::grasping::Row;
 use crate::workers::Notice;
 use crate::workers::listener::Listener;
 use palpate_learn::Model;
-use palpate_tactile::Channel;
-use palpate_tactile::calibration::Felt;
+use palpate_tactile::board::Reading;
 use std::sync::Arc;
 
 impl Desk {
@@ -24,36 +24,28 @@ impl Desk {
 
     pub(super) fn begin_recognition(&mut self) {
         let (Some(listener), Some(connection)) = (&mut self.listener, &self.connection) else { return };
-        let channels: Vec<String> = connection.readout.channels().iter().map(Channel::name).collect();
-        if let Some(warning) = listener.begin_grasp_of(&channels) {
+        let place = "on the gripper: the model reads more than is calibrated";
+        let calibrated = connection.readout.channels();
+        let columns = self.channels.iter().enumerate().filter(|(_, channel)| calibrated.contains(channel));
+        if let Some(warning) = listener.begin_grasp(columns, place) {
             self.outlets.tell(Notice::Warning(warning));
         }
     }
 
-    /// Lets the model hear a reading of the grasp that goes on.
-    pub(super) fn recognise(&mut self, t_s: f64, felt: &Felt) {
+    /// Lets the model listen to a row, from the closing on.
+    pub(super) fn recognise(&mut self, row: &Row) {
         let (Some(listener), Some(recording)) = (&mut self.listener, &self.recording) else { return };
-        let Some(t) = recording.controller().closing_s().map(|closing_s| t_s - closing_s).filter(|t| *t >= 0.0) else {
-            return;
-        };
-        let names = listener.channels();
-        let value =
-            |name: &String| self.channels.iter().find(|channel| channel.name() == *name).and_then(|c| felt.of(c));
-        // A reading in which a sensor is at an end of its range is passed over.
-        let row: Option<Vec<f32>> = names.iter().map(|name| value(name).map(|value| value as f32)).collect();
-        if let Some(row) = row {
-            listener.push_row(t as f32, &row);
+        let since = recording.controller().closing_s().map(|closing_s| row.t_s - closing_s);
+        if let Some(t) = since.filter(|t| *t >= 0.0) {
+            listener.push(t, row);
         }
     }
 
-    /// Recognises what was heard since the closing began, where that was found out later.
+    /// Recognises the readings since the closing began, where that was detected later.
     pub(super) fn catch_up(&mut self, closing_s: f64, until_s: f64) {
         let Some(connection) = &self.connection else { return };
-        let heard = connection.recent.between(closing_s, until_s);
-        let felt: Vec<(f64, Felt)> =
-            heard.iter().map(|reading| (reading.t_s, connection.readout.felt(reading))).collect();
-        for (t_s, felt) in felt {
-            self.recognise(t_s, &felt);
-        }
+        let row = |reading: &Reading| connection.plotted.row(reading, &connection.readout.felt(reading), None);
+        let rows: Vec<Row> = connection.recent.between(closing_s, until_s).iter().map(row).collect();
+        rows.iter().for_each(|row| self.recognise(row));
     }
 }
