@@ -137,12 +137,11 @@ pub struct Gap {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// Names and numbers, as Arduino's plotter takes them.
+    /// Names and numbers, as Arduino's plotter takes them. Trials that were recorded from Teleplot lines load as these.
+    #[serde(alias = "teleplot")]
     Plotter,
     /// Numbers in columns.
     Csv,
-    /// One named number to a line.
-    Teleplot,
     /// A flat JSON object to a line.
     JsonLines,
 }
@@ -153,17 +152,15 @@ impl Format {
         match self {
             Self::Plotter => "Arduino plotter lines",
             Self::Csv => "CSV",
-            Self::Teleplot => "Teleplot",
             Self::JsonLines => "JSON lines",
         }
     }
 
-    /// The mark by which it was told from the others.
+    /// The mark that sets it apart from the others.
     pub fn mark(self) -> &'static str {
         match self {
-            Self::Plotter => "each number stands behind its name and a colon",
+            Self::Plotter => "each number follows its name and a colon",
             Self::Csv => "the lines are numbers in columns",
-            Self::Teleplot => "the lines begin with >",
             Self::JsonLines => "the lines begin with {",
         }
     }

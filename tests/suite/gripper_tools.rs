@@ -12,7 +12,7 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Action};
 use palpate_device::doctor::{ChannelTraces, Observations};
-use palpate_device::protocol::Saturation;
+use palpate_device::protocol::{AdcRange, Saturation};
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
@@ -57,8 +57,7 @@ fn sound() -> Observations {
         detected: None,
         cadence,
         saturation: vec![None; 4],
-        looks_10_bit: false,
-        units: Vec::new(),
+        adc_range: AdcRange::Fits,
         reconnects: 0,
         now_s: 8.0,
         dropped: [0; 2],

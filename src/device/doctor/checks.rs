@@ -1,7 +1,7 @@
 //! The checks, each from what was seen to what it means.
 
 use super::{ChannelTrace, CheckFinding, CheckStatus, Observations, SKETCH};
-use crate::protocol::Saturation;
+use crate::protocol::{AdcRange, Saturation};
 use crate::serial::{LinkState, LinkStatus, MODEM_MANAGER_COMMAND, PortTrouble};
 use palpate_geometry::units::three_digits;
 use palpate_tactile::board::{Board, Sensor};
@@ -315,28 +315,27 @@ fn firmware(seen: &Observations) -> Told {
 fn bits(seen: &Observations) -> Told {
     or_not_seen(readings(seen).map(|link| {
         let full = link.board.full_scale;
-        if link.looks_10_bit && full < 4095 {
-            return Told::note(format!(
-                "no count was above {full}, so that the converter is taken for one of ten bits"
-            ))
-            .because(
-                "analogRead gives ten bits until it is told otherwise, and the board does not say how far it counts",
-                "Call analogReadResolution(12) in setup() for finer counts, and say adc=12 in a hello line",
-            );
-        }
-        if link.looks_10_bit && link.board.firmware.is_none() {
-            return Told::note(format!("no count is beyond ten bits; {full} is taken for granted")).because(
-                "Neither the board nor a flex strip tells how far the converter counts",
-                "Say adc=12, or adc=10, in a hello line",
-            );
-        }
-        if link.looks_10_bit {
-            let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
-            return Told::wrong(format!("no count was above {most:.0}; the converter is said to go to {full}"))
-                .because(
-                    "analogRead gives 10 bits until it is told otherwise",
-                    "Call analogReadResolution(12) in setup()",
+        let stated = link.board.firmware.is_some();
+        match link.adc_range {
+            AdcRange::Exceeded => {
+                return Told::wrong(format!("counts exceed {full}")).because(
+                    if stated {
+                        "The converter has more bits than the handshake states"
+                    } else {
+                        "The converter has more than the assumed 12 bits"
+                    },
+                    "State its bits in the handshake, as in adc=16",
                 );
+            }
+            AdcRange::LooksTenBit => {
+                let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
+                let assumed = if stated { "the handshake states" } else { "assumed:" };
+                return Told::wrong(format!("no count above {most:.0}; {assumed} a range of {full}")).because(
+                    "analogRead gives 10 bits by default",
+                    "Call analogReadResolution(12) in setup(), or state adc=10 in the handshake",
+                );
+            }
+            AdcRange::Fits => {}
         }
         if full < 4095 {
             return Told::note(format!("the converter goes to {full}")).because(

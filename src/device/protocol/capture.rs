@@ -68,7 +68,7 @@ impl<R: Read> CaptureReader<R> {
 impl Pace {
     fn go_on(&mut self, line: &[u8]) {
         let clock = match parse(line) {
-            Ok(Parsed::Named { fields, .. }) => fields.iter().find_map(|field| match field.name.as_str() {
+            Ok(Parsed::Named(_, fields)) => fields.iter().find_map(|field| match field.name.as_str() {
                 "t_us" => field.value.map(|us| us * 1e-6),
                 "ms" => field.value.map(|ms| ms * 1e-3),
                 _ => None,

@@ -12,7 +12,6 @@ use super::lines::{Line, LineSplitter};
 use super::reply::BoardReply;
 use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
 use super::shape::{Candidate, Judged, Role, Shapes};
-use super::teleplot::Assembler;
 use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
 
@@ -45,15 +44,13 @@ struct Reader {
     channels: Vec<String>,
     /// The sensor on each of them.
     sensors: Vec<Option<Sensor>>,
+    /// Channels of flex strips beside a usual resistor.
+    strips: Vec<bool>,
     /// What the board said of itself.
     hello: Option<Handshake>,
-    teleplot: Assembler,
     clock: StreamClock,
     meter: Meter,
     saturation: SaturationWatch,
-    adc_range: AdcRange,
-    /// The full scale that was told last.
-    told_scale: Option<u32>,
     line_log: LineLog,
     /// Lines since the last reading that could not be read.
     unreadable: u64,
@@ -89,13 +86,12 @@ impl Decoder {
     /// The stream was interrupted; readings that are found missing when it goes on are put down to `cause`.
     pub fn interrupt(&mut self, cause: &str) {
         self.splitter.interrupt();
-        self.reader.teleplot = Assembler::default();
         self.reader.shapes.give_up();
         self.reader.clock.interrupt();
         // Another sketch may be on the board when it comes back; it need not say hello.
         self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
         self.reader.broken = Some(cause.to_owned());
-        self.reader.adc_range = AdcRange::default();
+        self.reader.saturation.interrupt();
         self.reader.columns.interrupt();
         self.reader.meter.forget_what_came_before();
     }
@@ -115,7 +111,7 @@ impl Decoder {
         let format = self.reader.shapes.format?;
         let why = match format {
             Format::Csv => format!("{}; {}", format.mark(), self.reader.columns.why()),
-            Format::Plotter | Format::Teleplot | Format::JsonLines => format.mark().to_owned(),
+            Format::Plotter | Format::JsonLines => format.mark().to_owned(),
         };
         Some(Detected { format, why, time: self.reader.clock.source() })
     }
@@ -140,23 +136,15 @@ impl Decoder {
         self.reader.saturation.at()
     }
 
-    /// The unit that stands behind a channel's numbers, for each that has one.
-    pub fn units(&self) -> Vec<(String, String)> {
-        let named = |(place, unit): (usize, &str)| Some((self.reader.channels.get(place)?.clone(), unit.to_owned()));
-        self.reader.shapes.units().filter_map(named).collect()
-    }
-
-    /// True where the counts look like those of a converter with 10 bits, though it is taken for one with 12, or said to be
-    /// one: a sketch may say so and forget `analogReadResolution`.
-    pub fn looks_10_bit(&self) -> bool {
-        self.reader.looks_10_bit()
+    /// Whether the counts fit the converter's range, stated or assumed.
+    pub fn adc_range(&self) -> AdcRange {
+        self.reader.saturation.adc_range()
     }
 }
 
 impl Reader {
     fn board(&self) -> Board {
         let mut board = self.said().cloned().unwrap_or_default();
-        board.full_scale = self.full_scale();
         let place = |name: &String| board.channels.iter().position(|known| is_same_channel(known, name));
         let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
@@ -167,25 +155,6 @@ impl Reader {
     /// What the board said of itself.
     fn said(&self) -> Option<&Board> {
         self.hello.as_ref().map(|hello| &hello.board)
-    }
-
-    /// How far its converter counts: as it says, and else as its counts tell.
-    fn full_scale(&self) -> u32 {
-        self.adc_range.full_scale(self.said().map(|board| board.full_scale))
-    }
-
-    fn looks_10_bit(&self) -> bool {
-        let Some(said) = self.said().filter(|_| self.saturation.looks_10_bit()) else {
-            return self.saturation.looks_10_bit();
-        };
-        // Against the board's word only strips speak: they are never near zero.
-        let board = self.board();
-        let is_told_by = |sensor: Sensor| {
-            let place = board.channel_of(sensor).filter(|_| sensor.is_flex());
-            let ohm = |place: usize| board.divider_ohm.get(place).copied().unwrap_or(0.0);
-            place.is_some_and(|place| self.saturation.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
-        };
-        said.full_scale >= FULL_12_BIT && Sensor::ALL.into_iter().any(is_told_by)
     }
 
     fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
@@ -207,26 +176,16 @@ impl Reader {
         if line.starts_with(b"#") {
             return self.remark(line, arrived_s, heard);
         }
-        let (format, fields, odd) = match self.check(line).and_then(|()| parse(line)) {
+        let (format, fields) = match self.check(line).and_then(|()| parse(line)) {
             Err(why) => return self.bad(line, why, arrived_s),
             Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
-            Ok(Parsed::Columns(cells)) => {
-                let odd = cells.iter().any(|cell| !cell.plain);
-                (Format::Csv, self.columns.name(cells, self.hello.as_ref().map(|hello| &hello.board)), odd)
+            Ok(Parsed::Columns(values)) => {
+                (Format::Csv, self.columns.name(values, self.hello.as_ref().map(|hello| &hello.board)))
             }
-            Ok(Parsed::Named { format: Format::Teleplot, fields, odd }) => {
-                self.line_log.add(line, arrived_s, LineKind::Values);
-                match self.teleplot.push(fields) {
-                    None => return,
-                    Some(fields) => (Format::Teleplot, fields, odd),
-                }
-            }
-            Ok(Parsed::Named { format, fields, odd }) => (format, fields, odd),
+            Ok(Parsed::Named(format, fields)) => (format, fields),
         };
-        if format != Format::Teleplot {
-            self.line_log.add(line, arrived_s, LineKind::Values);
-        }
-        match self.shapes.judge(Candidate { format, fields, odd, arrived_s }) {
+        self.line_log.add(line, arrived_s, LineKind::Values);
+        match self.shapes.judge(Candidate { format, fields, arrived_s }) {
             Judged::Known(line) => {
                 self.give_up(arrived_s);
                 self.reading(&line, heard);
@@ -267,7 +226,7 @@ impl Reader {
         self.line_log.add(line, arrived_s, LineKind::Remark);
         if hello.is_some() && self.hello != hello {
             self.hello = hello;
-            self.adc_range = AdcRange::default();
+            self.find_sensors();
             self.name_columns(heard);
             heard.push(DecodedEvent::Board(self.board()));
         }
@@ -307,6 +266,12 @@ impl Reader {
 
     fn find_sensors(&mut self) {
         self.sensors = self.channels.iter().map(|name| Sensor::called(name)).collect();
+        let said = self.said();
+        let ohm = |sensor: Sensor| said.and_then(|board| board.divider_ohm.get(board.channel_of(sensor)?));
+        let is_strip = |sensor: &Option<Sensor>| {
+            sensor.is_some_and(|s| s.is_flex() && ohm(s).is_none_or(|ohm| *ohm <= LARGEST_BESIDE_A_STRIP))
+        };
+        self.strips = self.sensors.iter().map(is_strip).collect();
     }
 
     fn reading(&mut self, line: &Candidate, heard: &mut Vec<DecodedEvent>) {
@@ -341,17 +306,13 @@ impl Reader {
             self.unreadable += 1;
             return self.meter.bad_line(line.arrived_s);
         };
-        let said = self.said().map(|board| board.full_scale);
-        let [strip, largest] = self.largest(&counts);
-        self.adc_range.add(stamp.t_s, strip, largest, said);
-        if self.told_scale.replace(self.full_scale()) != Some(self.full_scale()) {
-            heard.push(DecodedEvent::Board(self.board()));
-        }
         self.tell_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
-        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { self.full_scale() };
-        self.saturation.add(&counts, &sent, stamp.t_s, full_scale);
+        let full_scale = self.said().map_or(FULL_12_BIT, |board| board.full_scale);
+        self.saturation.add_range(&self.largest(&counts), stamp.t_s, full_scale);
+        let ten_bits = self.saturation.adc_range() == AdcRange::LooksTenBit;
+        self.saturation.add(&counts, &sent, stamp.t_s, if ten_bits { FULL_10_BIT } else { full_scale });
         let Stamp { t_s, seq, .. } = stamp;
         heard.push(DecodedEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
     }
@@ -359,12 +320,11 @@ impl Reader {
     /// The largest count of the strips, and of all sensors; what else a board sends need not come from its converter.
     fn largest(&self, counts: &[Option<f32>]) -> [f32; 2] {
         let mut largest = [0.0f32; 2];
-        for (sensor, count) in self.sensors.iter().zip(counts) {
-            if let (Some(sensor), Some(count)) = (sensor, count) {
-                largest[1] = largest[1].max(*count);
-                if sensor.is_flex() {
-                    largest[0] = largest[0].max(*count);
-                }
+        for ((sensor, strip), count) in self.sensors.iter().zip(&self.strips).zip(counts) {
+            let count = count.filter(|_| sensor.is_some()).unwrap_or(0.0);
+            largest[1] = largest[1].max(count);
+            if *strip {
+                largest[0] = largest[0].max(count);
             }
         }
         largest

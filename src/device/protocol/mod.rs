@@ -26,7 +26,6 @@ mod lines;
 mod reply;
 mod saturation;
 mod shape;
-mod teleplot;
 
 pub use capture::CaptureReader;
 pub use checksum::checksum;
@@ -35,4 +34,4 @@ pub use fuzz::{FuzzListener, FuzzStream};
 pub use line_log::{ConsoleLine, LineKind};
 pub use lines::MAX_LINE;
 pub use reply::BoardReply;
-pub use saturation::Saturation;
+pub use saturation::{AdcRange, Saturation};

@@ -14,7 +14,7 @@ use super::ports::{PortInfo, choose, describe, list_ports};
 use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
 use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
-use crate::protocol::{ConsoleLine, Decoder, Saturation};
+use crate::protocol::{AdcRange, ConsoleLine, Decoder, Saturation};
 use palpate_tactile::board::Detected;
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::cadence::Cadence;
@@ -26,9 +26,6 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-
-/// Full scale of ten bits.
-const TEN_BITS: u32 = 1023;
 
 /// What to listen to, and how.
 #[derive(Clone, Debug)]
@@ -111,10 +108,8 @@ pub struct LinkStatus {
     pub cadence: Cadence,
     /// Channels at an end of the converter's range, or without numbers.
     pub saturation: Vec<Option<Saturation>>,
-    /// The counts look like those of ten bits.
-    pub looks_10_bit: bool,
-    /// Channels whose numbers have a unit behind them, and which.
-    pub units: Vec<(String, String)>,
+    /// Whether the counts fit the converter's range.
+    pub adc_range: AdcRange,
     /// How often the connection was taken up again.
     pub reconnects: u32,
     /// Time since the link was opened (s).
@@ -145,26 +140,17 @@ impl LinkStatus {
     /// What is wrong with the sensors' wiring as far as counts tell, in sentences.
     pub fn wiring_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        if self.looks_10_bit {
-            let said = self.board.firmware.is_some();
-            let text = match (self.board.full_scale <= TEN_BITS, said) {
-                (true, _) => {
-                    "the counts are those of ten bits, and taken as such: analogReadResolution(12) in the sketch gives finer ones"
-                }
-                (false, false) => {
-                    "no count is beyond ten bits; twelve are taken for granted, since neither the board nor a strip tells"
-                }
-                (false, true) => {
-                    "the counts look like those of ten bits, against the board's word, so that what is derived from them is \
-                          wrong: call analogReadResolution(12) in the sketch"
-                }
-            };
-            remarks.push(text.to_owned());
+        let full = self.board.full_scale;
+        match self.adc_range {
+            AdcRange::Fits => {}
+            AdcRange::LooksTenBit => remarks.push(format!(
+                "the counts look like 10 bits, but the range is {full}: derived values are wrong. Call \
+                 analogReadResolution(12) in the sketch"
+            )),
+            AdcRange::Exceeded => remarks.push(format!(
+                "counts exceed {full}: derived values are wrong. State the converter's bits in the handshake, as in adc=16"
+            )),
         }
-        let sensors = self.units.iter().filter(|(name, _)| Sensor::called(name).is_some());
-        remarks.extend(sensors.map(|(name, unit)| {
-            format!("{name} comes in {unit}, and is taken for counts: print what analogRead gives, without a unit")
-        }));
         let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
         for (channel, (name, rail)) in self.board.channels.iter().zip(&self.saturation).enumerate() {
             let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
@@ -376,8 +362,7 @@ impl SerialLink {
             detected: decoder.detected(),
             cadence: decoder.cadence(),
             saturation: decoder.saturation(),
-            looks_10_bit: decoder.looks_10_bit(),
-            units: decoder.units(),
+            adc_range: decoder.adc_range(),
             reconnects: shared.reconnects.load(Ordering::Relaxed),
             now_s: self.now_s(),
             dropped: [shared.bytes.dropped_bytes(), shared.events.dropped_readings()],
