@@ -2,12 +2,13 @@
 //! clock of its own: told how late it is and what the host said, it gives bytes. The same seed, the same times and the
 //! same words of the host give the same bytes.
 
-use super::board::{BoardSetup, FirmwareBoard, sign};
 use super::faults::{Fault, FaultKind};
+use super::firmware::{BoardSetup, FirmwareBoard};
 use super::hand::{Began, Hand, HandPlan};
 use super::parts::{HiddenParts, Sensors, Stimulus};
 use super::script::Step;
 use super::uart::misread;
+use crate::protocol::checksum;
 use palpate_sim::objects::ObjectError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::electronics::Converter;
@@ -145,7 +146,7 @@ impl EmulatedGripper {
             most_steps: setup.most_steps,
         };
         let mut hello = String::new();
-        let board = FirmwareBoard::begin(board_setup.clone(), setup.clock_start_us, &mut hello);
+        let board = FirmwareBoard::begin(&board_setup, setup.clock_start_us, &mut hello);
         Ok(Self {
             hand: Hand::new(setup.hand)?,
             sensors: setup.parts.sensors(f64::from(setup.rate_hz)),
@@ -259,7 +260,7 @@ impl EmulatedGripper {
         let felt = self.hand.at(self.now_s, self.board.line_bar());
         self.tell_hand();
         if let Some(bar) = self.hand.own_bar() {
-            self.board.set_by_hand((bar * 20.0).round() as u8);
+            self.board.set_by_hand((bar * 20.0).round() as u8, due);
         }
         let shares = self.shares(felt);
         self.converter.strike(&self.faults, self.now_s);
@@ -290,7 +291,7 @@ impl EmulatedGripper {
     fn restart(&mut self) {
         let until = self.fault(FaultKind::Reset).map_or(self.now_s, |fault| fault.until_s);
         self.restarted.clear();
-        self.board = FirmwareBoard::begin(self.board_setup.clone(), self.clock_start_us, &mut self.restarted);
+        self.board = FirmwareBoard::begin(&self.board_setup, self.clock_start_us, &mut self.restarted);
         self.now_s = until;
         self.anchor = (until, u64::from(self.clock_start_us));
     }
@@ -365,9 +366,8 @@ impl EmulatedGripper {
             Some((key, _)) if key == name => format!("{key}:nan"),
             _ => field.to_owned(),
         };
-        let mut line = body.split(',').map(field).collect::<Vec<_>>().join(",");
-        sign(&mut line, ",ck:");
-        line
+        let body = body.split(',').map(field).collect::<Vec<_>>().join(",");
+        format!("{body},ck:{}\n", checksum(body.as_bytes()))
     }
 
     /// Lets go what a burst holds back, when its time has come.
