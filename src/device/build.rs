@@ -1,7 +1,5 @@
 //! Compiles the board's firmware for the emulator.
 
-#![expect(clippy::print_stdout, reason = "cargo reads what a build script prints")]
-
 fn main() {
     let (wrapper, firmware) = ("emulator/firmware.c", "../../assets/firmware/due_gripper");
     println!("cargo::rerun-if-changed={wrapper}");
