@@ -117,25 +117,43 @@ pub fn fault_help() -> String {
     TABLE.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Reads a list of faults.
-pub fn parse_faults(text: &str) -> Result<Vec<Fault>, String> {
-    text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse_fault).collect()
+/// An error in a list of faults.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the fault \"{text}\" {problem}; write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2")]
+pub struct FaultError {
+    /// The fault.
+    pub text: String,
+    /// What is wrong with it.
+    pub problem: FaultProblem,
 }
 
-fn parse_fault(text: &str) -> Result<Fault, String> {
-    let wrong =
-        |what: &str| format!("the fault \"{text}\" {what}; write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2");
-    let (named, times) = text.split_once('@').ok_or_else(|| wrong("does not say when"))?;
+/// What is wrong with a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FaultProblem {
+    /// No time.
+    #[error("does not say when")]
+    NoTime,
+    /// An unknown name.
+    #[error("is not one of {names}", names = TABLE.map(|row| row.name).join(", "))]
+    Unknown,
+    /// A wrong number.
+    #[error("has a wrong number")]
+    Number,
+}
+
+/// Parses a list of faults.
+pub fn parse_faults(text: &str) -> Result<Vec<Fault>, FaultError> {
+    let parse = |text| parse_fault(text).map_err(|problem| FaultError { text: String::from(text), problem });
+    text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse).collect()
+}
+
+fn parse_fault(text: &str) -> Result<Fault, FaultProblem> {
+    let (named, times) = text.split_once('@').ok_or(FaultProblem::NoTime)?;
     let (name, value) = named.split_once('=').map_or((named, None), |(name, value)| (name, Some(value)));
-    let row = TABLE.iter().find(|row| row.name == name).ok_or_else(|| {
-        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
-        wrong(&format!("is not one of {}", names.join(", ")))
-    })?;
+    let row = TABLE.iter().find(|row| row.name == name).ok_or(FaultProblem::Unknown)?;
     let (from, duration) = times.split_once('/').map_or((times, None), |(from, lasts)| (from, Some(lasts)));
     let number = |text: Option<&str>, usual: f64| match text {
-        Some(text) => {
-            text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or_else(|| wrong("has a wrong number"))
-        }
+        Some(text) => text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or(FaultProblem::Number),
         None => Ok(usual),
     };
     let from_s = number(Some(from), 0.0)?;
@@ -171,7 +189,7 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_fault_is_said() {
         for (text, word) in [("vanish", "when"), ("vnish@3", "vanish"), ("loss=x@3", "number"), ("loss@-1", "number")] {
-            let told = parse_faults(text).expect_err(text);
+            let told = parse_faults(text).expect_err(text).to_string();
             assert!(told.contains(word) && told.contains(text), "{told}");
         }
     }

@@ -23,11 +23,11 @@ mod script;
 mod tests;
 mod uart;
 
-pub use faults::{Fault, FaultKind, fault_help, parse_faults};
+pub use faults::{Fault, FaultError, FaultKind, FaultProblem, fault_help, parse_faults};
 pub use gripper::{EmulatedGripper, EmulatorEvent, EmulatorEventKind, EmulatorSetup};
 pub use hand::HandPlan;
-pub use parts::{HiddenParts, PadSetup, Stimulus, StripSetup};
+pub use parts::{HiddenParts, PadSetup, PartsError, Stimulus, StripSetup};
 #[cfg(unix)]
 pub use port::{PortSetup, ServeError, serve};
-pub use script::{ScriptError, Step, parse_script, parse_step};
+pub use script::{ScriptError, Step, StepProblem, parse_script};
 pub use uart::misread;

@@ -42,7 +42,7 @@ pub struct PortSetup {
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// Something else stands where the link should be.
-    #[error("{path} exists and is no link to a terminal: it is left alone. Choose another name, or remove it")]
+    #[error("{path} exists and is not a link to a terminal. Choose another name, or remove it")]
     Taken {
         /// The path.
         path: PathBuf,
@@ -58,6 +58,9 @@ pub enum ServeError {
     /// There is no pseudo-terminal.
     #[error("cannot open a pseudo-terminal: {0}")]
     Terminal(#[from] serialport::Error),
+    /// The writing thread cannot start.
+    #[error("cannot start a thread: {0}")]
+    Thread(std::io::Error),
 }
 
 /// Runs the gripper on a pseudo-terminal until `stop` is set. `turn` is called again and again, to take what happened and to
@@ -253,7 +256,7 @@ impl Terminal {
                     left.fetch_sub(piece.len(), Ordering::Relaxed);
                 }
             })
-            .map_err(|cause| ServeError::Link { path: link.path.clone(), cause })?;
+            .map_err(ServeError::Thread)?;
         link.lead_to(&name)?;
         Ok((Self { near, output, waiting, given_up: 0, told: Instant::now() }, name))
     }

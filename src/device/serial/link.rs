@@ -1,7 +1,7 @@
-//! A link to a board: what it says, in order and without loss, whatever happens to the cable.
+//! Link to a board: its events in order and without loss, through disconnections.
 //!
 //! ```text
-//!   "serial-read"                 "serial-decode"              whoever listens
+//!   "serial-read"                 "serial-decode"              listener
 //!   reads, stamps  --bytes-->     Decoder      --events-->     take(): readings, gaps, bytes
 //!   opens again after a loss                                   status(), console(), send()
 //! ```
@@ -27,16 +27,16 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// What to listen to, and how.
+/// Port and settings of a link.
 #[derive(Clone, Debug)]
 pub struct LinkOptions {
-    /// A port, a link to one, or a file of captured bytes; the only likely port where nothing is named.
+    /// A port, a link to one, or a file of captured bytes; none for the only likely port.
     pub path: Option<PathBuf>,
-    /// The speed; without it the usual ones are tried.
+    /// Baud rate; none to scan the usual ones.
     pub baud: Option<Baud>,
-    /// Whether a board that vanishes is waited for.
+    /// Wait for a board that disconnects.
     pub reconnect: bool,
-    /// How fast captured bytes are played, as a multiple of the pace they came at; infinite for as fast as they are taken.
+    /// Speed of a replay, as a multiple of the original; infinite for as fast as it is read.
     pub replay_speed: f64,
 }
 
@@ -46,11 +46,11 @@ impl Default for LinkOptions {
     }
 }
 
-/// Where a link stands.
+/// State of a link.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "state")]
 pub enum LinkState {
-    /// Just opened; boards restart when they are connected to.
+    /// Just opened: a board may restart.
     Waiting,
     /// Readings come.
     Listening,
@@ -80,64 +80,64 @@ impl LinkState {
     /// In a sentence for the user.
     pub fn sentence(&self) -> String {
         match self {
-            Self::Waiting => "Waiting for the board (it restarts when it is connected to)".to_owned(),
+            Self::Waiting => "Waiting for the board (it restarts on connection)".to_owned(),
             Self::Listening => "Listening".to_owned(),
             Self::Silent { hint } | Self::Unreadable { hint } => hint.clone(),
-            Self::Lost { cause } => format!("Connection lost: {cause}. Looking for the board each second"),
+            Self::Lost { cause } => format!("Connection lost: {cause}. Trying again every second"),
             Self::Ended { cause: Some(cause) } => format!("Ended: {cause}"),
             Self::Ended { cause: None } => "Ended".to_owned(),
         }
     }
 }
 
-/// Everything that can be shown of a link.
+/// Status of a link, for display.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinkStatus {
-    /// Where it stands.
+    /// Its state.
     #[serde(flatten)]
     pub state: LinkState,
-    /// What is listened to.
+    /// Its port.
     pub port: PortInfo,
-    /// The speed in use (bit/s); none for captured bytes.
+    /// Baud rate; none for captured bytes.
     pub baud: Option<u32>,
-    /// What is known of the board.
+    /// The board, as far as it is known.
     pub board: Board,
-    /// How its lines are read; none before two of them agree.
+    /// Detected line format; none before two lines agree.
     pub detected: Option<Detected>,
-    /// How well it keeps time.
+    /// Rate, jitter and losses.
     pub cadence: Cadence,
-    /// Channels at an end of the converter's range, or without numbers.
+    /// Saturation of each channel.
     pub saturation: Vec<Option<Saturation>>,
     /// Whether the counts fit the converter's range.
     pub adc_range: AdcRange,
-    /// How often the connection was taken up again.
+    /// Number of reconnections.
     pub reconnects: u32,
     /// Time since the link was opened (s).
     pub now_s: f64,
-    /// Bytes, and readings, that this computer was too slow to take.
+    /// Bytes, and readings, dropped because this computer was too slow.
     pub dropped: [u64; 2],
 }
 
 impl LinkStatus {
-    /// What is wrong with the line, and what to try, in sentences.
+    /// Faults of the connection, and what to try.
     pub fn line_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.cadence.troubled {
             let bad = self.cadence.bad_lines;
             remarks.push(format!(
-                "many lines cannot be read, {bad} so far: look at them in the console; a short cable straight into the \
-                 computer helps, and no other program on the port"
+                "{bad} unreadable lines so far: see the console; use a short cable directly into the computer, and no other \
+                 program on the port"
             ));
         }
         if let [bytes, readings] = self.dropped
             && bytes + readings > 0
         {
-            remarks.push(format!("this computer was too slow for {bytes} bytes and {readings} readings"));
+            remarks.push(format!("this computer was too slow: {bytes} bytes and {readings} readings dropped"));
         }
         remarks
     }
 
-    /// What is wrong with the sensors' wiring as far as counts tell, in sentences.
+    /// Faults of the wiring, as far as counts show them.
     pub fn wiring_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         let full = self.board.full_scale;
@@ -156,9 +156,9 @@ impl LinkStatus {
             let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
             remarks.extend(match (rail, sensor.is_some_and(Sensor::is_flex)) {
                 (Some(Saturation::High), true) => {
-                    Some(format!("{name} is at the upper end of the range: the strip or one of its wires has come off"))
+                    Some(format!("{name} is at full scale: the strip or one of its wires is disconnected"))
                 }
-                (Some(Saturation::Low), true) => Some(format!("{name} reads nothing: the strip is shorted, or its divider not fed")),
+                (Some(Saturation::Low), true) => Some(format!("{name} reads zero: the strip is shorted, or its divider has no supply")),
                 (Some(Saturation::High), false) => Some(format!(
                     "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
                      ground that is missing or too large"
@@ -264,11 +264,11 @@ pub enum SendError {
     #[error("the board is not connected, so that it was not told")]
     NotConnected,
     /// The port did not take it.
-    #[error("the board was not told: {0}")]
+    #[error("cannot send to the board: {0}")]
     Port(String),
 }
 
-/// An open link. Dropping it closes the port.
+/// Open link. Dropping it closes the port.
 #[derive(Debug)]
 pub struct SerialLink {
     shared: Arc<Shared>,
@@ -276,7 +276,7 @@ pub struct SerialLink {
 }
 
 impl SerialLink {
-    /// Opens a port, or a file of captured bytes, and begins to listen.
+    /// Opens a port or a file of captured bytes, and starts listening.
     pub fn open(options: &LinkOptions) -> Result<Self, PortError> {
         let port = match &options.path {
             Some(path) if is_capture(path) => return Self::replay(path, options.replay_speed),
@@ -327,17 +327,17 @@ impl SerialLink {
         Ok(link)
     }
 
-    /// What has come since the last call; if nothing has, waits for it up to a time.
+    /// Takes the events since the last call; waits up to `patience` for the first.
     pub fn take(&self, patience: Duration) -> Vec<LinkEvent> {
         self.shared.events.take(patience)
     }
 
-    /// True when everything was taken and nothing more will come.
+    /// True when every event was taken and no more will come.
     pub fn is_over(&self) -> bool {
         self.shared.events.is_over()
     }
 
-    /// This computer's clock as the readings have it (s since the link was opened).
+    /// Time on the clock of the readings (s since the link was opened).
     pub fn now_s(&self) -> f64 {
         self.shared.began.elapsed().as_secs_f64()
     }
@@ -349,7 +349,7 @@ impl SerialLink {
         port.write_all(format!("{line}\n").as_bytes()).map_err(|error| SendError::Port(error.to_string()))
     }
 
-    /// Everything that can be shown.
+    /// Status, for display.
     pub fn status(&self) -> LinkStatus {
         let shared = &self.shared;
         let decoder = lock(&shared.decoder);
@@ -369,12 +369,12 @@ impl SerialLink {
         }
     }
 
-    /// The newest lines as they came, oldest first.
+    /// Newest raw lines, oldest first.
     pub fn console(&self) -> Vec<ConsoleLine> {
         lock(&self.shared.decoder).console().cloned().collect()
     }
 
-    /// Stops listening; what has come can still be taken.
+    /// Stops listening; events so far can still be taken.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
     }
@@ -383,11 +383,11 @@ impl SerialLink {
 impl Drop for SerialLink {
     fn drop(&mut self) {
         self.stop();
-        // Whoever waits for room waits in vain from now on.
+        // Wakes threads that wait for room.
         self.shared.events.close();
         self.shared.bytes.close();
         for thread in self.threads.drain(..) {
-            // A panic in the thread has printed itself; there is nobody left to tell here.
+            // A panic in the thread has printed itself.
             let _ended = thread.join();
         }
     }
