@@ -42,7 +42,7 @@ impl Sensor {
         letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
     }
 
-    /// What it is called on screen.
+    /// Its name on screen.
     pub fn label(self) -> &'static str {
         match self {
             Self::FlexLeft => "left flex strip",
@@ -133,7 +133,7 @@ pub struct Gap {
     pub cause: String,
 }
 
-/// How a board writes its lines.
+/// Line format of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
@@ -147,7 +147,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// What it is called on screen.
+    /// Its name on screen.
     pub fn label(self) -> &'static str {
         match self {
             Self::Plotter => "Arduino plotter lines",
@@ -166,7 +166,7 @@ impl Format {
     }
 }
 
-/// What the times of readings rest on.
+/// Source of the times of readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TimeSource {
@@ -174,18 +174,18 @@ pub enum TimeSource {
     Device,
     /// The board's sequence numbers, at an even pace.
     Sequence,
-    /// Lines counted on this side, at an even pace: lost ones are told from late ones only afterwards.
+    /// Lines counted on arrival, at an even pace: a loss shows only afterwards.
     Arrival,
 }
 
-/// How a board's lines are read, and why.
+/// Detected line format of a board.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Detected {
-    /// How it writes.
+    /// The format.
     pub format: Format,
-    /// How that was found out, and what was taken for granted, in a sentence.
+    /// Reason, and assumptions, in a sentence.
     pub why: String,
-    /// What the times of readings rest on.
+    /// Source of the times of readings.
     pub time: TimeSource,
 }
 

@@ -100,7 +100,7 @@ fn lost_lines_and_bad_lines_are_gaps_and_nothing_is_invented() {
     let (decoder, heard) = hear_lines(&lines);
     let gaps = gaps(&heard);
     assert_eq!(gaps.iter().map(|gap| gap.lost).collect::<Vec<_>>(), [Some(1), Some(1), Some(2), Some(4)]);
-    assert_eq!((gaps[1].cause.as_str(), gaps[3].cause.as_str()), ("a line could not be read", "lost on the way"));
+    assert_eq!((gaps[1].cause.as_str(), gaps[3].cause.as_str()), ("1 unreadable line", "lost in transit"));
     for reading in readings(&heard) {
         let i = reading.seq.unwrap_or_default();
         let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];

@@ -1,12 +1,12 @@
-//! The wire: bytes of a sensor board to stamped readings. No ports and no threads here; bytes and their times of arrival
-//! go in, and memory is bounded whatever they are.
+//! Serial protocol: bytes of a sensor board to stamped readings, gaps and replies. Independent of ports and threads; memory
+//! is bounded whatever the bytes.
 //!
 //! ```text
-//! bytes -> lines -> checksum -> fields -> shape -> clock -> readings, gaps, remarks
+//! bytes -> lines -> checksum -> fields -> shape -> clock -> readings, gaps, replies
 //!         (lines)  (checksum)  (fields)  (shape)  (clock, delay_line, counters)
 //! ```
 //!
-//! Not read: binary frames (COBS). Text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
+//! Binary frames (COBS) are not supported: text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
 
 mod cadence;
 mod capture;

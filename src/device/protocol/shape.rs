@@ -14,10 +14,10 @@ pub(super) struct Candidate {
     pub(super) arrived_s: f64,
 }
 
-/// Where each field of a line goes.
+/// Role of a field of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// Into the counts, at this place.
+    /// Counts, at this place.
     Channel(usize),
     /// The board's time, in microseconds or milliseconds.
     Micros,
@@ -27,14 +27,14 @@ pub(super) enum Role {
     Sequence,
     /// Line pressure (bar).
     LineBar,
-    /// The checksum, which has been looked at.
+    /// The checksum, already verified.
     Checksum,
-    /// Nowhere: it has no name, or there are too many channels.
+    /// None: it has no name, or there are too many channels.
     Ignored,
 }
 
 impl Role {
-    /// The role of a field that is no channel.
+    /// The role of a field that is not a channel.
     fn named(name: &str) -> Option<Self> {
         let is = |other: &str| name.eq_ignore_ascii_case(other);
         match () {
@@ -48,7 +48,7 @@ impl Role {
         }
     }
 
-    /// True where a field by this name is a channel.
+    /// True where a field of this name is a channel.
     pub(super) fn is_channel(name: &str) -> bool {
         Self::named(name).is_none()
     }
@@ -59,29 +59,29 @@ const CONFIRM: u32 = 2;
 /// The same where it is a part of the known one.
 const CONFIRM_PART: u32 = 20;
 
-/// The fields that are believed, and those that might be next.
+/// Accepted fields, and the candidates for others.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shapes {
     pub(super) format: Option<Format>,
     names: Vec<String>,
     roles: Vec<Role>,
-    /// The newest line with other fields, and how many such came in a row.
+    /// Newest line with other fields, and how many such came in a row.
     waiting: Option<(Candidate, u32)>,
 }
 
-/// What becomes of a line.
+/// Verdict on a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Judged {
     /// It has the known fields.
     Known(Candidate),
-    /// Its fields are now known; the line before it had them too, and waited.
+    /// Its fields are now accepted; the line before, which had them too, waited.
     Changed(Box<[Candidate; 2]>),
-    /// It waits for a second one like it. How many lines are given up instead: those that waited before.
+    /// It waits for another like it, in place of `given_up` lines that waited before.
     Waits { given_up: u64 },
 }
 
 impl Shapes {
-    /// What to make of a line.
+    /// Judges a line.
     pub(super) fn judge(&mut self, line: Candidate) -> Judged {
         if self.is_known(&line) {
             // The caller, who has seen this line arrive, gives up the line that waits.
@@ -107,7 +107,7 @@ impl Shapes {
         }
     }
 
-    /// Gives up the line that waits; true where there was one.
+    /// Gives up the waiting line; true where there was one.
     pub(super) fn give_up(&mut self) -> bool {
         self.waiting.take().is_some()
     }
@@ -128,7 +128,7 @@ impl Shapes {
             && line.fields.iter().zip(&self.names).all(|(field, name)| named(field, name))
     }
 
-    /// Where the fields go; channels that are new are added to `channels`.
+    /// Roles of the fields; new channels are added to `channels`.
     pub(super) fn roles(&mut self, channels: &mut Vec<String>) -> &[Role] {
         if self.roles.is_empty() {
             let mut role = |name: &String| {
@@ -151,7 +151,7 @@ impl Shapes {
         &self.names
     }
 
-    /// Calls the fields by other names, one for each; true where that changes something.
+    /// Renames the fields; true where that changes something.
     pub(super) fn rename(&mut self, names: &[String]) -> bool {
         let changed = self.names != names;
         if changed {
