@@ -131,7 +131,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
         let ran = run(at, &["doctor", "hand.bytes", "--crosstalk", "--json"]);
         let told: Value = serde_json::from_str(&ran.out).unwrap();
         assert_eq!((ran.code, &told["sound"]), (Some(i32::from(!sound)), &Value::Bool(sound)), "{ran:?}");
-        assert!(ran.err.contains("1 of 4: bend the left finger") && ran.err.contains("4 of 4: let go"), "{ran:?}");
+        assert!(ran.err.contains("1 of 4: bend the left finger") && ran.err.contains("4 of 4: release"), "{ran:?}");
         let found = told["found"].as_array().unwrap();
         assert_eq!(found.len(), 8, "{told}");
         for bleed in found {

@@ -383,7 +383,7 @@ mod tests {
             while let Some(sensor) = self.test.source() {
                 assert_eq!(self.test.instruction(), "do not touch the fingers");
                 self.rest(1.1);
-                assert!(self.test.instruction().contains("let go; do not touch"), "{}", self.test.instruction());
+                assert!(self.test.instruction().contains("release it; do not touch"), "{}", self.test.instruction());
                 for k in 0..100u32 {
                     let wave = (std::f64::consts::PI * f64::from(k) / 100.0).sin();
                     let mut counts = [1420.0, 1400.0, 0.0, 0.0];
@@ -477,7 +477,7 @@ mod tests {
         hand.rest(3.0);
         assert!(hand.test.instruction().starts_with("bend the right finger"), "{}", hand.test.instruction());
         assert_eq!((hand.test.step(), hand.test.found()), ([2, 4], &[][..]));
-        assert_eq!(hand.test.summary(), ["Not moved: left flex strip, right flex strip, left pad, right pad"]);
+        assert_eq!(hand.test.summary(), ["Skipped: left flex strip, right flex strip, left pad, right pad"]);
         assert!(!hand.test.is_sound());
         let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
         assert!(CrosstalkTest::new(&one).is_err(), "nothing could be watched");
