@@ -79,7 +79,7 @@ pub(super) struct EmulateArguments {
 struct Faults(Vec<Fault>);
 
 fn parse_faults_once(text: &str) -> Result<Faults, String> {
-    parse_faults(text).map(Faults)
+    parse_faults(text).map(Faults).map_err(|error| error.to_string())
 }
 
 /// Imperfections of the sensors that can be left out.
@@ -156,7 +156,7 @@ fn parts(arguments: &EmulateArguments) -> Result<HiddenParts, Failure> {
             };
             let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
             let parts: HiddenParts = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
-            parts.check().map_err(wrong)?;
+            parts.check().map_err(|error| wrong(error.to_string()))?;
             parts
         }
     };

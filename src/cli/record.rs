@@ -78,7 +78,7 @@ fn parse_wait(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn parse_baud(text: &str) -> Result<Baud, String> {
-    Baud::try_from(text.parse::<u32>().map_err(|e| e.to_string())?)
+    Baud::try_from(text.parse::<u32>().map_err(|e| e.to_string())?).map_err(|e| e.to_string())
 }
 
 /// Output of `--json`.

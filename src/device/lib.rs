@@ -1,4 +1,4 @@
-//! Sensor boards: bytes in, readings out, pressure out. The line protocol, serial ports, diagnosis, and an emulated gripper.
+//! Sensor boards: serial protocol, ports, diagnosis, and an emulated gripper.
 
 pub mod doctor;
 pub mod emulator;

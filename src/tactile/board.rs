@@ -42,7 +42,7 @@ impl Sensor {
         letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
     }
 
-    /// What it is called on screen.
+    /// Its name on screen.
     pub fn label(self) -> &'static str {
         match self {
             Self::FlexLeft => "left flex strip",
@@ -133,43 +133,40 @@ pub struct Gap {
     pub cause: String,
 }
 
-/// How a board writes its lines.
+/// Line format of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// Names and numbers, as Arduino's plotter takes them.
+    /// Names and numbers, as Arduino's plotter takes them. Trials that were recorded from Teleplot lines load as these.
+    #[serde(alias = "teleplot")]
     Plotter,
     /// Numbers in columns.
     Csv,
-    /// One named number to a line.
-    Teleplot,
     /// A flat JSON object to a line.
     JsonLines,
 }
 
 impl Format {
-    /// What it is called on screen.
+    /// Its name on screen.
     pub fn label(self) -> &'static str {
         match self {
             Self::Plotter => "Arduino plotter lines",
             Self::Csv => "CSV",
-            Self::Teleplot => "Teleplot",
             Self::JsonLines => "JSON lines",
         }
     }
 
-    /// The mark by which it was told from the others.
+    /// The mark that sets it apart from the others.
     pub fn mark(self) -> &'static str {
         match self {
-            Self::Plotter => "each number stands behind its name and a colon",
+            Self::Plotter => "each number follows its name and a colon",
             Self::Csv => "the lines are numbers in columns",
-            Self::Teleplot => "the lines begin with >",
             Self::JsonLines => "the lines begin with {",
         }
     }
 }
 
-/// What the times of readings rest on.
+/// Source of the times of readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TimeSource {
@@ -177,18 +174,18 @@ pub enum TimeSource {
     Device,
     /// The board's sequence numbers, at an even pace.
     Sequence,
-    /// Lines counted on this side, at an even pace: lost ones are told from late ones only afterwards.
+    /// Lines counted on arrival, at an even pace: a loss shows only afterwards.
     Arrival,
 }
 
-/// How a board's lines are read, and why.
+/// Detected line format of a board.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Detected {
-    /// How it writes.
+    /// The format.
     pub format: Format,
-    /// How that was found out, and what was taken for granted, in a sentence.
+    /// Reason, and assumptions, in a sentence.
     pub why: String,
-    /// What the times of readings rest on.
+    /// Source of the times of readings.
     pub time: TimeSource,
 }
 

@@ -1,7 +1,7 @@
 //! Fuzzing of the protocol decoder: random bytes for any duration.
 
 use super::{Failure, report};
-use palpate_device::protocol::{FuzzListener, FuzzStream};
+use crate::fuzz_stream::{FuzzListener, FuzzStream};
 use std::time::{Duration, Instant};
 
 /// A listener hears this many chunks; then another begins, with the next seed.

@@ -11,6 +11,7 @@
 //! Objects lie as placed: z up, long side along y, so that the fingers close across it along x.
 
 mod fuzz;
+mod fuzz_stream;
 mod live_model;
 mod sixteen;
 mod thumbnails;

@@ -5,7 +5,6 @@
 //! - `physics`: whole grasps of every object; no allocation in a step.
 //! - `determinism`: the same seed gives the same bytes.
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
-//! - `firmware`: the logic of the board, compiled and run against a stand-in for its pins.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
 //! - `emulator`: the emulated gripper, with every fault, recorded and diagnosed.
@@ -39,7 +38,6 @@ mod desk;
 mod determinism;
 mod emulator;
 mod files;
-mod firmware;
 mod fuzz;
 mod golden;
 mod gripper;

@@ -2,6 +2,7 @@
 //! that runs as fast as it is asked.
 
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup};
+use palpate_device::protocol::AdcRange;
 use palpate_device::protocol::{ConsoleLine, DecodedEvent, Decoder};
 use palpate_device::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
 use palpate_lab::gripper::BoardStream;
@@ -25,8 +26,7 @@ fn listening(board: Board, cadence: Cadence, now_s: f64) -> LinkStatus {
         detected: None,
         cadence,
         saturation: Vec::new(),
-        looks_10_bit: false,
-        units: Vec::new(),
+        adc_range: AdcRange::Fits,
         reconnects: 0,
         now_s,
         dropped: [0; 2],

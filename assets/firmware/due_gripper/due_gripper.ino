@@ -1,5 +1,5 @@
 /* Palpate's firmware for an Arduino Due: two flex strips, two force pads, and, where it takes one, the line pressure of the
- * control box. Wiring: README.md. What it does: gripper_logic.h; here are only the pins. */
+ * control box. Wiring: README.md. Logic: gripper_logic.h; here are only the pins. */
 
 #include "gripper_logic.h"
 
@@ -9,8 +9,8 @@
 #define HOST SerialUSB
 #endif
 
-/* Highest line pressure that is ever put out, in steps of 0.05 bar: 20 is 1.0 bar. 0 when no control box is wired; the
- * board then refuses to be told a pressure. Never above what the fingers bear: 30 is 1.5 bar. */
+/* Highest line pressure, in steps of 0.05 bar: 20 is 1.0 bar. 0 when no control box is wired; the board then refuses
+ * pressure commands. Never above the limit of the fingers: 30 is 1.5 bar. */
 #define MOST_STEPS 0
 
 /* Analogue output to the control box, 0.55 V to 2.75 V over 0 to 1.5 bar. DAC0 cannot reach 0 V: the box must take

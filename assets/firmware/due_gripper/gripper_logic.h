@@ -1,22 +1,22 @@
-/* What the board of the gripper does, in plain C: no Arduino in it, so that a test can compile it against a stand-in for
- * the pins (tests/suite/firmware.rs). due_gripper.ino gives it the real ones.
+/* Logic of the gripper's board, in plain C without Arduino: due_gripper.ino gives it the real pins, the emulator of Palpate
+ * (src/device/emulator) emulated ones.
  *
- * Every period it reads each channel: one conversion thrown away, for the multiplexer to settle behind a high-impedance
+ * Every period it reads each channel: one conversion discarded, for the multiplexer to settle behind a high-impedance
  * divider, then eight that are averaged. It prints
  *
  *     t_us:20000,seq:1,flexL:512.1,flexR:498.0,fsrL:30.4,fsrR:28.0,p_bar:0.55,ck:14493
  *
- * where ck is the CRC-16 of what stands before it, so that a digit that is lost on the way is noticed.
+ * where ck is the CRC-16 of the line before it, so that a lost digit is noticed.
  *
- * It obeys lines from the host:
+ * Commands from the host:
  *
  *     P 0.55   line pressure, bar, in steps of 0.05      ->  # ok p=0.55
  *     V        vent                                      ->  # ok p=0.00
- *     K        still here; at least every 500 ms         ->  # ok p=0.55
- *     ?        who are you                               ->  # tactile-gripper fw=2 ...
+ *     K        keep-alive; at least every 500 ms         ->  # ok p=0.55
+ *     ?        identify                                  ->  # tactile-gripper fw=2 ...
  *
- * and answers anything else with "# refused reason=...". Pressure that is on goes off when no line that it understood
- * came for a second: "# vent reason=watchdog".
+ * It answers anything else with "# refused reason=...". It vents after a second without a valid command:
+ * "# vent reason=watchdog".
  *
  * Time is the 32 bits of micros(), which wrap after 71.6 minutes: times are compared by their difference only.
  */

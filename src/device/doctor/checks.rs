@@ -1,21 +1,21 @@
-//! The checks, each from what was seen to what it means.
+//! The checks: each is a function from observations to an outcome.
 
 use super::{ChannelTrace, CheckFinding, CheckStatus, Observations, SKETCH};
-use crate::protocol::Saturation;
+use crate::protocol::{AdcRange, Saturation};
 use crate::serial::{LinkState, LinkStatus, MODEM_MANAGER_COMMAND, PortTrouble};
 use palpate_geometry::units::three_digits;
 use palpate_tactile::board::{Board, Sensor};
 
-/// A clock that is farther off than this is worth a note (ppm): crystals are within 50, resonators within 5000.
+/// Clock error from which on a note is given (ppm): crystals are within 50, resonators within 5000.
 const CRYSTAL_PPM: f64 = 100.0;
 
-/// A clock that is farther off than this does not count microseconds (ppm).
+/// Clock error from which on a counter does not count microseconds (ppm).
 const NO_CLOCK_PPM: f64 = 10_000.0;
 
-/// A rate that is farther from what the board says than this share is another rate.
+/// Relative difference from the stated rate that passes.
 const RATE_SHARE: f64 = 0.02;
 
-/// Share of readings that may be lost before it is more than a hiccup.
+/// Share of readings that may be lost.
 const LOST_SHARE: f64 = 1e-3;
 
 /// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
@@ -24,26 +24,26 @@ const IDLE_COUNTS: f64 = 20.0;
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// What it looks for, in a few words.
+    /// What holds when it passes.
     pub about: &'static str,
-    look: fn(&Observations) -> Told,
+    look: fn(&Observations) -> Outcome,
     next: Next,
 }
 
-/// What to run where a check finds something and knows no command of its own.
+/// Command to run next when a check finds something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Next {
-    /// Only what the finding says.
+    /// None.
     Nothing,
-    /// See which ports there are.
+    /// List the ports.
     Ports,
-    /// Put our firmware on the board.
+    /// Upload the firmware.
     Upload,
-    /// When it is mended, look again, for longer.
+    /// Run the doctor again, for longer.
     Again,
-    /// Move one sensor after the other.
+    /// Run the guided crosstalk test.
     Crosstalk,
 }
 
@@ -73,42 +73,47 @@ impl Next {
     }
 }
 
-/// A path as shells take it.
+/// A path quoted for a shell.
 fn quoted(path: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
     if path.chars().all(plain) { path.to_owned() } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
 impl Check {
-    /// Looks.
+    /// Runs the check.
     pub fn look(&self, seen: &Observations) -> CheckFinding {
-        let Told { verdict, seen: told, cause, fix, command } = (self.look)(seen);
+        let Outcome { verdict, seen: found, cause, fix, command } = (self.look)(seen);
         let worth_it = matches!(verdict, CheckStatus::Note | CheckStatus::Failed);
         let command = command.or_else(|| self.next.command(seen).filter(|_| worth_it));
-        CheckFinding { check: self.name, verdict, seen: told, cause, fix, command }
+        CheckFinding { check: self.name, verdict, seen: found, cause, fix, command }
     }
 }
 
-/// All of them.
+/// All checks, in the order in which they are shown.
 pub const CHECKS: &[Check] = &[
-    Check { name: "port", about: "there is a board", look: port, next: Next::Ports },
-    Check { name: "permission", about: "you may open it", look: permission, next: Next::Nothing },
-    Check { name: "busy", about: "nobody else has it", look: busy, next: Next::Ports },
-    Check { name: "modem-manager", about: "nobody takes it for a modem", look: modem_manager, next: Next::Nothing },
-    Check { name: "silence", about: "it says something", look: silence, next: Next::Upload },
-    Check { name: "baud", about: "at a rate that can be read", look: baud, next: Next::Again },
-    Check { name: "lines", about: "in lines that can be read", look: lines, next: Next::Again },
-    Check { name: "firmware", about: "and says what it is", look: firmware, next: Next::Upload },
-    Check { name: "bits", about: "the converter gives 12 bits", look: bits, next: Next::Upload },
-    Check { name: "saturation", about: "no channel is at its upper end", look: saturation, next: Next::Again },
+    Check { name: "port", about: "a board is connected", look: port, next: Next::Ports },
+    Check { name: "permission", about: "you may open the port", look: permission, next: Next::Nothing },
+    Check { name: "busy", about: "no other program has the port", look: busy, next: Next::Ports },
+    Check {
+        name: "modem-manager",
+        about: "ModemManager leaves the port alone",
+        look: modem_manager,
+        next: Next::Nothing,
+    },
+    Check { name: "silence", about: "the board sends data", look: silence, next: Next::Upload },
+    Check { name: "baud", about: "the baud rate is right", look: baud, next: Next::Again },
+    Check { name: "lines", about: "lines are readable", look: lines, next: Next::Again },
+    Check { name: "firmware", about: "the board identifies itself", look: firmware, next: Next::Upload },
+    Check { name: "bits", about: "the converter has 12 bits", look: bits, next: Next::Upload },
+    Check { name: "saturation", about: "no channel is saturated", look: saturation, next: Next::Again },
     Check { name: "open-circuit", about: "every sensor is connected", look: open_circuit, next: Next::Again },
     Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk, next: Next::Crosstalk },
-    Check { name: "rate", about: "samples come as often as they should", look: rate, next: Next::Again },
-    Check { name: "clock", about: "the board's clock can be relied on", look: clock, next: Next::Upload },
+    Check { name: "rate", about: "samples arrive at the stated rate", look: rate, next: Next::Again },
+    Check { name: "clock", about: "the board's clock is accurate", look: clock, next: Next::Upload },
 ];
 
 /// A finding without its name.
-struct Told {
+struct Outcome {
     verdict: CheckStatus,
     seen: String,
     cause: Option<String>,
@@ -116,16 +121,16 @@ struct Told {
     command: Option<String>,
 }
 
-impl Told {
+impl Outcome {
     fn new(verdict: CheckStatus, seen: impl Into<String>) -> Self {
         Self { verdict, seen: seen.into(), cause: None, fix: None, command: None }
     }
 
-    fn good(seen: impl Into<String>) -> Self {
+    fn passed(seen: impl Into<String>) -> Self {
         Self::new(CheckStatus::Passed, seen)
     }
 
-    fn not_seen(seen: impl Into<String>) -> Self {
+    fn skipped(seen: impl Into<String>) -> Self {
         Self::new(CheckStatus::Skipped, seen)
     }
 
@@ -133,7 +138,7 @@ impl Told {
         Self::new(CheckStatus::Note, seen)
     }
 
-    fn wrong(seen: impl Into<String>) -> Self {
+    fn failed(seen: impl Into<String>) -> Self {
         Self::new(CheckStatus::Failed, seen)
     }
 
@@ -146,30 +151,30 @@ impl Told {
     }
 }
 
-/// The trouble that kept the port from being opened, if it is one of these.
-fn refusal(seen: &Observations, troubles: &[PortTrouble]) -> Option<Told> {
+/// The error that kept the port from opening, if it is one of these.
+fn refusal(seen: &Observations, troubles: &[PortTrouble]) -> Option<Outcome> {
     let refused = seen.refused.as_ref().filter(|refused| troubles.contains(&refused.trouble))?;
-    let told = Told::wrong(refused.what.clone()).because(refused.cause.clone(), refused.fix.clone());
-    Some(Told { command: refused.command.clone(), ..told })
+    let outcome = Outcome::failed(refused.what.clone()).because(refused.cause.clone(), refused.fix.clone());
+    Some(Outcome { command: refused.command.clone(), ..outcome })
 }
 
-/// How the link stands, or that there is none.
-fn link(seen: &Observations) -> Result<&LinkStatus, Told> {
-    seen.link.as_ref().ok_or_else(|| Told::not_seen("the port could not be opened"))
+/// Status of the link, if it was opened.
+fn link(seen: &Observations) -> Result<&LinkStatus, Outcome> {
+    seen.link.as_ref().ok_or_else(|| Outcome::skipped("the port did not open"))
 }
 
-/// The same where lines were read.
-fn readings(seen: &Observations) -> Result<&LinkStatus, Told> {
+/// Status of the link, if readings came.
+fn readings(seen: &Observations) -> Result<&LinkStatus, Outcome> {
     let link = link(seen)?;
-    if link.cadence.samples > 0 { Ok(link) } else { Err(Told::not_seen("nothing could be read")) }
+    if link.cadence.samples > 0 { Ok(link) } else { Err(Outcome::skipped("no readings")) }
 }
 
-/// A check that may end early because there is nothing to see.
-fn or_not_seen(told: Result<Told, Told>) -> Told {
-    told.unwrap_or_else(|not_seen| not_seen)
+/// Either outcome.
+fn or_skipped(outcome: Result<Outcome, Outcome>) -> Outcome {
+    outcome.unwrap_or_else(|skipped| skipped)
 }
 
-fn port(seen: &Observations) -> Told {
+fn port(seen: &Observations) -> Outcome {
     let troubles = [
         PortTrouble::NotFound,
         PortTrouble::NoBoard,
@@ -178,173 +183,169 @@ fn port(seen: &Observations) -> Told {
         PortTrouble::Capture,
         PortTrouble::System,
     ];
-    if let Some(told) = refusal(seen, &troubles) {
-        return told;
+    if let Some(outcome) = refusal(seen, &troubles) {
+        return outcome;
     }
     match &seen.link {
         Some(link) => {
             let (path, title) = (link.port.path.display(), &link.port.title);
             match &link.state {
-                LinkState::Lost { cause } => Told::wrong(format!("{path} went away")).because(
-                    cause.clone(),
-                    "Check cable and plug; a cable that charges a phone may have no wires for data",
-                ),
+                LinkState::Lost { cause } => Outcome::failed(format!("{path} disconnected"))
+                    .because(cause.clone(), "Check cable and plug; some charging cables have no data wires"),
                 LinkState::Waiting
                 | LinkState::Listening
                 | LinkState::Silent { .. }
                 | LinkState::Unreadable { .. }
-                | LinkState::Ended { .. } => Told::good(format!("{path}: {title}")),
+                | LinkState::Ended { .. } => Outcome::passed(format!("{path}: {title}")),
             }
         }
-        None => Told::good("it is there"),
+        None => Outcome::passed("port found"),
     }
 }
 
-fn permission(seen: &Observations) -> Told {
+fn permission(seen: &Observations) -> Outcome {
     refusal(seen, &[PortTrouble::Permission])
-        .unwrap_or_else(|| or_not_seen(link(seen).map(|_| Told::good("it can be opened"))))
+        .unwrap_or_else(|| or_skipped(link(seen).map(|_| Outcome::passed("the port opens"))))
 }
 
-fn busy(seen: &Observations) -> Told {
+fn busy(seen: &Observations) -> Outcome {
     refusal(seen, &[PortTrouble::Busy])
-        .unwrap_or_else(|| or_not_seen(link(seen).map(|_| Told::good("it is ours alone"))))
+        .unwrap_or_else(|| or_skipped(link(seen).map(|_| Outcome::passed("no other program has it"))))
 }
 
-fn modem_manager(seen: &Observations) -> Told {
+fn modem_manager(seen: &Observations) -> Outcome {
     let is_usb = |port: &crate::serial::PortInfo| port.usb.is_some();
     let concerns = seen.link.as_ref().map_or_else(|| seen.ports.iter().any(is_usb), |link| is_usb(&link.port));
     match (seen.modem_manager, concerns) {
-        (false, _) => Told::good("it does not run"),
-        (true, false) => Told::good("it runs, but this is no USB port"),
-        (true, true) => Told::note("ModemManager runs")
+        (false, _) => Outcome::passed("ModemManager is not running"),
+        (true, false) => Outcome::passed("ModemManager is running, but this is not a USB port"),
+        (true, true) => Outcome::note("ModemManager is running")
             .because(
-                "It asks every new port whether it is a modem: for half a minute after plugging in the port is busy, or \
-                 the board hears nonsense",
-                "Tell it to leave boards alone, then plug the board in again",
+                "It probes every new port for a modem: for half a minute after plugging in, the port is busy or the board \
+                 receives garbage",
+                "Make it ignore the board, then plug the board in again",
             )
             .with(MODEM_MANAGER_COMMAND),
     }
 }
 
-fn silence(seen: &Observations) -> Told {
+fn silence(seen: &Observations) -> Outcome {
     let link = match link(seen) {
         Ok(link) => link,
-        Err(not_seen) => return not_seen,
+        Err(skipped) => return skipped,
     };
     let silent = matches!(link.state, LinkState::Silent { .. } | LinkState::Waiting) && link.cadence.samples == 0;
     if !silent {
-        return Told::good("it speaks");
+        return Outcome::passed("data arrives");
     }
-    let told = Told::wrong(format!("nothing came in {} s", three_digits(seen.listened_s)));
+    let outcome = Outcome::failed(format!("no data in {} s", three_digits(seen.listened_s)));
     if link.port.kind.native {
-        told.because(
-            "The native port sends only while the host holds DTR, which it does; so the sketch is not running, or prints on \
-             the other port",
-            "Press the board's reset button once; upload our firmware, or set HOST to the port in use",
+        outcome.because(
+            "The native port sends only while the host sets DTR, which it does: the sketch is not running, or prints to the \
+             other port",
+            "Press the board's reset button; then upload the firmware, or set HOST to the port in use",
         )
     } else {
-        told.because(
-            "The board is not running a sketch that prints, or prints on its other port",
-            "Upload our firmware; on a Due, plug the cable into the native port (next to the reset button)",
+        outcome.because(
+            "No sketch prints to this port",
+            "Upload the firmware; on a Due, use the native port (next to the reset button)",
         )
     }
 }
 
-fn baud(seen: &Observations) -> Told {
+fn baud(seen: &Observations) -> Outcome {
     let link = match link(seen) {
         Ok(link) => link,
-        Err(not_seen) => return not_seen,
+        Err(skipped) => return skipped,
     };
     let printable = 100.0 * link.cadence.printable_share;
     match (&link.state, link.baud) {
         (LinkState::Unreadable { .. }, _) => {
-            Told::wrong(format!("bytes come, but no lines: {printable:.0} % of them are text")).because(
-                "The board sends at a rate that is none of the usual ones, or something else than text",
-                "Set the sketch to Serial.begin(115200), or name its rate with --baud",
+            Outcome::failed(format!("unreadable data: {printable:.0} % of the bytes are text")).because(
+                "The board sends at an unusual baud rate, or not text",
+                "Use Serial.begin(115200) in the sketch, or give its rate with --baud",
             )
         }
-        _ if link.cadence.samples == 0 => Told::not_seen("nothing came"),
-        (_, Some(rate)) if rate != 115_200 && !link.port.kind.native => Told::note(format!(
-            "the board speaks at {rate} bit/s"
-        ))
-        .because(
-            "Its sketch says so; it was found by trying",
-            format!("Name the rate with --baud {rate} to save the trying, or set the sketch to Serial.begin(115200)"),
-        ),
-        _ => Told::good(format!("{printable:.0} % of the bytes are text")),
+        _ if link.cadence.samples == 0 => Outcome::skipped("no readings"),
+        (_, Some(rate)) if rate != 115_200 && !link.port.kind.native => {
+            Outcome::note(format!("the board sends at {rate} baud")).because(
+                "The sketch sets it; found by scanning",
+                format!("Give --baud {rate} to skip the scan, or use Serial.begin(115200) in the sketch"),
+            )
+        }
+        _ => Outcome::passed(format!("{printable:.0} % of the bytes are text")),
     }
 }
 
-fn lines(seen: &Observations) -> Told {
-    let told = link(seen).and_then(|link| {
+fn lines(seen: &Observations) -> Outcome {
+    let outcome = link(seen).and_then(|link| {
         let cadence = &link.cadence;
         let bad = cadence.bad_lines;
         let all = bad + cadence.samples;
         if all == 0 {
-            return Err(Told::not_seen("no lines came"));
+            return Err(Outcome::skipped("no lines"));
         }
         let share = bad as f64 / all as f64;
         let why = link.detected.as_ref().map_or_else(String::new, |detected| format!(": {}", detected.why));
         Ok(if share > 0.02 {
-            Told::wrong(format!("{bad} of {all} lines could not be read")).because(
-                "Bytes are lost or damaged on the way: a long or bad cable, a hub, a ground that floats, or two programs on one port",
-                "Use a short cable straight into the computer; see the raw lines in the console",
+            Outcome::failed(format!("{bad} of {all} lines unreadable")).because(
+                "Bytes are lost or damaged: a long or bad cable, a hub, a floating ground, or two programs on one port",
+                "Use a short cable directly into the computer; the console shows the raw lines",
             )
         } else if bad > 2 {
-            Told::note(format!("{bad} of {all} lines could not be read")).because(
-                "A few damaged lines; they are left out, and shown as gaps",
-                "Nothing, unless there are more of them: then a short cable straight into the computer",
+            Outcome::note(format!("{bad} of {all} lines unreadable")).because(
+                "A few damaged lines; they are skipped and shown as gaps",
+                "None needed. If there are more: a short cable directly into the computer",
             )
         } else {
-            Told::good(format!("{} lines were read{why}", cadence.samples))
+            Outcome::passed(format!("{} lines read{why}", cadence.samples))
         })
     });
-    or_not_seen(told)
+    or_skipped(outcome)
 }
 
-fn firmware(seen: &Observations) -> Told {
-    or_not_seen(readings(seen).map(|link| match &link.board.firmware {
-        Some(version) => Told::good(format!("tactile-gripper, version {version}")),
-        None => Told::note("the board does not say what it is").because(
-            "It runs a sketch of its own: bits, reference voltage and resistors are taken for granted",
-            "Print a hello line as our firmware does, or upload that",
+fn firmware(seen: &Observations) -> Outcome {
+    or_skipped(readings(seen).map(|link| match &link.board.firmware {
+        Some(version) => Outcome::passed(format!("tactile-gripper, version {version}")),
+        None => Outcome::note("the board sends no handshake").because(
+            "It runs another sketch: 12 bits, 3.3 V and the usual resistors are assumed",
+            "Print the handshake line of our firmware, or upload our firmware",
         ),
     }))
 }
 
-fn bits(seen: &Observations) -> Told {
-    or_not_seen(readings(seen).map(|link| {
+fn bits(seen: &Observations) -> Outcome {
+    or_skipped(readings(seen).map(|link| {
         let full = link.board.full_scale;
-        if link.looks_10_bit && full < 4095 {
-            return Told::note(format!(
-                "no count was above {full}, so that the converter is taken for one of ten bits"
-            ))
-            .because(
-                "analogRead gives ten bits until it is told otherwise, and the board does not say how far it counts",
-                "Call analogReadResolution(12) in setup() for finer counts, and say adc=12 in a hello line",
-            );
-        }
-        if link.looks_10_bit && link.board.firmware.is_none() {
-            return Told::note(format!("no count is beyond ten bits; {full} is taken for granted")).because(
-                "Neither the board nor a flex strip tells how far the converter counts",
-                "Say adc=12, or adc=10, in a hello line",
-            );
-        }
-        if link.looks_10_bit {
-            let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
-            return Told::wrong(format!("no count was above {most:.0}; the converter is said to go to {full}"))
-                .because(
-                    "analogRead gives 10 bits until it is told otherwise",
-                    "Call analogReadResolution(12) in setup()",
+        let stated = link.board.firmware.is_some();
+        match link.adc_range {
+            AdcRange::Exceeded => {
+                return Outcome::failed(format!("counts exceed {full}")).because(
+                    if stated {
+                        "The converter has more bits than the handshake states"
+                    } else {
+                        "The converter has more than the assumed 12 bits"
+                    },
+                    "State its bits in the handshake, as in adc=16",
                 );
+            }
+            AdcRange::LooksTenBit => {
+                let most = seen.traces.channels.iter().map(|trace| trace.most).fold(0.0, f64::max);
+                let assumed = if stated { "the handshake states" } else { "assumed:" };
+                return Outcome::failed(format!("no count above {most:.0}; {assumed} a range of {full}")).because(
+                    "analogRead gives 10 bits by default",
+                    "Call analogReadResolution(12) in setup(), or state adc=10 in the handshake",
+                );
+            }
+            AdcRange::Fits => {}
         }
         if full < 4095 {
-            return Told::note(format!("the converter goes to {full}")).because(
-                "The board says so, or has sent nothing beyond",
-                "A Due has 12 bits: call analogReadResolution(12), and say adc=12 in the hello line",
+            return Outcome::note(format!("the converter's range is {full}")).because(
+                "The handshake states it",
+                "A Due has 12 bits: call analogReadResolution(12), and state adc=12 in the handshake",
             );
         }
-        Told::good(format!("counts up to {full}"))
+        Outcome::passed(format!("counts up to {full}"))
     }))
 }
 
@@ -360,53 +361,53 @@ fn named(link: &LinkStatus, holds: impl Fn(usize, Option<Sensor>) -> bool) -> Ve
     held.map(|(_, name)| name.clone()).collect()
 }
 
-fn rail(link: &LinkStatus, channel: usize) -> Option<Saturation> {
+fn saturation_of(link: &LinkStatus, channel: usize) -> Option<Saturation> {
     link.saturation.get(channel).copied().flatten()
 }
 
 fn is_high(link: &LinkStatus, channel: usize) -> bool {
-    rail(link, channel) == Some(Saturation::High)
+    saturation_of(link, channel) == Some(Saturation::High)
 }
 
-fn saturation(seen: &Observations) -> Told {
-    or_not_seen(readings(seen).map(|link| {
-        // A strip at the upper end has come off, which is another check's.
+fn saturation(seen: &Observations) -> Outcome {
+    or_skipped(readings(seen).map(|link| {
+        // A strip at the upper end has come off, which is the next check's finding.
         let high = named(link, |channel, sensor| {
             is_high(link, channel) && !sensor.is_some_and(Sensor::is_flex)
         });
         if high.is_empty() {
-            return Told::good("none");
+            return Outcome::passed("no channel saturated");
         }
-        Told::wrong(format!("{} at the upper end for more than half a second", high.join(", "))).because(
-            "The divider is fed from 5 V, which the pins of a Due do not bear; or the pad is shorted; or its resistor to ground is \
-             missing or far too large",
-            "Pull the plug and measure: the divider belongs to 3.3 V, with 4.7 kOhm from the pin to ground",
+        Outcome::failed(format!("{} saturated for more than half a second", high.join(", "))).because(
+            "The divider is on 5 V, which damages a Due; or the pad is shorted; or its resistor to ground is missing or far too \
+             large",
+            "Unplug and measure: the divider belongs on 3.3 V, with 4.7 kOhm from the pin to ground",
         )
     }))
 }
 
-fn open_circuit(seen: &Observations) -> Told {
-    or_not_seen(readings(seen).map(|link| {
+fn open_circuit(seen: &Observations) -> Outcome {
+    or_skipped(readings(seen).map(|link| {
         let trace = |channel: usize| seen.traces.channels.get(channel).cloned().unwrap_or_default();
         let without = named(link, |channel, _| trace(channel).without > trace(channel).numbers);
         let off = named(link, |channel, sensor| sensor.is_some_and(Sensor::is_flex) && is_high(link, channel));
         let shorted = named(link, |channel, sensor| {
-            sensor.is_some_and(Sensor::is_flex) && rail(link, channel) == Some(Saturation::Low)
+            sensor.is_some_and(Sensor::is_flex) && saturation_of(link, channel) == Some(Saturation::Low)
         });
         if !off.is_empty() {
-            return Told::wrong(format!("{} at the upper end", off.join(", "))).because(
-                "The strip has come off: nothing pulls the pin to ground",
-                "Look at the crimp of the strip, which is brittle, and at the wire from it to ground",
+            return Outcome::failed(format!("{} at full scale", off.join(", "))).because(
+                "The strip is disconnected: nothing pulls the pin to ground",
+                "Check the strip's crimp, which is brittle, and its wire to ground",
             );
         }
         if !without.is_empty() {
-            return Told::wrong(format!("{} without a number in most lines", without.join(", "))).because(
-                "The sketch has nothing to print: the sensor is not connected",
-                "Look at the plug and the wires of that sensor; the other channels go on",
+            return Outcome::failed(format!("{} without a number in most lines", without.join(", "))).because(
+                "The sketch has no value to print: the sensor is disconnected",
+                "Check the plug and the wires of that sensor; the other channels keep working",
             );
         }
         if !shorted.is_empty() {
-            return Told::wrong(format!("{} at zero", shorted.join(", "))).because(
+            return Outcome::failed(format!("{} at zero", shorted.join(", "))).because(
                 "The pin is shorted to ground, or the resistor to 3.3 V is missing",
                 "Measure 47 kOhm from 3.3 V to the pin, and 17 to 70 kOhm from the pin to ground",
             );
@@ -415,34 +416,35 @@ fn open_circuit(seen: &Observations) -> Told {
             sensor.is_some_and(|sensor| !sensor.is_flex()) && trace(channel).most <= IDLE_COUNTS
         });
         if idle.is_empty() {
-            return Told::good("every channel gives numbers");
+            return Outcome::passed("every sensor responds");
         }
-        Told::note(format!("{} never pressed", idle.join(", "))).because(
-            "A pad that is not touched reads nothing, and so does one that has come off",
-            "Press each pad while the doctor listens",
-        )
+        Outcome::note(format!("{} never pressed", idle.join(", ")))
+            .because("An untouched pad reads zero, and so does a disconnected one", "Press each pad during the check")
     }))
 }
 
-fn crosstalk(seen: &Observations) -> Told {
-    let told = readings(seen).map(|link| {
+fn crosstalk(seen: &Observations) -> Outcome {
+    let outcome = readings(seen).map(|link| {
         let scale = f64::from(link.board.full_scale) / 4095.0;
         let pads = (1..link.board.channels.len()).filter(|channel| {
-            // A channel at the rail says nothing of its neighbour, nor does its neighbour.
-            let railed = |channel: usize| is_high(link, channel);
+            // A saturated channel hides crosstalk in both directions.
+            let saturated = |channel: usize| is_high(link, channel);
             sensor(&link.board, *channel).is_some_and(|sensor| !sensor.is_flex())
-                && !railed(*channel)
-                && !railed(channel - 1)
+                && !saturated(*channel)
+                && !saturated(channel - 1)
         });
         let found = pads.filter_map(|channel| bleeding(link, channel, seen.traces.channels.get(channel)?, scale));
-        let found: Vec<Told> = found.collect();
-        found.into_iter().max_by_key(|told| told.verdict).unwrap_or_else(|| Told::good("idle pads read nothing"))
+        let found: Vec<Outcome> = found.collect();
+        found
+            .into_iter()
+            .max_by_key(|outcome| outcome.verdict)
+            .unwrap_or_else(|| Outcome::passed("idle pads read zero"))
     });
-    or_not_seen(told)
+    or_skipped(outcome)
 }
 
-/// What a pad shows that should read nothing at times: it never does, and goes with the channel before it.
-fn bleeding(link: &LinkStatus, channel: usize, trace: &ChannelTrace, scale: f64) -> Option<Told> {
+/// Finding for a pad that never reads zero, and may follow the channel before it.
+fn bleeding(link: &LinkStatus, channel: usize, trace: &ChannelTrace, scale: f64) -> Option<Outcome> {
     if trace.numbers == 0 || trace.least <= IDLE_COUNTS * scale {
         return None;
     }
@@ -450,48 +452,48 @@ fn bleeding(link: &LinkStatus, channel: usize, trace: &ChannelTrace, scale: f64)
     let least = trace.least;
     if let Some(share) = trace.takes().filter(|share| (0.01..1.0).contains(share)) {
         let percent = 100.0 * share;
-        let seen = format!("{name} takes {percent:.0} % of {before}, and is never below {least:.0} counts");
-        return Some(Told::wrong(seen).because(
+        let seen = format!("{name} follows {before} by {percent:.0} %, and is never below {least:.0} counts");
+        return Some(Outcome::failed(seen).because(
             "The converter's multiplexer does not settle behind the high resistance of the divider",
-            "Solder 100 nF from each pin to ground, and throw away the first conversion of each channel, as our firmware does",
+            "Solder 100 nF from each pin to ground, and discard the first conversion of each channel, as our firmware does",
         ));
     }
-    Some(Told::note(format!("{name} is never below {least:.0} counts")).because(
+    Some(Outcome::note(format!("{name} is never below {least:.0} counts")).because(
         format!("Something presses the pad all the time, or {before} bleeds into it"),
         "Move one sensor after the other: that says which",
     ))
 }
 
-fn rate(seen: &Observations) -> Told {
-    or_not_seen(readings(seen).map(|link| {
+fn rate(seen: &Observations) -> Outcome {
+    or_skipped(readings(seen).map(|link| {
         let cadence = &link.cadence;
         let (measured, jitter) = (cadence.rate_hz, cadence.jitter_p95_ms);
         let lost = cadence.lost as f64 / (cadence.samples + cadence.lost).max(1) as f64;
         let [bytes, rows] = link.dropped;
         if lost > LOST_SHARE {
-            let seen = format!("{} of {} samples did not arrive", cadence.lost, cadence.samples + cadence.lost);
+            let seen = format!("{} of {} samples lost", cadence.lost, cadence.samples + cadence.lost);
             if cadence.bad_lines > 0 {
                 // Another check's: what is unreadable is missing.
-                return Told::note(seen)
-                    .because("Some lines could not be read", "See what the check of lines says first");
+                return Outcome::note(seen).because("Some lines were unreadable", "See the check of lines");
             }
             let cause = if bytes + rows > 0 {
-                "This computer was too slow to take them"
+                "This computer was too slow"
             } else {
-                "The board skips samples, or the line between loses them"
+                "The board skips samples, or the connection loses them"
             };
-            return Told::wrong(seen)
-                .because(cause, "Lower the rate in the sketch, close other programs, use a short cable");
+            return Outcome::failed(seen)
+                .because(cause, "Lower the sample rate in the sketch, close other programs, use a short cable");
         }
         match link.board.rate_hz {
             Some(said) if (measured / said - 1.0).abs() > RATE_SHARE => {
-                Told::wrong(format!("{} samples a second; the board says {said}", three_digits(measured))).because(
-                    "The sketch does more in a period than fits, or waits by delay()",
-                    "Keep its schedule from micros(), as our firmware does, or lower the rate",
-                )
+                Outcome::failed(format!("{} samples per second; the board states {said}", three_digits(measured)))
+                    .because(
+                        "The sketch needs longer than its period, or uses delay()",
+                        "Schedule samples by micros(), as our firmware does, or lower the rate",
+                    )
             }
-            _ => Told::good(format!(
-                "{} samples a second, jitter {} ms (95 %)",
+            _ => Outcome::passed(format!(
+                "{} samples per second, jitter {} ms (95 %)",
                 three_digits(measured),
                 three_digits(jitter)
             )),
@@ -499,24 +501,24 @@ fn rate(seen: &Observations) -> Told {
     }))
 }
 
-fn clock(seen: &Observations) -> Told {
-    or_not_seen(readings(seen).map(|link| {
+fn clock(seen: &Observations) -> Outcome {
+    or_skipped(readings(seen).map(|link| {
         let Some(ppm) = link.cadence.drift_ppm else {
-            return Told::note("the board sends no time").because(
-                "Its lines have no t_us: times are taken from when bytes arrive, which is later by some milliseconds now and then",
-                "Print t_us:, as our firmware does",
+            return Outcome::note("the board sends no timestamps").because(
+                "Its lines have no t_us: times of arrival are used, which lag by some milliseconds",
+                "Print t_us, as our firmware does",
             );
         };
-        let told = format!("{ppm:+.0} ppm against this computer's");
+        let drift = format!("{ppm:+.0} ppm against this computer's clock");
         if ppm.abs() > NO_CLOCK_PPM {
-            Told::wrong(told).because("t_us does not count microseconds", "Print micros() as t_us")
+            Outcome::failed(drift).because("t_us does not count microseconds", "Print micros() as t_us")
         } else if ppm.abs() > CRYSTAL_PPM {
-            Told::note(told).because(
-                "The board's clock comes from a resonator, or it was measured for a few seconds only",
-                "Nothing: it is taken into account",
+            Outcome::note(drift).because(
+                "The board's clock is a resonator, or it was measured for a few seconds only",
+                "None needed: the drift is corrected",
             )
         } else {
-            Told::good(told)
+            Outcome::passed(drift)
         }
     }))
 }

@@ -1,5 +1,5 @@
-//! Whether one sensor bleeds into another: each is moved in turn, alone, while the sensors of the other finger are watched,
-//! which nobody touches. Those of the same finger say nothing here: bending a finger presses on its pad.
+//! Guided crosstalk test: each sensor is moved in turn, alone, while the untouched sensors of the other finger are watched.
+//! Those of the same finger cannot be used: bending a finger presses on its pad.
 //!
 //! ```text
 //!   leave both fingers alone   -> where every sensor rests
@@ -7,20 +7,20 @@
 //!   ...                           for every sensor of the board
 //! ```
 //!
-//! What a converter's multiplexer leaves behind follows the other sensor at once and in proportion. What moves without
-//! being in step with it was touched.
+//! Crosstalk of a converter's multiplexer follows the other sensor at once and in proportion. A sensor that moves out of step
+//! was touched.
 
 use palpate_tactile::board::{Board, Reading, Sensor};
 use serde::Serialize;
 use std::collections::VecDeque;
 
-/// Shares from this one on are told: a pad of 1 N at 1 % is 18 counts of 4095, and a degree of bend 10.
-const WORTH_TELLING: f64 = 0.01;
+/// Least share that is reported: a pad of 1 N at 1 % is 18 counts of 4095, and a degree of bend 10.
+const LEAST_SHARE: f64 = 0.01;
 /// Counts of 4095 that such a share must come to: four deviations of the usual noise.
 const LEAST_COUNTS: f64 = 8.0;
 /// Correlation from which on two sensors move in step.
 const IN_STEP: f64 = 0.8;
-/// A sensor that is to be moved must move by this much (counts of 4095): a press of 0.1 N, a bend of ten degrees.
+/// Least change of the moved sensor (counts of 4095): a press of 0.1 N, a bend of ten degrees.
 const MOVES: f64 = 150.0;
 /// It is back when it is this near to its rest (counts of 4095), or by this share of how far it was away: strips creep.
 const BACK: f64 = 50.0;
@@ -35,7 +35,7 @@ const PATIENCE_S: f64 = 6.0;
 /// Readings that a rest must have.
 const LEAST_READINGS: usize = 10;
 
-/// What one sensor does to another.
+/// Influence of one sensor on another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bleed {
     /// The one that was moved.
@@ -44,15 +44,26 @@ pub struct Bleed {
     pub into: Sensor,
     /// Change of the second over that of the first.
     pub share: f64,
-    /// How much the second changed by it, at most (counts).
+    /// Largest change of the second by it (counts).
     pub counts: f64,
-    /// The second moved at all.
+    /// The second moved.
     pub moved: bool,
     /// It is crosstalk: the second is in step with the first, by more than noise.
     pub bleeds: bool,
 }
 
-/// The test, step by step. It knows no port: readings go in, instructions come out.
+/// Why a board cannot be tested.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CrosstalkError {
+    /// No sensors on one of the fingers.
+    #[error("the crosstalk test needs sensors on both fingers; the board has {channels}")]
+    OneFinger {
+        /// Its channels.
+        channels: String,
+    },
+}
+
+/// Guided crosstalk test, independent of any port: readings in, instructions out.
 #[derive(Clone, Debug)]
 pub struct CrosstalkTest {
     /// Sensors of the board and their channels, in the order in which they are moved.
@@ -89,13 +100,12 @@ struct Moving {
 }
 
 impl CrosstalkTest {
-    /// Begins with a board; refuses one that has not got a sensor of each finger, in a sentence.
-    pub fn new(board: &Board) -> Result<Self, String> {
+    /// Begins a test of a board with sensors on both fingers.
+    pub fn new(board: &Board) -> Result<Self, CrosstalkError> {
         let sensors: Vec<(Sensor, usize)> =
             Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, board.channel_of(sensor)?))).collect();
         if ![0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
-            let has = board.channels.join(", ");
-            return Err(format!("crosstalk is seen between sensors of both fingers; the board has {has}"));
+            return Err(CrosstalkError::OneFinger { channels: board.channels.join(", ") });
         }
         Ok(Self {
             sensors,
@@ -112,12 +122,12 @@ impl CrosstalkTest {
         })
     }
 
-    /// Learns more of the board.
+    /// Takes in news of the board.
     pub fn see(&mut self, board: &Board) {
         self.scale = f64::from(board.full_scale) / 4095.0;
     }
 
-    /// The sensor that is to be moved; none when all have been.
+    /// Sensor to move; none when all have been.
     pub fn source(&self) -> Option<Sensor> {
         self.sensors.get(self.at).map(|(sensor, _)| *sensor)
     }
@@ -127,20 +137,20 @@ impl CrosstalkTest {
         [(self.at + 1).min(self.sensors.len()), self.sensors.len()]
     }
 
-    /// What to do, in words.
+    /// Instruction for the user.
     pub fn instruction(&self) -> String {
-        let Some(sensor) = self.source() else { return "that was all".to_owned() };
+        let Some(sensor) = self.source() else { return "test complete".to_owned() };
         let (side, other) = if side_of(sensor) == 0 { ("left", "right") } else { ("right", "left") };
         match &self.moving {
             None => match self.restless {
-                None => "leave both fingers alone".to_owned(),
-                Some(restless) => format!("leave both fingers alone: the {} does not rest", restless.label()),
+                None => "do not touch the fingers".to_owned(),
+                Some(restless) => format!("do not touch the fingers: the {} is not at rest", restless.label()),
             },
-            Some(moving) if moving.most.abs() >= MOVES * self.scale => format!("let go of the {side} finger"),
+            Some(moving) if moving.most.abs() >= MOVES * self.scale => format!("release the {side} finger"),
             Some(_) if sensor.is_flex() => {
-                format!("bend the {side} finger by hand and let go; do not touch the {other} one")
+                format!("bend the {side} finger by hand and release it; do not touch the {other} one")
             }
-            Some(_) => format!("press the {side} pad firmly and let go; do not touch the {other} finger"),
+            Some(_) => format!("press the {side} pad firmly and release it; do not touch the {other} finger"),
         }
     }
 
@@ -168,44 +178,44 @@ impl CrosstalkTest {
         }
     }
 
-    /// Leaves out the sensor that is to be moved.
+    /// Skips the sensor to move.
     pub fn skip(&mut self) {
         self.left_out.extend(self.source());
         self.next();
     }
 
-    /// What was found so far.
+    /// Results so far.
     pub fn found(&self) -> &[Bleed] {
         &self.found
     }
 
-    /// True where every sensor was moved and nothing bleeds into anything.
+    /// True where every sensor was moved and none shows crosstalk.
     pub fn is_sound(&self) -> bool {
         let all = self.left_out.is_empty() && self.unwatched.is_empty();
         self.source().is_none() && all && !self.found.iter().any(|bleed| bleed.bleeds)
     }
 
-    /// What it comes to, in sentences: what bleeds into what, and what to do about it; or that nothing does.
+    /// Results in sentences, and what to do.
     pub fn summary(&self) -> Vec<String> {
-        let mut told: Vec<String> = self.found.iter().filter(|bleed| bleed.bleeds).map(Bleed::sentence).collect();
-        if !told.is_empty() {
-            told.push(
+        let mut lines: Vec<String> = self.found.iter().filter(|bleed| bleed.bleeds).map(Bleed::sentence).collect();
+        if !lines.is_empty() {
+            lines.push(
                 "The converter's multiplexer does not settle behind the high resistance of a divider: solder 100 nF from each \
-                 pin to ground, and throw away the first conversion of each channel, as our firmware does"
+                 pin to ground, and discard the first conversion of each channel, as our firmware does"
                     .to_owned(),
             );
         } else if !self.found.is_empty() {
-            let percent = 100.0 * WORTH_TELLING;
-            told.push(format!("No sensor follows one of the other finger by {percent:.0} % or more"));
+            let percent = 100.0 * LEAST_SHARE;
+            lines.push(format!("No crosstalk of {percent:.0} % or more"));
         }
         let touched = self.found.iter().filter(|bleed| bleed.moved && !bleed.bleeds);
-        told.extend(touched.map(|bleed| {
+        lines.extend(touched.map(|bleed| {
             let (into, from) = (bleed.into.label(), bleed.from.label());
-            format!("The {into} moved while the {from} was moved, but not in step with it: was it touched? Test again")
+            format!("The {into} moved during the {from}'s turn, but not in step with it: was it touched? Test again")
         }));
-        told.extend(self.unwatched.iter().map(|[from, into]| {
+        lines.extend(self.unwatched.iter().map(|[from, into]| {
             format!(
-                "The {} did not rest or has no numbers, so that nothing is known of what the {} does to it",
+                "The {} was not at rest or has no readings: crosstalk from the {} is unknown",
                 into.label(),
                 from.label()
             )
@@ -214,9 +224,9 @@ impl CrosstalkTest {
         let left_out = asked.chain(self.sensors[self.at..].iter().map(|(sensor, _)| sensor.label()));
         let left_out: Vec<&str> = left_out.collect();
         if !left_out.is_empty() {
-            told.push(format!("Not moved: {}", left_out.join(", ")));
+            lines.push(format!("Skipped: {}", left_out.join(", ")));
         }
-        told
+        lines
     }
 
     fn next(&mut self) {
@@ -304,7 +314,7 @@ impl Moving {
         t_s - *self.back.get_or_insert(t_s) >= BACK_S
     }
 
-    /// What the sensors of the other finger did meanwhile.
+    /// Results for the sensors of the other finger.
     fn found(&self, source: Sensor, scale: f64) -> Vec<Bleed> {
         let watched = |sensor: &Sensor| side_of(*sensor) != side_of(source) && self.rest[*sensor as usize].is_some();
         let bleed = |into: Sensor| {
@@ -312,7 +322,7 @@ impl Moving {
             let share = if xx > 0.0 { xy / xx } else { 0.0 };
             let counts = share * self.most;
             let in_step = xy.abs() >= IN_STEP * (xx * yy).sqrt();
-            let bleeds = in_step && share.abs() >= WORTH_TELLING && counts.abs() >= LEAST_COUNTS * scale;
+            let bleeds = in_step && share.abs() >= LEAST_SHARE && counts.abs() >= LEAST_COUNTS * scale;
             let moved = self.others[into as usize] > STILL * scale;
             Bleed { from: source, into, share, counts, moved, bleeds }
         };
@@ -324,7 +334,7 @@ impl Bleed {
     /// In a sentence.
     pub fn sentence(&self) -> String {
         let (into, from) = (self.into.label(), self.from.label());
-        format!("The {into} shows {:.1} % of what the {from} does: {:+.0} counts", 100.0 * self.share, self.counts)
+        format!("The {into} follows the {from} by {:.1} %: {:+.0} counts", 100.0 * self.share, self.counts)
     }
 }
 
@@ -337,7 +347,7 @@ fn side_of(sensor: Sensor) -> usize {
 mod tests {
     use super::*;
 
-    /// A hand that obeys, seen through a converter by which each channel takes a share of the one before it.
+    /// A hand that follows the instructions, seen through a converter by which each channel takes a share of the one before it.
     struct Hand {
         test: CrosstalkTest,
         t_s: f64,
@@ -371,9 +381,9 @@ mod tests {
         /// Does what is asked for, to the end.
         fn obey(&mut self) {
             while let Some(sensor) = self.test.source() {
-                assert_eq!(self.test.instruction(), "leave both fingers alone");
+                assert_eq!(self.test.instruction(), "do not touch the fingers");
                 self.rest(1.1);
-                assert!(self.test.instruction().contains("let go; do not touch"), "{}", self.test.instruction());
+                assert!(self.test.instruction().contains("release it; do not touch"), "{}", self.test.instruction());
                 for k in 0..100u32 {
                     let wave = (std::f64::consts::PI * f64::from(k) / 100.0).sin();
                     let mut counts = [1420.0, 1400.0, 0.0, 0.0];
@@ -404,9 +414,9 @@ mod tests {
         // Of the change of the channel before, which keeps 90 % of its own.
         assert_eq!(bleeds, [(FlexLeft, FlexRight, 100), (FlexRight, PadLeft, 111), (PadLeft, PadRight, 111)]);
         assert_eq!(hand.test.found().len(), 8);
-        let told = hand.test.summary();
-        assert!(told.len() == 4 && told[0].contains("right flex strip shows 10.0 % of what the left flex strip does"));
-        assert!(told[3].contains("100 nF"), "{told:?}");
+        let lines = hand.test.summary();
+        assert!(lines.len() == 4 && lines[0].contains("right flex strip follows the left flex strip by 10.0 %"));
+        assert!(lines[3].contains("100 nF"), "{lines:?}");
     }
 
     #[test]
@@ -414,11 +424,11 @@ mod tests {
         for clumsy in [false, true] {
             let mut hand = Hand { clumsy, ..Hand::new(0.0) };
             hand.obey();
-            let told = hand.test.summary();
-            let sound = "No sensor follows one of the other finger by 1 % or more";
+            let lines = hand.test.summary();
+            let sound = "No crosstalk of 1 % or more";
             let touched =
-                "The right pad moved while the left pad was moved, but not in step with it: was it touched? Test again";
-            assert_eq!(told, if clumsy { vec![sound, touched] } else { vec![sound] }, "{:?}", hand.test.found());
+                "The right pad moved during the left pad's turn, but not in step with it: was it touched? Test again";
+            assert_eq!(lines, if clumsy { vec![sound, touched] } else { vec![sound] }, "{:?}", hand.test.found());
             assert!(hand.test.is_sound());
         }
     }
@@ -453,7 +463,7 @@ mod tests {
             test.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None });
         }
         assert!(test.instruction().starts_with("bend the right finger"), "{}", test.instruction());
-        assert_eq!(test.summary().last().map(|told| told.starts_with("Not moved: left flex strip")), Some(true));
+        assert_eq!(test.summary().last().map(|line| line.starts_with("Skipped: left flex strip")), Some(true));
     }
 
     #[test]
@@ -462,12 +472,12 @@ mod tests {
         for k in 0..200 {
             hand.feed([1420.0 + f64::from(k % 10) * 20.0, 1400.0, 0.0, 0.0]);
         }
-        assert_eq!(hand.test.instruction(), "leave both fingers alone: the left flex strip does not rest");
+        assert_eq!(hand.test.instruction(), "do not touch the fingers: the left flex strip is not at rest");
         hand.test.skip();
         hand.rest(3.0);
         assert!(hand.test.instruction().starts_with("bend the right finger"), "{}", hand.test.instruction());
         assert_eq!((hand.test.step(), hand.test.found()), ([2, 4], &[][..]));
-        assert_eq!(hand.test.summary(), ["Not moved: left flex strip, right flex strip, left pad, right pad"]);
+        assert_eq!(hand.test.summary(), ["Skipped: left flex strip, right flex strip, left pad, right pad"]);
         assert!(!hand.test.is_sound());
         let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
         assert!(CrosstalkTest::new(&one).is_err(), "nothing could be watched");

@@ -1,18 +1,18 @@
-//! One look at a port: open it, ask the board who it is, listen.
+//! Observations of a port: open it, ask the board for its handshake, listen.
 
 use super::{ChannelTraces, Observations};
 use crate::protocol::DecodedEvent;
 use crate::serial::{LinkEvent, LinkOptions, SerialLink, is_running, list_ports};
 use std::time::{Duration, Instant};
 
-/// How long events are waited for at a time.
+/// Longest wait for events.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// When the board is asked who it is: it may restart when the port is opened.
+/// Times of the query `?`: the board may restart when the port is opened.
 const ASKED_AT: [Duration; 2] = [Duration::from_millis(300), Duration::from_millis(4500)];
 
-/// Opens a port and listens for a time. `goes_on` is asked again and again, and told how long it has listened (s); it ends the
-/// look early by saying no.
+/// Opens a port and listens for a time. `goes_on` is called again and again with the time so far (s); false ends it
+/// early.
 pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(f64) -> bool) -> Observations {
     let mut seen = Observations {
         ports: list_ports(),
@@ -31,8 +31,8 @@ pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(
     while began.elapsed() < listen && goes_on(began.elapsed().as_secs_f64()) && !link.is_over() {
         if ASKED_AT.get(asked).is_some_and(|at| began.elapsed() >= *at) {
             asked += 1;
-            // A board that cannot be told is told about by the checks.
-            let _told = link.send("?");
+            // The checks report a board that does not answer.
+            let _sent = link.send("?");
         }
         for event in link.take(PATIENCE) {
             if let LinkEvent::Decoded(DecodedEvent::Reading(reading)) = event {

@@ -1,7 +1,7 @@
 //! The checks on made-up observations: a sound gripper, and one trouble at a time.
 
 use super::{CHECKS, ChannelTraces, CheckFinding, CheckStatus, Observations, findings};
-use crate::protocol::Saturation;
+use crate::protocol::{AdcRange, Saturation};
 use crate::serial::{BoardKind, LinkState, LinkStatus, PortError, PortInfo, PortTrouble, UsbIdentity};
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::cadence::Cadence;
@@ -28,8 +28,7 @@ fn sound() -> Observations {
         detected: None,
         cadence,
         saturation: vec![None; 4],
-        looks_10_bit: false,
-        units: Vec::new(),
+        adc_range: AdcRange::Fits,
         reconnects: 0,
         now_s: 8.0,
         dropped: [0; 2],
@@ -127,7 +126,7 @@ fn each_trouble_is_found_by_its_own_check() {
     assert_eq!(complaints(&high(0)), wrong("open-circuit"));
     assert_eq!(complaints(&changed(|link| link.saturation[1] = Some(Saturation::Low))), wrong("open-circuit"));
     assert_eq!(complaints(&changed(|link| link.saturation[3] = Some(Saturation::Low))), [], "an idle pad is at zero");
-    assert_eq!(complaints(&changed(|link| link.looks_10_bit = true)), wrong("bits"));
+    assert_eq!(complaints(&changed(|link| link.adc_range = AdcRange::LooksTenBit)), wrong("bits"));
     assert_eq!(complaints(&changed(|link| link.cadence.lost = 10)), wrong("rate"));
     assert_eq!(complaints(&changed(|link| link.cadence.rate_hz = 42.0)), wrong("rate"));
     let unreadable = |link: &mut LinkStatus| (link.cadence.lost, link.cadence.bad_lines) = (40, 40);

@@ -1,17 +1,17 @@
-//! What each channel did while it was listened to: its range, and how much it changes with the one that is read before it.
+//! Range of each channel, and how much it follows the channel that is converted before it.
 
 use palpate_tactile::board::Reading;
 
-/// A channel that changes by more than this within [`WITHIN_S`] moves (counts): far more than noise, a few degrees of bend.
+/// Change within [`WITHIN_S`] that counts as movement (counts): far more than noise, a few degrees of bend.
 const MOVES: f64 = 40.0;
 
-/// Changes are looked at over this time (s): a hand bends a finger in several times that.
+/// Duration of a change (s): a hand takes several times as long to bend a finger.
 const WITHIN_S: f64 = 0.2;
 
 /// Changes that are remembered.
 const MOST_CHANGES: usize = 1000;
 
-/// One channel and how it changes with the one before it.
+/// Range of one channel, and how it follows the one before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelTrace {
     /// Readings with a number.
@@ -62,9 +62,9 @@ impl ChannelTrace {
         }
     }
 
-    /// Share of the channel before that it takes, if it does: at its least it reads that share, and now and then, when the
-    /// other moves and nothing else happens, it moves by about that share. A pad that something presses all the time reads one
-    /// too, but does not move with it; one that is pressed by a closing finger moves far more.
+    /// Share of the channel before that it follows, if it does: at its least it reads that share, and at times, when the
+    /// other moves and nothing else happens, it moves by about that share. A pad that is pressed all the time reads one too,
+    /// but does not move with it; one that is pressed by a closing finger moves far more.
     pub fn takes(&self) -> Option<f64> {
         let share = self.least_share;
         let like = |slope: &&f64| (**slope - share).abs() < 0.5 * share;

@@ -1,5 +1,5 @@
-//! How the gripper's board is wired, and the sketch that runs on it: what a mender needs beside the findings. The files are
-//! those of `assets/firmware/due_gripper`, so that the program has them wherever it was installed.
+//! Wiring of the gripper's board, and the sketch that runs on it. The files of `assets/firmware/due_gripper` are part of the
+//! program.
 
 use palpate_tactile::board::Sensor;
 use palpate_tactile::electronics::{PadPart, StripPart};
@@ -7,7 +7,7 @@ use std::fs;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
-/// Wiring, ports and lines of the board, as a page of Markdown.
+/// Wiring, ports and protocol of the board, as a page of Markdown.
 pub const WIRING_PAGE: &str = include_str!("../../../assets/firmware/due_gripper/README.md");
 
 /// Name of the sketch, and of its folder: Arduino wants them to be the same.
@@ -19,22 +19,22 @@ const SKETCH_FILES: [(&str, &str); 3] = [
     ("README.md", WIRING_PAGE),
 ];
 
-/// What must be known before anything is soldered.
+/// Rules of the wiring.
 pub const WIRING_RULES: [&str; 2] = [
-    "The Due bears 3.3 V at its pins and no more: feed the dividers from its 3.3 V pin, never from 5 V.",
+    "The pins of a Due take at most 3.3 V: feed the dividers from its 3.3 V pin, never from 5 V.",
     "100 nF from each pin to ground, at the pin: without it one channel bleeds into the next.",
 ];
 
-/// A divider: what is between the pin and 3.3 V, and what between the pin and ground.
+/// Voltage divider of one pin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wire {
     /// The pin.
     pub pin: &'static str,
     /// Its sensor.
     pub sensor: Sensor,
-    /// To 3.3 V.
+    /// Part between the pin and 3.3 V.
     pub above: String,
-    /// To ground.
+    /// Part between the pin and ground.
     pub below: String,
 }
 
@@ -52,11 +52,11 @@ pub fn wires() -> [Wire; 4] {
     })
 }
 
-/// Why the sketch could not be written.
+/// Error when writing the sketch.
 #[derive(Debug, thiserror::Error)]
 pub enum SketchError {
-    /// Something else has that name, or the sketch was changed there.
-    #[error("\"{path}\" is there already and is another: it was left as it is. Choose another folder")]
+    /// A different file exists.
+    #[error("\"{path}\" exists and differs: nothing was written. Choose another folder")]
     Exists {
         /// The file.
         path: PathBuf,
@@ -71,8 +71,8 @@ pub enum SketchError {
     },
 }
 
-/// Writes the sketch into a folder, which is made where it is missing; which files it has. One that is there and is not
-/// the same is left as it is, and then nothing is written.
+/// Writes the sketch into a folder, which is created where it is missing, and returns its files. Writes nothing where a
+/// different file exists.
 pub fn write_sketch(folder: &Path) -> Result<Vec<PathBuf>, SketchError> {
     fs::create_dir_all(folder).map_err(|cause| SketchError::System { path: folder.to_owned(), cause })?;
     let files = SKETCH_FILES.map(|(name, text)| (folder.join(name), text));

@@ -1,16 +1,16 @@
-//! What may go wrong on the way from a sensor to the host, on request: `NAME[=VALUE]@SECONDS[/DURATION]`, separated by
-//! commas, as in `vanish@5,garbage@7/2,stuck=2@10`. One table says what there is.
+//! Faults of the emulator, on request: `NAME[=VALUE]@SECONDS[/DURATION]`, separated by commas, as in
+//! `vanish@5,garbage@7/2,stuck=2@10`.
 
 use std::fmt;
 
-/// The kinds, by the stage at which they strike.
+/// Kinds of fault, from the sensor to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultKind {
     /// A channel keeps its reading.
     Stuck,
-    /// A channel is at the upper rail.
+    /// A channel is at full scale.
     Saturated,
-    /// A channel's sensor has come off.
+    /// A sensor is disconnected.
     Open,
     /// A channel is printed as `nan`.
     Nan,
@@ -20,27 +20,27 @@ pub enum FaultKind {
     TenBit,
     /// The board's clock is fast.
     Clock,
-    /// The board restarts: silent for a second, then hello; its clock and counter begin anew.
+    /// The board restarts: a second of silence, then the handshake; its clock and counter restart.
     Reset,
     /// Lines are lost.
     Loss,
-    /// Lines are cut somewhere.
+    /// Lines are truncated.
     Partial,
-    /// Lines lose a byte somewhere.
+    /// Lines lose a byte.
     Byte,
-    /// Random bytes stand in for lines.
+    /// Random bytes replace lines.
     Garbage,
-    /// The board sends at another rate than the host reads.
+    /// The baud rates of board and host differ.
     Baud,
     /// Lines come in bunches.
     Burst,
     /// Nothing is sent.
     Silent,
-    /// The port goes away and comes back, perhaps under another number.
+    /// The port disappears and comes back.
     Vanish,
 }
 
-/// What a kind is called, what its value means and is unless given, how long it lasts unless said (s).
+/// Name, default value, default duration (s) and description of a kind.
 struct Row {
     kind: FaultKind,
     name: &'static str,
@@ -56,22 +56,22 @@ const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, w
 }
 
 const TABLE: [Row; 16] = [
-    row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE keeps its reading"),
-    row(FaultKind::Saturated, "rail", 0.0, FOR_EVER, "channel VALUE is at the upper rail"),
-    row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE has come off"),
+    row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE is stuck at its reading"),
+    row(FaultKind::Saturated, "rail", 0.0, FOR_EVER, "channel VALUE is saturated at full scale"),
+    row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE is disconnected"),
     row(FaultKind::Nan, "nan", 0.0, FOR_EVER, "channel VALUE is printed as nan"),
-    row(FaultKind::Crosstalk, "crosstalk", 0.2, FOR_EVER, "each channel takes a share VALUE of the one before"),
+    row(FaultKind::Crosstalk, "crosstalk", 0.2, FOR_EVER, "each channel picks up a share VALUE of the one before"),
     row(FaultKind::TenBit, "tenbit", 0.0, FOR_EVER, "the converter gives 10 bits"),
     row(FaultKind::Clock, "clock", 200.0, FOR_EVER, "the board's clock is fast by VALUE ppm"),
     row(FaultKind::Reset, "reset", 0.0, 1.0, "the board restarts"),
     row(FaultKind::Loss, "loss", 0.1, 1.0, "a share VALUE of the lines is lost"),
-    row(FaultKind::Partial, "partial", 0.5, 1.0, "a share VALUE of the lines is cut"),
+    row(FaultKind::Partial, "partial", 0.5, 1.0, "a share VALUE of the lines is truncated"),
     row(FaultKind::Byte, "byte", 0.5, 1.0, "a share VALUE of the lines loses a byte"),
     row(FaultKind::Garbage, "garbage", 0.0, 0.5, "random bytes instead of lines"),
     row(FaultKind::Baud, "baud", 2.0, 2.0, "the board sends VALUE times faster than the host reads"),
-    row(FaultKind::Burst, "burst", 0.25, 2.0, "lines are held back and come every VALUE s"),
+    row(FaultKind::Burst, "burst", 0.25, 2.0, "lines arrive in bunches, every VALUE s"),
     row(FaultKind::Silent, "silent", 0.0, 2.0, "nothing is sent"),
-    row(FaultKind::Vanish, "vanish", 0.0, 1.0, "the port goes away and comes back"),
+    row(FaultKind::Vanish, "vanish", 0.0, 1.0, "the port disappears and comes back"),
 ];
 
 impl FaultKind {
@@ -81,21 +81,21 @@ impl FaultKind {
     }
 }
 
-/// One fault and when it strikes.
+/// A fault and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What happens.
+    /// Its kind.
     pub kind: FaultKind,
-    /// What it takes a number for; see [`fault_help`].
+    /// Its parameter; see [`fault_help`].
     pub value: f64,
-    /// From when (s since the first host).
+    /// Start (s since the first host).
     pub from_s: f64,
-    /// Until when (s).
+    /// End (s).
     pub until_s: f64,
 }
 
 impl Fault {
-    /// Whether it is on at a time (s).
+    /// True while it is active (s).
     pub fn is_on(&self, t: f64) -> bool {
         (self.from_s..self.until_s).contains(&t)
     }
@@ -108,34 +108,53 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Lines that say which faults there are.
+/// Help text: all faults.
 pub fn fault_help() -> String {
     let line = |row: &Row| {
-        let lasts = if row.duration_s.is_finite() { format!("{} s", row.duration_s) } else { "for ever".to_owned() };
-        format!("  {:<10} {} (VALUE {}, lasts {lasts})", row.name, row.words, row.value)
+        let lasts =
+            if row.duration_s.is_finite() { format!("{} s", row.duration_s) } else { "until the end".to_owned() };
+        format!("  {:<10} {} (VALUE {}, duration {lasts})", row.name, row.words, row.value)
     };
     TABLE.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Reads a list of faults.
-pub fn parse_faults(text: &str) -> Result<Vec<Fault>, String> {
-    text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse_fault).collect()
+/// An error in a list of faults.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the fault \"{text}\" {problem}; write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2")]
+pub struct FaultError {
+    /// The fault.
+    pub text: String,
+    /// What is wrong with it.
+    pub problem: FaultProblem,
 }
 
-fn parse_fault(text: &str) -> Result<Fault, String> {
-    let wrong =
-        |what: &str| format!("the fault \"{text}\" {what}; write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2");
-    let (named, times) = text.split_once('@').ok_or_else(|| wrong("does not say when"))?;
+/// What is wrong with a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FaultProblem {
+    /// No time.
+    #[error("has no time")]
+    NoTime,
+    /// An unknown name.
+    #[error("is not one of {names}", names = TABLE.map(|row| row.name).join(", "))]
+    Unknown,
+    /// A wrong number.
+    #[error("has a wrong number")]
+    Number,
+}
+
+/// Parses a list of faults.
+pub fn parse_faults(text: &str) -> Result<Vec<Fault>, FaultError> {
+    let parse = |text| parse_fault(text).map_err(|problem| FaultError { text: String::from(text), problem });
+    text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse).collect()
+}
+
+fn parse_fault(text: &str) -> Result<Fault, FaultProblem> {
+    let (named, times) = text.split_once('@').ok_or(FaultProblem::NoTime)?;
     let (name, value) = named.split_once('=').map_or((named, None), |(name, value)| (name, Some(value)));
-    let row = TABLE.iter().find(|row| row.name == name).ok_or_else(|| {
-        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
-        wrong(&format!("is not one of {}", names.join(", ")))
-    })?;
+    let row = TABLE.iter().find(|row| row.name == name).ok_or(FaultProblem::Unknown)?;
     let (from, duration) = times.split_once('/').map_or((times, None), |(from, lasts)| (from, Some(lasts)));
     let number = |text: Option<&str>, usual: f64| match text {
-        Some(text) => {
-            text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or_else(|| wrong("has a wrong number"))
-        }
+        Some(text) => text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or(FaultProblem::Number),
         None => Ok(usual),
     };
     let from_s = number(Some(from), 0.0)?;
@@ -170,8 +189,8 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_fault_is_said() {
-        for (text, word) in [("vanish", "when"), ("vnish@3", "vanish"), ("loss=x@3", "number"), ("loss@-1", "number")] {
-            let told = parse_faults(text).expect_err(text);
+        for (text, word) in [("vanish", "time"), ("vnish@3", "vanish"), ("loss=x@3", "number"), ("loss@-1", "number")] {
+            let told = parse_faults(text).expect_err(text).to_string();
             assert!(told.contains(word) && told.contains(text), "{told}");
         }
     }

@@ -1,55 +1,55 @@
-//! The emulated gripper: fingers, sensors, board and line, with whatever goes wrong on the way. It has no port and no
-//! clock of its own: told how late it is and what the host said, it gives bytes. The same seed, the same times and the
-//! same words of the host give the same bytes.
+//! The emulated gripper: fingers, sensors, board and connection, with its faults. It has no port and no clock of its own: time
+//! and the host's bytes go in, the board's bytes come out. The same seed, times and input give the same bytes.
 
-use super::board::{BoardSetup, FirmwareBoard, sign};
 use super::faults::{Fault, FaultKind};
+use super::firmware::{BoardSetup, FirmwareBoard};
 use super::hand::{Began, Hand, HandPlan};
 use super::parts::{HiddenParts, Sensors, Stimulus};
 use super::script::Step;
 use super::uart::misread;
+use crate::protocol::checksum;
 use palpate_sim::objects::ObjectError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::electronics::Converter;
 use palpate_tactile::model::Stream;
 use serde::Serialize;
 
-/// Resistor of the inputs beyond the four sensors, as the hello line says (ohm).
+/// Stated resistor of the inputs beyond the four sensors (ohm).
 const SPARE_OHM: u32 = 4700;
 
-/// Times that differ by less are the same (s): what sums of periods leave in rounding, and less than a tick of the clock.
+/// Times that differ by less are equal (s): rounding of summed periods, and less than a tick of the clock.
 const SAME_TIME_S: f64 = 5e-7;
 
-/// What the gripper is and does.
+/// Setup of the emulated gripper.
 #[derive(Clone, Debug)]
 pub struct EmulatorSetup {
-    /// What its fingers do.
+    /// Programme of its fingers.
     pub hand: HandPlan,
-    /// What its sensors are made of.
+    /// Hidden values of its sensors.
     pub parts: HiddenParts,
     /// Samples per second.
     pub rate_hz: u32,
-    /// Channels: the four sensors, then spare inputs that swing slowly.
+    /// Number of channels: the four sensors, then spare inputs with slow sine waves.
     pub channels: usize,
-    /// Highest pressure that its board puts out, in steps of 0.05 bar; 0: the control box is worked by hand.
+    /// Highest pressure of its board, in steps of 0.05 bar; 0: no pressure output.
     pub most_steps: u8,
-    /// What the board's clock shows when it starts (µs).
+    /// Start of the board's clock (µs).
     pub clock_start_us: u32,
-    /// What goes wrong.
+    /// Faults.
     pub faults: Vec<Fault>,
-    /// Names noise and faults.
+    /// Random seed of noise and faults.
     pub seed: u64,
 }
 
-/// Something worth telling.
+/// Kind of an event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum EmulatorEventKind {
     /// The fingers close.
     Grasp {
-        /// Which grasp, from 1.
+        /// Number of the grasp, from 1.
         number: u32,
-        /// On what.
+        /// The object.
         object: String,
     },
     /// A bend and a load are held on the bench.
@@ -58,17 +58,17 @@ pub enum EmulatorEventKind {
         bend_deg: [f64; 2],
         /// Load on the pads (N).
         load_n: [f64; 2],
-        /// For how long (s).
+        /// Duration (s).
         seconds: f64,
     },
-    /// The script is at its end.
+    /// The script ended.
     ScriptDone,
     /// A fault begins.
     Fault {
-        /// Which, as on the command line.
+        /// The fault, as on the command line.
         fault: String,
     },
-    /// The board vented because the host fell silent.
+    /// The board vented because the host was silent.
     Watchdog,
     /// The simulation stopped.
     Failed {
@@ -84,24 +84,24 @@ pub enum EmulatorEventKind {
         /// Path of the terminal.
         path: String,
     },
-    /// Lines were given up because the host does not read.
+    /// Bytes were dropped because the host does not read.
     Overrun {
-        /// How many bytes.
+        /// Number of bytes.
         bytes: u64,
     },
 }
 
-/// Something worth telling, and when.
+/// Event of the emulator, and its time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EmulatorEvent {
     /// Time since the first host (s).
     pub t_s: f64,
-    /// What.
+    /// The event.
     #[serde(flatten)]
     pub what: EmulatorEventKind,
 }
 
-/// The gripper.
+/// Emulated gripper.
 #[derive(Debug)]
 pub struct EmulatedGripper {
     hand: Hand,
@@ -109,15 +109,15 @@ pub struct EmulatedGripper {
     sensors: Sensors,
     board_setup: BoardSetup,
     board: FirmwareBoard,
-    /// What it says when it has restarted.
+    /// Handshake after a restart.
     restarted: String,
     clock_start_us: u32,
     faults: Vec<Fault>,
-    /// Which faults have been told of.
+    /// Faults that have been reported.
     struck: Vec<bool>,
     converter: Conversions,
     now_s: f64,
-    /// A moment at which the board's clock was read: our time (s) and its own since it was made, unwrapped (µs).
+    /// A moment on both clocks: our time (s) and the board's, unwrapped (µs).
     anchor: (f64, u64),
     line_chance: Stream,
     garbage: Stream,
@@ -126,12 +126,12 @@ pub struct EmulatedGripper {
     released_s: f64,
     bytes: Vec<u8>,
     happened: Vec<EmulatorEvent>,
-    /// What the board printed, before anything went wrong with it.
+    /// Output of the board, before faults.
     printed: String,
 }
 
 impl EmulatedGripper {
-    /// Makes it and starts its board. Takes some tenths of a second for each object.
+    /// Starts an emulated gripper; takes some tenths of a second for each object.
     pub fn new(setup: EmulatorSetup) -> Result<Self, ObjectError> {
         let spare = (1..).map(|k| format!("aux{k}"));
         let channels = Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).chain(spare).take(setup.channels);
@@ -145,7 +145,7 @@ impl EmulatedGripper {
             most_steps: setup.most_steps,
         };
         let mut hello = String::new();
-        let board = FirmwareBoard::begin(board_setup.clone(), setup.clock_start_us, &mut hello);
+        let board = FirmwareBoard::begin(&board_setup, setup.clock_start_us, &mut hello);
         Ok(Self {
             hand: Hand::new(setup.hand)?,
             sensors: setup.parts.sensors(f64::from(setup.rate_hz)),
@@ -169,7 +169,7 @@ impl EmulatedGripper {
         })
     }
 
-    /// What its sensors are made of.
+    /// Hidden values of its sensors.
     pub fn parts(&self) -> &HiddenParts {
         &self.parts
     }
@@ -179,27 +179,27 @@ impl EmulatedGripper {
         self.hand.add(step)
     }
 
-    /// Bytes that have come out since it was asked last.
+    /// Takes the bytes since the last call.
     pub fn take_bytes(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.bytes)
     }
 
-    /// What has happened since it was asked last.
+    /// Takes the events since the last call.
     pub fn take_happened(&mut self) -> Vec<EmulatorEvent> {
         std::mem::take(&mut self.happened)
     }
 
-    /// What its board has printed since it was asked last: every line whole, whatever happened to it afterwards.
+    /// Takes the output of the board since the last call, before faults.
     pub fn take_printed(&mut self) -> String {
         std::mem::take(&mut self.printed)
     }
 
-    /// The fault of a kind that is on now.
+    /// The active fault of a kind.
     pub fn fault(&self, kind: FaultKind) -> Option<Fault> {
         self.faults.iter().copied().find(|fault| fault.kind == kind && fault.is_on(self.now_s))
     }
 
-    /// Lets time pass until `t` (s since the first host).
+    /// Advances to the time `t` (s since the first host).
     pub fn advance(&mut self, t: f64) {
         loop {
             let due_s = self.due_s();
@@ -218,7 +218,7 @@ impl EmulatedGripper {
         self.release();
     }
 
-    /// Takes what the host sent, now.
+    /// Takes bytes from the host, now.
     pub fn hear(&mut self, bytes: &[u8]) {
         let mut said = String::new();
         let clock_us = self.clock_us(self.now_s) as u32;
@@ -231,7 +231,7 @@ impl EmulatedGripper {
         self.send(&said);
     }
 
-    /// When the board's next sample is due, in our time (s).
+    /// Our time of the board's next sample (s).
     fn due_s(&self) -> f64 {
         let (anchor_s, anchor_us) = self.anchor;
         let ahead = self.board.next_us().wrapping_sub(anchor_us as u32);
@@ -259,7 +259,7 @@ impl EmulatedGripper {
         let felt = self.hand.at(self.now_s, self.board.line_bar());
         self.tell_hand();
         if let Some(bar) = self.hand.own_bar() {
-            self.board.set_by_hand((bar * 20.0).round() as u8);
+            self.board.set_by_hand((bar * 20.0).round() as u8, due);
         }
         let shares = self.shares(felt);
         self.converter.strike(&self.faults, self.now_s);
@@ -290,12 +290,12 @@ impl EmulatedGripper {
     fn restart(&mut self) {
         let until = self.fault(FaultKind::Reset).map_or(self.now_s, |fault| fault.until_s);
         self.restarted.clear();
-        self.board = FirmwareBoard::begin(self.board_setup.clone(), self.clock_start_us, &mut self.restarted);
+        self.board = FirmwareBoard::begin(&self.board_setup, self.clock_start_us, &mut self.restarted);
         self.now_s = until;
         self.anchor = (until, u64::from(self.clock_start_us));
     }
 
-    /// Notes that something happened now.
+    /// Adds an event, now.
     pub fn tell(&mut self, what: EmulatorEventKind) {
         self.happened.push(EmulatorEvent { t_s: self.now_s, what });
     }
@@ -320,7 +320,7 @@ impl EmulatedGripper {
         }
     }
 
-    /// Puts what the board printed on the line, as far as the line lets it.
+    /// Sends output of the board through the faulty connection.
     fn send(&mut self, said: &str) {
         self.printed.push_str(said);
         for line in said.split_inclusive('\n') {
@@ -329,7 +329,7 @@ impl EmulatedGripper {
         }
     }
 
-    /// What becomes of a line.
+    /// Applies the faults to a line.
     fn on_the_line(&mut self, line: &str) -> Vec<u8> {
         let chance = self.line_chance.within(0.0, 1.0);
         let where_cut = self.line_chance.within(0.0, line.len() as f64) as usize;
@@ -355,7 +355,7 @@ impl EmulatedGripper {
         }
     }
 
-    /// A line in which a channel has no number: what a board prints for it, which the checksum covers.
+    /// A line with `nan` for a channel, with its checksum.
     fn without_number(&self, line: &str, channel: usize) -> String {
         let name = self.board_setup.channels.get(channel);
         let Some((name, body)) = name.zip(line.rsplit_once(",ck:").map(|(body, _)| body)) else {
@@ -365,12 +365,11 @@ impl EmulatedGripper {
             Some((key, _)) if key == name => format!("{key}:nan"),
             _ => field.to_owned(),
         };
-        let mut line = body.split(',').map(field).collect::<Vec<_>>().join(",");
-        sign(&mut line, ",ck:");
-        line
+        let body = body.split(',').map(field).collect::<Vec<_>>().join(",");
+        format!("{body},ck:{}\n", checksum(body.as_bytes()))
     }
 
-    /// Lets go what a burst holds back, when its time has come.
+    /// Releases what a burst holds back, at its time.
     fn release(&mut self) {
         if let Some(burst) = self.fault(FaultKind::Burst) {
             if self.now_s - self.released_s < burst.value {
@@ -382,14 +381,14 @@ impl EmulatedGripper {
     }
 }
 
-/// The board's converter, with what is wrong with it now.
+/// The board's converter, with its faults.
 #[derive(Debug)]
 struct Conversions {
     noise_counts: f64,
     noise: Stream,
     ten_bits: bool,
     crosstalk: f64,
-    at_rail: Vec<bool>,
+    saturated: Vec<bool>,
     stuck: Vec<bool>,
     kept: Vec<u32>,
 }
@@ -401,19 +400,19 @@ impl Conversions {
             noise: Stream::new(seed, "converter", "noise"),
             ten_bits: false,
             crosstalk: 0.0,
-            at_rail: vec![false; channels],
+            saturated: vec![false; channels],
             stuck: vec![false; channels],
             kept: vec![0; channels],
         }
     }
 
-    /// Takes in what is wrong at a time (s).
+    /// Sets the faults of a time (s).
     fn strike(&mut self, faults: &[Fault], t: f64) {
         let on = |kind: FaultKind| faults.iter().filter(move |fault| fault.kind == kind && fault.is_on(t));
         self.ten_bits = on(FaultKind::TenBit).next().is_some();
         self.crosstalk = on(FaultKind::Crosstalk).map(|fault| fault.value).next().unwrap_or(0.0);
         for channel in 0..self.kept.len() {
-            self.at_rail[channel] = on(FaultKind::Saturated).any(|fault| fault.value as usize == channel);
+            self.saturated[channel] = on(FaultKind::Saturated).any(|fault| fault.value as usize == channel);
             self.stuck[channel] = on(FaultKind::Stuck).any(|fault| fault.value as usize == channel);
         }
     }
@@ -426,11 +425,11 @@ impl Conversions {
         }
         let before = shares[(channel + self.kept.len() - 1) % self.kept.len()];
         let share = shares[channel] + self.crosstalk * (before - shares[channel]);
-        let share = if self.at_rail[channel] { 1.0 } else { share };
+        let share = if self.saturated[channel] { 1.0 } else { share };
         let levels = if self.ten_bits { 1024.0 } else { Converter::DUE.levels };
         let noise = noise * self.noise_counts * levels / Converter::DUE.levels;
-        // On the rail there is no noise: nothing is above it.
-        let noise = if self.at_rail[channel] { 0.0 } else { noise };
+        // Saturated: no noise exceeds full scale.
+        let noise = if self.saturated[channel] { 0.0 } else { noise };
         self.kept[channel] = Converter { levels, ..Converter::DUE }.counts(share, noise) as u32;
         self.kept[channel]
     }

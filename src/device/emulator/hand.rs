@@ -1,5 +1,5 @@
-//! What the fingers do: they grasp by themselves as at a hand-driven control box, or as a host drives them, or a script
-//! bends and loads them on the bench. Grasps are simulated; the bench is held by hand.
+//! Fingers of the emulated gripper: they grasp by a programme of their own, as a host drives them, or are bent and loaded by a
+//! bench script. Grasps are simulated.
 
 use super::parts::Stimulus;
 use super::script::Step;
@@ -13,22 +13,22 @@ use palpate_tactile::Sensors;
 use palpate_tactile::electronics::StripPart;
 use std::collections::VecDeque;
 
-/// Length of a simulation that is driven from outside (s): a day, after which the fingers stay as they are.
+/// Length of a simulation that a host drives (s): a day, after which the fingers stop.
 const LONGEST_GRASP_S: f64 = 86_400.0;
 
-/// How long fingers are left alone after a programme has ended (s).
+/// Rest after a programme (s).
 const SETTLE_S: f64 = 0.5;
 
-/// How often fingers that a host drives look at the pressure (1/s): a control box obeys at once, and a host may set any moment.
+/// Actuation rate of fingers that a host drives (1/s): a host may set a pressure at any moment.
 const DRIVEN_HZ: u32 = 300;
 
-/// A host that vents for so long has let go: what it presses next is another grasp (s).
+/// Time of venting after which the next pressure begins another grasp (s).
 const LET_GO_S: f64 = 0.5;
 
-/// Time in which hands bend a strip or put a weight down (s).
+/// Time to bend a strip or place a weight (s).
 const RAMP_S: f64 = 0.3;
 
-/// Something that is there to be grasped.
+/// Object to grasp.
 #[derive(Clone, Debug)]
 struct Graspable {
     name: String,
@@ -36,22 +36,22 @@ struct Graspable {
     poses: PoseSampler,
 }
 
-/// What the hand is to do.
+/// Plan of the hand.
 #[derive(Clone, Debug)]
 pub struct HandPlan {
     /// The gripper, its programme, and how objects lie.
     pub scene: Scene,
-    /// What it grasps by itself and for a host, one after the other.
+    /// Objects, grasped in turn.
     pub objects: Vec<String>,
-    /// Names the poses.
+    /// Random seed of the poses.
     pub seed: u64,
-    /// From grasp to grasp (s); none: it waits for a host.
+    /// Period of its own grasps (s); none: it waits for a host.
     pub grasp_every_s: Option<f64>,
-    /// Steps on the bench, which come before its own grasps and instead of them.
+    /// Bench script, in place of its own grasps.
     pub script: Vec<Step>,
 }
 
-/// What the fingers are in the middle of.
+/// Activity of the fingers.
 #[derive(Debug)]
 enum Doing {
     Rest,
@@ -59,7 +59,7 @@ enum Doing {
     Grasp(Box<LiveGrasp>),
 }
 
-/// What began, for those who want to know.
+/// Start of an activity.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Began {
     /// The fingers close on something.
@@ -68,7 +68,7 @@ pub(super) enum Began {
     Hold { bend_deg: [f64; 2], load_n: [f64; 2], seconds: f64 },
     /// The script is at its end.
     Done,
-    /// The simulation had to stop; the fingers stay as they are.
+    /// The simulation failed; the fingers stop.
     Failed(String),
 }
 
@@ -82,7 +82,7 @@ pub(super) struct Hand {
     doing: Doing,
     grasps: u32,
     next_s: f64,
-    /// A host has set a pressure: it drives from now on.
+    /// A host drives.
     driven: bool,
     vented_since_s: Option<f64>,
     began: Vec<Began>,
@@ -90,7 +90,7 @@ pub(super) struct Hand {
 }
 
 impl Hand {
-    /// Loads what it will need, which takes some tenths of a second for each object.
+    /// Loads the objects, some tenths of a second for each.
     pub(super) fn new(plan: HandPlan) -> Result<Self, ObjectError> {
         let in_script = plan.script.iter().filter_map(|step| match step {
             Step::Grasp { object, .. } => Some(object.clone()),
@@ -140,12 +140,12 @@ impl Hand {
         Ok(())
     }
 
-    /// What began since it was asked last.
+    /// Takes the starts since the last call.
     pub(super) fn take_began(&mut self) -> Vec<Began> {
         std::mem::take(&mut self.began)
     }
 
-    /// Line pressure that the hand's own programme sets (bar); none when it has none.
+    /// Line pressure of the hand's own programme (bar), if it has one.
     pub(super) fn own_bar(&self) -> Option<f64> {
         match &self.doing {
             Doing::Grasp(grasp) if grasp.programme.is_some() => Some(grasp.line_bar),
@@ -154,10 +154,10 @@ impl Hand {
         }
     }
 
-    /// A host has set a pressure at a time (s), instead of the one there was (bar): whatever was going on by itself is over.
+    /// Hands control to a host that sets a pressure at a time (s), in place of `was_bar` (bar).
     pub(super) fn take_over(&mut self, t: f64, was_bar: f64) {
         if self.driven {
-            // So far the old pressure was on.
+            // Until now the old pressure was on.
             self.at(t, was_bar);
         } else {
             (self.driven, self.doing) = (true, Doing::Rest);
@@ -165,7 +165,7 @@ impl Hand {
         }
     }
 
-    /// What the sensors feel at a time (s), which never goes back; `host_bar` is the pressure that the host has set (bar).
+    /// Stimulus of the sensors at a time (s), which never decreases; `host_bar` is the pressure set by the host (bar).
     pub(super) fn at(&mut self, t: f64, host_bar: f64) -> Stimulus {
         if self.driven {
             self.follow_host(t, host_bar);
@@ -195,7 +195,7 @@ impl Hand {
         }
     }
 
-    /// Goes on with the script, or with its own grasps.
+    /// Continues the script, or its own grasps.
     fn go_on(&mut self, t: f64) {
         let busy = match &self.doing {
             Doing::Rest => false,
@@ -255,17 +255,17 @@ impl Hand {
     }
 }
 
-/// A simulated grasp that is driven while it runs.
+/// Simulated grasp, driven while it runs.
 #[derive(Debug)]
 struct LiveGrasp {
     rig: SimRun,
     sensors: Sensors,
     start_s: f64,
     ends_s: f64,
-    /// The hand's own; none when a host drives.
+    /// The hand's own programme; none when a host drives.
     programme: Option<Programme>,
     line_bar: f64,
-    /// Time since the start (s) and what was felt, at the last frame and at the one to come.
+    /// Time since the start (s) and stimulus, at the last frame and at the next.
     frames: [(f64, Stimulus); 2],
     failed: Option<String>,
 }

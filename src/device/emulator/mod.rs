@@ -1,16 +1,18 @@
-//! A gripper that is not there: fingers from the physics, sensors from the electronics, a board that prints what the
-//! firmware prints, and a pseudo-terminal that a host opens like any port. What it is made of is hidden, and can be told.
+//! The emulated gripper: fingers from the physics, sensors from the electronics, a board that runs the firmware, and a
+//! pseudo-terminal that a host opens like any port. Its sensors' values are hidden, and can be printed.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `hand` | what the fingers do: by themselves, driven by a host, or on the bench by a script |
+//! | `hand` | the fingers: driven by a programme, a host, or a bench script |
 //! | `parts` | strips, pads, dividers: the hidden values |
-//! | `board` | the firmware, statement by statement |
+//! | `firmware` | the board's firmware, compiled from `assets/firmware/due_gripper` |
 //! | `gripper` | all of them, and the line with its faults; no port, no clock of its own |
 //! | `port` | the pseudo-terminal and its link (Unix) |
 
-mod board;
 mod faults;
+mod firmware;
+#[cfg(test)]
+mod firmware_tests;
 mod gripper;
 mod hand;
 mod parts;
@@ -21,12 +23,11 @@ mod script;
 mod tests;
 mod uart;
 
-pub use board::{BoardSetup, FirmwareBoard, OVERSAMPLE, WATCHDOG_US};
-pub use faults::{Fault, FaultKind, fault_help, parse_faults};
+pub use faults::{Fault, FaultError, FaultKind, FaultProblem, fault_help, parse_faults};
 pub use gripper::{EmulatedGripper, EmulatorEvent, EmulatorEventKind, EmulatorSetup};
 pub use hand::HandPlan;
-pub use parts::{HiddenParts, PadSetup, Stimulus, StripSetup};
+pub use parts::{HiddenParts, PadSetup, PartsError, Stimulus, StripSetup};
 #[cfg(unix)]
 pub use port::{PortSetup, ServeError, serve};
-pub use script::{ScriptError, Step, parse_script, parse_step};
+pub use script::{ScriptError, Step, StepProblem, parse_script};
 pub use uart::misread;

@@ -1,4 +1,4 @@
-//! What the emulated gripper is made of: values that nobody knows of a real one, and that a calibration finds out.
+//! Parts of the emulated gripper: values that nobody knows of a real one, and that a calibration estimates.
 
 use palpate_tactile::electronics::{Divider, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::model::Stream;
@@ -27,7 +27,7 @@ pub struct PadSetup {
     pub divider_ohm: f64,
 }
 
-/// Everything that is hidden in the emulated gripper's electronics. What is hidden in its fingers stands in the scene.
+/// Hidden values of the emulated gripper's electronics. Those of its fingers stand in the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HiddenParts {
@@ -74,11 +74,11 @@ impl HiddenParts {
         Self { strips, pads, noise_counts: 2.0, hysteresis: true, drift: true }
     }
 
-    /// Complains about values that no part has; says which.
-    pub fn check(&self) -> Result<(), String> {
-        let positive = |name: &str, value: f64| {
+    /// Refuses values that no part has.
+    pub fn check(&self) -> Result<(), PartsError> {
+        let positive = |name: &'static str, value: f64| {
             let fine = value.is_finite() && value > 0.0;
-            if fine { Ok(()) } else { Err(format!("{name} is {value}; it must be a positive number")) }
+            if fine { Ok(()) } else { Err(PartsError::NotPositive { name, value }) }
         };
         for strip in &self.strips {
             positive("flat_ohm", strip.part.flat_ohm)?;
@@ -93,7 +93,7 @@ impl HiddenParts {
             positive("divider_ohm", pad.divider_ohm)?;
             positive("reaching", pad.part.reaching)?;
         }
-        if self.noise_counts >= 0.0 { Ok(()) } else { Err("noise_counts is negative".to_owned()) }
+        if self.noise_counts >= 0.0 { Ok(()) } else { Err(PartsError::Negative { value: self.noise_counts }) }
     }
 
     /// The four sensors, read so many times a second (1/s).
@@ -112,11 +112,30 @@ impl HiddenParts {
     }
 }
 
+/// A value that no part has.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PartsError {
+    /// It must be a positive number.
+    #[error("{name} is {value}; it must be a positive number")]
+    NotPositive {
+        /// Which value.
+        name: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// Noise must not be negative.
+    #[error("noise_counts is {value}; it must not be negative")]
+    Negative {
+        /// The value.
+        value: f64,
+    },
+}
+
 /// Load that bending puts on a pad, least and most (N m). Assumed: 0.07 to 0.3 N when the finger is closed on nothing
 /// at 1 bar (14 1/m), so that it shows above the threshold of some pads and not of others.
 const MOST_BENDING_LOAD: [f64; 2] = [0.005, 0.02];
 
-/// What the fingers do to their sensors.
+/// Curvature and force on the sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Stimulus {
     /// Mean curvature, left and right (1/m).

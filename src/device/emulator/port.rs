@@ -1,7 +1,7 @@
-//! The pseudo-terminal on which the emulated gripper is reached, and the link that names it.
+//! Pseudo-terminal of the emulated gripper, and the symbolic link to it.
 //!
-//! The terminal's other end is not kept open here, so that a host that comes or goes is noticed. Each host gets a fresh
-//! terminal: nothing that was meant for the last one is left in it, and no lock that the last one put on it.
+//! The terminal's other end is not kept open, so that hosts are noticed when they connect and disconnect. Each host gets a
+//! fresh terminal, without old bytes and locks.
 
 use super::faults::FaultKind;
 use super::gripper::{EmulatedGripper, EmulatorEventKind};
@@ -15,53 +15,55 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
-/// How long a look for bytes from the host takes at most: the grain of everything that happens on the port.
+/// Longest wait for bytes from the host, and time resolution of the port.
 const GRAIN: Duration = Duration::from_millis(1);
 
-/// Bytes that wait for a host that does not read, beyond what the terminal itself holds: two seconds at 1 kHz on eight
-/// channels. What comes then is given up, as drivers and boards give it up.
+/// Buffer for a host that does not read, beyond the terminal's own (bytes): two seconds at 1 kHz on eight channels. More is
+/// dropped, as drivers and boards drop it.
 const MOST_WAITING: usize = 1 << 18;
 
-/// How often it is told that something was given up.
-const TELL_EVERY: Duration = Duration::from_secs(1);
+/// Period of reports about dropped bytes.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// How the gripper is reached.
+/// Port of the emulated gripper.
 #[derive(Clone, Debug)]
 pub struct PortSetup {
-    /// The symbolic link that names the terminal.
+    /// Symbolic link to the terminal.
     pub link: PathBuf,
-    /// Seconds of the gripper per second.
+    /// Speed of emulated time.
     pub speed: f64,
-    /// Bits per second of its serial line, where it has one: a host that reads at another rate gets nonsense.
+    /// Baud rate, if it has one: a host at another rate reads garbage.
     pub baud: Option<u32>,
-    /// Silence after a host has opened the port (s): the programming port of a Due restarts the board.
+    /// Silence after a host connects (s): the programming port of a Due restarts the board.
     pub boot_s: f64,
 }
 
-/// Why a emulated gripper cannot be reached.
+/// Error of the emulator's port.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// Something else stands where the link should be.
-    #[error("{path} exists and is no link to a terminal: it is left alone. Choose another name, or remove it")]
+    /// The path is taken.
+    #[error("{path} exists and is not a link to a terminal. Choose another name, or remove it")]
     Taken {
         /// The path.
         path: PathBuf,
     },
-    /// The link cannot be made.
-    #[error("cannot make the link {path}: {cause}. Choose a folder that exists and that you may write to")]
+    /// The link cannot be created.
+    #[error("cannot create the link {path}: {cause}. Choose an existing, writable folder")]
     Link {
         /// The path.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         cause: std::io::Error,
     },
-    /// There is no pseudo-terminal.
+    /// No pseudo-terminal.
     #[error("cannot open a pseudo-terminal: {0}")]
     Terminal(#[from] serialport::Error),
+    /// The writing thread cannot start.
+    #[error("cannot start a thread: {0}")]
+    Thread(std::io::Error),
 }
 
-/// Runs the gripper on a pseudo-terminal until `stop` is set. `turn` is called again and again, to take what happened and to
-/// say what comes next.
+/// Runs the gripper on a pseudo-terminal until `stop` is set; `turn` is called every millisecond or so.
 pub fn serve(
     gripper: &mut EmulatedGripper,
     served: &PortSetup,
@@ -76,15 +78,15 @@ pub fn serve(
     Ok(())
 }
 
-/// The port as a host sees it.
+/// The port, as a host sees it.
 struct Port<'a> {
     served: &'a PortSetup,
-    /// Gone while it has vanished.
+    /// None while it has disappeared.
     terminal: Option<Terminal>,
     link: Link,
-    /// When the first host came: the gripper's time counts from there.
+    /// Time of the first host, from which the gripper's time counts.
     since: Option<Instant>,
-    /// When the host came that is there now.
+    /// Time at which the present host connected.
     host: Option<Instant>,
 }
 
@@ -96,7 +98,7 @@ impl<'a> Port<'a> {
         Ok(port)
     }
 
-    /// Opens a terminal, beside the one there was if that is still held by its writer.
+    /// Opens a terminal, beside the old one if its writer still holds it.
     fn appear(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
         let (terminal, path) = Terminal::open(&self.link)?;
         gripper.tell(EmulatorEventKind::Port { path });
@@ -104,7 +106,7 @@ impl<'a> Port<'a> {
         Ok(())
     }
 
-    /// Looks what the host does, lets the gripper's time pass, and hands over what it printed.
+    /// Reads from the host, advances the gripper, and sends its output.
     fn turn(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
         if let Some(since) = self.since {
             gripper.advance(since.elapsed().as_secs_f64() * self.served.speed);
@@ -123,7 +125,7 @@ impl<'a> Port<'a> {
                 self.host_is_there(gripper);
                 gripper.hear(&heard[..count]);
             }
-            // A host is there and says nothing.
+            // A host is connected and silent.
             Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => self.host_is_there(gripper),
             Err(_) => self.nobody_is_there(gripper)?,
         }
@@ -136,7 +138,7 @@ impl<'a> Port<'a> {
             let now = Instant::now();
             self.since.get_or_insert(now);
             self.host = Some(now);
-            // What came out before was for nobody.
+            // Output from before is dropped.
             drop(gripper.take_bytes());
             gripper.tell(EmulatorEventKind::HostCame);
         }
@@ -164,7 +166,7 @@ impl<'a> Port<'a> {
         std::thread::sleep(GRAIN);
     }
 
-    /// Gives the host what the board printed, as its line makes it arrive.
+    /// Sends the board's output to the host, at its baud rate.
     fn hand_over(&mut self, gripper: &mut EmulatedGripper) {
         let bytes = gripper.take_bytes();
         let (Some(terminal), Some(host)) = (&mut self.terminal, self.host) else { return };
@@ -176,19 +178,19 @@ impl<'a> Port<'a> {
             _ => bytes,
         };
         terminal.send(bytes);
-        if let Some(bytes) = terminal.take_given_up() {
+        if let Some(bytes) = terminal.take_dropped() {
             gripper.tell(EmulatorEventKind::Overrun { bytes });
         }
     }
 }
 
-/// The symbolic link; it goes when this does.
+/// Symbolic link, removed on drop.
 struct Link {
     path: PathBuf,
 }
 
 impl Link {
-    /// Complains when something else is in its place.
+    /// Refuses a path that is taken.
     fn new(path: &Path) -> Result<Self, ServeError> {
         match std::fs::symlink_metadata(path) {
             Err(e) if e.kind() == ErrorKind::NotFound => {}
@@ -198,7 +200,7 @@ impl Link {
         Ok(Self { path: path.to_owned() })
     }
 
-    /// Makes it lead to a terminal; at no moment is there none if there was one.
+    /// Points it to a terminal, atomically.
     fn lead_to(&self, terminal: &str) -> Result<(), ServeError> {
         let mut beside = self.path.clone().into_os_string();
         beside.push(format!(".{}", std::process::id()));
@@ -220,19 +222,19 @@ impl Drop for Link {
     }
 }
 
-/// Whether a path is a symbolic link to a pseudo-terminal, of whatever age.
+/// True for a symbolic link to a pseudo-terminal, old or new.
 fn leads_to_a_terminal(path: &Path) -> bool {
     std::fs::read_link(path).is_ok_and(|to| to.starts_with("/dev/pts") || to.to_string_lossy().starts_with("/dev/ttys"))
 }
 
-/// One pseudo-terminal: our end of it, and a thread that writes, so that a host that does not read holds up nobody.
+/// Our end of a pseudo-terminal, and a writing thread, so that a host that does not read blocks nothing.
 struct Terminal {
     near: TTYPort,
     output: Sender<Vec<u8>>,
-    /// Bytes that were handed to the writer and that the terminal has not taken.
+    /// Bytes that the writer holds.
     waiting: Arc<AtomicUsize>,
-    /// Bytes that were given up and not told of, and when that was done last.
-    given_up: u64,
+    /// Dropped bytes since the last report, and its time.
+    dropped: u64,
     told: Instant,
 }
 
@@ -253,12 +255,12 @@ impl Terminal {
                     left.fetch_sub(piece.len(), Ordering::Relaxed);
                 }
             })
-            .map_err(|cause| ServeError::Link { path: link.path.clone(), cause })?;
+            .map_err(ServeError::Thread)?;
         link.lead_to(&name)?;
-        Ok((Self { near, output, waiting, given_up: 0, told: Instant::now() }, name))
+        Ok((Self { near, output, waiting, dropped: 0, told: Instant::now() }, name))
     }
 
-    /// Hands bytes to the host; what it does not read in time is given up.
+    /// Sends bytes to the host, or drops them when the buffer is full.
     fn send(&mut self, bytes: Vec<u8>) {
         if bytes.is_empty() {
             return;
@@ -270,20 +272,20 @@ impl Terminal {
                 return;
             }
         }
-        self.given_up += size as u64;
+        self.dropped += size as u64;
     }
 
-    /// Bytes that were given up since this was asked for last, once in a while.
-    fn take_given_up(&mut self) -> Option<u64> {
-        if self.given_up == 0 || self.told.elapsed() < TELL_EVERY {
+    /// Dropped bytes since the last report, once per [`REPORT_EVERY`].
+    fn take_dropped(&mut self) -> Option<u64> {
+        if self.dropped == 0 || self.told.elapsed() < REPORT_EVERY {
             return None;
         }
         self.told = Instant::now();
-        Some(std::mem::take(&mut self.given_up))
+        Some(std::mem::take(&mut self.dropped))
     }
 }
 
-/// Writes a piece, however often it takes; a host that has gone misses it.
+/// Writes a piece in full, unless the host is gone.
 fn write(writer: &mut TTYPort, mut piece: &[u8]) {
     while !piece.is_empty() {
         match writer.write(piece) {

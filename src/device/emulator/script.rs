@@ -39,7 +39,7 @@ pub enum Step {
     },
 }
 
-/// A script that was not understood.
+/// An error in a script.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("step {number} of the script, \"{step}\": {problem}")]
 pub struct ScriptError {
@@ -47,11 +47,53 @@ pub struct ScriptError {
     pub number: usize,
     /// Its text.
     pub step: String,
-    /// What is wrong with it and what to write instead.
-    pub problem: String,
+    /// What is wrong with it.
+    pub problem: StepProblem,
 }
 
-/// Reads a script.
+/// A fault in a step, and what to write instead.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepProblem {
+    /// A grasp without an object.
+    #[error("write close empty, or grasp and an object's name")]
+    NoObject,
+    /// An unknown word.
+    #[error("\"{word}\" is not known; write {instead}")]
+    Unknown {
+        /// The word.
+        word: String,
+        /// What may stand there.
+        instead: &'static str,
+    },
+    /// A word too many.
+    #[error("\"{word}\" is one word too many")]
+    TooMany {
+        /// The word.
+        word: String,
+    },
+    /// A number out of range, or no number.
+    #[error("{name}={text} is not a number from {least} to {most} {unit}")]
+    Number {
+        /// The key.
+        name: String,
+        /// What stands there.
+        text: String,
+        /// Least value.
+        least: f64,
+        /// Largest value.
+        most: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+}
+
+impl StepProblem {
+    fn unknown(word: &str, instead: &'static str) -> Self {
+        Self::Unknown { word: word.to_owned(), instead }
+    }
+}
+
+/// Parses a script.
 pub fn parse_script(text: &str) -> Result<Vec<Step>, ScriptError> {
     let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default());
     let steps = lines.flat_map(|line| line.split(';')).map(str::trim).filter(|step| !step.is_empty());
@@ -61,34 +103,34 @@ pub fn parse_script(text: &str) -> Result<Vec<Step>, ScriptError> {
     steps.enumerate().map(step).collect()
 }
 
-/// Reads one step.
-pub fn parse_step(text: &str) -> Result<Step, String> {
+/// Parses one step.
+fn parse_step(text: &str) -> Result<Step, StepProblem> {
     let words: Vec<&str> = text.split_whitespace().collect();
     match words.as_slice() {
         ["close", "empty", rest @ ..] => grasp("empty", rest),
         ["grasp", object, rest @ ..] => grasp(object, rest),
-        ["close" | "grasp", ..] => Err("write close empty, or grasp and an object's name".to_owned()),
+        ["close" | "grasp", ..] => Err(StepProblem::NoObject),
         words => hold(words),
     }
 }
 
-fn grasp(object: &str, words: &[&str]) -> Result<Step, String> {
+fn grasp(object: &str, words: &[&str]) -> Result<Step, StepProblem> {
     let bar = match words {
         [] => None,
         [word] => match word.split_once('=') {
             Some(("bar", value)) => Some(within("bar", value, "", 0.05..=1.5)?),
-            _ => return Err(format!("\"{word}\" is not known here; write bar=0.8")),
+            _ => return Err(StepProblem::unknown(word, "bar=0.8")),
         },
-        [_, other, ..] => return Err(format!("\"{other}\" is one word too many")),
+        [_, other, ..] => return Err(StepProblem::TooMany { word: (*other).to_owned() }),
     };
     Ok(Step::Grasp { object: object.to_owned(), bar })
 }
 
-fn hold(words: &[&str]) -> Result<Step, String> {
+fn hold(words: &[&str]) -> Result<Step, StepProblem> {
     let (mut bend, mut load, mut seconds) = ([0.0; 2], [0.0; 2], HOLD_S);
     for word in words {
         let (name, value) = word.split_once('=').ok_or_else(|| {
-            format!("\"{word}\" is not known; write angle=30, load=0.1kg, hold=2, rest=2, close empty or grasp lemon")
+            StepProblem::unknown(word, "angle=30, load=0.1kg, hold=2, rest=2, close empty or grasp lemon")
         })?;
         match name {
             "hold" | "rest" => seconds = within(name, value, "s", 0.0..=3600.0)?,
@@ -103,9 +145,7 @@ fn hold(words: &[&str]) -> Result<Step, String> {
                 set(&mut load, name, force);
             }
             _ => {
-                return Err(format!(
-                    "\"{name}\" is not known; angle, angleL, angleR, load, loadL, loadR, hold and rest are"
-                ));
+                return Err(StepProblem::unknown(name, "angle, angleL, angleR, load, loadL, loadR, hold or rest"));
             }
         }
     }
@@ -121,9 +161,15 @@ fn set(sides: &mut [f64; 2], name: &str, value: f64) {
     }
 }
 
-fn within(name: &str, text: &str, unit: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
+fn within(
+    name: &str,
+    text: &str,
+    unit: &'static str,
+    range: std::ops::RangeInclusive<f64>,
+) -> Result<f64, StepProblem> {
     let number = text.strip_suffix(unit).unwrap_or(text).parse().ok().filter(|value| range.contains(value));
-    number.ok_or_else(|| format!("{name}={text} is not a number from {} to {} {unit}", range.start(), range.end()))
+    let (least, most) = range.into_inner();
+    number.ok_or_else(|| StepProblem::Number { name: name.to_owned(), text: text.to_owned(), least, most, unit })
 }
 
 #[cfg(test)]

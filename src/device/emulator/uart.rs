@@ -1,7 +1,7 @@
 //! Bytes on a line whose two ends run at different rates: one start bit (low), eight data bits from the lowest, one stop bit
 //! (high); the line rests high. A receiver waits for a falling edge and looks into the middle of each bit, by its own clock.
 
-/// What a receiver at `read_baud` makes of bytes that were sent at `sent_baud` without a pause.
+/// Bytes that a receiver at `read_baud` reads from bytes sent at `sent_baud` without a pause.
 pub fn misread(bytes: &[u8], sent_baud: f64, read_baud: f64) -> Vec<u8> {
     if sent_baud == read_baud {
         return bytes.to_vec();

@@ -1,4 +1,4 @@
-//! How well a stream keeps time: rate, jitter, losses, unreadable lines; over the last seconds, in bounded memory.
+//! Rate, jitter, losses and unreadable lines of a stream over the last seconds, in bounded memory.
 
 use super::clock::Stamp;
 use palpate_tactile::cadence::Cadence;
@@ -16,7 +16,7 @@ const BAD_SHARE: f64 = 0.2;
 /// Fewer lines in a second say nothing about shares.
 const LINES_NEEDED: u64 = 5;
 
-/// Keeps account of a stream.
+/// Statistics of a stream.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meter {
     samples: u64,
@@ -67,8 +67,8 @@ impl Meter {
         self.bin(arrived_s).bad += 1;
     }
 
-    /// What could not be read before the first reading was heard at another speed: it says nothing of the lines.
-    pub(super) fn forget_what_came_before(&mut self) {
+    /// Forgets unreadable lines from before the first reading: they came at another baud rate.
+    pub(super) fn forget_start(&mut self) {
         if self.samples == 0 {
             *self = Self::default();
         }

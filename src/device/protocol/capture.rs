@@ -1,8 +1,8 @@
-//! Files of captured bytes, to be replayed. Two forms; the first four bytes tell which:
+//! Files of captured bytes, for replay. Two forms, distinguished by the first four bytes:
 //!
 //! - records with their times of arrival, see [`palpate_tactile::capture`];
-//! - raw bytes, as any terminal program saves them. Without times of arrival they get the pace of the board's own clock
-//!   where its lines have one, else that of 50 lines a second.
+//! - raw bytes, as any terminal program saves them. They get times of arrival from the board's clock where its lines have
+//!   one, else 50 lines per second.
 
 use super::fields::{Parsed, parse};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured, LONGEST_RECORD, read_record};
@@ -10,7 +10,7 @@ use std::io::{self, Read};
 
 /// Time between lines that have no clock (s): the paper's board takes 50 samples a second.
 const PACE_S: f64 = 0.02;
-/// Two lines of a raw file further apart than this are not of one stretch (s).
+/// Largest step of the clock between two lines of a raw file (s).
 const FARTHEST_S: f64 = 10.0;
 
 /// Reads a captured file piece by piece, in bounded memory.
@@ -26,7 +26,7 @@ enum Form {
     Raw { pace: Pace, waiting: Vec<u8>, ended: bool },
 }
 
-/// The clock that a raw file is given.
+/// Times of arrival of a raw file.
 #[derive(Debug, Default)]
 struct Pace {
     now_s: f64,
@@ -68,7 +68,7 @@ impl<R: Read> CaptureReader<R> {
 impl Pace {
     fn go_on(&mut self, line: &[u8]) {
         let clock = match parse(line) {
-            Ok(Parsed::Named { fields, .. }) => fields.iter().find_map(|field| match field.name.as_str() {
+            Ok(Parsed::Named(_, fields)) => fields.iter().find_map(|field| match field.name.as_str() {
                 "t_us" => field.value.map(|us| us * 1e-6),
                 "ms" => field.value.map(|ms| ms * 1e-3),
                 _ => None,

@@ -1,30 +1,28 @@
-//! The checksum at the end of a line, as our firmware writes it: `p_bar:0.55,ck:2698`. A line that has lost or changed
-//! some of its bytes still looks like one when they were digits; its checksum tells.
+//! Checksum at the end of a line: `p_bar:0.55,ck:2698`. Without it a lost or changed digit goes unnoticed.
 //!
-//! It is the CRC-16 of all bytes before the separator and the key, as a decimal number, so that it is one more named number to
-//! whoever plots the line: CCITT polynomial 0x1021, from 0xffff, highest bit first ("CRC-16/IBM-3740"). It finds every change
-//! within 16 bits; any other damage passes once in 65536 times.
+//! It is the CRC-16 of all bytes before the separator and the key, as a decimal number, so that plotters read it as one more
+//! named number: CCITT polynomial 0x1021, from 0xffff, highest bit first ("CRC-16/IBM-3740"). It finds every change within
+//! 16 bits; any other damage passes once in 65536 times.
 
-/// The key of the checksum, in lines and in the hello.
+/// Key of the checksum, in lines and in the handshake.
 pub(super) const KEY: &str = "ck";
 
-/// Of some bytes.
+/// CRC-16 of bytes.
 pub fn checksum(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xffff, |sum, byte| {
         (0..8).fold(sum ^ u16::from(*byte) << 8, |sum, _| if sum & 0x8000 == 0 { sum << 1 } else { sum << 1 ^ 0x1021 })
     })
 }
 
-/// Whether a line ends in a checksum, as its last word behind `mark`, which is the key and what separates it from its
-/// number; an error where that is not the checksum of what stands before.
+/// Whether a line ends in a checksum; an error where it is wrong. `mark` separates the key from its number.
 pub(super) fn ends_in_one(line: &[u8], mark: char) -> Result<bool, &'static str> {
     let line = line.trim_ascii_end();
     let last = line.iter().rposition(|byte| b",; \t".contains(byte)).unwrap_or(0);
     let (body, word) = line.split_at(last);
     let word = std::str::from_utf8(word).unwrap_or_default().trim_start_matches([',', ';', ' ', '\t']);
     let Some(number) = word.strip_prefix(KEY).and_then(|rest| rest.strip_prefix(mark)) else { return Ok(false) };
-    // As it is written, and not in any other way: a sign or a zero before it is damage too.
-    if number == checksum(body).to_string() { Ok(true) } else { Err("its checksum is another") }
+    // Compared as text: a sign or a leading zero is damage too.
+    if number == checksum(body).to_string() { Ok(true) } else { Err("wrong checksum") }
 }
 
 #[cfg(test)]

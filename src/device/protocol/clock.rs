@@ -1,54 +1,52 @@
-//! When readings were taken, on this computer's clock, and how many are missing between two. By the board's own time
-//! where it sends one (`t_us`, `ms`), else by its sequence numbers, else by counting its lines: each is a count of equal
-//! steps, and a [`DelayLine`] maps it onto the times of arrival, so that readings which arrive in a bunch were not taken
-//! in a bunch.
+//! Times of readings on this computer's clock, and the number missing between two. From the board's clock where it sends one
+//! (`t_us`, `ms`), else from its sequence numbers, else from counted lines: each is a count of equal steps, which a
+//! [`DelayLine`] maps onto the times of arrival, so that readings that arrive in a bunch are spread out again.
 
 use super::counters::{DeviceTime, Sequence, Step};
 use super::delay_line::DelayLine;
 use palpate_tactile::board::TimeSource;
 use std::collections::VecDeque;
 
-/// The counters of one line, as far as it has them.
+/// Counters of one line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Counters {
-    /// The board's time, and how many seconds one count of it is.
+    /// The board's time, and its unit (s).
     pub(super) time: Option<(f64, f64)>,
     /// Its sequence number.
     pub(super) seq: Option<f64>,
-    /// Lines since the last good one that could not be read.
+    /// Unreadable lines since the last good one.
     pub(super) unreadable: u64,
 }
 
-/// What became of the counters of one line.
+/// Time stamp of one line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stamp {
-    /// When the reading was taken (s).
+    /// Time of the reading (s).
     pub(super) t_s: f64,
-    /// Its number, run on.
+    /// Its unwrapped number.
     pub(super) seq: Option<u64>,
-    /// The board has begun anew.
+    /// The board restarted.
     pub(super) restarted: bool,
-    /// How many readings are missing before this one; none where that cannot be known.
+    /// Readings missing before this one; none where unknown.
     pub(super) missing: Option<u64>,
-    /// Time since the reading before (s): by the board's clock, which what is learned of delays does not move, else by
-    /// arrival. None where the board began anew, or nobody knows what was lost.
+    /// Time since the reading before (s): by the board's clock, else by arrival. None after a restart or an unknown loss.
     pub(super) step_s: Option<f64>,
 }
 
-/// A mapped time that lies this far in the future shows that the board's clock began anew (s).
+/// A mapped time this far in the future shows that the board's clock restarted (s).
 const FUTURE_S: f64 = 1.0;
 /// Without any counter, a silence this long is a gap (s); a shorter one may be a busy host.
 const SILENCE_S: f64 = 0.3;
-/// Without any counter: lines that come later than this share of the period, for [`LATE_FOR_S`], were preceded by a loss.
+/// Without any counter: lines later than this share of the period, for [`LATE_FOR_S`], follow a loss.
 const LATE_SHARE: f64 = 0.6;
 /// How long lines must be late before one counts as lost (s).
 const LATE_FOR_S: f64 = 1.0;
-/// A number that has run ahead of the time by more than this factor, and by more than this many, is not one of it.
+/// Factor, and number of steps, by which a sequence number may run ahead of the time.
 const AHEAD: f64 = 2.0;
-/// Two readings are never given the same time (s).
+/// Least step between two readings (s).
 const LEAST_STEP_S: f64 = 1e-6;
 
-/// Places the readings of one stream in time.
+/// Clock of one stream.
 #[derive(Clone, Debug)]
 pub(super) struct StreamClock {
     source: TimeSource,
@@ -92,23 +90,23 @@ impl Default for StreamClock {
 }
 
 impl StreamClock {
-    /// What the times rest on.
+    /// Source of the times.
     pub(super) fn source(&self) -> TimeSource {
         self.source
     }
 
-    /// How fast the board's clock runs against this computer's, less one; none where it sends no time.
+    /// Drift of the board's clock against this computer's, as a ratio less one; none without timestamps.
     pub(super) fn drift(&self) -> Option<f64> {
         let gain = self.line.gain().filter(|_| self.source == TimeSource::Device)?;
         Some(1.0 / gain - 1.0)
     }
 
-    /// The connection was lost: lines that are merely counted say nothing of what was lost meanwhile.
+    /// Marks an interruption: counted lines do not show what was lost meanwhile.
     pub(super) fn interrupt(&mut self) {
         self.broken = true;
     }
 
-    /// Places the next reading; none where its counters contradict each other, so that one has lost a digit on its way.
+    /// Stamps the next reading; none where its counters contradict each other: one has lost a digit.
     pub(super) fn stamp(&mut self, counters: &Counters, arrived_s: f64) -> Option<Stamp> {
         let source = match counters {
             Counters { time: Some(_), .. } => TimeSource::Device,
@@ -135,7 +133,7 @@ impl StreamClock {
         let broken = std::mem::take(&mut self.broken) && source == TimeSource::Arrival;
         let missing = if restarted || broken { None } else { self.missing(counters, step, x, arrived_s) };
         if source == TimeSource::Arrival && missing.is_none() {
-            // Whatever was lost in the silence, the count has lost its meaning.
+            // The count is meaningless after an unknown loss.
             self.line = DelayLine::new(None);
         }
         self.line.add(x, arrived_s);
@@ -163,7 +161,7 @@ impl StreamClock {
         self.late = None;
     }
 
-    /// The count of equal steps at which a line stands.
+    /// Count of equal steps at a line.
     fn count(&mut self, counters: &Counters, arrived_s: f64) -> f64 {
         match (self.source, counters.time) {
             (TimeSource::Device, Some((count, unit_s))) => {
@@ -178,8 +176,8 @@ impl StreamClock {
         }
     }
 
-    /// Steps by which a mere count of lines is wrong: lines that come late and stay late follow others that were lost; a
-    /// line before its time shows that too many were held for lost.
+    /// Error of the count of lines: lines that come late and stay late follow a loss; an early line shows that too many were
+    /// counted as lost.
     fn slipped(&mut self, arrived_s: f64) -> f64 {
         let (Some(due), Some(period)) = (self.line.at(self.counted), self.line.gain()) else { return 0.0 };
         let delay = arrived_s - due;
@@ -201,14 +199,13 @@ impl StreamClock {
         (least / period).round()
     }
 
-    /// True where a board's clock says a time that cannot be, so that it must have begun anew.
+    /// True where the board's clock shows an impossible time: it restarted.
     fn is_elsewhere(&self, x: f64, arrived_s: f64) -> bool {
         let backwards = self.last.is_some_and(|last| x < last.x);
         self.time.is_some() && (backwards || self.line.at(x).is_some_and(|t| t > arrived_s + FUTURE_S))
     }
 
-    /// True where the board's number and its time do not tell of the same thing: only one of them has begun anew, or the
-    /// number has run far ahead.
+    /// True where the board's number and time disagree: only one of them restarted, or the number ran far ahead.
     fn is_contradiction(&self, step: Option<Step>, elsewhere: bool, x: f64) -> bool {
         match (step, self.source, self.last, self.period.median()) {
             (Some(Step::Restarted), TimeSource::Device, Some(_), _) => !elsewhere,
@@ -233,14 +230,14 @@ impl StreamClock {
         }
     }
 
-    /// The mapped time, which is never later than the arrival, nor earlier than the reading before.
+    /// Mapped time, never later than the arrival nor earlier than the reading before.
     fn place(&self, x: f64, arrived_s: f64) -> f64 {
         let mapped = self.line.at(x).map_or(arrived_s, |t| t.min(arrived_s));
         self.last.map_or(mapped, |last| mapped.max(last.t_s + LEAST_STEP_S))
     }
 }
 
-/// The usual time between readings: a median, which lost readings do not move.
+/// Median time between readings, which lost readings do not move.
 #[derive(Clone, Debug, Default)]
 struct Period {
     newest: VecDeque<f64>,
@@ -248,7 +245,7 @@ struct Period {
 
 impl Period {
     const REMEMBERED: usize = 31;
-    /// Fewer say too little.
+    /// Least number for a median.
     const NEEDED: usize = 5;
 
     fn add(&mut self, step_s: f64) {

@@ -1,7 +1,7 @@
-//! What the columns of CSV lines are called: by a line of names, whenever it comes; by the board's hello line; or by a
-//! guess that is told as one.
+//! Names of the columns of CSV lines: from a header, whenever it comes; from the handshake; or assumed, which
+//! [`Columns::why`] states.
 
-use super::fields::{Cell, Field, Fields, names_a_sensor};
+use super::fields::{Field, Fields, names_a_sensor};
 use palpate_tactile::board::{Board, Sensor};
 
 /// Names for columns.
@@ -13,7 +13,7 @@ pub(super) struct Columns {
     origin: Origin,
 }
 
-/// Where the names in use come from.
+/// Origin of the names in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Origin {
     #[default]
@@ -40,11 +40,11 @@ impl Columns {
     }
 
     /// Names for this many columns.
-    pub(super) fn names(&mut self, count: usize, hello: Option<&Board>) -> Vec<String> {
+    pub(super) fn names(&mut self, count: usize, handshake: Option<&Board>) -> Vec<String> {
         let fits = |names: &&Vec<String>| names.len() == count;
         let (origin, names) = if let Some(names) = self.header.as_ref().filter(fits) {
             (Origin::Header, names.clone())
-        } else if let Some(names) = hello.map(|board| &board.channels).filter(fits) {
+        } else if let Some(names) = handshake.map(|board| &board.channels).filter(fits) {
             (Origin::Handshake, names.clone())
         } else if count == Sensor::ALL.len() {
             (Origin::Order, Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).collect())
@@ -56,20 +56,18 @@ impl Columns {
     }
 
     /// The values of a line with their names.
-    pub(super) fn name(&mut self, cells: Vec<Cell>, hello: Option<&Board>) -> Fields {
-        let names = self.names(cells.len(), hello);
-        names.into_iter().zip(cells).map(|(name, Cell { value, unit, .. })| Field { name, unit, value }).collect()
+    pub(super) fn name(&mut self, values: Vec<Option<f64>>, handshake: Option<&Board>) -> Fields {
+        let names = self.names(values.len(), handshake);
+        names.into_iter().zip(values).map(|(name, value)| Field { name, value }).collect()
     }
 
-    /// Where the names come from, in words.
+    /// Origin of the names, in words.
     pub(super) fn why(&self) -> &'static str {
         match self.origin {
-            Origin::Header => "a line of names says what they are",
-            Origin::Handshake => "the board's first line says what they are",
-            Origin::Order => {
-                "no line of names was seen, so that four columns are taken for flexL, flexR, fsrL, fsrR in this order"
-            }
-            Origin::Number => "no line of names was seen, so that they are numbered",
+            Origin::Header => "a header names them",
+            Origin::Handshake => "the handshake names them",
+            Origin::Order => "no header seen: four columns are assumed to be flexL, flexR, fsrL, fsrR in this order",
+            Origin::Number => "no header seen: columns are numbered",
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Counters of a board, unwrapped: its time and its sequence numbers begin again at zero when they are full.
+//! Unwrapped counters of a board: its time and its sequence numbers.
 
-/// A counter that wraps as a `u32` of microseconds does after 71.6 minutes, made to run on.
+/// Unwrapped clock of the board; a `u32` of microseconds wraps after 71.6 minutes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DeviceTime {
     /// Seconds per count.
@@ -20,7 +20,7 @@ impl DeviceTime {
 
     /// The board's time since it was at zero (s).
     pub(super) fn run_on(&mut self, count: f64) -> f64 {
-        // A fraction of a microsecond is below what any of this can tell; milliseconds may have one that matters.
+        // Milliseconds may have a fraction that matters.
         let whole = count.max(0.0) as u64;
         // Wider counters do not wrap within a day's work; a narrow one that falls back has wrapped.
         if whole < self.last && self.last < FULL && self.carried < u64::MAX / 2 {
@@ -31,7 +31,7 @@ impl DeviceTime {
     }
 }
 
-/// Sequence numbers, made to run on.
+/// Unwrapped sequence numbers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sequence {
     last: Option<u64>,
@@ -40,12 +40,12 @@ pub(super) struct Sequence {
     running: u64,
 }
 
-/// What a sequence number says.
+/// Step of a sequence number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// This many on from the last: 1 where nothing was lost.
+    /// Forward by this many: 1 without a loss.
     On(u64),
-    /// It counts from the beginning again: the board has restarted.
+    /// Back to the beginning: the board restarted.
     Restarted,
 }
 

@@ -1,5 +1,5 @@
-//! Bytes to readings. The board's way of writing is found out from its lines and may be asked for; what cannot be read is
-//! counted and told as a gap, and nothing is put in its place.
+//! Decoder: bytes to readings. The line format is detected; unreadable lines are counted and become gaps, and nothing is put
+//! in their place.
 
 use super::cadence::Meter;
 use super::checksum;
@@ -12,50 +12,47 @@ use super::lines::{Line, LineSplitter};
 use super::reply::BoardReply;
 use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
 use super::shape::{Candidate, Judged, Role, Shapes};
-use super::teleplot::Assembler;
 use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
 
-/// What was heard, in its order.
+/// Event of the decoder, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DecodedEvent {
-    /// A line of the board.
+    /// A line of numbers.
     Reading(Reading),
-    /// Readings are missing before the one that comes next.
+    /// Readings are missing before the next one.
     Gap(Gap),
-    /// What is known of the board has changed. Its channels are only ever added to, or renamed in place.
+    /// The description of the board changed. Channels are only added, or renamed in place.
     Board(Board),
     /// A reply or remark of the board.
     Reply(BoardReply),
 }
 
-/// Listens to one board. Memory stays bounded whatever it sends.
+/// Decoder of one board's stream, in bounded memory.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     splitter: LineSplitter,
     reader: Reader,
 }
 
-/// A decoder without the line that is going on.
+/// A decoder without the unfinished line.
 #[derive(Clone, Debug, Default)]
 struct Reader {
     shapes: Shapes,
     columns: Columns,
     /// Names of the channels, in the order of the counts.
     channels: Vec<String>,
-    /// The sensor on each of them.
+    /// Sensor of each channel.
     sensors: Vec<Option<Sensor>>,
-    /// What the board said of itself.
-    hello: Option<Handshake>,
-    teleplot: Assembler,
+    /// Channels of flex strips beside a usual resistor.
+    strips: Vec<bool>,
+    /// Handshake of the board.
+    handshake: Option<Handshake>,
     clock: StreamClock,
     meter: Meter,
     saturation: SaturationWatch,
-    adc_range: AdcRange,
-    /// The full scale that was told last.
-    told_scale: Option<u32>,
     line_log: LineLog,
-    /// Lines since the last reading that could not be read.
+    /// Unreadable lines since the last reading.
     unreadable: u64,
     /// Why readings may be missing before the next one.
     broken: Option<String>,
@@ -63,100 +60,91 @@ struct Reader {
     last_s: Option<f64>,
 }
 
-/// Beside a resistor up to this (ohm) a strip, which has 17.5 kOhm or more (data sheet), is above a quarter of the range.
+/// Divider resistor up to which a strip, which has at least 17.5 kOhm (data sheet), stays above a quarter of the range (ohm).
 const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
 
-/// Largest counter that is believed: beyond it whole numbers are not told apart.
+/// Largest valid counter: beyond it an `f64` no longer separates whole numbers.
 const LARGEST_COUNTER: f64 = 9.0e15;
 
-/// True where two names are those of one channel.
+/// True where two names mean the same channel.
 fn is_same_channel(a: &str, b: &str) -> bool {
     a.eq_ignore_ascii_case(b) || Sensor::called(a).is_some_and(|sensor| sensor.is_called(b))
 }
 
 impl Decoder {
-    /// Takes in bytes that arrived at a time (s since the stream began) and adds what they say to `heard`.
+    /// Decodes bytes that arrived at a time (s since the stream began) and appends their events to `heard`.
     pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         let Self { splitter, reader } = self;
         reader.meter.bytes(bytes, arrived_s);
         splitter.push(bytes, |line| match line {
             Line::Whole(line) => reader.line(line, arrived_s, heard),
             Line::First(line) => reader.first(line, arrived_s, heard),
-            Line::TooLong => reader.bad(b"", "it does not end", arrived_s),
+            Line::TooLong => reader.bad(b"", "too long", arrived_s),
         });
     }
 
-    /// The stream was interrupted; readings that are found missing when it goes on are put down to `cause`.
+    /// Marks an interruption; readings that turn out to be missing are attributed to `cause`.
     pub fn interrupt(&mut self, cause: &str) {
         self.splitter.interrupt();
-        self.reader.teleplot = Assembler::default();
         self.reader.shapes.give_up();
         self.reader.clock.interrupt();
-        // Another sketch may be on the board when it comes back; it need not say hello.
-        self.reader.hello.iter_mut().for_each(|hello| hello.checked = false);
+        // Another sketch may be on the board when it comes back, without checksums or a handshake.
+        self.reader.handshake.iter_mut().for_each(|handshake| handshake.checked = false);
         self.reader.broken = Some(cause.to_owned());
-        self.reader.adc_range = AdcRange::default();
+        self.reader.saturation.interrupt();
         self.reader.columns.interrupt();
-        self.reader.meter.forget_what_came_before();
+        self.reader.meter.forget_start();
     }
 
-    /// What is known of the board.
+    /// The board, as far as it is known.
     pub fn board(&self) -> Board {
         self.reader.board()
     }
 
-    /// True once the board has said what it is.
+    /// True once a handshake came.
     pub fn knows_board(&self) -> bool {
-        self.reader.hello.is_some()
+        self.reader.handshake.is_some()
     }
 
-    /// How its lines are read; none before two of them agree.
+    /// Detected line format; none before two lines agree.
     pub fn detected(&self) -> Option<Detected> {
         let format = self.reader.shapes.format?;
         let why = match format {
             Format::Csv => format!("{}; {}", format.mark(), self.reader.columns.why()),
-            Format::Plotter | Format::Teleplot | Format::JsonLines => format.mark().to_owned(),
+            Format::Plotter | Format::JsonLines => format.mark().to_owned(),
         };
         Some(Detected { format, why, time: self.reader.clock.source() })
     }
 
-    /// How well it keeps time.
+    /// Rate, jitter and losses.
     pub fn cadence(&self) -> Cadence {
         self.reader.meter.cadence(self.reader.clock.drift())
     }
 
-    /// How many readings there were so far; [`Decoder::cadence`] says more, for more work.
+    /// Number of readings, cheaper than [`Decoder::cadence`].
     pub fn readings(&self) -> u64 {
         self.reader.meter.readings()
     }
 
-    /// The newest lines as they came, oldest first.
+    /// Newest raw lines, oldest first.
     pub fn console(&self) -> impl Iterator<Item = &ConsoleLine> {
         self.reader.line_log.lines()
     }
 
-    /// For each channel, where it has said nothing of its sensor for half a second or more.
+    /// Channels that have been saturated for half a second or more.
     pub fn saturation(&self) -> Vec<Option<Saturation>> {
         self.reader.saturation.at()
     }
 
-    /// The unit that stands behind a channel's numbers, for each that has one.
-    pub fn units(&self) -> Vec<(String, String)> {
-        let named = |(place, unit): (usize, &str)| Some((self.reader.channels.get(place)?.clone(), unit.to_owned()));
-        self.reader.shapes.units().filter_map(named).collect()
-    }
-
-    /// True where the counts look like those of a converter with 10 bits, though it is taken for one with 12, or said to be
-    /// one: a sketch may say so and forget `analogReadResolution`.
-    pub fn looks_10_bit(&self) -> bool {
-        self.reader.looks_10_bit()
+    /// Whether the counts fit the converter's range, stated or assumed.
+    pub fn adc_range(&self) -> AdcRange {
+        self.reader.saturation.adc_range()
     }
 }
 
 impl Reader {
     fn board(&self) -> Board {
         let mut board = self.said().cloned().unwrap_or_default();
-        board.full_scale = self.full_scale();
         let place = |name: &String| board.channels.iter().position(|known| is_same_channel(known, name));
         let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
@@ -164,28 +152,9 @@ impl Reader {
         board
     }
 
-    /// What the board said of itself.
+    /// Handshake of the board.
     fn said(&self) -> Option<&Board> {
-        self.hello.as_ref().map(|hello| &hello.board)
-    }
-
-    /// How far its converter counts: as it says, and else as its counts tell.
-    fn full_scale(&self) -> u32 {
-        self.adc_range.full_scale(self.said().map(|board| board.full_scale))
-    }
-
-    fn looks_10_bit(&self) -> bool {
-        let Some(said) = self.said().filter(|_| self.saturation.looks_10_bit()) else {
-            return self.saturation.looks_10_bit();
-        };
-        // Against the board's word only strips speak: they are never near zero.
-        let board = self.board();
-        let is_told_by = |sensor: Sensor| {
-            let place = board.channel_of(sensor).filter(|_| sensor.is_flex());
-            let ohm = |place: usize| board.divider_ohm.get(place).copied().unwrap_or(0.0);
-            place.is_some_and(|place| self.saturation.is_connected(place) && ohm(place) <= LARGEST_BESIDE_A_STRIP)
-        };
-        said.full_scale >= FULL_12_BIT && Sensor::ALL.into_iter().any(is_told_by)
+        self.handshake.as_ref().map(|handshake| &handshake.board)
     }
 
     fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
@@ -195,7 +164,7 @@ impl Reader {
         self.meter.bad_line(arrived_s);
     }
 
-    /// Counts the line that waited for another like it as one that could not be read.
+    /// Counts the line that waited for another like it as unreadable.
     fn give_up(&mut self, arrived_s: f64) {
         if self.shapes.give_up() {
             self.unreadable += 1;
@@ -207,26 +176,16 @@ impl Reader {
         if line.starts_with(b"#") {
             return self.remark(line, arrived_s, heard);
         }
-        let (format, fields, odd) = match self.check(line).and_then(|()| parse(line)) {
+        let (format, fields) = match self.check(line).and_then(|()| parse(line)) {
             Err(why) => return self.bad(line, why, arrived_s),
             Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
-            Ok(Parsed::Columns(cells)) => {
-                let odd = cells.iter().any(|cell| !cell.plain);
-                (Format::Csv, self.columns.name(cells, self.hello.as_ref().map(|hello| &hello.board)), odd)
+            Ok(Parsed::Columns(values)) => {
+                (Format::Csv, self.columns.name(values, self.handshake.as_ref().map(|handshake| &handshake.board)))
             }
-            Ok(Parsed::Named { format: Format::Teleplot, fields, odd }) => {
-                self.line_log.add(line, arrived_s, LineKind::Values);
-                match self.teleplot.push(fields) {
-                    None => return,
-                    Some(fields) => (Format::Teleplot, fields, odd),
-                }
-            }
-            Ok(Parsed::Named { format, fields, odd }) => (format, fields, odd),
+            Ok(Parsed::Named(format, fields)) => (format, fields),
         };
-        if format != Format::Teleplot {
-            self.line_log.add(line, arrived_s, LineKind::Values);
-        }
-        match self.shapes.judge(Candidate { format, fields, odd, arrived_s }) {
+        self.line_log.add(line, arrived_s, LineKind::Values);
+        match self.shapes.judge(Candidate { format, fields, arrived_s }) {
             Judged::Known(line) => {
                 self.give_up(arrived_s);
                 self.reading(&line, heard);
@@ -241,8 +200,8 @@ impl Reader {
         }
     }
 
-    /// A first line is most often the rest of one, and passed over. A line of names is read: a board that is reset by being
-    /// connected to begins with it. Its first name is that of something known where nothing of it is missing.
+    /// Skips the first line, which is most often the rest of one, unless it is a header: a board that restarts on connection
+    /// begins with it. It is complete where its first name is known.
     fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
         let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
@@ -251,23 +210,23 @@ impl Reader {
         }
     }
 
-    /// Refuses a line of numbers whose checksum is wrong, or missing though the board said that there is one.
+    /// Refuses a line of numbers whose checksum is wrong, or missing though the handshake announced one.
     fn check(&self, line: &[u8]) -> Result<(), &'static str> {
         let has_one = checksum::ends_in_one(line, ':')?;
-        let wanted = self.hello.as_ref().is_some_and(|hello| hello.checked);
-        if wanted && !has_one { Err("its checksum is missing") } else { Ok(()) }
+        let wanted = self.handshake.as_ref().is_some_and(|handshake| handshake.checked);
+        if wanted && !has_one { Err("checksum missing") } else { Ok(()) }
     }
 
     fn remark(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
-        let text = std::str::from_utf8(line).map_err(|_not_text| "it holds bytes that are no text");
-        let (text, hello) = match text.and_then(|text| Ok((text, handshake::parse(text)?))) {
+        let text = std::str::from_utf8(line).map_err(|_not_text| "not text");
+        let (text, handshake) = match text.and_then(|text| Ok((text, handshake::parse(text)?))) {
             Ok(said) => said,
             Err(why) => return self.bad(line, why, arrived_s),
         };
         self.line_log.add(line, arrived_s, LineKind::Remark);
-        if hello.is_some() && self.hello != hello {
-            self.hello = hello;
-            self.adc_range = AdcRange::default();
+        if handshake.is_some() && self.handshake != handshake {
+            self.handshake = handshake;
+            self.find_sensors();
             self.name_columns(heard);
             heard.push(DecodedEvent::Board(self.board()));
         }
@@ -276,18 +235,18 @@ impl Reader {
 
     fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
         if !self.columns.set_header(names) {
-            return self.bad(line, "it is neither numbers nor names of sensors", arrived_s);
+            return self.bad(line, "neither numbers nor names of sensors", arrived_s);
         }
         self.line_log.add(line, arrived_s, LineKind::Remark);
         self.name_columns(heard);
     }
 
-    /// Columns that have gone by other names so far get those that have become known.
+    /// Renames columns whose names have become known.
     fn name_columns(&mut self, heard: &mut Vec<DecodedEvent>) {
         if self.shapes.format != Some(Format::Csv) {
             return;
         }
-        let said = self.hello.as_ref().map(|hello| &hello.board);
+        let said = self.handshake.as_ref().map(|handshake| &handshake.board);
         let names = self.columns.names(self.shapes.names().len(), said);
         let before = self.shapes.roles(&mut self.channels).to_vec();
         if !self.shapes.rename(&names) {
@@ -295,7 +254,7 @@ impl Reader {
         }
         for (column, (role, name)) in before.iter().zip(names).enumerate() {
             if let Role::Channel(place) = role {
-                // What turns out to be a counter leaves a channel behind that stays empty from now on.
+                // A column that turns out to be a counter leaves an empty channel behind.
                 let name = if Role::is_channel(&name) { name } else { format!("column {}", column + 1) };
                 self.channels[*place] = name;
             }
@@ -307,6 +266,12 @@ impl Reader {
 
     fn find_sensors(&mut self) {
         self.sensors = self.channels.iter().map(|name| Sensor::called(name)).collect();
+        let said = self.said();
+        let ohm = |sensor: Sensor| said.and_then(|board| board.divider_ohm.get(board.channel_of(sensor)?));
+        let is_strip = |sensor: &Option<Sensor>| {
+            sensor.is_some_and(|s| s.is_flex() && ohm(s).is_none_or(|ohm| *ohm <= LARGEST_BESIDE_A_STRIP))
+        };
+        self.strips = self.sensors.iter().map(is_strip).collect();
     }
 
     fn reading(&mut self, line: &Candidate, heard: &mut Vec<DecodedEvent>) {
@@ -319,7 +284,7 @@ impl Reader {
         for (role, Field { value, .. }) in roles.iter().zip(&line.fields) {
             let counter = value.filter(|value| (0.0..LARGEST_COUNTER).contains(value));
             match role {
-                // What no f32 can hold is no count of any converter.
+                // Values beyond f32 are not counts.
                 Role::Channel(place) => {
                     counts[*place] = value.map(|value| value as f32).filter(|c| c.is_finite());
                     sent[*place] = true;
@@ -341,47 +306,42 @@ impl Reader {
             self.unreadable += 1;
             return self.meter.bad_line(line.arrived_s);
         };
-        let said = self.said().map(|board| board.full_scale);
-        let [strip, largest] = self.largest(&counts);
-        self.adc_range.add(stamp.t_s, strip, largest, said);
-        if self.told_scale.replace(self.full_scale()) != Some(self.full_scale()) {
-            heard.push(DecodedEvent::Board(self.board()));
-        }
-        self.tell_gap(&stamp, heard);
+        self.report_gap(&stamp, heard);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
-        let full_scale = if self.looks_10_bit() { FULL_10_BIT } else { self.full_scale() };
-        self.saturation.add(&counts, &sent, stamp.t_s, full_scale);
+        let full_scale = self.said().map_or(FULL_12_BIT, |board| board.full_scale);
+        self.saturation.add_range(&self.largest(&counts), stamp.t_s, full_scale);
+        let ten_bits = self.saturation.adc_range() == AdcRange::LooksTenBit;
+        self.saturation.add(&counts, &sent, stamp.t_s, if ten_bits { FULL_10_BIT } else { full_scale });
         let Stamp { t_s, seq, .. } = stamp;
         heard.push(DecodedEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
     }
 
-    /// The largest count of the strips, and of all sensors; what else a board sends need not come from its converter.
+    /// Largest count of the strips, and of all sensors; other channels need not come from the converter.
     fn largest(&self, counts: &[Option<f32>]) -> [f32; 2] {
         let mut largest = [0.0f32; 2];
-        for (sensor, count) in self.sensors.iter().zip(counts) {
-            if let (Some(sensor), Some(count)) = (sensor, count) {
-                largest[1] = largest[1].max(*count);
-                if sensor.is_flex() {
-                    largest[0] = largest[0].max(*count);
-                }
+        for ((sensor, strip), count) in self.sensors.iter().zip(&self.strips).zip(counts) {
+            let count = count.filter(|_| sensor.is_some()).unwrap_or(0.0);
+            largest[1] = largest[1].max(count);
+            if *strip {
+                largest[0] = largest[0].max(count);
             }
         }
         largest
     }
 
-    fn tell_gap(&mut self, stamp: &Stamp, heard: &mut Vec<DecodedEvent>) {
+    fn report_gap(&mut self, stamp: &Stamp, heard: &mut Vec<DecodedEvent>) {
         let unreadable = std::mem::take(&mut self.unreadable);
         let broken = self.broken.take();
         let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
         let cause = match (broken, stamp.restarted, unreadable) {
-            (Some(cause), true, _) => format!("{cause}; the board began anew"),
+            (Some(cause), true, _) => format!("{cause}; the board restarted"),
             (Some(cause), false, _) => cause,
-            (None, true, _) => "the board began anew".to_owned(),
-            (None, false, 0) if stamp.missing.is_none() => "nothing arrived".to_owned(),
-            (None, false, 0) => "lost on the way".to_owned(),
-            (None, false, 1) => "a line could not be read".to_owned(),
-            (None, false, n) => format!("{n} lines could not be read"),
+            (None, true, _) => "the board restarted".to_owned(),
+            (None, false, 0) if stamp.missing.is_none() => "no data".to_owned(),
+            (None, false, 0) => "lost in transit".to_owned(),
+            (None, false, 1) => "1 unreadable line".to_owned(),
+            (None, false, n) => format!("{n} unreadable lines"),
         };
         self.meter.gap(stamp.missing);
         heard.push(DecodedEvent::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));

@@ -1,11 +1,11 @@
-//! When something happened, from when it was heard of. Events tick on a clock of their own, x (seconds of a board, or a
-//! plain count), and are heard of late, by a delay that is never negative and now and then least:
+//! Times of events from their times of arrival. Events tick on a clock of their own, x (seconds of a board, or a plain
+//! count), and arrive late, by a delay that is never negative and sometimes minimal:
 //!
 //! ```text
-//! heard = offset + gain x + delay,   delay >= 0
+//! arrival = offset + gain x + delay,   delay >= 0
 //! ```
 //!
-//! Offset and gain are fitted to the points of least delay. Those lie along the lower convex hull of (x, heard), which no
+//! Offset and gain are fitted to the points of least delay. Those lie along the lower convex hull of (x, arrival), which no
 //! late point can bend, however many there are; its edge under the middle of the points is the line from which the sum of
 //! all delays is least. Least squares over the points near that edge averages what noise is left. This is the method
 //! of strawlab's triggerbox, with the hull in place of its rejection of outliers.
@@ -46,7 +46,7 @@ impl DelayLine {
         Self { nominal, origin: None, points: VecDeque::new(), open: None, offset: 0.0, gain: nominal }
     }
 
-    /// When something happened that is at `x` on its own clock (s); none while too little is known.
+    /// Time of an event at `x` on its own clock (s); none while too little is known.
     pub(super) fn at(&self, x: f64) -> Option<f64> {
         let (x0, heard0) = self.origin?;
         Some(heard0 + self.offset + self.gain? * (x - x0))
@@ -57,11 +57,11 @@ impl DelayLine {
         self.gain
     }
 
-    /// Takes in that something at `x` was heard of at `heard` (s).
+    /// Takes in the arrival of an event at `x` (s).
     pub(super) fn add(&mut self, x: f64, heard: f64) {
         let (x0, heard0) = *self.origin.get_or_insert((x, heard));
         let point = (x - x0, heard - heard0);
-        // An earlier arrival than the line allows moves it at once: nothing is heard of before it happens.
+        // An earlier arrival than the line allows moves it at once: nothing arrives before it happens.
         if let Some(gain) = self.gain {
             self.offset = self.offset.min(point.1 - gain * point.0);
         }

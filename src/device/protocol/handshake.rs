@@ -1,32 +1,32 @@
-//! What a board says of itself:
+//! Handshake of the board:
 //!
 //! ```text
 //! # tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700 ck=55195
 //! ```
 //!
-//! A `ck` at its end is the checksum of what stands before it, and says that every line of numbers has one too. From version 2
-//! on our firmware has it, so that a hello of that version without one was cut on its way.
+//! A `ck` at its end is its checksum and announces that every line of numbers has one. Our firmware has it from version 2 on,
+//! so that a handshake of that version without it was cut.
 
 use super::checksum;
 use palpate_tactile::board::Board;
 
-/// How the hello line of our firmware begins.
+/// First word of the handshake.
 const GREETING: &str = "tactile-gripper";
 
-/// Versions of the firmware from this one on end their lines in a checksum.
+/// First version of the firmware whose lines end in a checksum.
 const CHECKED_FROM: u32 = 2;
 
-/// A hello.
+/// Parsed handshake.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Handshake {
-    /// What it says of the board.
+    /// The board.
     pub(super) board: Board,
     /// Lines of numbers end in a checksum.
     pub(super) checked: bool,
 }
 
-/// Reads a hello line, with its `#`; none where it is another remark, an error where it was damaged. What it leaves out is
-/// as [`Board::default`] has it, but for the channels, which then stay empty.
+/// Parses a handshake line, with its `#`; none for another remark, an error for a damaged handshake. Missing values are
+/// those of [`Board::default`], but for the channels, which stay empty.
 pub(super) fn parse(line: &str) -> Result<Option<Handshake>, &'static str> {
     let mut words = line.strip_prefix('#').unwrap_or(line).split_whitespace();
     if words.next() != Some(GREETING) {
@@ -36,12 +36,12 @@ pub(super) fn parse(line: &str) -> Result<Option<Handshake>, &'static str> {
     let board = board(words);
     let version = board.firmware.as_ref().and_then(|version| version.parse::<u32>().ok());
     if !checked && version.is_some_and(|version| version >= CHECKED_FROM) {
-        return Err("its checksum is missing");
+        return Err("checksum missing");
     }
     Ok(Some(Handshake { board, checked }))
 }
 
-/// What the words behind the greeting say.
+/// Parses the words behind the greeting.
 fn board<'a>(words: impl Iterator<Item = &'a str>) -> Board {
     let mut board = Board { channels: Vec::new(), ..Board::default() };
     for (key, value) in words.filter_map(|word| word.split_once('=')) {
@@ -63,7 +63,7 @@ fn board<'a>(words: impl Iterator<Item = &'a str>) -> Board {
             _ => {}
         }
     }
-    // Resistors that do not match the channels belong to nobody.
+    // Resistors that do not match the channels are ignored.
     if board.divider_ohm.len() != board.channels.len() {
         board.divider_ohm.clear();
     }
@@ -78,12 +78,12 @@ fn positive(text: &str) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn hello(text: &str) -> Option<Board> {
-        parse(text).expect("sound").map(|hello| hello.board)
+    fn handshake(text: &str) -> Option<Board> {
+        parse(text).expect("sound").map(|handshake| handshake.board)
     }
 
     #[test]
-    fn the_firmwares_hello_is_understood() {
+    fn the_firmwares_handshake_is_understood() {
         let text = "# tactile-gripper fw=1 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700";
         let board = Board {
             rate_hz: Some(50.0),
@@ -91,23 +91,23 @@ mod tests {
             firmware: Some("1".to_owned()),
             ..Board::default()
         };
-        assert_eq!(hello(text), Some(board));
+        assert_eq!(handshake(text), Some(board));
     }
 
     #[test]
     fn nonsense_in_it_is_left_out() {
-        let board = hello("# tactile-gripper adc=99 vref=-1 rate=nan ch=a,b rm=1,2,3 colour=red");
+        let board = handshake("# tactile-gripper adc=99 vref=-1 rate=nan ch=a,b rm=1,2,3 colour=red");
         let plain = Board { channels: vec!["a".into(), "b".into()], ..Board::default() };
         assert_eq!(board, Some(plain));
-        assert_eq!(hello("# ok p=0.55"), None);
-        assert_eq!(hello("#"), None);
+        assert_eq!(handshake("# ok p=0.55"), None);
+        assert_eq!(handshake("#"), None);
     }
 
     #[test]
     fn one_that_lost_a_byte_is_refused() {
         let body = "# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR rm=47000,47000 p_max=1.00";
         let line = format!("{body} ck={}", checksum::checksum(body.as_bytes()));
-        let whole = parse(&line).expect("sound").expect("a hello");
+        let whole = parse(&line).expect("sound").expect("a handshake");
         assert!(whole.checked && whole.board.full_scale == 4095 && whole.board.divider_ohm == [47e3; 2]);
         // Without a byte of the greeting it is another remark.
         for at in 1..line.len() {
@@ -115,7 +115,7 @@ mod tests {
             lost.remove(at);
             assert!(!matches!(parse(&lost), Ok(Some(_))), "{lost}");
         }
-        assert_eq!(parse(body), Err("its checksum is missing"));
+        assert_eq!(parse(body), Err("checksum missing"));
         assert!(parse(&body.replace("fw=2", "fw=1")).expect("sound").is_some_and(|hello| !hello.checked));
     }
 }

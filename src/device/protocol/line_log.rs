@@ -1,32 +1,32 @@
-//! The newest lines as they came, for whoever wants to see them.
+//! Log of the newest raw lines.
 
 use std::collections::VecDeque;
 
-/// Lines that are remembered.
+/// Lines that are kept.
 const LINES: usize = 200;
-/// Bytes of a line that are remembered: a line of the firmware has about a hundred.
+/// Bytes of a line that are kept: a line of the firmware has about a hundred.
 const SHOWN: usize = 240;
 
-/// What was made of a line.
+/// Kind of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LineKind {
     /// Numbers.
     Values,
-    /// A remark, or names of columns.
+    /// A remark, or a header.
     Remark,
-    /// Nothing; why.
+    /// Unreadable, and why.
     Bad(&'static str),
 }
 
-/// A line as it came.
+/// Raw line.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct ConsoleLine {
-    /// When it arrived, in milliseconds since the stream began.
+    /// Time of arrival (ms since the stream began).
     pub arrived_ms: u64,
-    /// Its text; what is none is escaped.
+    /// Its text; other bytes are escaped.
     pub text: String,
-    /// What was made of it.
+    /// Its kind.
     pub kind: LineKind,
 }
 

@@ -1,19 +1,18 @@
-//! Bytes to lines. A line ends with LF, CR or both. What a listener hears first is most often the end of a line; it is
-//! told as such. A line longer than [`MAX_LINE`] is no line of a board: it is passed over to its end and told as one.
+//! Bytes to lines. A line ends with LF, CR or both. The first line is most often the end of one, and is marked. A line longer
+//! than [`MAX_LINE`] is skipped to its end and reported once.
 
-/// Longest line that is read (bytes): thirty-two channels with long names fit. It bounds the memory of a stream that
-/// never ends a line.
+/// Longest line (bytes): thirty-two channels with long names fit. It bounds the memory of a stream without line ends.
 pub const MAX_LINE: usize = 1024;
 
-/// What stands at a line's beginning and nowhere else: such a line is whole, though it be the first.
+/// First byte of a remark, found nowhere else: such a line is whole even as the first.
 const OPENING: u8 = b'#';
 
-/// A line as it came, without its end.
+/// Raw line, without its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Line<'a> {
     /// Its bytes.
     Whole(&'a [u8]),
-    /// The first line that was heard: its beginning may be missing.
+    /// The first line: its beginning may be missing.
     First(&'a [u8]),
     /// Longer than [`MAX_LINE`].
     TooLong,
@@ -28,9 +27,9 @@ pub(super) struct LineSplitter {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// Nothing was heard yet: the first line may lack its beginning.
+    /// In the first line, whose beginning may be missing.
     First,
-    /// In a line whose beginning was heard.
+    /// In a whole line.
     Inside,
     /// In a line that is too long.
     Passing,
@@ -43,7 +42,7 @@ impl Default for LineSplitter {
 }
 
 impl LineSplitter {
-    /// Takes in the next bytes and hands over the lines that they end. Empty lines are left out.
+    /// Takes in bytes and hands over the lines that they end, without empty ones.
     pub(super) fn push(&mut self, bytes: &[u8], mut take: impl FnMut(Line<'_>)) {
         for &byte in bytes {
             if byte == b'\n' || byte == b'\r' {
@@ -67,7 +66,7 @@ impl LineSplitter {
         self.state = State::Inside;
     }
 
-    /// The stream was interrupted: what was begun is forgotten, and the next line may lack its beginning.
+    /// Marks an interruption: drops the unfinished line; the next one may lack its beginning.
     pub(super) fn interrupt(&mut self) {
         *self = Self::default();
     }

@@ -1,12 +1,12 @@
-//! The wire: bytes of a sensor board to stamped readings. No ports and no threads here; bytes and their times of arrival
-//! go in, and memory is bounded whatever they are.
+//! Serial protocol: bytes of a sensor board to stamped readings, gaps and replies. Independent of ports and threads; memory
+//! is bounded whatever the bytes.
 //!
 //! ```text
-//! bytes -> lines -> checksum -> fields -> shape -> clock -> readings, gaps, remarks
+//! bytes -> lines -> checksum -> fields -> shape -> clock -> readings, gaps, replies
 //!         (lines)  (checksum)  (fields)  (shape)  (clock, delay_line, counters)
 //! ```
 //!
-//! Not read: binary frames (COBS). Text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
+//! Binary frames (COBS) are not supported: text at 1 kHz and 8 channels is 70 kB/s, which USB carries with ease.
 
 mod cadence;
 mod capture;
@@ -19,20 +19,17 @@ mod decoder;
 mod decoder_tests;
 mod delay_line;
 mod fields;
-mod fuzz;
 mod handshake;
 mod line_log;
 mod lines;
 mod reply;
 mod saturation;
 mod shape;
-mod teleplot;
 
 pub use capture::CaptureReader;
 pub use checksum::checksum;
 pub use decoder::{DecodedEvent, Decoder};
-pub use fuzz::{FuzzListener, FuzzStream};
 pub use line_log::{ConsoleLine, LineKind};
 pub use lines::MAX_LINE;
 pub use reply::BoardReply;
-pub use saturation::Saturation;
+pub use saturation::{AdcRange, Saturation};

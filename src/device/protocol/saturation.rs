@@ -1,6 +1,6 @@
-//! Channels that stand at an end of the converter's range or have no numbers, and how far the converter counts.
+//! Saturated channels: at an end of the converter's range, or without numbers; and whether counts fit that range.
 
-/// Where a channel says nothing of its sensor: an end of the converter's range, or no number at all.
+/// State of a channel that says nothing of its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Saturation {
@@ -12,8 +12,8 @@ pub enum Saturation {
     NoNumber,
 }
 
-/// A channel is told once it has stood at an end for this long (s).
-const TOLD_AFTER_S: f64 = 0.5;
+/// A channel counts as saturated after this long at an end (s).
+const AFTER_S: f64 = 0.5;
 /// Counts within this share of the range of an end are at it: 8 of 4096, 2 of 1024. What is open or shorted picks up noise,
 /// half of which the end cuts off. With a deviation of 2 counts of 12 bits, and no average taken, one reading in a thousand
 /// is 6 counts away, one in 300 000 more than 8; the mean of eight conversions is never more than 3 away. With 10 bits,
@@ -28,60 +28,21 @@ pub(super) const FULL_10_BIT: u32 = 1023;
 const WATCHED_S: f64 = 5.0;
 /// With less than this nothing is connected, and nothing can be said.
 const ANYTHING: f32 = 128.0;
-
-/// Largest counts of the converters that there are: 10, 12, 14, 16, 18, 20 and 24 bits.
-const FULL_SCALES: [u32; 7] =
-    [FULL_10_BIT, FULL_12_BIT, (1 << 14) - 1, (1 << 16) - 1, (1 << 18) - 1, (1 << 20) - 1, (1 << 24) - 1];
-/// Readings in a row that are beyond a full scale before a larger one is believed: one alone may be a damaged number.
+/// Readings in a row beyond the full scale that show a wider converter: one alone may be a damaged number.
 const BELIEVED: u32 = 3;
-/// A strip that has not been beyond ten bits for this long (s) is read with ten: with 12 it is above a quarter of the range,
-/// beside the resistor that it should have, from the first reading on.
-const TEN_BITS_AFTER_S: f64 = 1.0;
 
-/// How far a converter counts, by what it has sent.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct AdcRange {
-    /// More than is said, or usual: at least three readings in a row were beyond.
-    more: Option<u32>,
-    /// Readings in a row that are beyond, and the least of them.
-    beyond: Option<(u32, f32)>,
-    /// Since when a strip is read (s).
-    strip_since_s: Option<f64>,
-    /// Readings in a row that are beyond ten bits; once there were enough, ten is out of the question.
-    past_ten: u32,
-    ten: bool,
-}
-
-impl AdcRange {
-    /// Takes in the largest counts of a reading, of the strips and of all sensors. `said` is what the board says of its full
-    /// scale.
-    pub(super) fn add(&mut self, t_s: f64, strip: f32, largest: f32, said: Option<u32>) {
-        let before = self.full_scale(said);
-        self.beyond = match self.beyond {
-            _ if largest <= before as f32 => None,
-            None => Some((1, largest)),
-            Some((count, least)) => Some((count + 1, least.min(largest))),
-        };
-        if let Some((BELIEVED.., least)) = self.beyond {
-            self.more = FULL_SCALES.into_iter().find(|full_scale| least <= *full_scale as f32).or(self.more);
-            self.beyond = None;
-        }
-        if largest > FULL_10_BIT as f32 {
-            self.past_ten = self.past_ten.saturating_add(1);
-            self.ten &= self.past_ten < BELIEVED;
-        } else if self.past_ten < BELIEVED {
-            self.past_ten = 0;
-            if strip >= ANYTHING {
-                self.ten = t_s - *self.strip_since_s.get_or_insert(t_s) >= TEN_BITS_AFTER_S;
-            }
-        }
-    }
-
-    /// The full scale: what is said, or else twelve bits, unless the counts tell otherwise.
-    pub(super) fn full_scale(self, said: Option<u32>) -> u32 {
-        let usual = if self.ten { FULL_10_BIT } else { FULL_12_BIT };
-        said.unwrap_or(usual).max(self.more.unwrap_or(0))
-    }
+/// Whether the counts fit the converter's range: as the handshake states it, else 12 bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AdcRange {
+    /// They do, or too few have come.
+    #[default]
+    Fits,
+    /// A flex strip never exceeds 10 bits; with 12 it is above a quarter of the range. A sketch may forget
+    /// `analogReadResolution`.
+    LooksTenBit,
+    /// They exceed it.
+    Exceeded,
 }
 
 /// Watches the counts.
@@ -89,26 +50,29 @@ impl AdcRange {
 pub(super) struct SaturationWatch {
     channels: Vec<Channel>,
     now_s: f64,
+    /// First reading (s).
     since_s: Option<f64>,
+    /// Largest count of a flex strip.
+    strip: f32,
+    /// Readings in a row beyond the full scale.
+    beyond: u32,
+    full_scale: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
     /// The end at which it stands, and since when (s).
     at: Option<(Saturation, f64)>,
-    largest: f32,
 }
 
 impl SaturationWatch {
-    /// Takes in counts of a converter with this full scale. What is not sent at all says nothing.
+    /// Takes in counts of a converter with this full scale. A channel that was not sent is not saturated.
     pub(super) fn add(&mut self, counts: &[Option<f32>], sent: &[bool], t_s: f64, full_scale: u32) {
         self.channels.resize(counts.len(), Channel::default());
         self.now_s = t_s;
-        self.since_s.get_or_insert(t_s);
         let full = full_scale as f32;
         let near = NEAR * (full + 1.0);
         for ((channel, count), sent) in self.channels.iter_mut().zip(counts).zip(sent) {
-            channel.largest = channel.largest.max(count.unwrap_or(0.0));
             let rail = match count {
                 // What is beyond does not come from this converter.
                 Some(count) if *count > full + near => None,
@@ -124,22 +88,40 @@ impl SaturationWatch {
         }
     }
 
-    /// The end at which each channel has stood for long.
+    /// Saturation of each channel.
     pub(super) fn at(&self) -> Vec<Option<Saturation>> {
-        let told = |(rail, since): (Saturation, f64)| (self.now_s - since > TOLD_AFTER_S).then_some(rail);
+        let told = |(rail, since): (Saturation, f64)| (self.now_s - since > AFTER_S).then_some(rail);
         self.channels.iter().map(|channel| channel.at.and_then(told)).collect()
     }
 
-    /// True where nothing was ever above what 10 bits can say.
-    pub(super) fn looks_10_bit(&self) -> bool {
-        let watched = self.since_s.is_some_and(|since| self.now_s - since >= WATCHED_S);
-        let largest = self.channels.iter().map(|channel| channel.largest).fold(0.0, f32::max);
-        watched && (ANYTHING..=FULL_10_BIT as f32).contains(&largest)
+    /// Takes in the largest counts of a reading, of the strips and of all sensors.
+    pub(super) fn add_range(&mut self, [strip, largest]: &[f32; 2], t_s: f64, full_scale: u32) {
+        self.now_s = t_s;
+        self.since_s.get_or_insert(t_s);
+        self.strip = self.strip.max(*strip);
+        if self.full_scale != full_scale {
+            (self.full_scale, self.beyond) = (full_scale, 0);
+        }
+        if self.beyond < BELIEVED {
+            self.beyond = if *largest > full_scale as f32 { self.beyond + 1 } else { 0 };
+        }
     }
 
-    /// True where something is connected to a channel.
-    pub(super) fn is_connected(&self, channel: usize) -> bool {
-        self.channels.get(channel).is_some_and(|channel| channel.largest >= ANYTHING)
+    /// Whether the counts so far fit the range.
+    pub(super) fn adc_range(&self) -> AdcRange {
+        let watched = self.since_s.is_some_and(|since| self.now_s - since >= WATCHED_S);
+        if self.beyond >= BELIEVED {
+            AdcRange::Exceeded
+        } else if watched && self.full_scale > FULL_10_BIT && (ANYTHING..=FULL_10_BIT as f32).contains(&self.strip) {
+            AdcRange::LooksTenBit
+        } else {
+            AdcRange::Fits
+        }
+    }
+
+    /// The stream was interrupted: another sketch may be on the board.
+    pub(super) fn interrupt(&mut self) {
+        (self.since_s, self.strip, self.beyond) = (None, 0.0, 0);
     }
 }
 
@@ -213,54 +195,24 @@ mod tests {
     }
 
     #[test]
-    fn a_converter_reaches_as_far_as_three_readings_in_a_row() {
-        let mut reach = AdcRange::default();
-        let mut now = 0.0;
-        let mut all = |said: Option<u32>, counts: &[f32]| {
-            counts.iter().for_each(|count| {
-                now += 0.02;
-                reach.add(now, 0.0, *count, said);
-            });
-            reach.full_scale(said)
-        };
-        assert_eq!(all(None, &[1400.0, 1400.0, 14_325.0, 300.0, 9000.0, 9000.0]), 4095, "single ones were damaged");
-        assert_eq!(all(None, &[300.0, 9000.0, 9000.0, 140_000.0]), 16_383, "the least of them tells");
-        assert_eq!(all(None, &[2.0, 5e9, 5e9, 5e9]), 16_383, "no converter counts as far");
-        assert_eq!(all(Some(65_535), &[9000.0]), 65_535);
-        let mut said = AdcRange::default();
-        (0..9).for_each(|k| said.add(f64::from(k), 1000.0, 1000.0, Some(4095)));
-        assert_eq!(said.full_scale(Some(4095)), 4095, "a board that says so is believed");
-    }
-
-    #[test]
-    fn ten_bits_are_told_by_strips_within_a_second_and_by_pads_never() {
-        let full_scale = |strip: f32, pad: f32, last: &[f32]| {
-            let mut reach = AdcRange::default();
-            for k in 0..200u32 {
-                reach.add(0.02 * f64::from(k), strip, strip.max(pad), None);
-            }
-            for (k, count) in (0u32..).zip(last) {
-                reach.add(4.0 + 0.02 * f64::from(k), *count, *count, None);
-            }
-            reach.full_scale(None)
-        };
-        assert_eq!(full_scale(350.0, 0.0, &[]), 1023);
-        assert_eq!(full_scale(1420.0, 0.0, &[]), 4095);
-        assert_eq!(full_scale(0.0, 900.0, &[]), 4095, "pads may be anywhere");
-        assert_eq!(full_scale(800.0, 0.0, &[1100.0]), 1023, "one was damaged");
-        assert_eq!(full_scale(800.0, 0.0, &[1100.0; 3]), 4095, "a strip beside more than it should have, bent");
-    }
-
-    #[test]
-    fn ten_bits_are_suspected_from_the_largest_count() {
-        let largest = |count: f32, seconds: f64| {
+    fn ten_bits_are_suspected_from_a_strip_and_a_wider_converter_from_three_readings() {
+        let range = |full_scale: u32, largest: [f32; 2], seconds: u32| {
             let mut watch = SaturationWatch::default();
-            watch.add(&[Some(count)], &[true], 0.0, FULL_12_BIT);
-            watch.add(&[Some(10.0)], &[true], seconds, FULL_12_BIT);
-            assert_eq!((watch.is_connected(0), watch.is_connected(1)), (count >= 128.0, false));
-            watch.looks_10_bit()
+            (0..=50 * seconds).for_each(|k| watch.add_range(&largest, 0.02 * f64::from(k), full_scale));
+            watch.adc_range()
         };
-        assert!(largest(668.0, 6.0));
-        assert!(!largest(668.0, 2.0) && !largest(1400.0, 6.0) && !largest(3.0, 6.0));
+        assert_eq!(range(FULL_12_BIT, [668.0; 2], 6), AdcRange::LooksTenBit);
+        assert_eq!(range(FULL_12_BIT, [668.0; 2], 2), AdcRange::Fits, "too early to say");
+        assert_eq!(range(FULL_10_BIT, [668.0; 2], 6), AdcRange::Fits, "as stated");
+        for largest in [[1400.0; 2], [3.0; 2], [0.0, 900.0]] {
+            assert_eq!(range(FULL_12_BIT, largest, 6), AdcRange::Fits, "{largest:?}");
+        }
+        assert_eq!(range(FULL_12_BIT, [0.0, 5000.0], 6), AdcRange::Exceeded);
+        assert_eq!(range(65_535, [0.0, 5000.0], 6), AdcRange::Fits);
+        let mut watch = SaturationWatch::default();
+        for largest in [9000.0, 300.0, 9000.0, 9000.0] {
+            watch.add_range(&[0.0, largest], 0.0, FULL_12_BIT);
+        }
+        assert_eq!(watch.adc_range(), AdcRange::Fits, "single ones were damaged");
     }
 }

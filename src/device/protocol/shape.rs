@@ -1,7 +1,6 @@
-//! Which fields a board's lines have. A board repeats itself, and that is how its lines are told from noise: a line is
-//! taken when it has the fields of the lines before. Other fields are believed when two lines in a row have them; a part
-//! of the known ones looks like a line that was cut, and is believed only when it goes on like that. A unit belongs to its
-//! field: `51k` among `512` and `513` is a damaged number, not another unit.
+//! The fields of a board's lines. A board repeats itself, and noise does not: a line is accepted when it has the fields of
+//! the lines before. Other fields are accepted when two lines in a row have them; a part of the known fields looks like a
+//! line that was cut, and is accepted only when twenty lines in a row have it.
 
 use super::checksum::KEY;
 use super::fields::{Field, Fields, MAX_FIELDS, NAMELESS};
@@ -12,15 +11,13 @@ use palpate_tactile::board::Format;
 pub(super) struct Candidate {
     pub(super) format: Format,
     pub(super) fields: Fields,
-    /// Words are among its fields.
-    pub(super) odd: bool,
     pub(super) arrived_s: f64,
 }
 
-/// Where each field of a line goes.
+/// Role of a field of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// Into the counts, at this place.
+    /// Counts, at this place.
     Channel(usize),
     /// The board's time, in microseconds or milliseconds.
     Micros,
@@ -30,14 +27,14 @@ pub(super) enum Role {
     Sequence,
     /// Line pressure (bar).
     LineBar,
-    /// The checksum, which has been looked at.
+    /// The checksum, already verified.
     Checksum,
-    /// Nowhere: it has no name, or there are too many channels.
+    /// None: it has no name, or there are too many channels.
     Ignored,
 }
 
 impl Role {
-    /// The role of a field that is no channel.
+    /// The role of a field that is not a channel.
     fn named(name: &str) -> Option<Self> {
         let is = |other: &str| name.eq_ignore_ascii_case(other);
         match () {
@@ -51,7 +48,7 @@ impl Role {
         }
     }
 
-    /// True where a field by this name is a channel.
+    /// True where a field of this name is a channel.
     pub(super) fn is_channel(name: &str) -> bool {
         Self::named(name).is_none()
     }
@@ -61,56 +58,41 @@ impl Role {
 const CONFIRM: u32 = 2;
 /// The same where it is a part of the known one.
 const CONFIRM_PART: u32 = 20;
-/// The same where words are among them, as in what a board says while it sets itself up.
-const CONFIRM_ODD: u32 = 5;
 
-/// The fields that are believed, and those that might be next.
+/// Accepted fields, and the candidates for others.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shapes {
     pub(super) format: Option<Format>,
     names: Vec<String>,
-    /// What stands behind their numbers, where one has come already.
-    units: Vec<Option<String>>,
     roles: Vec<Role>,
-    /// The newest line with other fields, and how many such came in a row.
+    /// Newest line with other fields, and how many such came in a row.
     waiting: Option<(Candidate, u32)>,
 }
 
-/// What becomes of a line.
+/// Verdict on a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Judged {
     /// It has the known fields.
     Known(Candidate),
-    /// Its fields are now known; the line before it had them too, and waited.
+    /// Its fields are now accepted; the line before, which had them too, waited.
     Changed(Box<[Candidate; 2]>),
-    /// It waits for a second one like it. How many lines are given up instead: those that waited before.
+    /// It waits for another like it, in place of `given_up` lines that waited before.
     Waits { given_up: u64 },
 }
 
 impl Shapes {
-    /// What to make of a line.
+    /// Judges a line.
     pub(super) fn judge(&mut self, line: Candidate) -> Judged {
         if self.is_known(&line) {
-            for (known, field) in self.units.iter_mut().zip(&line.fields) {
-                if known.is_none() {
-                    *known = unit(field);
-                }
-            }
-            // Whoever waits is given up by the caller, who has seen this line arrive.
+            // The caller, who has seen this line arrive, gives up the line that waits.
             return Judged::Known(line);
         }
         let part = self.format == Some(line.format) && self.is_part(&line);
-        let needed = match (part, line.odd) {
-            (true, _) => CONFIRM_PART,
-            (false, true) => CONFIRM_ODD,
-            (false, false) => CONFIRM,
-        };
+        let needed = if part { CONFIRM_PART } else { CONFIRM };
         match self.waiting.take() {
             Some((before, count)) if before.format == line.format && same_names(&before, &line) => {
                 if count + 1 >= needed {
                     self.names = line.fields.iter().map(|field| field.name.clone()).collect();
-                    self.units =
-                        before.fields.iter().zip(&line.fields).map(|(a, b)| unit(a).or_else(|| unit(b))).collect();
                     self.format = Some(line.format);
                     self.roles.clear();
                     return Judged::Changed(Box::new([before, line]));
@@ -125,7 +107,7 @@ impl Shapes {
         }
     }
 
-    /// Gives up the line that waits; true where there was one.
+    /// Gives up the waiting line; true where there was one.
     pub(super) fn give_up(&mut self) -> bool {
         self.waiting.take().is_some()
     }
@@ -141,17 +123,12 @@ impl Shapes {
     /// Columns have no names of their own.
     fn is_known(&self, line: &Candidate) -> bool {
         let named = |field: &Field, name: &String| line.format == Format::Csv || field.name == *name;
-        let known = self.names.iter().zip(&self.units);
         self.format == Some(line.format)
             && line.fields.len() == self.names.len()
-            && line
-                .fields
-                .iter()
-                .zip(known)
-                .all(|(field, (name, known))| named(field, name) && agree(&unit(field), known))
+            && line.fields.iter().zip(&self.names).all(|(field, name)| named(field, name))
     }
 
-    /// Where the fields go; channels that are new are added to `channels`.
+    /// Roles of the fields; new channels are added to `channels`.
     pub(super) fn roles(&mut self, channels: &mut Vec<String>) -> &[Role] {
         if self.roles.is_empty() {
             let mut role = |name: &String| {
@@ -169,19 +146,12 @@ impl Shapes {
         &self.roles
     }
 
-    /// The unit behind the numbers of each channel that has one.
-    pub(super) fn units(&self) -> impl Iterator<Item = (usize, &str)> {
-        let channel = |role: &Role| if let Role::Channel(place) = role { Some(*place) } else { None };
-        let units = self.roles.iter().zip(&self.units);
-        units.filter_map(move |(role, unit)| Some((channel(role)?, unit.as_deref().filter(|unit| !unit.is_empty())?)))
-    }
-
     /// Names of the fields.
     pub(super) fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Calls the fields by other names, one for each; true where that changes something.
+    /// Renames the fields; true where that changes something.
     pub(super) fn rename(&mut self, names: &[String]) -> bool {
         let changed = self.names != names;
         if changed {
@@ -192,16 +162,6 @@ impl Shapes {
     }
 }
 
-/// A field's unit, which may be that it has none; a number that is not there says nothing of it.
-fn unit(field: &Field) -> Option<String> {
-    field.value.map(|_| field.unit.clone())
-}
-
-fn agree(a: &Option<String>, b: &Option<String>) -> bool {
-    a.is_none() || b.is_none() || a == b
-}
-
 fn same_names(a: &Candidate, b: &Candidate) -> bool {
-    let same = |(a, b): (&Field, &Field)| a.name == b.name && agree(&unit(a), &unit(b));
-    a.fields.len() == b.fields.len() && a.fields.iter().zip(&b.fields).all(same)
+    a.fields.len() == b.fields.len() && a.fields.iter().zip(&b.fields).all(|(a, b)| a.name == b.name)
 }

@@ -1,7 +1,7 @@
-//! A link to a board: what it says, in order and without loss, whatever happens to the cable.
+//! Link to a board: its events in order and without loss, through disconnections.
 //!
 //! ```text
-//!   "serial-read"                 "serial-decode"              whoever listens
+//!   "serial-read"                 "serial-decode"              listener
 //!   reads, stamps  --bytes-->     Decoder      --events-->     take(): readings, gaps, bytes
 //!   opens again after a loss                                   status(), console(), send()
 //! ```
@@ -14,7 +14,7 @@ use super::ports::{PortInfo, choose, describe, list_ports};
 use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
 use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
-use crate::protocol::{ConsoleLine, Decoder, Saturation};
+use crate::protocol::{AdcRange, ConsoleLine, Decoder, Saturation};
 use palpate_tactile::board::Detected;
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::cadence::Cadence;
@@ -27,19 +27,16 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Full scale of ten bits.
-const TEN_BITS: u32 = 1023;
-
-/// What to listen to, and how.
+/// Port and settings of a link.
 #[derive(Clone, Debug)]
 pub struct LinkOptions {
-    /// A port, a link to one, or a file of captured bytes; the only likely port where nothing is named.
+    /// A port, a link to one, or a file of captured bytes; none for the only likely port.
     pub path: Option<PathBuf>,
-    /// The speed; without it the usual ones are tried.
+    /// Baud rate; none to scan the usual ones.
     pub baud: Option<Baud>,
-    /// Whether a board that vanishes is waited for.
+    /// Wait for a board that disconnects.
     pub reconnect: bool,
-    /// How fast captured bytes are played, as a multiple of the pace they came at; infinite for as fast as they are taken.
+    /// Speed of a replay, as a multiple of the original; infinite for as fast as it is read.
     pub replay_speed: f64,
 }
 
@@ -49,11 +46,11 @@ impl Default for LinkOptions {
     }
 }
 
-/// Where a link stands.
+/// State of a link.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "state")]
 pub enum LinkState {
-    /// Just opened; boards restart when they are connected to.
+    /// Just opened: a board may restart.
     Waiting,
     /// Readings come.
     Listening,
@@ -83,96 +80,85 @@ impl LinkState {
     /// In a sentence for the user.
     pub fn sentence(&self) -> String {
         match self {
-            Self::Waiting => "Waiting for the board (it restarts when it is connected to)".to_owned(),
+            Self::Waiting => "Waiting for the board (it restarts on connection)".to_owned(),
             Self::Listening => "Listening".to_owned(),
             Self::Silent { hint } | Self::Unreadable { hint } => hint.clone(),
-            Self::Lost { cause } => format!("Connection lost: {cause}. Looking for the board each second"),
+            Self::Lost { cause } => format!("Connection lost: {cause}. Trying again every second"),
             Self::Ended { cause: Some(cause) } => format!("Ended: {cause}"),
             Self::Ended { cause: None } => "Ended".to_owned(),
         }
     }
 }
 
-/// Everything that can be shown of a link.
+/// Status of a link, for display.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinkStatus {
-    /// Where it stands.
+    /// Its state.
     #[serde(flatten)]
     pub state: LinkState,
-    /// What is listened to.
+    /// Its port.
     pub port: PortInfo,
-    /// The speed in use (bit/s); none for captured bytes.
+    /// Baud rate; none for captured bytes.
     pub baud: Option<u32>,
-    /// What is known of the board.
+    /// The board, as far as it is known.
     pub board: Board,
-    /// How its lines are read; none before two of them agree.
+    /// Detected line format; none before two lines agree.
     pub detected: Option<Detected>,
-    /// How well it keeps time.
+    /// Rate, jitter and losses.
     pub cadence: Cadence,
-    /// Channels at an end of the converter's range, or without numbers.
+    /// Saturation of each channel.
     pub saturation: Vec<Option<Saturation>>,
-    /// The counts look like those of ten bits.
-    pub looks_10_bit: bool,
-    /// Channels whose numbers have a unit behind them, and which.
-    pub units: Vec<(String, String)>,
-    /// How often the connection was taken up again.
+    /// Whether the counts fit the converter's range.
+    pub adc_range: AdcRange,
+    /// Number of reconnections.
     pub reconnects: u32,
     /// Time since the link was opened (s).
     pub now_s: f64,
-    /// Bytes, and readings, that this computer was too slow to take.
+    /// Bytes, and readings, dropped because this computer was too slow.
     pub dropped: [u64; 2],
 }
 
 impl LinkStatus {
-    /// What is wrong with the line, and what to try, in sentences.
+    /// Faults of the connection, and what to try.
     pub fn line_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.cadence.troubled {
             let bad = self.cadence.bad_lines;
             remarks.push(format!(
-                "many lines cannot be read, {bad} so far: look at them in the console; a short cable straight into the \
-                 computer helps, and no other program on the port"
+                "{bad} unreadable lines so far: see the console; use a short cable directly into the computer, and no other \
+                 program on the port"
             ));
         }
         if let [bytes, readings] = self.dropped
             && bytes + readings > 0
         {
-            remarks.push(format!("this computer was too slow for {bytes} bytes and {readings} readings"));
+            remarks.push(format!("this computer was too slow: {bytes} bytes and {readings} readings dropped"));
         }
         remarks
     }
 
-    /// What is wrong with the sensors' wiring as far as counts tell, in sentences.
+    /// Faults of the wiring, as far as counts show them.
     pub fn wiring_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        if self.looks_10_bit {
-            let said = self.board.firmware.is_some();
-            let text = match (self.board.full_scale <= TEN_BITS, said) {
-                (true, _) => {
-                    "the counts are those of ten bits, and taken as such: analogReadResolution(12) in the sketch gives finer ones"
-                }
-                (false, false) => {
-                    "no count is beyond ten bits; twelve are taken for granted, since neither the board nor a strip tells"
-                }
-                (false, true) => {
-                    "the counts look like those of ten bits, against the board's word, so that what is derived from them is \
-                          wrong: call analogReadResolution(12) in the sketch"
-                }
-            };
-            remarks.push(text.to_owned());
+        let full = self.board.full_scale;
+        match self.adc_range {
+            AdcRange::Fits => {}
+            AdcRange::LooksTenBit => remarks.push(format!(
+                "the counts look like 10 bits, but the range is {full}: derived values are wrong. Call \
+                 analogReadResolution(12) in the sketch"
+            )),
+            AdcRange::Exceeded => remarks.push(format!(
+                "counts exceed {full}: derived values are wrong. State the converter's bits in the handshake, as in adc=16"
+            )),
         }
-        let sensors = self.units.iter().filter(|(name, _)| Sensor::called(name).is_some());
-        remarks.extend(sensors.map(|(name, unit)| {
-            format!("{name} comes in {unit}, and is taken for counts: print what analogRead gives, without a unit")
-        }));
         let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
         for (channel, (name, rail)) in self.board.channels.iter().zip(&self.saturation).enumerate() {
             let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
             remarks.extend(match (rail, sensor.is_some_and(Sensor::is_flex)) {
                 (Some(Saturation::High), true) => {
-                    Some(format!("{name} is at the upper end of the range: the strip or one of its wires has come off"))
+                    Some(format!("{name} is at full scale: the strip or one of its wires is disconnected"))
                 }
-                (Some(Saturation::Low), true) => Some(format!("{name} reads nothing: the strip is shorted, or its divider not fed")),
+                (Some(Saturation::Low), true) => Some(format!("{name} reads zero: the strip is shorted, or its divider has no supply")),
                 (Some(Saturation::High), false) => Some(format!(
                     "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
                      ground that is missing or too large"
@@ -278,11 +264,11 @@ pub enum SendError {
     #[error("the board is not connected, so that it was not told")]
     NotConnected,
     /// The port did not take it.
-    #[error("the board was not told: {0}")]
+    #[error("cannot send to the board: {0}")]
     Port(String),
 }
 
-/// An open link. Dropping it closes the port.
+/// Open link. Dropping it closes the port.
 #[derive(Debug)]
 pub struct SerialLink {
     shared: Arc<Shared>,
@@ -290,7 +276,7 @@ pub struct SerialLink {
 }
 
 impl SerialLink {
-    /// Opens a port, or a file of captured bytes, and begins to listen.
+    /// Opens a port or a file of captured bytes, and starts listening.
     pub fn open(options: &LinkOptions) -> Result<Self, PortError> {
         let port = match &options.path {
             Some(path) if is_capture(path) => return Self::replay(path, options.replay_speed),
@@ -341,17 +327,17 @@ impl SerialLink {
         Ok(link)
     }
 
-    /// What has come since the last call; if nothing has, waits for it up to a time.
+    /// Takes the events since the last call; waits up to `patience` for the first.
     pub fn take(&self, patience: Duration) -> Vec<LinkEvent> {
         self.shared.events.take(patience)
     }
 
-    /// True when everything was taken and nothing more will come.
+    /// True when every event was taken and no more will come.
     pub fn is_over(&self) -> bool {
         self.shared.events.is_over()
     }
 
-    /// This computer's clock as the readings have it (s since the link was opened).
+    /// Time on the clock of the readings (s since the link was opened).
     pub fn now_s(&self) -> f64 {
         self.shared.began.elapsed().as_secs_f64()
     }
@@ -363,7 +349,7 @@ impl SerialLink {
         port.write_all(format!("{line}\n").as_bytes()).map_err(|error| SendError::Port(error.to_string()))
     }
 
-    /// Everything that can be shown.
+    /// Status, for display.
     pub fn status(&self) -> LinkStatus {
         let shared = &self.shared;
         let decoder = lock(&shared.decoder);
@@ -376,20 +362,19 @@ impl SerialLink {
             detected: decoder.detected(),
             cadence: decoder.cadence(),
             saturation: decoder.saturation(),
-            looks_10_bit: decoder.looks_10_bit(),
-            units: decoder.units(),
+            adc_range: decoder.adc_range(),
             reconnects: shared.reconnects.load(Ordering::Relaxed),
             now_s: self.now_s(),
             dropped: [shared.bytes.dropped_bytes(), shared.events.dropped_readings()],
         }
     }
 
-    /// The newest lines as they came, oldest first.
+    /// Newest raw lines, oldest first.
     pub fn console(&self) -> Vec<ConsoleLine> {
         lock(&self.shared.decoder).console().cloned().collect()
     }
 
-    /// Stops listening; what has come can still be taken.
+    /// Stops listening; events so far can still be taken.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
     }
@@ -398,11 +383,11 @@ impl SerialLink {
 impl Drop for SerialLink {
     fn drop(&mut self) {
         self.stop();
-        // Whoever waits for room waits in vain from now on.
+        // Wakes threads that wait for room.
         self.shared.events.close();
         self.shared.bytes.close();
         for thread in self.threads.drain(..) {
-            // A panic in the thread has printed itself; there is nobody left to tell here.
+            // A panic in the thread has printed itself.
             let _ended = thread.join();
         }
     }

@@ -202,5 +202,5 @@ fn a_board_that_goes_on_at_another_speed_is_found_there() {
     assert_eq!((status.state, status.baud), (LinkState::Listening, Some(57_600)));
     assert!(before > 0 && status.cadence.samples > before, "{before} {}", status.cadence.samples);
     let cause = gaps(&events).first().map(|gap| gap.cause.clone()).unwrap_or_default();
-    assert!(cause.contains("57600 baud"), "{cause}");
+    assert!(cause.contains("57600"), "{cause}");
 }

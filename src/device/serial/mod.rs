@@ -1,4 +1,4 @@
-//! The real gripper's board on a serial port.
+//! Serial link to the gripper's board.
 
 mod baud;
 mod link;
@@ -11,7 +11,7 @@ mod reader;
 mod replay;
 mod scan;
 
-pub use baud::Baud;
+pub use baud::{Baud, BaudError};
 pub use link::{LinkOptions, LinkState, LinkStatus, SendError, SerialLink};
 pub use port_error::{ACCESS_RULE, MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};

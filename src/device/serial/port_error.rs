@@ -1,11 +1,11 @@
-//! Why a port cannot be used, and what to do about it.
+//! Errors of ports, with cause and fix.
 
 use super::ports::PortInfo;
 use serde::Serialize;
 use std::io::ErrorKind as Io;
 use std::path::Path;
 
-/// Which kind of trouble it is.
+/// Kind of port error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PortTrouble {
@@ -13,43 +13,43 @@ pub enum PortTrouble {
     NotFound,
     /// No port looks like a board.
     NoBoard,
-    /// More than one does.
+    /// More than one port looks like a board.
     Several,
-    /// The user may not open it.
+    /// The user lacks permission.
     Permission,
     /// Another program has it.
     Busy,
-    /// It is no serial port.
+    /// It is not a serial port.
     NotSerial,
     /// A file of captured bytes cannot be read.
     Capture,
-    /// Something else.
+    /// Another system error.
     System,
 }
 
-/// Trouble with a port: what, why, and what to try.
+/// Error of a port: what failed, why, and what to try.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[error("{what}: {cause}. {fix}")]
 pub struct PortError {
-    /// Which kind.
+    /// Its kind.
     pub trouble: PortTrouble,
-    /// What could not be done, to what.
+    /// What failed.
     pub what: String,
-    /// Why.
+    /// Cause.
     pub cause: String,
-    /// What to try, in a sentence.
+    /// Fix, in a sentence.
     pub fix: String,
-    /// A command that does it, where there is one.
+    /// Command for the fix, if there is one.
     pub command: Option<String>,
 }
 
-/// A rule that keeps ModemManager away from the boards of Arduino.
+/// udev rule that keeps ModemManager away from Arduino boards.
 pub const MODEM_MANAGER_RULE: &str = "ATTRS{idVendor}==\"2341|2a03\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"";
-/// Puts that rule where udev finds it.
+/// Command that installs [`MODEM_MANAGER_RULE`].
 pub const MODEM_MANAGER_COMMAND: &str = "echo 'ATTRS{idVendor}==\"2341|2a03\", ENV{ID_MM_DEVICE_IGNORE}=\"1\"' | \
      sudo tee /etc/udev/rules.d/77-palpate.rules && sudo udevadm control --reload && sudo udevadm trigger";
 
-/// A rule that lets whoever sits at the computer use the boards of Arduino; its file must come before 73 in the alphabet.
+/// udev rule that lets the logged-in user access Arduino boards; its file must sort before 73.
 pub const ACCESS_RULE: &str = "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"2341|2a03\", TAG+=\"uaccess\"";
 
 impl PortError {
@@ -58,7 +58,7 @@ impl PortError {
         Self { trouble, what, cause: cause.into(), fix: fix.into(), command: None }
     }
 
-    /// What a failed attempt to open a port means.
+    /// Explains a failed attempt to open a port.
     pub(super) fn of(path: &Path, error: &serialport::Error, ports: &[PortInfo]) -> Self {
         match error.kind() {
             serialport::ErrorKind::Io(Io::PermissionDenied) => Self::permission(path),
@@ -78,19 +78,19 @@ impl PortError {
 
     pub(super) fn not_found(path: &Path, ports: &[PortInfo]) -> Self {
         let fix = format!("Is the board plugged in? Choose another port{}", listing(ports));
-        Self::opening(PortTrouble::NotFound, path, "there is no such port", fix)
+        Self::opening(PortTrouble::NotFound, path, "no such port", fix)
     }
 
     fn permission(path: &Path) -> Self {
         let Some(group) = group_of(path) else {
-            let fix = "Ask whoever looks after this computer for access to serial ports";
-            return Self::opening(PortTrouble::Permission, path, "you are not allowed to", fix);
+            let fix = "Ask your administrator for access to serial ports";
+            return Self::opening(PortTrouble::Permission, path, "permission denied", fix);
         };
         let command = format!("sudo usermod -aG {group} $USER");
-        let cause = format!("only members of the group {group} are allowed to");
+        let cause = format!("permission denied; only the group {group} is allowed");
         let fix = format!(
-            "Run `{command}`, then log out and in again. Or let whoever sits at this computer use such boards: put the udev \
-             rule {ACCESS_RULE} into /etc/udev/rules.d/70-palpate.rules, and plug the board in again"
+            "Run `{command}`, then log out and in again. Or allow the logged-in user: put the udev rule {ACCESS_RULE} into \
+             /etc/udev/rules.d/70-palpate.rules, and plug the board in again"
         );
         Self { command: Some(command), ..Self::opening(PortTrouble::Permission, path, cause, fix) }
     }
@@ -98,15 +98,15 @@ impl PortError {
     fn busy(path: &Path) -> Self {
         if is_running("ModemManager") {
             let fix = format!(
-                "Close the Serial Monitor of the Arduino IDE and other programs that listen to it, then connect. Within half \
-                 a minute of plugging in it may be ModemManager, which asks each new port whether it is a modem: wait, or \
-                 keep it away from boards with the udev rule {MODEM_MANAGER_RULE}, and plug the board in again"
+                "Close the Arduino Serial Monitor and other programs on the port, then connect. In the first half minute it \
+                 may be ModemManager, which probes each new port: wait, or add the udev rule {MODEM_MANAGER_RULE} and plug \
+                 the board in again"
             );
             let command = Some(MODEM_MANAGER_COMMAND.to_owned());
-            let cause = "it is open in another program, or ModemManager looks at it";
+            let cause = "it is open in another program, or ModemManager is probing it";
             return Self { command, ..Self::opening(PortTrouble::Busy, path, cause, fix) };
         }
-        let fix = "Close the Serial Monitor of the Arduino IDE and other programs that listen to it, then connect";
+        let fix = "Close the Arduino Serial Monitor and other programs on the port, then connect";
         Self::opening(PortTrouble::Busy, path, "it is open in another program", fix)
     }
 
@@ -114,7 +114,7 @@ impl PortError {
         Self {
             trouble: PortTrouble::Several,
             what: "cannot choose a port".to_owned(),
-            cause: "more than one looks like the gripper's board".to_owned(),
+            cause: "several look like the gripper's board".to_owned(),
             fix: format!("Name one{}", listing(ports)),
             command: None,
         }
@@ -135,16 +135,16 @@ impl PortError {
             trouble: PortTrouble::Capture,
             what: format!("cannot replay \"{}\"", path.display()),
             cause: cause.into(),
-            fix: "Choose a port, or a file of bytes that were captured from one".to_owned(),
+            fix: "Choose a port, or a file of captured bytes".to_owned(),
             command: None,
         }
     }
 }
 
-/// The ports that there are, for the end of a sentence.
+/// The ports of this computer, for the end of a sentence.
 fn listing(ports: &[PortInfo]) -> String {
     if ports.is_empty() {
-        return "; this computer has none at the moment".to_owned();
+        return "; this computer has none".to_owned();
     }
     let ports: Vec<String> = ports.iter().map(|p| format!("{} {}", p.path.display(), p.title)).collect();
     format!(": {}", ports.join(", "))
@@ -162,7 +162,7 @@ fn group_of(path: &Path) -> Option<String> {
     let gid = std::fs::metadata(path).ok()?.gid().to_string();
     let groups = std::fs::read_to_string("/etc/group").ok()?;
     let line = groups.lines().find(|line| line.split(':').nth(2) == Some(gid.as_str()))?;
-    // Being of root's group would be more than anybody should ask for.
+    // Nobody should join root's group.
     line.split(':').next().filter(|name| *name != "root").map(str::to_owned)
 }
 
@@ -171,7 +171,7 @@ fn group_of(_path: &Path) -> Option<String> {
     None
 }
 
-/// True where a program by this name runs, as far as the system tells (Linux).
+/// True where a program of this name is running (Linux).
 pub fn is_running(program: &str) -> bool {
     let Ok(processes) = std::fs::read_dir("/proc") else { return false };
     let comm = |entry: std::fs::DirEntry| std::fs::read_to_string(entry.path().join("comm")).unwrap_or_default();
@@ -203,7 +203,7 @@ mod tests {
         );
         assert!(gone.trouble == PortTrouble::NotFound && gone.fix.contains("plugged in"));
         let denied = error(serialport::ErrorKind::Io(Io::PermissionDenied), "Permission denied");
-        assert!(denied.trouble == PortTrouble::Permission && denied.cause.contains("allowed"));
+        assert!(denied.trouble == PortTrouble::Permission && denied.cause.contains("permission denied"));
         assert_eq!(error(serialport::ErrorKind::Unknown, "Not a typewriter").trouble, PortTrouble::NotSerial);
     }
 

@@ -1,12 +1,11 @@
-//! Which ports there are, what is plugged into them, and which of them is meant. Names and numbers are what the system
-//! knows of the USB device; no library of the system's is needed for that.
+//! Serial ports, their boards, and the choice among them. Names and numbers come from the USB device.
 
 use super::port_error::PortError;
 use serde::Serialize;
 use serialport::{SerialPortType, available_ports};
 use std::path::{Path, PathBuf};
 
-/// A USB device, found again by these wherever it is plugged in.
+/// Identity of a USB device, by which it is found again on another port.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct UsbIdentity {
     /// Vendor.
@@ -17,30 +16,30 @@ pub struct UsbIdentity {
     pub serial: Option<String>,
 }
 
-/// A port.
+/// Serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PortInfo {
-    /// How it is opened: `/dev/ttyACM0`, `COM3`.
+    /// Its path: `/dev/ttyACM0`, `COM3`.
     pub path: PathBuf,
-    /// What is plugged into it, in words.
+    /// Its board, in words.
     pub title: String,
-    /// The USB device, where it is one.
+    /// Its USB device, if it is one.
     pub usb: Option<UsbIdentity>,
-    /// What is known of such a board.
+    /// Kind of board.
     #[serde(skip)]
     pub kind: BoardKind,
 }
 
-/// What is known of a board by its USB numbers.
+/// Kind of board, by its USB numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardKind {
-    /// How much it looks like the gripper's board; 0 for what is never chosen by itself.
+    /// Likelihood of being the gripper's board; 0 is never chosen automatically.
     pub rank: u8,
-    /// The microcontroller speaks USB itself: its speed means nothing, and it is mute until DTR is set.
+    /// Native USB: the baud rate has no effect, and nothing is sent until DTR is set.
     pub native: bool,
 }
 
-/// What devices are, by vendor and product; a product of zero stands for any other of the vendor. Sources: Arduino's
+/// Known devices by vendor and product; product 0 stands for any other of the vendor. Sources: Arduino's
 /// `boards.txt`, usb.ids.
 const KNOWN: &[(u16, u16, &str, BoardKind)] = &[
     (0x2341, 0x003d, "Arduino Due, programming port", BoardKind { rank: 3, native: false }),
@@ -86,7 +85,7 @@ impl PortInfo {
         Self { path, title, usb: Some(identity), kind }
     }
 
-    /// A port that no list has: a pseudo-terminal, or a link to one.
+    /// A port that is not listed: a pseudo-terminal, or a link to one.
     pub(super) fn unlisted(path: &Path) -> Self {
         let is_pty = std::fs::canonicalize(path).is_ok_and(|real| real.starts_with("/dev/pts"));
         let title = if is_pty { "pseudo-terminal" } else { "serial port" };
@@ -94,9 +93,9 @@ impl PortInfo {
     }
 }
 
-/// All ports, those that look most like the gripper's board first.
+/// Lists all ports, likely boards first.
 pub fn list_ports() -> Vec<PortInfo> {
-    // The library takes this folder for granted; containers may lack it.
+    // The library expects this folder; containers may lack it.
     if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
         return Vec::new();
     }
@@ -109,7 +108,7 @@ pub fn list_ports() -> Vec<PortInfo> {
     ports
 }
 
-/// The port that is meant where nobody says which: the only one of those that look most like the gripper's board.
+/// Chooses the only likely port.
 pub(super) fn choose(ports: &[PortInfo]) -> Result<PortInfo, PortError> {
     let best = ports.iter().map(|port| port.kind.rank).max().unwrap_or(0);
     let mut likely = ports.iter().filter(|port| best > 0 && port.kind.rank == best);
@@ -120,14 +119,14 @@ pub(super) fn choose(ports: &[PortInfo]) -> Result<PortInfo, PortError> {
     }
 }
 
-/// What is known of the port at a path.
+/// Describes the port at a path.
 pub(super) fn describe(path: &Path) -> PortInfo {
     let real = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let listed = list_ports().into_iter().find(|port| port.path == real || port.path == path);
     listed.map_or_else(|| PortInfo::unlisted(path), |port| PortInfo { path: path.to_owned(), ..port })
 }
 
-/// Where a device is plugged in now.
+/// Finds the port of a device.
 pub(super) fn find(identity: &UsbIdentity) -> Option<PortInfo> {
     list_ports().into_iter().find(|port| port.usb.as_ref() == Some(identity))
 }

@@ -1,4 +1,4 @@
-//! Queues between the threads of a link. They are bounded: what does not fit is counted and told, never silently lost.
+//! Queues between the threads of a link. They are bounded: what does not fit is counted and reported.
 
 use crate::protocol::DecodedEvent;
 use palpate_tactile::board::Gap;
@@ -9,22 +9,22 @@ use std::time::Duration;
 
 /// Bytes that may wait to be decoded: a minute at 1 kHz and 8 channels.
 const WAITING_BYTES: usize = 4 << 20;
-/// Things heard that may wait to be taken: a minute at 1 kHz.
+/// Events that may wait to be taken: a minute at 1 kHz.
 const WAITING_EVENTS: usize = 120_000;
 
-/// What comes out of a link, in its order.
+/// Event of a link, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkEvent {
-    /// Bytes as they came, or a mark that the connection was lost. What they say follows.
+    /// Raw bytes, or a mark that the connection was lost. Their decoded events follow.
     Captured(Captured),
-    /// What they say.
+    /// Decoded event.
     Decoded(DecodedEvent),
 }
 
-/// What to do where a queue is full.
+/// Behaviour of a full queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WhenFull {
-    /// Let it go and count it: a board does not wait.
+    /// Drop and count: a board does not wait.
     Drop,
     /// Wait for room: a file does.
     Wait,

@@ -1,5 +1,5 @@
-//! The thread that reads a port. It stamps and queues what comes and does nothing else, but for two things that only it
-//! can do: to look for the board when it is gone, and to try other speeds when nothing can be understood.
+//! Reader thread of a port. It stamps and queues bytes, reconnects to a board that is gone, and scans baud rates when the
+//! data is unreadable.
 
 use super::baud::Baud;
 use super::link::{LinkOptions, LinkState, Shared};
@@ -15,36 +15,35 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// How long a read waits: stopping takes no longer.
+/// Longest wait of a read; stopping takes no longer.
 const READ_PATIENCE: Duration = Duration::from_millis(50);
-/// What was sent before a reset has arrived within this time.
+/// Time in which bytes from before a reset arrive.
 const RESET: Duration = Duration::from_millis(250);
-/// A board boots within this time of being connected to.
+/// Longest boot time of a board after connection.
 const BOOT: Duration = Duration::from_secs(4);
-/// A native port that is mute for this long is woken by DTR, once.
+/// Silence after which DTR is toggled on a native port, once.
 const MUTE: Duration = Duration::from_secs(3);
-/// This many bytes without a reading are not a start that went wrong.
+/// Bytes without a reading that show unreadable data.
 const ENOUGH_BYTES: u64 = 300;
-/// How long to listen before speeds are doubted: where nothing was understood yet, and where it was; and between two scans.
+/// Wait before a scan of baud rates: before the first reading, after it, and between two scans.
 const DOUBT: Duration = Duration::from_millis(1500);
 const DOUBT_LATER: Duration = Duration::from_secs(4);
 const RESCAN: Duration = Duration::from_secs(10);
-/// With more printable bytes than this the speed is right: at half of it, about half of the bytes are.
+/// Share of printable bytes at the right baud rate; at half the rate about half of the bytes are printable.
 const TEXT: f64 = 0.9;
-/// Waits between attempts to find a board that is gone; the last goes on.
+/// Waits between attempts to reconnect; the last repeats.
 const ATTEMPTS: [Duration; 3] = [Duration::from_millis(200), Duration::from_millis(500), Duration::from_secs(1)];
-/// After this many attempts it is looked for less often, at [`SELDOM`].
+/// Attempts after which the wait becomes [`SELDOM`].
 const MANY: u32 = 300;
 const SELDOM: Duration = Duration::from_secs(3);
 
-/// Opens a port as boards need it: DTR set, at no speed that does harm.
+/// Opens a port with DTR set, at a harmless baud rate.
 pub(super) fn open_port(path: &Path, baud: Baud) -> Result<Box<dyn SerialPort>, PortError> {
     let builder = serialport::new(path.to_string_lossy(), baud.rate()).timeout(READ_PATIENCE).dtr_on_open(true);
     builder.open().map_err(|error| PortError::of(path, &error, &list_ports()))
 }
 
-/// Discards what came before a port was opened: it is old, and most likely cut. A board that is reset by being connected
-/// to sends on for a moment.
+/// Discards bytes from before the port was opened. A board that restarts on connection sends on for a moment.
 pub(super) fn discard_old(port: &dyn SerialPort, kind: BoardKind) {
     if kind.rank > 0 && !kind.native {
         std::thread::sleep(RESET);
@@ -60,21 +59,21 @@ pub(super) struct PortReader {
     shared: Arc<Shared>,
     port: PortInfo,
     baud: Baud,
-    /// The user has said the speed.
+    /// The user has set the baud rate.
     baud_is_given: bool,
     reconnect: bool,
 }
 
-/// What is known of a connection.
+/// State of a connection.
 struct Connection {
     bytes: u64,
     newest: Instant,
-    /// Something was understood since it was made.
+    /// Readings came.
     understood: bool,
-    /// Readings when they last became more, when that was, and bytes by then.
+    /// Number of readings when it last grew, when that was, and bytes by then.
     progress: (u64, Instant, u64),
     woken: bool,
-    /// The board was asked what it is.
+    /// The handshake was requested.
     asked: bool,
     scanned: Option<Instant>,
 }
@@ -108,7 +107,7 @@ impl PortReader {
         }
     }
 
-    /// Reads until the port is gone, and says why; none when it was told to stop.
+    /// Reads until the port is gone and returns why; none when stopped.
     fn listen(&mut self, mut port: Box<dyn SerialPort>) -> Option<String> {
         self.shared.set_state(LinkState::Waiting);
         self.shared.baud.store(self.baud.rate(), Ordering::Relaxed);
@@ -137,14 +136,14 @@ impl PortReader {
                 Err(error) if error.kind() == ErrorKind::BrokenPipe => {
                     return Some("the board was unplugged".to_owned());
                 }
-                Err(error) => return Some(format!("the port cannot be read any more ({error})")),
+                Err(error) => return Some(format!("the port failed ({error})")),
             }
             self.judge(&mut connection, port.as_mut());
         }
         None
     }
 
-    /// Where the connection stands, and whether something should be done about it.
+    /// Updates the state; wakes the port or scans baud rates where needed.
     fn judge(&mut self, connection: &mut Connection, port: &mut dyn SerialPort) {
         let readings = self.shared.readings.load(Ordering::Relaxed);
         let mute = connection.newest.elapsed();
@@ -171,13 +170,13 @@ impl PortReader {
             }
         } else if connection.bytes - bytes_then >= ENOUGH_BYTES && since.elapsed() >= patience {
             let due = connection.scanned.is_none_or(|scanned| scanned.elapsed() >= RESCAN);
-            // Text that is no readings is not the fault of the speed.
+            // Text without readings is not the fault of the baud rate.
             let is_text = lock(&self.shared.decoder).cadence().printable_share > TEXT;
             if native || self.baud_is_given || is_text {
                 self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() });
             } else if due {
-                self.try_speeds(port);
-                // What came meanwhile was heard by the scan alone.
+                self.scan_rates(port);
+                // Bytes meanwhile went to the scan alone.
                 let now = Instant::now();
                 connection.scanned = Some(now);
                 connection.newest = now;
@@ -186,25 +185,25 @@ impl PortReader {
         }
     }
 
-    /// Asks a board that has not said what it is; our firmware answers with its hello line, other sketches mind nothing.
+    /// Requests the handshake, if it has not come; other sketches ignore that.
     fn ask(&self, port: &mut dyn SerialPort) {
         if !lock(&self.shared.decoder).knows_board()
             && let Err(error) = port.write_all(b"?\n")
         {
-            tracing::debug!("the board cannot be asked: {error}");
+            tracing::debug!("the handshake cannot be requested: {error}");
         }
     }
 
-    fn try_speeds(&mut self, port: &mut dyn SerialPort) {
+    fn scan_rates(&mut self, port: &mut dyn SerialPort) {
         let cause = match scan(port, self.baud, &self.shared.stop) {
             Scan::Found(baud) => {
                 self.baud = baud;
                 self.shared.baud.store(baud.rate(), Ordering::Relaxed);
-                format!("the speed was found to be {} baud", baud.rate())
+                format!("the baud rate was found to be {}", baud.rate())
             }
             Scan::Nothing => {
                 self.shared.set_state(LinkState::Unreadable { hint: self.nonsense() });
-                "other speeds were tried".to_owned()
+                "other baud rates were tried".to_owned()
             }
         };
         let at_s = self.shared.began.elapsed().as_secs_f64();
@@ -215,13 +214,10 @@ impl PortReader {
         let port = self.port.path.display();
         if self.port.kind.native {
             format!(
-                "Nothing comes from {port}: does the sketch print to SerialUSB? One that prints to Serial is heard on the \
-                 programming port"
+                "No data from {port}: does the sketch print to SerialUSB? One that prints to Serial uses the programming port"
             )
         } else {
-            format!(
-                "Nothing comes from {port}: is the sketch on the board? Press its reset button, or try its other port"
-            )
+            format!("No data from {port}: is the sketch on the board? Press its reset button, or try its other port")
         }
     }
 
@@ -230,15 +226,15 @@ impl PortReader {
         let speeds = if self.port.kind.native {
             String::new()
         } else if self.baud_is_given {
-            format!(" at {} baud; leave the speed out to have the usual ones tried", self.baud.rate())
+            format!(" at {} baud; omit the rate to scan the usual ones", self.baud.rate())
         } else {
             let tried = Baud::SCANNED.map(|baud| baud.rate().to_string());
-            format!("; tried at {} baud", tried.join(", "))
+            format!("; tried {} baud", tried.join(", "))
         };
-        format!("{port} sends what are no readings{speeds}. The console shows what comes")
+        format!("Unreadable data from {port}{speeds}. The console shows it")
     }
 
-    /// Looks for the board until it is back; none when told to stop.
+    /// Waits for the board to come back; none when stopped.
     fn find_again(&mut self, cause: &str) -> Option<Box<dyn SerialPort>> {
         let mut cause = cause.to_owned();
         for attempt in 0u32.. {
@@ -257,7 +253,7 @@ impl PortReader {
                     self.port = found;
                     return Some(port);
                 }
-                // That it is still gone is no news.
+                // Still gone.
                 Err(error) if !found.path.exists() => tracing::debug!("{error}"),
                 Err(error) => cause = error.to_string(),
             }
@@ -266,7 +262,7 @@ impl PortReader {
     }
 }
 
-/// Lowers DTR and raises it again: a native port sends only to whom it takes for connected.
+/// Toggles DTR: a native port sends only to a connected host.
 fn wake(port: &mut dyn SerialPort, shared: &Shared) {
     for level in [false, true] {
         if let Err(error) = port.write_data_terminal_ready(level) {

@@ -1,4 +1,4 @@
-//! A file of captured bytes, heard as if it were a port.
+//! Replay of a file of captured bytes in place of a port.
 
 use super::link::{LinkState, Shared};
 use super::port_error::PortError;
@@ -9,7 +9,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
 
-/// A captured stream that is played.
+/// Replay of a captured stream.
 #[derive(Debug)]
 pub(super) struct Replay {
     pieces: CaptureReader<BufReader<File>>,
@@ -24,7 +24,7 @@ impl Replay {
         Ok(Self { pieces, speed })
     }
 
-    /// Plays it to its end, each piece when its time has come.
+    /// Plays it to its end, each piece at its time.
     pub(super) fn run(self, shared: &Shared) {
         let mut first_s = None;
         for piece in self.pieces {
@@ -43,6 +43,6 @@ impl Replay {
             }
             shared.bytes.push(piece);
         }
-        shared.set_state(LinkState::Ended { cause: Some("all captured bytes were played".to_owned()) });
+        shared.set_state(LinkState::Ended { cause: Some("end of the captured bytes".to_owned()) });
     }
 }

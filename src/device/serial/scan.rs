@@ -1,4 +1,4 @@
-//! At which speed a board speaks: each is listened to for a moment and judged by what can be read.
+//! Scan of baud rates: listens at each for a moment and judges it by its readings.
 
 use super::baud::Baud;
 use crate::protocol::Decoder;
@@ -8,35 +8,35 @@ use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long each speed is listened to: five lines of a board that sends ten a second.
+/// Time at each rate: five lines of a board that sends ten per second.
 const LISTEN: Duration = Duration::from_millis(600);
-/// The same where text comes that may become readings: three whole lines of a board that sends one a second.
+/// Time where text comes: three lines of a board that sends one per second.
 const LISTEN_TO_TEXT: Duration = Duration::from_secs(4);
-/// The same where nothing comes: a board that sends one line a second has sent one.
+/// Time where nothing comes: one line of a board that sends one per second.
 const LISTEN_TO_NOTHING: Duration = Duration::from_millis(1200);
-/// Readings that a speed must give.
+/// Readings that a rate must give.
 const READINGS: u64 = 3;
-/// Share of unreadable lines that a speed may give.
+/// Largest share of unreadable lines.
 const BAD_SHARE: f64 = 0.2;
-/// Share of bytes that must be text.
+/// Least share of printable bytes.
 const PRINTABLE: f64 = 0.95;
 
-/// What came of a scan.
+/// Result of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scan {
-    /// The board speaks at this speed; the port is set to it.
+    /// The rate of the board, to which the port is set.
     Found(Baud),
-    /// None is understood; the port is as it was.
+    /// None fits; the port is unchanged.
     Nothing,
 }
 
-/// Tries the usual speeds in turn.
+/// Tries the usual rates in turn.
 pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) -> Scan {
     for baud in Baud::SCANNED {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        // A speed that the port does not have is not the one.
+        // Rates that the port does not support are skipped.
         if port.set_baud_rate(baud.rate()).is_err() || port.clear(ClearBuffer::Input).is_err() {
             continue;
         }
@@ -45,7 +45,7 @@ pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) 
         }
     }
     if let Err(error) = port.set_baud_rate(current.rate()) {
-        tracing::debug!("the speed cannot be set back: {error}");
+        tracing::debug!("the baud rate cannot be restored: {error}");
     }
     Scan::Nothing
 }

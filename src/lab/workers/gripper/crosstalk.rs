@@ -52,7 +52,7 @@ impl Crossing {
         }
         let test = match &mut self.test {
             Some(test) => test,
-            empty @ None => empty.insert(CrosstalkTest::new(board)?),
+            empty @ None => empty.insert(CrosstalkTest::new(board).map_err(|error| error.to_string())?),
         };
         test.see(board);
         test.feed(reading);

@@ -1,24 +1,23 @@
-//! Streams that no board should send, without end, and what must hold whatever they are. The same seed gives the same
-//! stream. A test hears a second of it; `palpate workshop --fuzz-wire SECONDS` goes on for as long as one likes.
+//! Random streams for the protocol decoder, and what must hold for its events whatever the stream. The same seed gives the
+//! same stream.
 
-use super::checksum::checksum;
-use super::decoder::{DecodedEvent, Decoder};
+use palpate_device::protocol::{DecodedEvent, Decoder, checksum};
 
-/// What is never exceeded: channels of a board.
+/// Largest number of channels of a board.
 const MOST_CHANNELS: usize = 64;
 
-/// Makes streams up.
+/// Random stream.
 #[derive(Clone, Debug)]
-pub struct FuzzStream {
+pub(crate) struct FuzzStream {
     state: u64,
     now_s: f64,
     sample: u64,
     format: u64,
 }
 
-/// Listens to one, and checks what it hears.
+/// Decoder of a stream that checks its events.
 #[derive(Clone, Debug, Default)]
-pub struct FuzzListener {
+pub(crate) struct FuzzListener {
     decoder: Decoder,
     heard: Vec<DecodedEvent>,
     last_s: Option<f64>,
@@ -27,8 +26,8 @@ pub struct FuzzListener {
 }
 
 impl FuzzStream {
-    /// A stream.
-    pub fn new(seed: u64) -> Self {
+    /// Begins a stream.
+    pub(crate) fn new(seed: u64) -> Self {
         Self { state: seed, now_s: 0.0, sample: 0, format: 0 }
     }
 
@@ -44,8 +43,8 @@ impl FuzzStream {
         self.draw() % n
     }
 
-    /// Puts the next bytes into `out`; when they arrive (s).
-    pub fn next(&mut self, out: &mut Vec<u8>) -> f64 {
+    /// Puts the next bytes into `out` and returns their time of arrival (s).
+    pub(crate) fn next(&mut self, out: &mut Vec<u8>) -> f64 {
         out.clear();
         self.now_s += match self.below(50) {
             0 => 3.0,
@@ -54,13 +53,13 @@ impl FuzzStream {
         };
         if self.below(80) == 0 {
             self.format = (self.format + 1) % 9;
-            // Another sketch says hello; without a checksum it has none in its lines.
+            // The handshake of another sketch; without a checksum its lines have none.
             out.extend_from_slice(b"# tactile-gripper fw=1\n");
         }
         for _ in 0..=self.below(3) {
             self.line(out);
         }
-        // What happens to bytes on their way.
+        // Damage on the way.
         match self.below(12) {
             0 => {
                 let end = self.below(out.len() as u64 + 1) as usize;
@@ -120,17 +119,17 @@ impl FuzzStream {
 }
 
 impl FuzzListener {
-    /// Takes in bytes; an error says what does not hold.
-    pub fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), String> {
+    /// Takes in bytes; an error names the broken rule and the event.
+    pub(crate) fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), String> {
         self.decoder.push(bytes, arrived_s, &mut self.heard);
         for event in std::mem::take(&mut self.heard) {
             self.check(&event).map_err(|what| format!("{what}: {event:?}"))?;
         }
-        let told = self.decoder.cadence().samples;
-        if told == self.readings {
+        let counted = self.decoder.cadence().samples;
+        if counted == self.readings {
             Ok(())
         } else {
-            Err(format!("{told} readings are told, {} were heard", self.readings))
+            Err(format!("cadence counts {counted} readings, {} were decoded", self.readings))
         }
     }
 
@@ -140,10 +139,10 @@ impl FuzzListener {
                 self.readings += 1;
                 let before = self.last_s.replace(reading.t_s);
                 if before.is_some_and(|before| reading.t_s <= before) {
-                    return Err("time does not move on");
+                    return Err("time does not increase");
                 }
                 if reading.counts.len() != self.channels {
-                    return Err("a reading has other channels than the board");
+                    return Err("a reading and the board differ in channels");
                 }
                 if !reading.t_s.is_finite() || reading.counts.iter().flatten().any(|count| !count.is_finite()) {
                     return Err("a number is not finite");
@@ -151,12 +150,12 @@ impl FuzzListener {
             }
             DecodedEvent::Gap(gap) => {
                 if self.last_s != Some(gap.from_s) || gap.to_s <= gap.from_s {
-                    return Err("a gap does not lie behind the last reading");
+                    return Err("a gap does not follow the last reading");
                 }
             }
             DecodedEvent::Board(board) => {
                 if board.channels.len() < self.channels || board.channels.len() > MOST_CHANNELS {
-                    return Err("channels were taken away, or are too many");
+                    return Err("channels were removed, or are too many");
                 }
                 self.channels = board.channels.len();
             }
@@ -166,7 +165,7 @@ impl FuzzListener {
     }
 
     /// Readings so far.
-    pub fn readings(&self) -> u64 {
+    pub(crate) fn readings(&self) -> u64 {
         self.readings
     }
 }
