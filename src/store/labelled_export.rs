@@ -75,7 +75,7 @@ pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<boo
 
 /// Writes all labelled trials into a folder that is empty or does not exist.
 pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportError> {
-    let rows: Vec<LabelledTrial> = store.labelled_trials()?.into_iter().filter(LabelledTrial::counts).collect();
+    let rows: Vec<LabelledTrial> = store.labels().trials()?.into_iter().filter(LabelledTrial::counts).collect();
     if rows.is_empty() {
         return Err(ExportError::Nothing);
     }

@@ -6,8 +6,11 @@ mod board_export;
 mod board_signals;
 mod board_trials;
 mod calibrations;
+mod checksum;
 mod csv_export;
 mod csv_import;
+#[cfg(test)]
+mod damage_tests;
 mod disk;
 mod journal;
 #[cfg(test)]
@@ -17,8 +20,11 @@ mod labelled_export;
 mod labelled_trials;
 pub mod labels;
 mod merge;
+#[cfg(test)]
+mod old_store_tests;
 mod points_csv;
 mod readings;
+mod schema;
 mod store;
 mod store_error;
 #[cfg(test)]
@@ -31,11 +37,12 @@ pub use blob::{BlobError, decode_frames, encode_frames};
 pub use board_export::write_board_csv;
 pub use board_signals::BoardSignals;
 pub use board_trials::{BOARD_RIG, BoardChunk, BoardInfo, BoardTrial};
-pub use calibrations::{CalibrationId, Serving, StoredCalibration};
+pub use calibrations::{CalibrationId, CalibrationRepository, Serving, StoredCalibration};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use disk::check_space;
-pub use journal::{Change, JournalEntry};
+pub use journal::{Change, JournalEntry, JournalRepository};
+pub use label_repository::LabelRepository;
 pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};
 pub use merge::Merged;
 pub use points_csv::{PointsError, read_points_csv};

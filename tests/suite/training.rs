@@ -42,8 +42,8 @@ fn calibrate(store: &mut Store) {
         let part = sensor.channel().to_owned();
         let input = Input::on(&Board::default(), sensor);
         let record = Record { part, kind, input, points, bending: None, note: String::new() };
-        store.add_calibration(&record).unwrap();
-        store.mount_part(sensor, &record.part).unwrap();
+        store.calibrations().add(&record).unwrap();
+        store.calibrations().mount(sensor, &record.part).unwrap();
     }
 }
 

@@ -55,31 +55,31 @@ pub(super) fn run(what: &Labelling, store: &mut Store) -> Result<(), Failure> {
     match what {
         Labelling::Label { id, name, unsure } => label(store, *id, name, *unsure),
         Labelling::Note { id, text } => {
-            store.set_note(*id, text)?;
+            store.labels().set_note(*id, text)?;
             say(if text.trim().is_empty() { format!("trial {id}: note removed") } else { format!("trial {id}: noted") })
         }
         Labelling::Tag { id, tags } => {
-            store.set_tags(*id, tags)?;
+            store.labels().set_tags(*id, tags)?;
             say(format!("trial {id}: tags [{}]", tags.join(", ")))
         }
-        Labelling::Undo => match store.undo()? {
+        Labelling::Undo => match store.journal().undo()? {
             Some(entry) => say(format!("taken back: {}", entry.sentence())),
             None => say("there is nothing to take back"),
         },
-        Labelling::Redo => match store.redo()? {
+        Labelling::Redo => match store.journal().redo()? {
             Some(entry) => say(format!("no longer taken back: {}", entry.restored())),
             None => say("nothing was taken back since the last change"),
         },
-        Labelling::Journal { last, json } => journal(&store.journal(*last)?, *json),
+        Labelling::Journal { last, json } => journal(&store.journal().entries(*last)?, *json),
     }
 }
 
 fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(), Failure> {
     let name = class_name(name)?;
-    let planned = store.label_plan()?.objects.iter().any(|object| object.name == name);
-    let known = planned || store.labelled_trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
-    store.label_trial(id, &name)?;
-    store.set_unsure(id, unsure)?;
+    let planned = store.labels().plan()?.objects.iter().any(|object| object.name == name);
+    let known = planned || store.labels().trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
+    store.labels().set_label(id, &name)?;
+    store.labels().set_unsure(id, unsure)?;
     if !known && name != palpate_sim::objects::EMPTY {
         warn(&format!(
             "\"{name}\" is a new class: it is not in the plan and no trial has it (`trials undo` takes it back)"

@@ -246,7 +246,7 @@ impl BoardRecorder {
     /// What a finished trial is flagged with, and its small picture.
     fn examine(&mut self, store: &Store) {
         // Without calibrations counts are judged: a damaged record is no reason not to end a trial.
-        let serving = store.serving(Some(self.id), &[]).unwrap_or_else(|error| {
+        let serving = store.calibrations().serving(Some(self.id), &[]).unwrap_or_else(|error| {
             tracing::warn!("the flags of trial {} are found without calibrations: {error}", self.id);
             Serving::default()
         });

@@ -187,7 +187,7 @@ impl Running {
         discarded: bool,
     ) -> Result<EndedTrial, StoreError> {
         let mut recorded = self.recorder.finish(store, status, self.notes)?;
-        let given_up = discarded.then(|| store.discard_trial(recorded.id));
+        let given_up = discarded.then(|| store.delete(&[recorded.id]));
         let discarded = matches!(given_up, Some(Ok(())));
         if let Some(Err(error)) = given_up {
             recorded.warnings.push(format!("it could not be discarded: {error}"));

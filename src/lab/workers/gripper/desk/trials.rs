@@ -188,7 +188,7 @@ impl Desk {
         let guess = guess.zip(self.model.clone());
         let finished = open(&mut self.store, &self.path).and_then(|store| {
             let ended = running.finish(store, &status, discarded).map_err(|error| error.to_string())?;
-            let guessed = guess.map_or(Ok(()), |(pmf, model)| store.set_guess(ended.id, &model, &pmf));
+            let guessed = guess.map_or(Ok(()), |(pmf, model)| store.labels().set_guess(ended.id, &model, &pmf));
             Ok((ended, guessed))
         });
         match finished {
