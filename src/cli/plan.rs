@@ -47,7 +47,7 @@ struct Told {
 }
 
 pub(super) fn run(arguments: &PlanArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let mut store = open_store(store)?;
+    let store = open_store(store)?;
     let mut plan = store.labels().plan()?;
     match arguments.what.as_ref().unwrap_or(&What::Show) {
         What::Show => {}

@@ -311,7 +311,7 @@ pub(super) mod tests {
     #[test]
     fn versions_count_up_within_a_part_and_survive_an_exchange() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
-        let mut here = store(&folder, "here");
+        let here = store(&folder, "here");
         let versions =
             [("A", 20e3), ("B", 25e3), ("A", 21e3)].map(|(part, flat)| here.calibrations().add(&strip(part, flat)));
         let versions: Vec<i64> =
@@ -319,7 +319,7 @@ pub(super) mod tests {
         assert_eq!(versions, [1, 1, 2]);
         here.calibrations().withdraw(1, true)?;
         let text = serde_json::to_string(&here.calibrations().list(None)?)?;
-        let mut there = store(&folder, "there");
+        let there = store(&folder, "there");
         there.calibrations().add(&strip("A", 30e3))?;
         let others: Vec<StoredCalibration> = serde_json::from_str(&text)?;
         assert_eq!((there.calibrations().import(&others)?, there.calibrations().import(&others)?), (3, 0));

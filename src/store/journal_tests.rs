@@ -33,22 +33,22 @@ fn labels(store: &Store) -> Result<Vec<Option<String>>, StoreError> {
 fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("trials.sqlite");
-    let mut store = store_with(&path, &[""])?;
+    let store = store_with(&path, &[""])?;
     assert_eq!(labels(&store)?, [None]);
     store.labels().set_label(1, " lemon ")?;
     store.labels().set_label(1, "cube")?;
     drop(store);
-    let mut store = Store::open(&path)?;
+    let store = Store::open(&path)?;
     let undone = store.journal().undo()?.ok_or("something was done")?;
     assert_eq!(undone.sentence(), "trial 1: label lemon -> cube");
     assert_eq!(labels(&store)?, [Some("lemon".to_owned())]);
     drop(store);
-    let mut store = Store::open(&path)?;
+    let store = Store::open(&path)?;
     store.journal().undo()?.ok_or("one more")?;
     assert_eq!((labels(&store)?, store.journal().undo()?), (vec![None], None));
     store.journal().redo()?.ok_or("it can be done again")?;
     drop(store);
-    let mut store = Store::open(&path)?;
+    let store = Store::open(&path)?;
     store.journal().redo()?.ok_or("and the other too")?;
     assert_eq!((labels(&store)?, store.journal().redo()?), (vec![Some("cube".to_owned())], None));
     let told: Vec<String> = store.journal().entries(100)?.iter().map(JournalEntry::sentence).collect();
@@ -62,7 +62,7 @@ fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
 #[test]
 fn something_new_leaves_nothing_to_be_done_again() -> Outcome {
     let folder = tempfile::tempdir()?;
-    let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
+    let store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
     store.labels().set_note(1, "slipped")?;
     store.journal().undo()?.ok_or("the note")?;
     // What a model says, and looking at a trial, is nothing to undo and in nobody's way.
@@ -163,7 +163,7 @@ fn nonsense_is_refused_and_changes_nothing() -> Outcome {
 fn the_plan_is_kept_and_told() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("trials.sqlite");
-    let mut store = store_with(&path, &[])?;
+    let store = store_with(&path, &[])?;
     let mut plan = store.labels().plan()?;
     assert_eq!(plan, LabelPlan::default());
     plan.set("mug", 40)?;
@@ -182,7 +182,7 @@ fn all_that_goes_with_a_trial_is_merged_and_only_once() -> Outcome {
     let (here, there) = (folder.path().join("here.sqlite"), folder.path().join("there.sqlite"));
     let mut ours = store_with(&here, &["box"])?;
     ours.labels().set_label(1, "case")?;
-    let mut theirs = store_with(&there, &["", "cube"])?;
+    let theirs = store_with(&there, &["", "cube"])?;
     theirs.labels().set_label(1, "lemon")?;
     theirs.labels().set_note(1, "slipped")?;
     theirs.labels().set_tags(1, &["wet".to_owned(), "late".to_owned()])?;
@@ -227,7 +227,7 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
          PRAGMA user_version = 6;",
     )?;
     drop(store);
-    let mut store = Store::open(&path)?;
+    let store = Store::open(&path)?;
     let row = &store.labels().trials()?[0];
     assert_eq!((row.object.as_deref(), row.cadence.as_str()), (Some("lemon"), "50.00 Hz, jitter 0.0 ms, 2 lost"));
     assert!(row.flags.is_empty() && row.sparkline.iter().all(Vec::is_empty));

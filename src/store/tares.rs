@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn a_tare_serves_its_part_until_a_newer_calibration() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
-        let mut store = Store::open(&folder.path().join("s"))?;
+        let store = Store::open(&folder.path().join("s"))?;
         assert_eq!(store.calibrations().tare()?, None);
         for (sensor, part) in [(Sensor::FlexLeft, "A"), (Sensor::FlexRight, "B")] {
             store.calibrations().add(&strip(part, 24e3))?;

@@ -408,7 +408,7 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     drop(store);
     refused(at, &["recognise", "1"], &["trial 1", "it is not known which part is the left flex strip"]);
     refused(at, &["fit", "1", "2"], &["no curvature"]);
-    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    let store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {
         store.calibrations().add(&calibration.record).unwrap();
         store.calibrations().mount(*sensor, &calibration.record.part).unwrap();

@@ -152,7 +152,7 @@ impl Desk {
 }
 
 fn store_calibrations(path: &Path, parts: &HiddenParts) {
-    let mut store = Store::open(path).unwrap();
+    let store = Store::open(path).unwrap();
     for (sensor, calibration) in calibrated(parts, 1).1 {
         store.calibrations().add(&calibration.record).unwrap();
         store.calibrations().mount(sensor, &calibration.record.part).unwrap();

@@ -18,7 +18,7 @@ impl Workbench {
         let draft = &mut self.view.draft;
         match action {
             DeskAction::Record => self.begin_trial(),
-            DeskAction::Discard => self.delete(&[]),
+            DeskAction::Discard => self.discard_trial(),
             DeskAction::Give => self.give_label(),
             DeskAction::Choose(place) => {
                 let objects = self.labeller.view().map(|labels| draft.objects(&labels).len());
