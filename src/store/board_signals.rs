@@ -1,5 +1,5 @@
-//! Signals of a trial of a real gripper: its readings converted by the calibrations of its parts. Derived each time, so that a
-//! better calibration improves old trials too.
+//! Signals of a trial of a real gripper: its readings converted by the calibrations of its parts. Derived each time, so
+//! that a better calibration improves old trials too.
 
 use super::calibrations::{CalibrationId, Serving};
 use super::store::Store;
@@ -38,8 +38,8 @@ impl BoardSignals {
 }
 
 impl Store {
-    /// Derives the signals of a trial of a real gripper with the newest calibrations of its parts, or those asked for; none for
-    /// a trial of another kind.
+    /// Derives the signals of a trial of a real gripper with the newest calibrations of its parts, or those asked for;
+    /// none for a trial of another kind.
     pub fn board_signals(&self, id: TrialId, asked: &[CalibrationId]) -> Result<Option<BoardSignals>, StoreError> {
         let Some(mut trial) = self.board_trial(id)? else { return Ok(None) };
         let began = trial.about.began_s;
@@ -71,8 +71,8 @@ const HALF_STEP_BAR: f64 = 0.026;
 /// The board reports a new pressure within this time (s).
 const ANSWER_S: f64 = 0.1;
 
-/// Whether the reported pressures follow the commands, whose times are then more exact. Where the board refused a command or
-/// vented by itself, only its reports are right.
+/// Whether the reported pressures follow the commands, whose times are then more exact. Where the board refused a
+/// command or vented by itself, only its reports are right.
 fn follows_commands(commanded: &[(f64, f64)], reported: &[(f64, f64)]) -> bool {
     let other = |(t_s, bar): &&(f64, f64)| {
         let last = commanded.iter().take_while(|(from_s, _)| from_s <= t_s).last();

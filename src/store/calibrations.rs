@@ -1,8 +1,8 @@
 //! Calibrations in the store, and which part is mounted where.
 //!
-//! Versions count up within a part; a calibration is never changed. The newest calibration of a part serves all its trials,
-//! older ones too, unless it was withdrawn or another one is asked for. Curves are fitted when they are needed: a record that
-//! a later program refuses causes a warning, and the one before it serves.
+//! Versions count up within a part; a calibration is never changed. The newest calibration of a part serves all its
+//! trials, older ones too, unless it was withdrawn or another one is asked for. Curves are fitted when they are needed:
+//! a record that a later program refuses causes a warning, and the one before it serves.
 
 use super::store::Store;
 use super::store_error::StoreError;

@@ -6,8 +6,8 @@ use std::path::Path;
 /// Space kept free for other programs and the store's own log (bytes).
 const RESERVE: f64 = 32e6;
 
-/// Refuses a trial that needs more bytes than are free on the store's disk. Where the system does not report free space, the
-/// trial may begin.
+/// Refuses a trial that needs more bytes than are free on the store's disk. Where the system does not report free
+/// space, the trial may begin.
 pub fn check_space(store: &Path, needed: f64) -> Result<(), StoreError> {
     match fs4::available_space(folder_of(store)) {
         Ok(free) => judge(store, free, needed),

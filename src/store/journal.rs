@@ -1,8 +1,8 @@
-//! The journal: every change of a label, note, tag, deletion or plan. Entries are only ever added, in the transaction of their
-//! change; undoing adds one as well. SQLite triggers refuse to alter or remove them.
+//! The journal: every change of a label, note, tag, deletion or plan. Entries are only ever added, in the transaction
+//! of their change; undoing adds one as well. SQLite triggers refuse to alter or remove them.
 //!
-//! Undo and redo are read from the journal, so that they work after a restart. Programs that share a store share its history:
-//! undo takes back the last change, whichever program made it.
+//! Undo and redo are read from the journal, so that they work after a restart. Programs that share a store share its
+//! history: undo takes back the last change, whichever program made it.
 
 use super::store::{Store, json};
 use super::store_error::StoreError;

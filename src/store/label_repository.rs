@@ -1,5 +1,5 @@
-//! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an entry
-//! to the journal in the same transaction.
+//! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an
+//! entry to the journal in the same transaction.
 
 use super::board_trials::BOARD_RIG;
 use super::journal::{Change, append, change};
@@ -104,7 +104,7 @@ impl LabelRepository<'_> {
         found.map(|(model, pmf)| Ok(Guess { model, pmf: serde_json::from_str(&pmf).map_err(bad)? })).transpose()
     }
 
-    /// Marks a trial as reviewed: somebody looked at it again and kept its label.
+    /// Marks a trial as reviewed: its label was checked and kept.
     pub fn mark_reviewed(&self, id: TrialId) -> Result<(), StoreError> {
         self.change_trial(id, |state| Ok((!state.reviewed).then_some(Change::Reviewed)))
     }

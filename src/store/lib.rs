@@ -1,4 +1,4 @@
-//! Trials on disk: an SQLite store that survives kills and shares itself between programs, and CSV for everyone else.
+//! Trials on disk: an SQLite store that survives kills and that several programs can share; CSV import and export.
 
 mod blob;
 mod board_blob;

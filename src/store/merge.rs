@@ -1,4 +1,5 @@
-//! Merging: copies the trials of another store into this one, such as the parts of a data set that several machines collected.
+//! Merging: copies the trials of another store into this one, such as the parts of a data set that several machines
+//! collected.
 
 use super::schema::TABLES_OF_A_TRIAL;
 use super::store::Store;
@@ -69,8 +70,8 @@ fn columns_of(transaction: &Transaction<'_>, table: &str, key: &str) -> rusqlite
 }
 
 impl Store {
-    /// Copies the trials of another store that this one does not have. Trials keep their identity, so that merging twice adds
-    /// nothing the second time; they get new numbers.
+    /// Copies the trials of another store that this one does not have. Trials keep their identity, so that merging
+    /// twice adds nothing the second time; they get new numbers.
     pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
         if !other.is_file() {
             let cause = "no such file".to_owned();

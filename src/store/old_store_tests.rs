@@ -1,5 +1,5 @@
-//! A store that version 0.1.0 of the program made still opens, with everything in it. It holds a simulated grasp, two imported
-//! trials, two trials of the emulated board, calibrations, tares, labels, notes, a plan and their journal.
+//! A store that version 0.1.0 of the program made still opens, with everything in it. It holds a simulated grasp, two
+//! imported trials, two trials of the emulated board, calibrations, tares, labels, notes, a plan and their journal.
 
 use super::*;
 use crate::labels::Flag;

@@ -1,5 +1,5 @@
-//! The SQLite store: its connection, and the trials in it. A write-ahead log, so that a kill at any moment loses at most the
-//! chunk being written and never harms another trial, and so that several programs can share one store.
+//! The SQLite store: its connection, and the trials in it. A write-ahead log, so that a kill at any moment loses at
+//! most the chunk being written and never harms another trial, and so that several programs can share one store.
 //!
 //! Tables and migrations are in `schema`. Each group of tables beside trials has a repository: [`Store::labels`],
 //! [`Store::journal`], [`Store::calibrations`].

@@ -33,8 +33,8 @@ pub struct StoredTare {
 }
 
 impl CalibrationRepository<'_> {
-    /// Stores the zeros of the mounted parts, measured through the calibrations that serve now. A zero is valid until a newer
-    /// tare or calibration of the part. Leaves out sensors without a calibration or a zero.
+    /// Stores the zeros of the mounted parts, measured through the calibrations that serve now. A zero is valid until a
+    /// newer tare or calibration of the part. Leaves out sensors without a calibration or a zero.
     pub fn add_tare(&self, zero: &Zero) -> Result<StoredTare, StoreError> {
         let serving = self.serving(None, &[])?;
         let fault = |e: rusqlite::Error| self.store.fault(&e);

@@ -406,7 +406,7 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
         stored(&mut store, &board, readings, &of(&known), object, 0.5);
     }
     drop(store);
-    refused(at, &["recognise", "1"], &["trial 1", "it is not known which part is the left flex strip"]);
+    refused(at, &["recognise", "1"], &["trial 1", "no part is mounted as the left flex strip"]);
     refused(at, &["fit", "1", "2"], &["no curvature"]);
     let store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {

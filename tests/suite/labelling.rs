@@ -114,9 +114,9 @@ fn an_afternoon_of_labels_from_the_terminal() {
     let journal = json(at, &["trials", "journal", "--json", "--last", "100"]);
     let journal = journal.as_array().unwrap();
     assert_eq!((journal.len(), &journal[0]["what"], &journal[1]["what"]), (13, &"plan".into(), &"plan".into()));
-    assert!(said(&["trials", "journal"]).contains("takes back 1"));
+    assert!(said(&["trials", "journal"]).contains("undoes 1"));
     refused(at, &["snapshot", "--trial", "1", "--out", "x.png"], &["was not simulated", "palpate trials export 1"]);
-    refused(at, &["recognise", "1"], &["trial 1", "it is not known which part"]);
+    refused(at, &["recognise", "1"], &["trial 1", "no part is mounted"]);
     refused(at, &["trials", "label", "9", "ball"], &["no trial 9"]);
 }
 
