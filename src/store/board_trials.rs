@@ -1,7 +1,7 @@
 //! Trials of a real gripper in the store: the bytes that its board sent, and the readings parsed from them.
 
-use super::board_blob::{decode_readings, encode_readings};
 use super::checksum::{checksum, is_intact};
+use super::reading_blob::{decode_readings, encode_readings};
 use super::store::{Store, insert_info, json, set_complete};
 use super::store_error::{StoreError, fault};
 use crate::labels::{FlagRemark, Sparkline};
@@ -133,7 +133,8 @@ impl Store {
         let sql =
             "SELECT number, readings, CAST(gaps AS BLOB), checksum FROM board_chunks WHERE trial = ?1 ORDER BY number";
         let columns = |row: &Row<'_>| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
-        let chunks: Vec<(i64, Vec<u8>, Vec<u8>, Option<u32>)> = self
+        type Columns = (i64, Vec<u8>, Vec<u8>, Option<u32>);
+        let chunks: Vec<Columns> = self
             .connection
             .prepare(sql)
             .and_then(|mut statement| statement.query_map([id], columns)?.collect())

@@ -1,4 +1,4 @@
-//! Labels, notes and discarded trials in the store: every change is told, and what was done can be undone.
+//! Labels, notes and deletions in the store: every change is in the journal and can be undone.
 
 use super::*;
 use crate::labels::{LabelPlan, LabelledTrial};
@@ -51,10 +51,10 @@ fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
     let store = Store::open(&path)?;
     store.journal().redo()?.ok_or("and the other too")?;
     assert_eq!((labels(&store)?, store.journal().redo()?), (vec![Some("cube".to_owned())], None));
-    let told: Vec<String> = store.journal().entries(100)?.iter().map(JournalEntry::sentence).collect();
-    assert_eq!(told.len(), 6);
-    assert_eq!(told[5], "trial 1: label unlabelled -> lemon");
-    assert_eq!(told[3], "trial 1: label cube -> lemon (undoes 2)");
+    let entries: Vec<String> = store.journal().entries(100)?.iter().map(JournalEntry::sentence).collect();
+    assert_eq!(entries.len(), 6);
+    assert_eq!(entries[5], "trial 1: label unlabelled -> lemon");
+    assert_eq!(entries[3], "trial 1: label cube -> lemon (undoes 2)");
     assert_eq!(store.journal().entries(2)?.len(), 2);
     Ok(())
 }
@@ -83,12 +83,12 @@ fn the_journal_is_only_added_to() -> Outcome {
         let refused = store.connection.execute(sql, []).expect_err("triggers refuse it").to_string();
         assert!(refused.contains("only added to"), "{refused}");
     }
-    // Removing a trial for good leaves what is told of it.
+    // Purging a trial leaves its entries.
     store.delete(&[1])?;
     assert_eq!(store.purge()?, 1);
-    let told = store.journal().entries(9)?;
-    assert_eq!((told.len(), told[1].trial), (2, None));
-    assert!(told[1].sentence().ends_with("(purged): label unlabelled -> lemon"), "{}", told[1].sentence());
+    let entries = store.journal().entries(9)?;
+    assert_eq!((entries.len(), entries[1].trial), (2, None));
+    assert!(entries[1].sentence().ends_with("(purged): label unlabelled -> lemon"), "{}", entries[1].sentence());
     assert_eq!(store.journal().undo()?, None, "there is nothing left to put it back on");
     Ok(())
 }
@@ -97,7 +97,7 @@ fn the_journal_is_only_added_to() -> Outcome {
 fn a_change_and_its_entry_are_one() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon", "cube"])?;
-    // As if the disk were full at the worst moment: after the change, while it is told.
+    // As if the disk were full at the worst moment: after the change, before its entry.
     store
         .connection
         .execute_batch("CREATE TRIGGER full BEFORE INSERT ON journal BEGIN SELECT raise(ABORT, 'no room'); END;")?;
@@ -138,20 +138,20 @@ fn nonsense_is_refused_and_changes_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
     let simulated = store.begin(&info("cube"))?;
-    let told = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
-    assert!(told(store.labels().set_label(1, "  ")).contains("cannot be empty"));
-    assert!(told(store.labels().set_label(simulated, "ball")).contains("only trials of the real gripper"));
-    assert!(told(store.labels().set_label(9, "ball")).contains("no trial 9"));
-    assert!(told(store.labels().set_note(1, &"x".repeat(4001))).contains("4000"));
-    assert!(told(store.labels().set_tags(1, &["a\u{7}".to_owned()])).contains("control"));
-    assert!(told(store.labels().set_guess(1, "m", &[("a".to_owned(), 0.4)])).contains("sum to 0.4"));
-    assert!(told(store.labels().set_guess(1, "m", &[("a".to_owned(), f64::NAN)])).contains("not stored"));
+    let message = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
+    assert!(message(store.labels().set_label(1, "  ")).contains("cannot be empty"));
+    assert!(message(store.labels().set_label(simulated, "ball")).contains("only trials of the real gripper"));
+    assert!(message(store.labels().set_label(9, "ball")).contains("no trial 9"));
+    assert!(message(store.labels().set_note(1, &"x".repeat(4001))).contains("4000"));
+    assert!(message(store.labels().set_tags(1, &["a\u{7}".to_owned()])).contains("control"));
+    assert!(message(store.labels().set_guess(1, "m", &[("a".to_owned(), 0.4)])).contains("sum to 0.4"));
+    assert!(message(store.labels().set_guess(1, "m", &[("a".to_owned(), f64::NAN)])).contains("not stored"));
     store.delete(&[1])?;
-    assert!(told(store.labels().set_label(1, "ball")).contains("restore"));
-    assert!(told(store.delete(&[1])).contains("restore"));
+    assert!(message(store.labels().set_label(1, "ball")).contains("restore"));
+    assert!(message(store.delete(&[1])).contains("restore"));
     store.restore(&[1])?;
-    assert!(told(store.restore(&[1])).contains("not deleted"));
-    assert_eq!(store.journal().entries(9)?.len(), 2, "only what was done is told");
+    assert!(message(store.restore(&[1])).contains("not deleted"));
+    assert_eq!(store.journal().entries(9)?.len(), 2, "refused changes have no entry");
     // A simulated trial takes notes all the same.
     store.labels().set_note(simulated, "odd")?;
     store.labels().set_label(1, "lemon")?;
@@ -160,7 +160,7 @@ fn nonsense_is_refused_and_changes_nothing() -> Outcome {
 }
 
 #[test]
-fn the_plan_is_kept_and_told() -> Outcome {
+fn the_plan_is_kept_and_in_the_journal() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("trials.sqlite");
     let store = store_with(&path, &[])?;
@@ -197,9 +197,9 @@ fn all_that_goes_with_a_trial_is_merged_and_only_once() -> Outcome {
     let (all, before) = (ours.labels().trials()?, theirs.labels().trials()?);
     assert_eq!(all[1..], [numbered(2, &before[0]), numbered(3, &before[1])]);
     assert_eq!(ours.labels().guess(2)?, theirs.labels().guess(1)?);
-    let told = ours.journal().entries(99)?;
-    assert_eq!((told.len(), told[0].merged, told[0].undoes), (9, true, Some(told[1].number)));
-    assert_eq!(told[1].sentence(), "trial 3: note \"x\"");
+    let entries = ours.journal().entries(99)?;
+    assert_eq!((entries.len(), entries[0].merged, entries[0].undoes), (9, true, Some(entries[1].number)));
+    assert_eq!(entries[1].sentence(), "trial 3: note \"x\"");
     assert_eq!(ours.labels().plan()?, LabelPlan::default(), "the plan is a matter of each store");
     assert_eq!((ours.merge_from(&there)?.added, ours.journal().entries(99)?.len()), (0, 9));
     assert_eq!(

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! trials       one row per trial; `state` is 'recording' until its last chunk is stored
-//! chunks       frames of a simulated trial, about a second each; see `blob`
+//! chunks       frames of a simulated trial, about a second each; see `frame_blob`
 //! readings     channels of an imported trial
 //! board_trials one row per trial of a real gripper: its board, cadence and flags
 //! board_chunks readings, gaps and bytes of such a trial, at most a second each

@@ -6,8 +6,8 @@
 //!
 //! Deleting marks a trial; purging removes it. Chunks are only ever added.
 
-use super::blob::{decode_frames, encode_frames};
 use super::checksum::{checksum, is_intact};
+use super::frame_blob::{decode_frames, encode_frames};
 use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
 use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain};
 use crate::labels::{FlagRemark, flaws};

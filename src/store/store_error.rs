@@ -1,6 +1,6 @@
 //! Errors of the store, as sentences for the user.
 
-use super::blob::BlobError;
+use super::frame_blob::BlobError;
 use crate::labels::{ClassNameError, PlanError, shown_name};
 use palpate_tactile::trial::TrialId;
 use rusqlite::ErrorCode;

@@ -186,7 +186,7 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
         }
     }
     // Nothing is overwritten, and nothing half-made is left behind.
-    refused(at, &["trials", "export", "--labelled", "--out", "out"], &["out", "in it already"]);
+    refused(at, &["trials", "export", "--labelled", "--out", "out"], &["out", "is not empty"]);
     std::fs::write(at.join("file"), "mine").unwrap();
     refused(at, &["trials", "export", "--labelled", "--out", "file/out"], &["cannot write"]);
     refused(at, &["trials", "export", "--labelled", "--out", "new", "--store", "none.sqlite"], &["no trial", "label"]);

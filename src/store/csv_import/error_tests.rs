@@ -71,6 +71,12 @@ fn rows_that_do_not_fit() {
 }
 
 #[test]
+fn an_endless_row_is_cut() {
+    let said = read_trials(std::io::repeat(b'x'), "f").expect_err("never ends").to_string();
+    assert!(said.contains("longer than 1 MiB"), "{said}");
+}
+
+#[test]
 fn numbers_that_are_none() {
     rows_refused("a,x,0,,,1\na,x,1,,,oops\n", &["line 3: \"oops\" in the column \"p\" is not a number"]);
     rows_refused("a,x,0,,,oops\na,x,1,,,1\n", &["line 2: \"oops\"", "or remove the column"]);
