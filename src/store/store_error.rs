@@ -33,7 +33,7 @@ pub enum StoreError {
         cause: String,
     },
     /// A file of another program, or no database at all.
-    #[error("\"{path}\" is not a Palpate store; choose another file with --store", path = path.display())]
+    #[error("\"{path}\" is not a store of Palpate; choose another file with --store", path = path.display())]
     Foreign {
         /// Path of the file.
         path: PathBuf,
