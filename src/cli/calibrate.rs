@@ -118,7 +118,8 @@ struct Report {
 }
 
 fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: &Store) -> Result<String, Failure> {
-    let mounted = || -> Result<Option<String>, Failure> { Ok(store.mounted_parts()?[sensor as usize].clone()) };
+    let mounted =
+        || -> Result<Option<String>, Failure> { Ok(store.calibrations().mounted()?[sensor as usize].clone()) };
     let name = match &arguments.part {
         Some(name) => Some(name.trim().to_owned()),
         None => mounted()?,
@@ -140,9 +141,9 @@ fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, fi
 
 /// Stores a calibration, and mounts its part where it was calibrated.
 fn keep(store: &mut Store, sensor: Sensor, calibration: &Calibration) -> Result<StoredCalibration, Failure> {
-    let stored = store.add_calibration(&calibration.record)?;
-    if store.mounted_parts()?[sensor as usize].as_ref() != Some(&stored.record.part) {
-        store.mount_part(sensor, &stored.record.part)?;
+    let stored = store.calibrations().add(&calibration.record)?;
+    if store.calibrations().mounted()?[sensor as usize].as_ref() != Some(&stored.record.part) {
+        store.calibrations().mount(sensor, &stored.record.part)?;
     }
     Ok(stored)
 }

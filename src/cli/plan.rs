@@ -52,20 +52,20 @@ struct Report {
 }
 
 pub(super) fn run(arguments: &PlanArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let mut store = open_store(store)?;
-    let mut plan = store.label_plan()?;
+    let store = open_store(store)?;
+    let mut plan = store.labels().plan()?;
     match arguments.command.as_ref().unwrap_or(&PlanCommand::Show) {
         PlanCommand::Show => {}
         PlanCommand::Set { name, wanted } => plan.set(name, *wanted)?,
         PlanCommand::Remove { name } => plan.remove(name)?,
     }
-    store.set_label_plan(&plan)?;
+    store.labels().set_plan(&plan)?;
     show(&store, arguments.json)
 }
 
 fn show(store: &Store, json: bool) -> Result<(), Failure> {
-    let rows = store.labelled_trials()?;
-    let progress = store.label_plan()?.progress(&rows);
+    let rows = store.labels().trials()?;
+    let progress = store.labels().plan()?.progress(&rows);
     let last = rows.iter().rev().find(|row| row.counts()).and_then(|row| row.object.as_deref());
     let next = progress.next(last);
     let unlabelled = rows.iter().filter(|row| row.complete && !row.discarded && row.object.is_none()).count();

@@ -1,9 +1,9 @@
-//! Trials of a real gripper as CSV: counts as they came, one row per reading. A file of the bytes beside it can be heard
-//! again as if it were a port.
+//! Trials of a real gripper as CSV: raw counts, one row per reading. The capture file beside it can be replayed like a
+//! port.
 //!
 //! Columns: `t_s` and `arrived_s` since the trial began, `seq`, `missing_before`, the channels (counts), `line_pressure
-//! (bar)`, `phase`. A field without a number had none; `missing_before` says how many readings are missing between the
-//! row before and this one, `?` where that is not known.
+//! (bar)`, `phase`. A missing number is an empty field; `missing_before` is the number of readings missing before the
+//! row, `?` where unknown.
 
 use super::board_trials::BoardTrial;
 use super::csv_export::{CsvError, number, write_file};

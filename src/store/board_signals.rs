@@ -1,5 +1,5 @@
-//! Signals of a trial of a real gripper: its readings through the calibrations that serve it. Derived anew each time, so
-//! that a better calibration serves old trials too.
+//! Signals of a trial of a real gripper: its readings converted by the calibrations of its parts. Derived each time, so
+//! that a better calibration improves old trials too.
 
 use super::calibrations::{CalibrationId, Serving};
 use super::store::Store;
@@ -9,25 +9,25 @@ use palpate_tactile::Signals;
 use palpate_tactile::calibration::{Derived, Readout};
 use palpate_tactile::trial::TrialId;
 
-/// A trial of a real gripper as its calibrations read it.
+/// Signals of a trial of a real gripper.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardSignals {
-    /// Its signals, with channels of layout C1+F; time counts from the beginning of the trial (s).
+    /// Signals with the channels of layout C1+F; time counts from the beginning of the trial (s).
     pub derived: Derived,
     /// The calibrations.
     pub serving: Serving,
     /// Line pressure, time (s) and pressure from then on (bar): as commanded, or else as the board reported; empty where
-    /// nobody says.
+    /// unknown.
     pub line: Vec<(f64, f64)>,
-    /// When the closing began (s), where it is known.
+    /// Beginning of the closing (s), where known.
     pub closing_s: Option<f64>,
-    /// When the release began (s), where it is known.
+    /// Beginning of the release (s), where known.
     pub release_s: Option<f64>,
 }
 
 impl BoardSignals {
-    /// What recognisers learn and files exchange: some channels from the beginning of the closing, where it is known, to the
-    /// end of the hold: what is heard while a grasp goes on, and what is simulated. None where a channel could not be derived.
+    /// The part that recognisers learn and files exchange: some channels from the beginning of the closing, where known, to
+    /// the end of the hold. None where a channel could not be derived.
     pub fn grasp(&self, channels: &[String]) -> Option<Signals> {
         let until = self.derived.signals.chosen(channels)?.until(self.release_s.unwrap_or(f64::INFINITY));
         Some(match self.closing_s {
@@ -38,8 +38,8 @@ impl BoardSignals {
 }
 
 impl Store {
-    /// Reads a trial of a real gripper through the newest calibrations of its parts, or those asked for; none for a trial of
-    /// another kind.
+    /// Derives the signals of a trial of a real gripper with the newest calibrations of its parts, or those asked for;
+    /// none for a trial of another kind.
     pub fn board_signals(&self, id: TrialId, asked: &[CalibrationId]) -> Result<Option<BoardSignals>, StoreError> {
         let Some(mut trial) = self.board_trial(id)? else { return Ok(None) };
         let began = trial.about.began_s;
@@ -52,33 +52,33 @@ impl Store {
         };
         let closing_s = from(Phase::Close, f64::NEG_INFINITY);
         let release_s = from(Phase::Release, closing_s.unwrap_or(f64::NEG_INFINITY));
-        let serving = self.serving(Some(id), asked)?;
+        let serving = self.calibrations().serving(Some(id), asked)?;
         let readout = Readout::new(&trial.about.board, &serving.calibrations)
             .map_err(|cause| StoreError::BadInfo { id, cause: cause.to_string() })?;
         let mut derived = readout.derive(&trial.readings, closing_s);
         derived.warnings.extend(serving.warnings.iter().cloned());
         let marks = trial.about.phases.iter().filter_map(|mark| Some((mark.from_s - began, mark.line_bar?)));
         let commanded: Vec<(f64, f64)> = marks.collect();
-        let told: Vec<(f64, f64)> =
+        let reported: Vec<(f64, f64)> =
             trial.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();
-        let line = if is_obeyed(&commanded, &told) { commanded } else { told };
+        let line = if follows_commands(&commanded, &reported) { commanded } else { reported };
         Ok(Some(BoardSignals { derived, serving, line, closing_s, release_s }))
     }
 }
 
-/// A pressure that is farther from the commanded one than this is another (bar): half a step of the control box.
+/// Largest difference between commanded and reported pressure (bar): half a step of the control box.
 const HALF_STEP_BAR: f64 = 0.026;
-/// The board tells a new pressure within this time (s).
+/// The board reports a new pressure within this time (s).
 const ANSWER_S: f64 = 0.1;
 
-/// Whether the board did what it was told, and when: commands are the better times then. Where it refused, or vented by
-/// itself, only what it tells is true.
-fn is_obeyed(commanded: &[(f64, f64)], told: &[(f64, f64)]) -> bool {
+/// Whether the reported pressures follow the commands, whose times are then more exact. Where the board refused a
+/// command or vented by itself, only its reports are right.
+fn follows_commands(commanded: &[(f64, f64)], reported: &[(f64, f64)]) -> bool {
     let other = |(t_s, bar): &&(f64, f64)| {
         let last = commanded.iter().take_while(|(from_s, _)| from_s <= t_s).last();
         last.is_some_and(|(from_s, asked)| t_s - from_s > ANSWER_S && (bar - asked).abs() > HALF_STEP_BAR)
     };
-    !commanded.is_empty() && told.iter().filter(other).count() < 3
+    !commanded.is_empty() && reported.iter().filter(other).count() < 3
 }
 
 #[cfg(test)]
@@ -86,15 +86,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_board_refused_or_vented_is_not_what_it_was_told() {
+    fn reports_replace_commands_that_a_board_refused_or_vented() {
         let commanded = [(0.0, 0.5), (1.0, 1.0)];
-        let told = |bar_of: fn(f64) -> f64| -> Vec<(f64, f64)> {
+        let reported = |bar_of: fn(f64) -> f64| -> Vec<(f64, f64)> {
             (0..100).map(|k| 0.02 * f64::from(k)).map(|t_s| (t_s, bar_of(t_s))).collect()
         };
-        assert!(is_obeyed(&commanded, &told(|t_s| if t_s < 1.04 { 0.5 } else { 1.0 })));
-        assert!(is_obeyed(&commanded, &[]), "a board that tells nothing is believed");
-        assert!(!is_obeyed(&commanded, &told(|_| 0.5)), "the second step was refused");
-        assert!(!is_obeyed(&commanded, &told(|t_s| if t_s < 1.5 { 1.0 } else { 0.0 })), "it vented");
-        assert!(!is_obeyed(&[], &told(|_| 0.5)));
+        assert!(follows_commands(&commanded, &reported(|t_s| if t_s < 1.04 { 0.5 } else { 1.0 })));
+        assert!(follows_commands(&commanded, &[]), "without reports the commands stand");
+        assert!(!follows_commands(&commanded, &reported(|_| 0.5)), "the second step was refused");
+        assert!(!follows_commands(&commanded, &reported(|t_s| if t_s < 1.5 { 1.0 } else { 0.0 })), "it vented");
+        assert!(!follows_commands(&[], &reported(|_| 0.5)));
     }
 }

@@ -1,81 +1,49 @@
-//! Calibrations in the store, and which part sits where.
+//! Calibrations in the store, and which part is mounted where.
 //!
-//! ```text
-//! calibrations  what was measured of a part, as JSON; versions count up within a part, none is ever changed
-//! mountings     which part has been put where, since when
-//! parts         which parts a trial was recorded with, by their places
-//! ```
-//!
-//! The newest calibration of a part serves all its trials, older ones too, unless it was withdrawn or another one is
-//! asked for. Curves are fitted when they are needed: a record that a later program refuses is told, and the one
-//! before it serves.
+//! Versions count up within a part; a calibration is never changed. The newest calibration of a part serves all its
+//! trials, older ones too, unless it was withdrawn or another one is asked for. Curves are fitted when they are needed:
+//! a record that a later program refuses causes a warning, and the one before it serves.
 
 use super::store::Store;
-use super::store_error::{StoreError, fault};
+use super::store_error::StoreError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Kind, Record};
 use palpate_tactile::trial::TrialId;
 use rusqlite::{OptionalExtension, Row, Transaction, params};
 use serde::{Deserialize, Serialize};
 
-/// Names a calibration within its store.
+/// Number of a calibration in its store.
 pub type CalibrationId = i64;
 
-/// The tables above.
-pub(super) const CALIBRATION_TABLES: &str = "
-    CREATE TABLE calibrations (
-        id INTEGER PRIMARY KEY AUTOINCREMENT,
-        uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
-        part TEXT NOT NULL,
-        version INTEGER NOT NULL,
-        created TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
-        withdrawn TEXT,
-        record TEXT NOT NULL
-    );
-    CREATE INDEX calibrations_by_part ON calibrations (part);
-    CREATE TABLE mountings (
-        id INTEGER PRIMARY KEY AUTOINCREMENT,
-        since TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
-        sensor TEXT NOT NULL,
-        part TEXT NOT NULL
-    );
-    CREATE TABLE parts (
-        trial INTEGER NOT NULL REFERENCES trials (id) ON DELETE CASCADE,
-        sensor TEXT NOT NULL,
-        part TEXT NOT NULL,
-        PRIMARY KEY (trial, sensor)
-    ) WITHOUT ROWID;
-";
-
-/// A calibration with its place in the store: also the form in which calibrations are exchanged as JSON.
+/// A calibration in a store; also the JSON format in which calibrations are exchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoredCalibration {
-    /// Its number in this store; another store gives it another one.
+    /// Number in this store.
     #[serde(default)]
     pub id: CalibrationId,
-    /// Its identity in every store.
+    /// Identity in every store.
     pub uid: String,
-    /// Which of its part's calibrations it is, from 1.
+    /// Version within its part, from 1.
     #[serde(default)]
     pub version: i64,
-    /// When it was made, UTC.
+    /// Time of creation, UTC.
     pub created: String,
-    /// When it was withdrawn, if it was.
+    /// Time of withdrawal, UTC.
     #[serde(default)]
     pub withdrawn: Option<String>,
-    /// What was measured.
+    /// Measured points.
     #[serde(flatten)]
     pub record: Record,
 }
 
-/// The calibrations that serve a trial, or whatever is recorded now.
+/// Calibrations that serve a trial, or the present recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Serving {
     /// A calibration for each place that has one, in the order of [`Sensor::ALL`].
     pub calibrations: Vec<(Sensor, Calibration)>,
-    /// Their numbers in the store, in the same order.
+    /// Numbers of the calibrations, in the same order.
     pub ids: Vec<CalibrationId>,
-    /// What is missing or was passed over, in sentences.
+    /// Missing and skipped calibrations, one sentence each.
     pub warnings: Vec<String>,
 }
 
@@ -106,22 +74,32 @@ fn read((row, record): (StoredRow, String)) -> Result<StoredCalibration, StoreEr
     Ok(StoredCalibration { id, uid, version, created, withdrawn, record })
 }
 
+/// Calibrations, mountings and tares of a store.
+#[derive(Clone, Copy, Debug)]
+pub struct CalibrationRepository<'a> {
+    pub(super) store: &'a Store,
+}
+
 impl Store {
-    /// Stores what was measured of a part as its newest calibration.
-    pub fn add_calibration(&mut self, record: &Record) -> Result<StoredCalibration, StoreError> {
-        let path = self.path().to_owned();
-        let transaction = self.write()?;
-        let id = insert(&transaction, record, None).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))?;
-        self.calibration(id)
+    /// Calibrations, mounted parts and tares.
+    pub fn calibrations(&self) -> CalibrationRepository<'_> {
+        CalibrationRepository { store: self }
+    }
+}
+
+impl CalibrationRepository<'_> {
+    /// Stores a record as the newest calibration of its part.
+    pub fn add(&self, record: &Record) -> Result<StoredCalibration, StoreError> {
+        let transaction = self.store.write()?;
+        let id = insert(&transaction, record, None).map_err(|e| self.store.fault(&e))?;
+        transaction.commit().map_err(|e| self.store.fault(&e))?;
+        self.get(id)
     }
 
-    /// Takes in calibrations from elsewhere, all or none; those that are here already stay as they are. Returns how many
-    /// were added.
-    pub fn import_calibrations(&mut self, others: &[StoredCalibration]) -> Result<usize, StoreError> {
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
+    /// Imports calibrations of another store, all or none; known ones stay unchanged. Returns how many were added.
+    pub fn import(&self, others: &[StoredCalibration]) -> Result<usize, StoreError> {
+        let fault = |e: rusqlite::Error| self.store.fault(&e);
+        let transaction = self.store.write()?;
         let mut added = 0;
         for other in others {
             let known = "SELECT EXISTS (SELECT 1 FROM calibrations WHERE uid = ?1)";
@@ -135,63 +113,64 @@ impl Store {
     }
 
     /// One calibration.
-    pub fn calibration(&self, id: CalibrationId) -> Result<StoredCalibration, StoreError> {
+    pub fn get(&self, id: CalibrationId) -> Result<StoredCalibration, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE id = ?1");
-        let found = self.connection.query_row(&sql, [id], of_row).optional().map_err(|e| fault(self.path(), &e))?;
+        let found = self.store.connection.query_row(&sql, [id], of_row).optional().map_err(|e| self.store.fault(&e))?;
         read(found.ok_or(StoreError::NoCalibration { id })?)
     }
 
     /// All calibrations, or those of one part, oldest first.
-    pub fn calibrations(&self, part: Option<&str>) -> Result<Vec<StoredCalibration>, StoreError> {
+    pub fn list(&self, part: Option<&str>) -> Result<Vec<StoredCalibration>, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE ?1 IS NULL OR part = ?1 ORDER BY created, id");
-        let rows: rusqlite::Result<Vec<_>> =
-            self.connection.prepare(&sql).and_then(|mut statement| statement.query_map([part], of_row)?.collect());
-        rows.map_err(|e| fault(self.path(), &e))?.into_iter().map(read).collect()
+        let rows: rusqlite::Result<Vec<_>> = self
+            .store
+            .connection
+            .prepare(&sql)
+            .and_then(|mut statement| statement.query_map([part], of_row)?.collect());
+        rows.map_err(|e| self.store.fault(&e))?.into_iter().map(read).collect()
     }
 
-    /// Withdraws a calibration, so that it serves no trial that does not ask for it, or takes that back.
-    pub fn withdraw_calibration(&mut self, id: CalibrationId, withdrawn: bool) -> Result<(), StoreError> {
-        let path = self.path().to_owned();
+    /// Withdraws a calibration, so that it serves only where it is asked for, or restores it.
+    pub fn withdraw(&self, id: CalibrationId, withdrawn: bool) -> Result<(), StoreError> {
         let sql = "UPDATE calibrations SET withdrawn =
                    CASE WHEN ?2 THEN strftime('%Y-%m-%dT%H:%M:%fZ', 'now') ELSE NULL END WHERE id = ?1";
-        let transaction = self.write()?;
-        let changed = transaction.execute(sql, params![id, withdrawn]).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))?;
+        let transaction = self.store.write()?;
+        let changed = transaction.execute(sql, params![id, withdrawn]).map_err(|e| self.store.fault(&e))?;
+        transaction.commit().map_err(|e| self.store.fault(&e))?;
         if changed == 0 { Err(StoreError::NoCalibration { id }) } else { Ok(()) }
     }
 
-    /// Notes that a part sits in a place from now on.
-    pub fn mount_part(&mut self, sensor: Sensor, part: &str) -> Result<(), StoreError> {
-        let path = self.path().to_owned();
-        let transaction = self.write()?;
+    /// Mounts a part in a place from now on.
+    pub fn mount(&self, sensor: Sensor, part: &str) -> Result<(), StoreError> {
+        let transaction = self.store.write()?;
         let sql = "INSERT INTO mountings (sensor, part) VALUES (?1, ?2)";
-        transaction.execute(sql, params![sensor.channel(), part.trim()]).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))
+        transaction.execute(sql, params![sensor.channel(), part.trim()]).map_err(|e| self.store.fault(&e))?;
+        transaction.commit().map_err(|e| self.store.fault(&e))
     }
 
-    /// Which part sits in each place now, in the order of [`Sensor::ALL`].
-    pub fn mounted_parts(&self) -> Result<[Option<String>; 4], StoreError> {
+    /// The part mounted in each place, in the order of [`Sensor::ALL`].
+    pub fn mounted(&self) -> Result<[Option<String>; 4], StoreError> {
         self.mounted_at(None)
     }
 
-    /// Which part sat in each place at a time; the first that was ever put there, where nothing is known of that time.
+    /// The part mounted in each place at a time; before its first mounting, the first part.
     fn mounted_at(&self, at: Option<&str>) -> Result<[Option<String>; 4], StoreError> {
         let sql = "SELECT part FROM mountings WHERE sensor = ?1
                    ORDER BY ?2 IS NULL OR since <= ?2 DESC, CASE WHEN ?2 IS NULL OR since <= ?2 THEN -id ELSE id END LIMIT 1";
         let mut parts = [const { None }; 4];
         for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
-            let found = self.connection.query_row(sql, params![sensor.channel(), at], |row| row.get(0)).optional();
-            *part = found.map_err(|e| fault(self.path(), &e))?;
+            let found =
+                self.store.connection.query_row(sql, params![sensor.channel(), at], |row| row.get(0)).optional();
+            *part = found.map_err(|e| self.store.fault(&e))?;
         }
         Ok(parts)
     }
 
-    /// Notes with which parts a trial is recorded: those that sit in their places now. To be called when it begins.
-    pub fn note_parts(&mut self, trial: TrialId) -> Result<(), StoreError> {
-        let parts = self.mounted_parts()?;
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
+    /// Stores which parts a trial is recorded with: those mounted now. To be called when it begins.
+    pub(super) fn note_parts(&self, trial: TrialId) -> Result<(), StoreError> {
+        let parts = self.mounted()?;
+        let fault = |e: rusqlite::Error| self.store.fault(&e);
+        let transaction = self.store.write()?;
         for (sensor, part) in Sensor::ALL.into_iter().zip(parts) {
             let Some(part) = part else { continue };
             let sql = "INSERT OR REPLACE INTO parts (trial, sensor, part) VALUES (?1, ?2, ?3)";
@@ -200,35 +179,35 @@ impl Store {
         transaction.commit().map_err(fault)
     }
 
-    /// With which parts a trial was recorded; where it says nothing, what sat in each place at its time.
+    /// The parts a trial was recorded with; where none are stored, those mounted at its time.
     pub fn parts_of(&self, trial: TrialId) -> Result<[Option<String>; 4], StoreError> {
-        let fault = |e: rusqlite::Error| fault(self.path(), &e);
+        let fault = |e: rusqlite::Error| self.store.fault(&e);
         let sql = "SELECT created FROM trials WHERE id = ?1";
         let created: Option<String> =
-            self.connection.query_row(sql, [trial], |row| row.get(0)).optional().map_err(fault)?;
+            self.store.connection.query_row(sql, [trial], |row| row.get(0)).optional().map_err(fault)?;
         let mut parts = self.mounted_at(created.as_deref())?;
         for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
             let sql = "SELECT part FROM parts WHERE trial = ?1 AND sensor = ?2";
-            let noted = self.connection.query_row(sql, params![trial, sensor.channel()], |row| row.get(0)).optional();
+            let noted =
+                self.store.connection.query_row(sql, params![trial, sensor.channel()], |row| row.get(0)).optional();
             *part = noted.map_err(fault)?.or(part.take());
         }
         Ok(parts)
     }
 
-    /// The calibrations that serve a trial, or without one what is recorded now: of each part the newest that is not
-    /// withdrawn, or the one that is asked for by its number.
+    /// Calibrations that serve a trial, or the present recording: of each part the newest that is not withdrawn, or the one
+    /// asked for by its number.
     pub fn serving(&self, trial: Option<TrialId>, asked: &[CalibrationId]) -> Result<Serving, StoreError> {
         let parts = match trial {
             Some(trial) => self.parts_of(trial)?,
-            None => self.mounted_parts()?,
+            None => self.mounted()?,
         };
-        let asked = asked.iter().map(|id| self.calibration(*id)).collect::<Result<Vec<_>, _>>()?;
+        let asked = asked.iter().map(|id| self.get(*id)).collect::<Result<Vec<_>, _>>()?;
         let mut serving = Serving::default();
         for (sensor, part) in Sensor::ALL.into_iter().zip(parts) {
             let Some(part) = part else {
                 let (place, channel) = (sensor.label(), sensor.channel());
-                let text =
-                    format!("it is not known which part is the {place}: `palpate calibrate mount {channel} NAME`");
+                let text = format!("no part is mounted as the {place}: `palpate calibrate mount {channel} NAME`");
                 serving.warnings.push(text);
                 continue;
             };
@@ -236,7 +215,7 @@ impl Store {
             let wanted: Vec<StoredCalibration> = match asked.iter().find(fits) {
                 Some(one) => vec![one.clone()],
                 None => {
-                    let all = self.calibrations(Some(&part))?.into_iter().rev();
+                    let all = self.list(Some(&part))?.into_iter().rev();
                     all.filter(|c| c.withdrawn.is_none() && fits(&c)).collect()
                 }
             };
@@ -252,14 +231,14 @@ impl Serving {
         while let Some(stored) = wanted.next() {
             match Calibration::fit(stored.record) {
                 Ok(calibration) => {
-                    let knew = |older: &StoredCalibration| older.record.bending.is_some();
+                    let has_bending = |older: &StoredCalibration| older.record.bending.is_some();
                     if calibration.record.bending.is_none()
-                        && let Some(older) = wanted.find(knew)
+                        && let Some(older) = wanted.find(has_bending)
                     {
                         let (id, channel) = (stored.id, sensor.channel());
                         self.warnings.push(format!(
-                            "calibration {id} (\"{part}\", version {}) does not know what bending does to it, as version {} \
-                             did: `palpate calibrate {channel} --part \"{part}\" --empty-close 5` learns it anew",
+                            "calibration {id} (\"{part}\", version {}) has no bending correction, unlike version {}: \
+                             measure it with `palpate calibrate {channel} --part \"{part}\" --empty-close 5`",
                             stored.version, older.version
                         ));
                     }
@@ -269,14 +248,13 @@ impl Serving {
                 }
                 Err(cause) => {
                     let (id, version) = (stored.id, stored.version);
-                    self.warnings
-                        .push(format!("calibration {id} (\"{part}\", version {version}) is passed over: {cause}"));
+                    self.warnings.push(format!("calibration {id} (\"{part}\", version {version}) is skipped: {cause}"));
                 }
             }
         }
         let (place, channel) = (sensor.label(), sensor.channel());
         self.warnings.push(format!(
-            "the {place}, \"{part}\", has no calibration: `palpate calibrate {channel} --part \"{part}\"` makes one"
+            "the {place}, \"{part}\", has no calibration: run `palpate calibrate {channel} --part \"{part}\"`"
         ));
     }
 }
@@ -333,24 +311,24 @@ pub(super) mod tests {
     #[test]
     fn versions_count_up_within_a_part_and_survive_an_exchange() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
-        let mut here = store(&folder, "here");
+        let here = store(&folder, "here");
         let versions =
-            [("A", 20e3), ("B", 25e3), ("A", 21e3)].map(|(part, flat)| here.add_calibration(&strip(part, flat)));
+            [("A", 20e3), ("B", 25e3), ("A", 21e3)].map(|(part, flat)| here.calibrations().add(&strip(part, flat)));
         let versions: Vec<i64> =
             versions.into_iter().map(|stored| stored.map(|s| s.version)).collect::<Result<_, _>>()?;
         assert_eq!(versions, [1, 1, 2]);
-        here.withdraw_calibration(1, true)?;
-        let text = serde_json::to_string(&here.calibrations(None)?)?;
-        let mut there = store(&folder, "there");
-        there.add_calibration(&strip("A", 30e3))?;
+        here.calibrations().withdraw(1, true)?;
+        let text = serde_json::to_string(&here.calibrations().list(None)?)?;
+        let there = store(&folder, "there");
+        there.calibrations().add(&strip("A", 30e3))?;
         let others: Vec<StoredCalibration> = serde_json::from_str(&text)?;
-        assert_eq!((there.import_calibrations(&others)?, there.import_calibrations(&others)?), (3, 0));
-        let of_a = there.calibrations(Some("A"))?;
+        assert_eq!((there.calibrations().import(&others)?, there.calibrations().import(&others)?), (3, 0));
+        let of_a = there.calibrations().list(Some("A"))?;
         assert_eq!(of_a.len(), 3);
         // Older ones come first, whatever their version here.
         assert_eq!(of_a[0].record, strip("A", 20e3));
         assert!(of_a[0].withdrawn.is_some() && of_a[0].version == 2 && of_a[2].version == 1);
-        assert!(matches!(there.withdraw_calibration(99, true), Err(StoreError::NoCalibration { id: 99 })));
+        assert!(matches!(there.calibrations().withdraw(99, true), Err(StoreError::NoCalibration { id: 99 })));
         Ok(())
     }
 
@@ -358,21 +336,21 @@ pub(super) mod tests {
     fn parts_get_swapped_and_trials_know_theirs() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
         let mut store = store(&folder, "s");
-        assert_eq!(store.mounted_parts()?, [const { None }; 4]);
+        assert_eq!(store.calibrations().mounted()?, [const { None }; 4]);
         let info = crate::test_trials::grasp(&palpate_sim::scene::Scene::default(), None, 0).info;
         let untold = store.begin(&info)?;
         // Times are stored to the millisecond.
         std::thread::sleep(std::time::Duration::from_millis(3));
-        store.mount_part(Sensor::FlexLeft, "A")?;
+        store.calibrations().mount(Sensor::FlexLeft, "A")?;
         let first = store.begin(&info)?;
-        store.note_parts(first)?;
-        store.mount_part(Sensor::FlexLeft, "B")?;
+        store.calibrations().note_parts(first)?;
+        store.calibrations().mount(Sensor::FlexLeft, "B")?;
         let second = store.begin(&info)?;
-        store.note_parts(second)?;
-        let left = |trial| store.parts_of(trial).map(|parts| parts[0].clone());
+        store.calibrations().note_parts(second)?;
+        let left = |trial| store.calibrations().parts_of(trial).map(|parts| parts[0].clone());
         assert_eq!((left(first)?.as_deref(), left(second)?.as_deref()), (Some("A"), Some("B")));
         assert_eq!(left(untold)?.as_deref(), Some("A"), "the first that is known");
-        assert_eq!(store.mounted_parts()?[0].as_deref(), Some("B"));
+        assert_eq!(store.calibrations().mounted()?[0].as_deref(), Some("B"));
         Ok(())
     }
 
@@ -380,34 +358,34 @@ pub(super) mod tests {
     fn the_newest_sound_calibration_serves_old_trials_too() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
         let mut store = store(&folder, "s");
-        store.mount_part(Sensor::FlexLeft, "A")?;
+        store.calibrations().mount(Sensor::FlexLeft, "A")?;
         let info = crate::test_trials::grasp(&palpate_sim::scene::Scene::default(), None, 0).info;
         let trial = store.begin(&info)?;
-        store.note_parts(trial)?;
-        assert!(store.serving(Some(trial), &[])?.warnings[0].contains("has no calibration"));
+        store.calibrations().note_parts(trial)?;
+        assert!(store.calibrations().serving(Some(trial), &[])?.warnings[0].contains("has no calibration"));
         let reading = {
             let counts = strip("A", 24e3).input.counts(36e3) as f32;
             Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts: vec![Some(counts); 4], line_bar: None }
         };
         let degrees = |store: &Store, asked: &[CalibrationId]| -> Result<f64, Box<dyn std::error::Error>> {
-            let serving = store.serving(Some(trial), asked)?;
+            let serving = store.calibrations().serving(Some(trial), asked)?;
             let felt = Readout::new(&Board::default(), &serving.calibrations)?.felt(&reading);
             Ok(felt.angle[0].ok_or("calibrated")?.to_degrees())
         };
         // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.
-        let old = store.add_calibration(&strip("A", 18e3))?.id;
+        let old = store.calibrations().add(&strip("A", 18e3))?.id;
         assert!((degrees(&store, &[])? - 90.0).abs() < 1e-2);
-        let new = store.add_calibration(&strip("A", 24e3))?.id;
+        let new = store.calibrations().add(&strip("A", 24e3))?.id;
         assert!((degrees(&store, &[])? - 45.0).abs() < 1e-2);
         assert!((degrees(&store, &[old])? - 90.0).abs() < 1e-2);
-        store.withdraw_calibration(new, true)?;
+        store.calibrations().withdraw(new, true)?;
         assert!((degrees(&store, &[])? - 90.0).abs() < 1e-2);
-        store.withdraw_calibration(new, false)?;
-        // One that no program of today would make is passed over with a word.
-        store.add_calibration(&strip("A", 90e3))?;
-        let serving = store.serving(Some(trial), &[])?;
+        store.calibrations().withdraw(new, false)?;
+        // One that no program of today would make is skipped with a warning.
+        store.calibrations().add(&strip("A", 90e3))?;
+        let serving = store.calibrations().serving(Some(trial), &[])?;
         assert_eq!(serving.ids, [new]);
-        assert!(serving.warnings.iter().any(|w| w.contains("passed over") && w.contains("90.0 kOhm")), "{serving:?}");
+        assert!(serving.warnings.iter().any(|w| w.contains("is skipped") && w.contains("90.0 kOhm")), "{serving:?}");
         Ok(())
     }
 }

@@ -12,20 +12,20 @@ use palpate_tactile::{Sensors, Signals};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Why a CSV file could not be written.
+/// Error of writing a CSV file.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvError {
-    /// The file or its folder.
+    /// The file or its folder cannot be written.
     #[error("cannot write \"{path}\": {cause}", path = path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         cause: String,
     },
 }
 
-/// The name of the file with the contacts beside a trial's file: `trial.csv` has `trial.contacts.csv`.
+/// Path of the file with the contacts, beside a trial's file: `trial.csv` has `trial.contacts.csv`.
 pub fn contacts_path(path: &Path) -> PathBuf {
     path.with_extension("contacts.csv")
 }
@@ -41,7 +41,7 @@ pub fn write_trial_csv(path: &Path, trial: &Trial, scene: &Scene, sensors: &Sens
     })
 }
 
-/// Writes a trial that was recorded elsewhere: time, then its channels as they came.
+/// Writes an imported trial: time, then its channels unchanged.
 pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError> {
     write_file(path, |out| {
         out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
@@ -53,9 +53,9 @@ pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError>
     })
 }
 
-/// Writes one row per loaded taxel and sample: where it is in the world, and the force on it.
+/// Writes one row per loaded taxel and sample: its position in the world and the force on it.
 ///
-/// The place is that of the taxel's undeformed skin; the skin is pushed in by at most the pad's thickness.
+/// Positions are those of the undeformed skin, which is indented by at most the pad's thickness.
 pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(), CsvError> {
     let header = [
         "t_s",
@@ -92,7 +92,7 @@ pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(
     })
 }
 
-/// Writes to a temporary neighbour first, so that a kill leaves either the old file or the whole new one.
+/// Writes to a temporary file first, so that a kill leaves either the old file or the whole new one.
 pub(super) fn write_file(
     path: &Path,
     fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<std::fs::File>>) -> csv::Result<()>,
@@ -110,7 +110,7 @@ pub(super) fn write_file(
         std::fs::rename(&unfinished, path)
     })();
     written.map_err(|cause| {
-        // The remains are of no use; that they may not be removable either adds nothing to the message.
+        // Nothing to add to the message where the remains cannot be removed either.
         let _gone = std::fs::remove_file(&unfinished);
         CsvError::Write { path: path.to_owned(), cause: cause.to_string() }
     })

@@ -1,35 +1,18 @@
-//! Labels, notes and discarded trials in the store: every change is told, and what was done can be undone.
+//! Labels, notes and deletions in the store: every change is in the journal and can be undone.
 
 use super::*;
 use crate::labels::{LabelPlan, LabelledTrial};
-use palpate_geometry::Pose;
-use palpate_sim::frame::{Plan, Quality};
+use crate::test_trials::{board_info, info};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::trial::TrialInfo;
 use proptest::prelude::*;
 use std::path::Path;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
-fn info(rig: &str, object: &str) -> TrialInfo {
-    TrialInfo {
-        rig: rig.to_owned(),
-        object: object.to_owned(),
-        seed: 0,
-        collection: None,
-        scene: String::new(),
-        world_from_gripper: Pose::IDENTITY,
-        plan: Plan::default(),
-        quality: Quality::default(),
-        warnings: Vec::new(),
-        version: "0".to_owned(),
-    }
-}
-
 /// Adds a finished trial of the real gripper.
 fn add(store: &mut Store, object: &str) -> Result<TrialId, StoreError> {
     let about = BoardInfo::default();
-    let id = store.begin_board(&info(BOARD_RIG, object), &about)?;
+    let id = store.begin_board(&board_info(object), &about)?;
     store.finish_board(id, &about, &[])?;
     Ok(id)
 }
@@ -43,51 +26,51 @@ fn store_with(path: &Path, objects: &[&str]) -> Result<Store, StoreError> {
 }
 
 fn labels(store: &Store) -> Result<Vec<Option<String>>, StoreError> {
-    Ok(store.labelled_trials()?.into_iter().map(|row| row.object).collect())
+    Ok(store.labels().trials()?.into_iter().map(|row| row.object).collect())
 }
 
 #[test]
 fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("trials.sqlite");
-    let mut store = store_with(&path, &[""])?;
+    let store = store_with(&path, &[""])?;
     assert_eq!(labels(&store)?, [None]);
-    store.label_trial(1, " lemon ")?;
-    store.label_trial(1, "cube")?;
+    store.labels().set_label(1, " lemon ")?;
+    store.labels().set_label(1, "cube")?;
     drop(store);
-    let mut store = Store::open(&path)?;
-    let undone = store.undo()?.ok_or("something was done")?;
+    let store = Store::open(&path)?;
+    let undone = store.journal().undo()?.ok_or("something was done")?;
     assert_eq!(undone.sentence(), "trial 1: label lemon -> cube");
     assert_eq!(labels(&store)?, [Some("lemon".to_owned())]);
     drop(store);
-    let mut store = Store::open(&path)?;
-    store.undo()?.ok_or("one more")?;
-    assert_eq!((labels(&store)?, store.undo()?), (vec![None], None));
-    store.redo()?.ok_or("it can be done again")?;
+    let store = Store::open(&path)?;
+    store.journal().undo()?.ok_or("one more")?;
+    assert_eq!((labels(&store)?, store.journal().undo()?), (vec![None], None));
+    store.journal().redo()?.ok_or("it can be done again")?;
     drop(store);
-    let mut store = Store::open(&path)?;
-    store.redo()?.ok_or("and the other too")?;
-    assert_eq!((labels(&store)?, store.redo()?), (vec![Some("cube".to_owned())], None));
-    let told: Vec<String> = store.journal(100)?.iter().map(JournalEntry::sentence).collect();
-    assert_eq!(told.len(), 6);
-    assert_eq!(told[5], "trial 1: label unlabelled -> lemon");
-    assert_eq!(told[3], "trial 1: label cube -> lemon (takes back 2)");
-    assert_eq!(store.journal(2)?.len(), 2);
+    let store = Store::open(&path)?;
+    store.journal().redo()?.ok_or("and the other too")?;
+    assert_eq!((labels(&store)?, store.journal().redo()?), (vec![Some("cube".to_owned())], None));
+    let entries: Vec<String> = store.journal().entries(100)?.iter().map(JournalEntry::sentence).collect();
+    assert_eq!(entries.len(), 6);
+    assert_eq!(entries[5], "trial 1: label unlabelled -> lemon");
+    assert_eq!(entries[3], "trial 1: label cube -> lemon (undoes 2)");
+    assert_eq!(store.journal().entries(2)?.len(), 2);
     Ok(())
 }
 
 #[test]
 fn something_new_leaves_nothing_to_be_done_again() -> Outcome {
     let folder = tempfile::tempdir()?;
-    let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
-    store.set_note(1, "slipped")?;
-    store.undo()?.ok_or("the note")?;
+    let store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
+    store.labels().set_note(1, "slipped")?;
+    store.journal().undo()?.ok_or("the note")?;
     // What a model says, and looking at a trial, is nothing to undo and in nobody's way.
-    store.set_guess(1, "m", &[("lemon".to_owned(), 0.75), ("ball".to_owned(), 0.25)])?;
-    store.mark_reviewed(1)?;
-    assert!(store.redo()?.is_some() && store.undo()?.is_some());
-    store.set_unsure(1, true)?;
-    assert_eq!(store.redo()?, None);
+    store.labels().set_guess(1, "m", &[("lemon".to_owned(), 0.75), ("ball".to_owned(), 0.25)])?;
+    store.labels().mark_reviewed(1)?;
+    assert!(store.journal().redo()?.is_some() && store.journal().undo()?.is_some());
+    store.labels().set_unsure(1, true)?;
+    assert_eq!(store.journal().redo()?, None);
     Ok(())
 }
 
@@ -95,18 +78,18 @@ fn something_new_leaves_nothing_to_be_done_again() -> Outcome {
 fn the_journal_is_only_added_to() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &[""])?;
-    store.label_trial(1, "lemon")?;
+    store.labels().set_label(1, "lemon")?;
     for sql in ["UPDATE journal SET entry = '{}'", "DELETE FROM journal", "UPDATE journal SET number = 7"] {
         let refused = store.connection.execute(sql, []).expect_err("triggers refuse it").to_string();
         assert!(refused.contains("only added to"), "{refused}");
     }
-    // Removing a trial for good leaves what is told of it.
-    store.discard_trial(1)?;
+    // Purging a trial leaves its entries.
+    store.delete(&[1])?;
     assert_eq!(store.purge()?, 1);
-    let told = store.journal(9)?;
-    assert_eq!((told.len(), told[1].trial), (2, None));
-    assert!(told[1].sentence().ends_with("(removed): label unlabelled -> lemon"), "{}", told[1].sentence());
-    assert_eq!(store.undo()?, None, "there is nothing left to put it back on");
+    let entries = store.journal().entries(9)?;
+    assert_eq!((entries.len(), entries[1].trial), (2, None));
+    assert!(entries[1].sentence().ends_with("(purged): label unlabelled -> lemon"), "{}", entries[1].sentence());
+    assert_eq!(store.journal().undo()?, None, "there is nothing left to put it back on");
     Ok(())
 }
 
@@ -114,44 +97,39 @@ fn the_journal_is_only_added_to() -> Outcome {
 fn a_change_and_its_entry_are_one() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon", "cube"])?;
-    // As if the disk were full at the worst moment: after the change, while it is told.
+    // As if the disk were full at the worst moment: after the change, before its entry.
     store
         .connection
         .execute_batch("CREATE TRIGGER full BEFORE INSERT ON journal BEGIN SELECT raise(ABORT, 'no room'); END;")?;
-    assert!(store.label_trial(1, "ball").is_err() && store.discard_trial(2).is_err());
-    assert!(store.set_label_plan(&LabelPlan { objects: Vec::new() }).is_err());
+    assert!(store.labels().set_label(1, "ball").is_err() && store.delete(&[2]).is_err());
+    assert!(store.labels().set_plan(&LabelPlan { objects: Vec::new() }).is_err());
     store.connection.execute_batch("DROP TRIGGER full")?;
-    let rows = store.labelled_trials()?;
+    let rows = store.labels().trials()?;
     assert_eq!((rows[0].object.as_deref(), rows[1].discarded), (Some("lemon"), false));
-    assert_eq!((store.label_plan()?, store.journal(9)?.len()), (LabelPlan::default(), 0));
+    assert_eq!((store.labels().plan()?, store.journal().entries(9)?.len()), (LabelPlan::default(), 0));
     Ok(())
 }
 
 #[test]
-fn what_another_program_has_changed_is_not_undone() -> Outcome {
+fn programs_share_one_history() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("trials.sqlite");
     let mut ours = store_with(&path, &["lemon", "cube"])?;
-    let mut theirs = Store::open(&path)?;
-    theirs.journal.writer = "another program".to_owned();
-    ours.set_note(2, "first")?;
-    ours.label_trial(1, "ball")?;
-    theirs.label_trial(1, "bigball")?;
-    theirs.set_note(1, "theirs")?;
-    let told = ours.undo().expect_err("it was changed").to_string();
-    assert!(told.contains("label lemon -> ball") && told.contains("another program"), "{told}");
-    assert_eq!(labels(&ours)?[0].as_deref(), Some("bigball"), "nothing is overwritten");
-    // What was done before that is not in its way.
-    assert_eq!(ours.undo()?.ok_or("the note")?.sentence(), "trial 2: note \"first\"");
-    assert_eq!(ours.undo()?, None, "theirs is theirs");
-    theirs.undo()?.ok_or("their note")?;
-    theirs.undo()?.ok_or("their label")?;
-    assert_eq!(labels(&ours)?[0].as_deref(), Some("ball"));
-    // A program that comes later undoes what it finds.
-    let mut later = Store::open(&path)?;
-    later.journal.writer = "one more".to_owned();
-    assert_eq!(later.undo()?.ok_or("found")?.sentence(), "trial 1: label lemon -> ball");
-    assert_eq!(ours.undo()?, None, "what they have taken back is not taken back again");
+    let theirs = Store::open(&path)?;
+    ours.labels().set_note(2, "first")?;
+    ours.labels().set_label(1, "ball")?;
+    theirs.labels().set_label(1, "bigball")?;
+    assert_eq!(ours.journal().undo()?.ok_or("theirs")?.sentence(), "trial 1: label ball -> bigball");
+    assert_eq!(labels(&theirs)?[0].as_deref(), Some("ball"));
+    theirs.journal().redo()?.ok_or("the same")?;
+    assert_eq!(labels(&ours)?[0].as_deref(), Some("bigball"));
+    // A change past the journal is not overwritten.
+    ours.connection.execute("UPDATE trials SET object = 'case' WHERE id = 1", [])?;
+    let refused = ours.journal().undo().expect_err("it has changed").to_string();
+    assert!(refused.contains("label ball -> bigball") && refused.contains("changed since"), "{refused}");
+    assert_eq!(labels(&ours)?[0].as_deref(), Some("case"));
+    ours.delete(&[2])?;
+    assert_eq!(theirs.journal().undo()?.ok_or("the deletion")?.sentence(), "trial 2: discarded");
     Ok(())
 }
 
@@ -159,42 +137,42 @@ fn what_another_program_has_changed_is_not_undone() -> Outcome {
 fn nonsense_is_refused_and_changes_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
-    let simulated = store.begin(&info("sim", "cube"))?;
-    let told = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
-    assert!(told(store.label_trial(1, "  ")).contains("cannot be empty"));
-    assert!(told(store.label_trial(simulated, "ball")).contains("only trials of the real gripper"));
-    assert!(told(store.label_trial(9, "ball")).contains("no trial 9"));
-    assert!(told(store.set_note(1, &"x".repeat(4001))).contains("4000"));
-    assert!(told(store.set_tags(1, &["a\u{7}".to_owned()])).contains("control"));
-    assert!(told(store.set_guess(1, "m", &[("a".to_owned(), 0.4)])).contains("sum to 0.4"));
-    assert!(told(store.set_guess(1, "m", &[("a".to_owned(), f64::NAN)])).contains("not kept"));
-    store.discard_trial(1)?;
-    assert!(told(store.label_trial(1, "ball")).contains("restore"));
-    assert!(told(store.discard_trial(1)).contains("restore"));
-    store.restore_trial(1)?;
-    assert!(told(store.restore_trial(1)).contains("not deleted"));
-    assert_eq!(store.journal(9)?.len(), 2, "only what was done is told");
+    let simulated = store.begin(&info("cube"))?;
+    let message = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
+    assert!(message(store.labels().set_label(1, "  ")).contains("cannot be empty"));
+    assert!(message(store.labels().set_label(simulated, "ball")).contains("only trials of the real gripper"));
+    assert!(message(store.labels().set_label(9, "ball")).contains("no trial 9"));
+    assert!(message(store.labels().set_note(1, &"x".repeat(4001))).contains("4000"));
+    assert!(message(store.labels().set_tags(1, &["a\u{7}".to_owned()])).contains("control"));
+    assert!(message(store.labels().set_guess(1, "m", &[("a".to_owned(), 0.4)])).contains("sum to 0.4"));
+    assert!(message(store.labels().set_guess(1, "m", &[("a".to_owned(), f64::NAN)])).contains("not stored"));
+    store.delete(&[1])?;
+    assert!(message(store.labels().set_label(1, "ball")).contains("restore"));
+    assert!(message(store.delete(&[1])).contains("restore"));
+    store.restore(&[1])?;
+    assert!(message(store.restore(&[1])).contains("not deleted"));
+    assert_eq!(store.journal().entries(9)?.len(), 2, "refused changes have no entry");
     // A simulated trial takes notes all the same.
-    store.set_note(simulated, "odd")?;
-    store.label_trial(1, "lemon")?;
-    assert_eq!(store.journal(9)?.len(), 3, "the same label again is no change");
+    store.labels().set_note(simulated, "odd")?;
+    store.labels().set_label(1, "lemon")?;
+    assert_eq!(store.journal().entries(9)?.len(), 3, "the same label again is no change");
     Ok(())
 }
 
 #[test]
-fn the_plan_is_kept_and_told() -> Outcome {
+fn the_plan_is_kept_and_in_the_journal() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("trials.sqlite");
-    let mut store = store_with(&path, &[])?;
-    let mut plan = store.label_plan()?;
+    let store = store_with(&path, &[])?;
+    let mut plan = store.labels().plan()?;
     assert_eq!(plan, LabelPlan::default());
     plan.set("mug", 40)?;
-    store.set_label_plan(&plan)?;
-    store.set_label_plan(&plan)?;
+    store.labels().set_plan(&plan)?;
+    store.labels().set_plan(&plan)?;
     drop(store);
     let store = Store::open(&path)?;
-    assert_eq!((store.label_plan()?, store.journal(9)?.len()), (plan, 1));
-    assert_eq!(store.journal(9)?[0].sentence(), "plan changed to 840 trials of 17 objects");
+    assert_eq!((store.labels().plan()?, store.journal().entries(9)?.len()), (plan, 1));
+    assert_eq!(store.journal().entries(9)?[0].sentence(), "plan changed to 840 trials of 17 objects");
     Ok(())
 }
 
@@ -203,29 +181,33 @@ fn all_that_goes_with_a_trial_is_merged_and_only_once() -> Outcome {
     let folder = tempfile::tempdir()?;
     let (here, there) = (folder.path().join("here.sqlite"), folder.path().join("there.sqlite"));
     let mut ours = store_with(&here, &["box"])?;
-    ours.label_trial(1, "case")?;
-    let mut theirs = store_with(&there, &["", "cube"])?;
-    theirs.label_trial(1, "lemon")?;
-    theirs.set_note(1, "slipped")?;
-    theirs.set_tags(1, &["wet".to_owned(), "late".to_owned()])?;
-    theirs.set_unsure(1, true)?;
-    theirs.set_guess(1, "m", &[("lemon".to_owned(), 0.25), ("ball".to_owned(), 0.75)])?;
-    theirs.mark_reviewed(1)?;
-    theirs.set_note(2, "x")?;
-    theirs.undo()?.ok_or("the note")?;
-    theirs.set_label_plan(&LabelPlan { objects: Vec::new() })?;
+    ours.labels().set_label(1, "case")?;
+    let theirs = store_with(&there, &["", "cube"])?;
+    theirs.labels().set_label(1, "lemon")?;
+    theirs.labels().set_note(1, "slipped")?;
+    theirs.labels().set_tags(1, &["wet".to_owned(), "late".to_owned()])?;
+    theirs.labels().set_unsure(1, true)?;
+    theirs.labels().set_guess(1, "m", &[("lemon".to_owned(), 0.25), ("ball".to_owned(), 0.75)])?;
+    theirs.labels().mark_reviewed(1)?;
+    theirs.labels().set_note(2, "x")?;
+    theirs.journal().undo()?.ok_or("the note")?;
+    theirs.labels().set_plan(&LabelPlan { objects: Vec::new() })?;
     assert_eq!(ours.merge_from(&there)?.added, 2);
     let numbered = |id: TrialId, row: &LabelledTrial| LabelledTrial { id, ..row.clone() };
-    let (all, before) = (ours.labelled_trials()?, theirs.labelled_trials()?);
+    let (all, before) = (ours.labels().trials()?, theirs.labels().trials()?);
     assert_eq!(all[1..], [numbered(2, &before[0]), numbered(3, &before[1])]);
-    assert_eq!(ours.guess(2)?, theirs.guess(1)?);
-    let told = ours.journal(99)?;
-    assert_eq!((told.len(), told[0].merged, told[0].undoes), (9, true, Some(told[1].number)));
-    assert_eq!(told[1].sentence(), "trial 3: note \"x\"");
-    assert_eq!(ours.label_plan()?, LabelPlan::default(), "the plan is a matter of each store");
-    assert_eq!((ours.merge_from(&there)?.added, ours.journal(99)?.len()), (0, 9));
-    assert_eq!(ours.undo()?.ok_or("our own")?.sentence(), "trial 1: label box -> case", "theirs was done elsewhere");
-    assert_eq!(ours.undo()?, None);
+    assert_eq!(ours.labels().guess(2)?, theirs.labels().guess(1)?);
+    let entries = ours.journal().entries(99)?;
+    assert_eq!((entries.len(), entries[0].merged, entries[0].undoes), (9, true, Some(entries[1].number)));
+    assert_eq!(entries[1].sentence(), "trial 3: note \"x\"");
+    assert_eq!(ours.labels().plan()?, LabelPlan::default(), "the plan is a matter of each store");
+    assert_eq!((ours.merge_from(&there)?.added, ours.journal().entries(99)?.len()), (0, 9));
+    assert_eq!(
+        ours.journal().undo()?.ok_or("our own")?.sentence(),
+        "trial 1: label box -> case",
+        "theirs was done elsewhere"
+    );
+    assert_eq!(ours.journal().undo()?, None);
     Ok(())
 }
 
@@ -237,18 +219,20 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
     // What version 6 did not have is taken away again.
     store.connection.execute_batch(
         "DROP TABLE journal; DROP TABLE tares; DROP TABLE guesses; DROP TABLE label_plan;
+         ALTER TABLE chunks DROP COLUMN checksum; ALTER TABLE readings DROP COLUMN checksum;
+         ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
          PRAGMA user_version = 6;",
     )?;
     drop(store);
-    let mut store = Store::open(&path)?;
-    let row = &store.labelled_trials()?[0];
+    let store = Store::open(&path)?;
+    let row = &store.labels().trials()?[0];
     assert_eq!((row.object.as_deref(), row.cadence.as_str()), (Some("lemon"), "50.00 Hz, jitter 0.0 ms, 2 lost"));
     assert!(row.flags.is_empty() && row.sparkline.iter().all(Vec::is_empty));
-    store.label_trial(1, "ball")?;
-    assert!(store.undo()?.is_some());
+    store.labels().set_label(1, "ball")?;
+    assert!(store.journal().undo()?.is_some());
     Ok(())
 }
 
@@ -284,7 +268,7 @@ fn deed() -> impl Strategy<Value = Deed> {
 
 /// What a list shows, in short.
 fn seen(store: &Store) -> Result<Vec<LabelledTrial>, StoreError> {
-    store.labelled_trials()
+    store.labels().trials()
 }
 
 proptest! {
@@ -300,19 +284,19 @@ proptest! {
         for deed in deeds {
             let before = seen(&store).expect("read");
             let outcome = match deed.clone() {
-                Deed::Label(id, n) => store.label_trial(id, &format!("class {n}")),
-                Deed::Note(id, n) => store.set_note(id, &"!".repeat(n.into())),
-                Deed::Tags(id, n) => store.set_tags(id, &(0..n).map(|k| k.to_string()).collect::<Vec<_>>()),
-                Deed::Unsure(id, unsure) => store.set_unsure(id, unsure),
-                Deed::Discard(id) => store.discard_trial(id),
-                Deed::Restore(id) => store.restore_trial(id),
+                Deed::Label(id, n) => store.labels().set_label(id, &format!("class {n}")),
+                Deed::Note(id, n) => store.labels().set_note(id, &"!".repeat(n.into())),
+                Deed::Tags(id, n) => store.labels().set_tags(id, &(0..n).map(|k| k.to_string()).collect::<Vec<_>>()),
+                Deed::Unsure(id, unsure) => store.labels().set_unsure(id, unsure),
+                Deed::Discard(id) => store.delete(&[id]),
+                Deed::Restore(id) => store.restore(&[id]),
                 Deed::Undo => {
-                    prop_assert_eq!(store.undo().expect("alone").is_some(), now > 0);
+                    prop_assert_eq!(store.journal().undo().expect("alone").is_some(), now > 0);
                     now = now.saturating_sub(1);
                     Ok(())
                 }
                 Deed::Redo => {
-                    prop_assert_eq!(store.redo().expect("alone").is_some(), now + 1 < states.len());
+                    prop_assert_eq!(store.journal().redo().expect("alone").is_some(), now + 1 < states.len());
                     now = (now + 1).min(states.len() - 1);
                     Ok(())
                 }

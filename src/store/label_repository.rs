@@ -1,45 +1,13 @@
-//! Labels of trials in the store, and what goes with them. Every change is told to the journal in the same transaction.
-//!
-//! ```text
-//! trials       object (empty: unlabelled), note, tags, unsure, reviewed
-//! guesses      what a model said of a trial when its label was given
-//! label_plan   how many trials of each object are wanted: one row, or none for the usual plan
-//! journal      see `journal`
-//! ```
+//! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an
+//! entry to the journal in the same transaction.
 
 use super::board_trials::BOARD_RIG;
-use super::journal::{Change, LabelState, append, change, state_of};
+use super::journal::{Change, append, change};
 use super::store::{Store, json};
-use super::store_error::{StoreError, fault};
+use super::store_error::StoreError;
 use crate::labels::{Guess, LabelPlan, class_name};
 use palpate_tactile::trial::TrialId;
-use rusqlite::{Connection, OptionalExtension, params};
-
-/// The tables above, but for the journal.
-pub(super) const LABEL_TABLES: &str = "
-    ALTER TABLE trials ADD COLUMN note TEXT NOT NULL DEFAULT '';
-    ALTER TABLE trials ADD COLUMN tags TEXT NOT NULL DEFAULT '[]';
-    ALTER TABLE trials ADD COLUMN unsure INTEGER NOT NULL DEFAULT 0;
-    ALTER TABLE trials ADD COLUMN reviewed INTEGER NOT NULL DEFAULT 0;
-    CREATE TABLE guesses (
-        trial INTEGER PRIMARY KEY REFERENCES trials (id) ON DELETE CASCADE,
-        model TEXT NOT NULL,
-        pmf TEXT NOT NULL
-    );
-    CREATE TABLE label_plan (
-        only INTEGER PRIMARY KEY CHECK (only = 1),
-        plan TEXT NOT NULL
-    );
-";
-
-/// Copies guesses with the trials of another store; part of merging. The plan is a matter of each store.
-pub(super) const COPY_GUESSES: &str = "
-    INSERT INTO main.guesses (trial, model, pmf)
-    SELECT ours.id, guesses.model, guesses.pmf FROM temp.incoming
-    JOIN other.trials AS theirs ON theirs.id = incoming.id
-    JOIN main.trials AS ours ON ours.uid = theirs.uid
-    JOIN other.guesses AS guesses ON guesses.trial = theirs.id;
-";
+use rusqlite::{Connection, OptionalExtension, Row, params};
 
 /// Most characters of a note.
 const LONGEST_NOTE: usize = 4000;
@@ -47,29 +15,61 @@ const LONGEST_NOTE: usize = 4000;
 /// How far probabilities may be from summing to one: those of a model are rounded when they are written.
 const PMF_TOLERANCE: f64 = 1e-3;
 
+/// Labels, notes, tags, predictions and the plan of a store.
+#[derive(Clone, Copy, Debug)]
+pub struct LabelRepository<'a> {
+    pub(super) store: &'a Store,
+}
+
 impl Store {
-    /// Gives a trial of the real gripper its label, or another one.
-    pub fn label_trial(&mut self, id: TrialId, object: &str) -> Result<(), StoreError> {
+    /// Labels of trials and the plan.
+    pub fn labels(&self) -> LabelRepository<'_> {
+        LabelRepository { store: self }
+    }
+}
+
+/// Labels of one trial.
+struct LabelState {
+    rig: String,
+    object: String,
+    note: String,
+    tags: Vec<String>,
+    unsure: bool,
+    reviewed: bool,
+}
+
+fn state_of(row: &Row<'_>) -> rusqlite::Result<LabelState> {
+    let tags = serde_json::from_str(&row.get::<_, String>(3)?).unwrap_or_default();
+    let (unsure, reviewed) = (row.get(4)?, row.get(5)?);
+    Ok(LabelState { rig: row.get(0)?, object: row.get(1)?, note: row.get(2)?, tags, unsure, reviewed })
+}
+
+impl LabelRepository<'_> {
+    /// Labels a trial of the real gripper.
+    pub fn set_label(&self, id: TrialId, object: &str) -> Result<(), StoreError> {
         let label = class_name(object)?;
-        self.change_trial(id, |state| {
-            let from = Some(state.object.clone()).filter(|name| !name.is_empty());
-            // Of others it is known what they are of: it was simulated, or came with the file.
-            (state.rig == BOARD_RIG).then_some(Change::Label { from, to: Some(label) })
+        self.change_trial(id, |LabelState { rig, object, .. }| {
+            // The object of simulated and imported trials is known.
+            if rig != BOARD_RIG {
+                return Err(StoreError::NotOfBoard { id, object, rig });
+            }
+            let from = Some(object).filter(|name| !name.is_empty());
+            Ok(Some(Change::Label { from, to: Some(label) }))
         })
     }
 
-    /// Sets what is noted of a trial; an empty text removes it.
-    pub fn set_note(&mut self, id: TrialId, note: &str) -> Result<(), StoreError> {
-        let note = note.trim().to_owned();
-        let length = note.chars().count();
+    /// Sets the note on a trial; an empty text removes it.
+    pub fn set_note(&self, id: TrialId, note: &str) -> Result<(), StoreError> {
+        let to = note.trim().to_owned();
+        let length = to.chars().count();
         if length > LONGEST_NOTE {
             return Err(StoreError::LongNote { length, most: LONGEST_NOTE });
         }
-        self.change_trial(id, |state| Some(Change::Note { from: state.note.clone(), to: note }))
+        self.change_trial(id, |state| Ok(Some(Change::Note { from: state.note, to })))
     }
 
-    /// Sets the tags of a trial; each is such a text as a label may be, and counts once.
-    pub fn set_tags(&mut self, id: TrialId, tags: &[String]) -> Result<(), StoreError> {
+    /// Sets the tags of a trial. Each must be a valid label; repeated ones count once.
+    pub fn set_tags(&self, id: TrialId, tags: &[String]) -> Result<(), StoreError> {
         let mut to: Vec<String> = Vec::new();
         for tag in tags {
             let tag = class_name(tag)?;
@@ -77,105 +77,81 @@ impl Store {
                 to.push(tag);
             }
         }
-        self.change_trial(id, |state| Some(Change::Tags { from: state.tags.clone(), to }))
+        self.change_trial(id, |state| Ok(Some(Change::Tags { from: state.tags, to })))
     }
 
-    /// Marks a label as doubted by whoever gave it, or takes that back.
-    pub fn set_unsure(&mut self, id: TrialId, unsure: bool) -> Result<(), StoreError> {
-        self.change_trial(id, |state| Some(Change::Unsure { from: state.unsure, to: unsure }))
+    /// Marks a label as unsure, or removes the mark.
+    pub fn set_unsure(&self, id: TrialId, unsure: bool) -> Result<(), StoreError> {
+        self.change_trial(id, |state| Ok(Some(Change::Unsure { from: state.unsure, to: unsure })))
     }
 
-    /// Keeps what a model said of a trial: classes and their probabilities, which sum to one.
-    pub fn set_guess(&mut self, id: TrialId, model: &str, pmf: &[(String, f64)]) -> Result<(), StoreError> {
+    /// Stores the prediction of a model for a trial: classes and their probabilities, which sum to one.
+    pub fn set_guess(&self, id: TrialId, model: &str, pmf: &[(String, f64)]) -> Result<(), StoreError> {
         let sum: f64 = pmf.iter().map(|(_, p)| p).sum();
         if !((sum - 1.0).abs() < PMF_TOLERANCE && pmf.iter().all(|(_, p)| (0.0..=1.0 + PMF_TOLERANCE).contains(p))) {
             return Err(StoreError::BadGuess { model: model.to_owned(), sum });
         }
         let guess = Guess { model: model.to_owned(), pmf: pmf.to_vec() };
-        self.change_trial(id, |_state| Some(Change::Guess { guess }))
+        self.change_trial(id, |_state| Ok(Some(Change::Guess { guess })))
     }
 
-    /// What a model said of a trial when its label was given.
+    /// The prediction stored for a trial.
     pub fn guess(&self, id: TrialId) -> Result<Option<Guess>, StoreError> {
         let sql = "SELECT model, pmf FROM guesses WHERE trial = ?1";
-        let found: Option<(String, String)> = self
-            .connection
-            .query_row(sql, [id], |row| Ok((row.get(0)?, row.get(1)?)))
-            .optional()
-            .map_err(|e| fault(self.path(), &e))?;
-        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: format!("its guess: {e}") };
+        let columns = |row: &Row<'_>| Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?));
+        let found = self.store.connection.query_row(sql, [id], columns).optional().map_err(|e| self.store.fault(&e))?;
+        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: format!("its prediction: {e}") };
         found.map(|(model, pmf)| Ok(Guess { model, pmf: serde_json::from_str(&pmf).map_err(bad)? })).transpose()
     }
 
-    /// Notes that somebody has looked at a trial again and keeps its label.
-    pub fn mark_reviewed(&mut self, id: TrialId) -> Result<(), StoreError> {
-        self.change_trial(id, |state| if state.reviewed { Some(keeps(state)) } else { Some(Change::Reviewed) })
-    }
-
-    /// Discards a trial: it stays until it is purged, but no list shows it and no data set takes it.
-    pub fn discard_trial(&mut self, id: TrialId) -> Result<(), StoreError> {
-        self.delete(&[id])
-    }
-
-    /// Takes a discarded trial back.
-    pub fn restore_trial(&mut self, id: TrialId) -> Result<(), StoreError> {
-        self.restore(&[id])
+    /// Marks a trial as reviewed: its label was checked and kept.
+    pub fn mark_reviewed(&self, id: TrialId) -> Result<(), StoreError> {
+        self.change_trial(id, |state| Ok((!state.reviewed).then_some(Change::Reviewed)))
     }
 
     /// How many trials of each object are wanted.
-    pub fn label_plan(&self) -> Result<LabelPlan, StoreError> {
-        plan_in(&self.connection).map_err(|e| fault(self.path(), &e))
+    pub fn plan(&self) -> Result<LabelPlan, StoreError> {
+        plan_in(&self.store.connection).map_err(|e| self.store.fault(&e))
     }
 
     /// Sets how many trials of each object are wanted.
-    pub fn set_label_plan(&mut self, plan: &LabelPlan) -> Result<(), StoreError> {
+    pub fn set_plan(&self, plan: &LabelPlan) -> Result<(), StoreError> {
         let to = plan.checked()?;
-        let (path, writer) = (self.path().to_owned(), self.journal.writer.clone());
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
+        let fault = |e: rusqlite::Error| self.store.fault(&e);
+        let transaction = self.store.write()?;
         let from = plan_in(&transaction).map_err(fault)?;
         if from == to {
             return Ok(());
         }
         let sql = "INSERT INTO label_plan (only, plan) VALUES (1, ?1) ON CONFLICT (only) DO UPDATE SET plan = ?1";
         transaction.execute(sql, params![json(&to)]).map_err(fault)?;
-        append(&transaction, &writer, None, &Change::Plan { from, to }, None).map_err(fault)?;
+        append(&transaction, None, &Change::Plan { from, to }, None).map_err(fault)?;
         transaction.commit().map_err(fault)
     }
 
-    /// Makes the change that follows from a trial's state; none where such a change cannot be made of this trial.
+    /// Makes the change that follows from a trial's present state, if any.
     fn change_trial(
-        &mut self,
+        &self,
         id: TrialId,
-        follows: impl FnOnce(&LabelState) -> Option<Change>,
+        follows: impl FnOnce(LabelState) -> Result<Option<Change>, StoreError>,
     ) -> Result<(), StoreError> {
-        let (path, writer) = (self.path().to_owned(), self.journal.writer.clone());
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
-        let Some(state) = state_of(&transaction, id).map_err(fault)? else {
-            drop(transaction);
-            return Err(self.no_trial(id));
-        };
-        let Some(wanted) = follows(&state) else {
-            return Err(StoreError::NotOfBoard { id, object: state.object, rig: state.rig });
-        };
-        change(&transaction, &writer, id, &wanted, None).map_err(fault)?;
+        let fault = |e: rusqlite::Error| self.store.fault(&e);
+        let transaction = self.store.write()?;
+        let sql = "SELECT rig, object, note, tags, unsure, reviewed FROM trials WHERE id = ?1 AND deleted IS NULL";
+        let state = transaction.query_row(sql, [id], state_of).optional().map_err(fault)?;
+        if let Some(wanted) = follows(state.ok_or_else(|| self.store.no_trial(id))?)? {
+            change(&transaction, id, &wanted, None).map_err(fault)?;
+        }
         transaction.commit().map_err(fault)
     }
 }
 
-/// The plan of a store; the usual one where it has none, or one that cannot be read.
+/// The plan of a store; the default where it has none, or one that cannot be read.
 fn plan_in(connection: &Connection) -> rusqlite::Result<LabelPlan> {
-    let sql = "SELECT plan FROM label_plan";
-    let found: Option<String> = connection.query_row(sql, [], |row| row.get(0)).optional()?;
+    let found: Option<String> = connection.query_row("SELECT plan FROM label_plan", [], |row| row.get(0)).optional()?;
     let readable = |text: String| {
         let plan = serde_json::from_str(&text);
         plan.inspect_err(|error| tracing::warn!("the plan in the store cannot be read: {error}")).ok()
     };
     Ok(found.and_then(readable).unwrap_or_default())
-}
-
-/// A change that changes nothing.
-fn keeps(state: &LabelState) -> Change {
-    Change::Unsure { from: state.unsure, to: state.unsure }
 }

@@ -1,14 +1,14 @@
-//! All labelled trials of the real gripper as a folder that needs no Palpate:
+//! Export of all labelled trials of the real gripper into a folder for other programs:
 //!
 //! ```text
-//! trials.csv               a row to a trial: label, note, tags, flags, guess, calibrations, cadence
-//! signals.csv              trial, label, size, shape, t_s, channels of layout C1+F, closing and hold: as `trials import` takes it
-//! raw/trial_7_lemon.csv    counts as they came, a row to a reading
-//! raw/trial_7_lemon.bytes  the bytes, which can be heard again as if they came from a port
+//! trials.csv               one row per trial: label, note, tags, flags, prediction, calibrations, cadence signals.csv
+//! trial, label, size, shape, t_s, channels of layout C1+F, closing and hold: input of `trials import`
+//! raw/trial_7_lemon.csv    raw counts, one row per reading raw/trial_7_lemon.bytes  received bytes, a capture file
+//! that can be replayed like a port
 //! ```
 //!
-//! The folder appears whole or not at all: it is written beside its place and renamed. Unlabelled and discarded trials, and
-//! those whose recording was cut short, are no part of it.
+//! The folder appears whole or not at all: it is written under another name and renamed. Unlabelled, deleted and incomplete
+//! trials are left out.
 
 use super::board_export::write_board_csv;
 use super::csv_export::{CsvError, number};
@@ -24,47 +24,47 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// What an export came to.
+/// Result of an export.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exported {
-    /// The folder.
+    /// Path of the folder.
     pub folder: PathBuf,
     /// Trials written.
     pub trials: usize,
     /// Trials whose channels are in `signals.csv`.
     pub derived: usize,
-    /// Trials whose channels are not, and why.
+    /// Trials left out of `signals.csv`, with the reason.
     pub left_out: Vec<(TrialId, String)>,
 }
 
-/// Why nothing was exported.
+/// Error of an export.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The store.
+    /// Error of the store.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A file or folder.
+    /// Error of a file or folder.
     #[error(transparent)]
     File(#[from] CsvError),
-    /// Something is there already.
-    #[error("\"{folder}\" has something in it already; choose a folder that is empty or does not exist", folder = folder.display())]
+    /// The folder is not empty.
+    #[error("\"{folder}\" is not empty; choose an empty or new folder", folder = folder.display())]
     NotEmpty {
-        /// The folder.
+        /// Path of the folder.
         folder: PathBuf,
     },
     /// No trial is labelled.
-    #[error("no trial of the real gripper is labelled: `palpate trials label ID NAME` gives one its label")]
+    #[error("no trial of the real gripper is labelled; label one with `palpate trials label ID NAME`")]
     Nothing,
 }
 
 type Out = csv::Writer<BufWriter<File>>;
 
-/// An object's name without anything that a file name should not have.
+/// Name of an object as part of a file name.
 pub fn file_name_of(object: &str) -> String {
     object.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect()
 }
 
-/// Writes a trial of the real gripper: counts as CSV, and the bytes beside them. False for a trial of another kind.
+/// Writes a trial of the real gripper: counts as CSV, and its bytes beside it. False for a trial of another kind.
 pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<bool, ExportError> {
     let Some(trial) = store.board_trial(id)? else { return Ok(false) };
     write_board_csv(path, &trial)?;
@@ -75,7 +75,7 @@ pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<boo
 
 /// Writes all labelled trials into a folder that is empty or does not exist.
 pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportError> {
-    let rows: Vec<LabelledTrial> = store.labelled_trials()?.into_iter().filter(LabelledTrial::counts).collect();
+    let rows: Vec<LabelledTrial> = store.labels().trials()?.into_iter().filter(LabelledTrial::counts).collect();
     if rows.is_empty() {
         return Err(ExportError::Nothing);
     }
@@ -84,7 +84,7 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
     }
     let unfinished = beside(folder);
     let written = write_all(store, &rows, &unfinished).and_then(|left_out| {
-        // An empty folder gives way; one that is not empty any more does not, and neither does anything else.
+        // Replaces an empty folder, but nothing else that has appeared meanwhile.
         if folder.is_dir() {
             std::fs::remove_dir(folder).map_err(|e| cannot(folder, &e))?;
         }
@@ -92,13 +92,13 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
         Ok(left_out)
     });
     let left_out = written.inspect_err(|_error| {
-        // The remains are of no use; that they may not be removable either adds nothing to the message.
+        // Nothing to add to the message where the remains cannot be removed either.
         let _gone = std::fs::remove_dir_all(&unfinished);
     })?;
     Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived: rows.len() - left_out.len(), left_out })
 }
 
-/// Where the folder is written before it is whole: on the same disk, under a name of this program's.
+/// Name of the unfinished folder, on the same disk.
 fn beside(folder: &Path) -> PathBuf {
     let name = folder.file_name().map_or_else(|| "export".into(), |name| name.to_string_lossy().into_owned());
     folder.with_file_name(format!(".{name}.{}.unfinished", std::process::id()))
@@ -184,7 +184,7 @@ fn write_signals(out: &mut Out, row: &LabelledTrial, label: &str, signals: &Sign
     let class = catalogue().iter().find(|built_in| built_in.name == label).map(|built_in| built_in.class());
     let (size, shape) = class.map_or(("", ""), |class| (class.size.name(), class.shape.name()));
     for (sample, t) in signals.t_s.iter().enumerate() {
-        // Numbers start anew in every store; the identity does not.
+        // The identity, because numbers differ between stores.
         let before = [row.uid.clone(), label.to_owned(), size.to_owned(), shape.to_owned(), number(*t)];
         out.write_record(before.into_iter().chain(signals.row(sample).iter().map(ToString::to_string)))?;
     }

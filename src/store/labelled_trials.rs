@@ -1,18 +1,18 @@
-//! Trials of the real gripper with their labels, for lists: everything a list shows is stored with the trial, so that
+//! Lists of the real gripper's trials with their labels. Everything that a list shows is stored with the trial, so that
 //! hundreds of them are read without decoding one.
 
 use super::board_trials::BOARD_RIG;
-use super::store::Store;
-use super::store_error::{StoreError, fault};
+use super::label_repository::LabelRepository;
+use super::store_error::StoreError;
 use crate::labels::{FlagRemark, Guess, GuessTop, LabelledTrial, Sparkline, cadence_line, flaws};
 use palpate_tactile::cadence::Cadence;
 use rusqlite::Row;
 use serde::Deserialize;
 
-/// What a list shows of `board_trials.about`.
+/// The part of `board_trials.about` that lists show.
 #[derive(Deserialize, Default)]
 #[serde(default)]
-struct Shown {
+struct ListedInfo {
     cadence: Cadence,
     flags: Vec<FlagRemark>,
     sparkline: Sparkline,
@@ -21,14 +21,14 @@ struct Shown {
 
 fn of_row(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
     let text = |column: usize| row.get::<_, String>(column);
-    let shown: Shown = serde_json::from_str(&text(11)?).unwrap_or_default();
+    let shown: ListedInfo = serde_json::from_str(&text(11)?).unwrap_or_default();
     let object = Some(text(4)?).filter(|object| !object.is_empty());
     let guess = match (row.get::<_, Option<String>>(12)?, row.get::<_, Option<String>>(13)?) {
         (Some(model), Some(pmf)) => serde_json::from_str(&pmf).ok().map(|pmf| Guess { model, pmf }),
         _ => None,
     };
     let samples = row.get::<_, i64>(10)?.max(0).cast_unsigned();
-    // Trials from before their length was kept: what their rate says.
+    // Trials of early versions have no length: it follows from their rate.
     let by_rate = if shown.cadence.rate_hz > 0.0 { samples as f64 / shown.cadence.rate_hz } else { 0.0 };
     Ok(LabelledTrial {
         id: row.get(0)?,
@@ -50,15 +50,14 @@ fn of_row(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
     })
 }
 
-impl Store {
-    /// All trials of the real gripper, oldest first; discarded ones too.
-    pub fn labelled_trials(&self) -> Result<Vec<LabelledTrial>, StoreError> {
+impl LabelRepository<'_> {
+    /// All trials of the real gripper, oldest first; deleted ones too.
+    pub fn trials(&self) -> Result<Vec<LabelledTrial>, StoreError> {
         let sql = "SELECT trials.id, uid, created, state, object, note, tags, unsure, reviewed, deleted IS NOT NULL,
                    samples, about, guesses.model, guesses.pmf
                    FROM trials JOIN board_trials ON board_trials.trial = trials.id
                    LEFT JOIN guesses ON guesses.trial = trials.id WHERE rig = ?1 ORDER BY trials.id";
-        let rows: rusqlite::Result<Vec<_>> =
-            self.connection.prepare(sql).and_then(|mut statement| statement.query_map([BOARD_RIG], of_row)?.collect());
-        rows.map_err(|e| fault(self.path(), &e))
+        let rows = self.store.connection.prepare(sql).and_then(|mut s| s.query_map([BOARD_RIG], of_row)?.collect());
+        rows.map_err(|e| self.store.fault(&e))
     }
 }

@@ -1,56 +1,30 @@
-//! Joining stores: the parts of a data set that several machines have collected.
+//! Merging: copies the trials of another store into this one, such as the parts of a data set that several machines
+//! collected.
 
-use super::board_trials::COPY_BOARD_TRIALS;
-use super::journal::COPY_JOURNAL;
-use super::label_repository::COPY_GUESSES;
+use super::schema::TABLES_OF_A_TRIAL;
 use super::store::Store;
-use super::store_error::{StoreError, fault};
+use super::store_error::StoreError;
+use rusqlite::Transaction;
 use serde::Serialize;
 use std::path::Path;
 
-/// What a merge came to.
+/// Result of a merge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Merged {
     /// Trials copied.
     pub added: u64,
-    /// Trials that were here already.
+    /// Trials that were in this store already.
     pub known: u64,
 }
 
 const CHOOSE_INCOMING: &str = "
-    CREATE TEMP TABLE incoming AS SELECT theirs.id FROM other.trials AS theirs
+    CREATE TEMP TABLE incoming AS SELECT theirs.id, theirs.uid FROM other.trials AS theirs
     WHERE NOT EXISTS (
         SELECT 1 FROM main.trials AS ours WHERE ours.uid = theirs.uid OR (
             ours.collection = theirs.collection AND ours.object = theirs.object AND ours.seed = theirs.seed));
 ";
 
-const COPY_TRIALS: &str = "
-    INSERT INTO main.trials (uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings,
-        version, samples, deleted, collection, size, shape, plan, note, tags, unsure, reviewed)
-    SELECT uid, created, state, rig, object, seed, scene, world_from_gripper, quality, warnings, version, samples,
-        deleted, collection, size, shape, plan, note, tags, unsure, reviewed
-    FROM other.trials WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id;
-";
-
-const COPY_CHUNKS: &str = "
-    INSERT INTO main.chunks (trial, number, frames)
-    SELECT ours.id, chunks.number, chunks.frames FROM temp.incoming
-    JOIN other.trials AS theirs ON theirs.id = incoming.id
-    JOIN main.trials AS ours ON ours.uid = theirs.uid
-    JOIN other.chunks AS chunks ON chunks.trial = theirs.id;
-    INSERT INTO main.readings (trial, channels, samples)
-    SELECT ours.id, readings.channels, readings.samples FROM temp.incoming
-    JOIN other.trials AS theirs ON theirs.id = incoming.id
-    JOIN main.trials AS ours ON ours.uid = theirs.uid
-    JOIN other.readings AS readings ON readings.trial = theirs.id;
-    INSERT INTO main.parts (trial, sensor, part)
-    SELECT ours.id, parts.sensor, parts.part FROM temp.incoming
-    JOIN other.trials AS theirs ON theirs.id = incoming.id
-    JOIN main.trials AS ours ON ours.uid = theirs.uid
-    JOIN other.parts AS parts ON parts.trial = theirs.id;
-";
-
-/// Calibrations come along, so that trials can be derived here too. Where parts sit now is a matter of each gripper.
+/// Calibrations come along, so that signals can be derived here too. Mountings and the plan stay with each store.
 const COPY_CALIBRATIONS: &str = "
     INSERT INTO main.calibrations (uid, part, version, created, withdrawn, record)
     SELECT uid, part, version + coalesce((SELECT max(version) FROM main.calibrations AS ours
@@ -58,30 +32,59 @@ const COPY_CALIBRATIONS: &str = "
     FROM other.calibrations AS theirs WHERE uid NOT IN (SELECT uid FROM main.calibrations) ORDER BY id;
 ";
 
+const COPY_JOURNAL: &str = "
+    INSERT INTO main.journal (uid, at, trial, undoes, undoable, merged, entry)
+    SELECT theirs.uid, at, trial, undoes, undoable, 1, entry
+    FROM temp.incoming JOIN other.journal AS theirs ON theirs.trial = incoming.uid
+    WHERE theirs.uid NOT IN (SELECT uid FROM main.journal) ORDER BY theirs.number;
+";
+
+/// Copies the chosen trials with everything that belongs to them; returns how many.
+fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<u64> {
+    transaction.execute_batch(CHOOSE_INCOMING)?;
+    let columns = columns_of(transaction, "trials", "id")?;
+    let sql = format!(
+        "INSERT INTO main.trials ({columns}) SELECT {columns} FROM other.trials
+         WHERE id IN (SELECT id FROM temp.incoming) ORDER BY id"
+    );
+    let added = transaction.execute(&sql, [])? as u64;
+    for table in TABLES_OF_A_TRIAL {
+        let columns = columns_of(transaction, table, "trial")?;
+        let sql = format!(
+            "INSERT INTO main.{table} (trial, {columns}) SELECT numbered.id, {columns} FROM temp.incoming
+             JOIN (SELECT id, uid FROM main.trials) AS numbered ON numbered.uid = incoming.uid
+             JOIN other.{table} AS theirs ON theirs.trial = incoming.id"
+        );
+        transaction.execute(&sql, [])?;
+    }
+    transaction.execute_batch(COPY_CALIBRATIONS)?;
+    transaction.execute_batch(COPY_JOURNAL)?;
+    transaction.execute_batch("DROP TABLE temp.incoming")?;
+    Ok(added)
+}
+
+/// All columns of a table but its key, separated by commas.
+fn columns_of(transaction: &Transaction<'_>, table: &str, key: &str) -> rusqlite::Result<String> {
+    let sql = "SELECT group_concat(name, ', ') FROM pragma_table_info(?1) WHERE name <> ?2";
+    transaction.query_row(sql, [table, key], |row| row.get(0))
+}
+
 impl Store {
-    /// Copies what another store holds and this one does not. Trials keep their identity, so that merging twice adds
-    /// nothing the second time; their numbers are new ones.
+    /// Copies the trials of another store that this one does not have. Trials keep their identity, so that merging
+    /// twice adds nothing the second time; they get new numbers.
     pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
-        // Opening it brings it up to date, or says why it cannot be read.
         if !other.is_file() {
-            let cause = "there is no such file".to_owned();
+            let cause = "no such file".to_owned();
             return Err(StoreError::Open { path: other.to_owned(), cause });
         }
+        // Opening it updates its tables, or says why it cannot be read.
         drop(Self::open(other)?);
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
+        let fault = |e: rusqlite::Error| self.fault(&e);
         self.connection.execute("ATTACH DATABASE ?1 AS other", [other.to_string_lossy()]).map_err(fault)?;
         let merged = self.write().and_then(|transaction| {
             let count = "SELECT count(*) FROM other.trials";
             let total: i64 = transaction.query_row(count, [], |row| row.get(0)).map_err(fault)?;
-            transaction.execute_batch(CHOOSE_INCOMING).map_err(fault)?;
-            let added = transaction.execute(COPY_TRIALS, []).map_err(fault)? as u64;
-            transaction.execute_batch(COPY_CHUNKS).map_err(fault)?;
-            transaction.execute_batch(COPY_CALIBRATIONS).map_err(fault)?;
-            transaction.execute_batch(COPY_BOARD_TRIALS).map_err(fault)?;
-            transaction.execute_batch(COPY_GUESSES).map_err(fault)?;
-            transaction.execute_batch(COPY_JOURNAL).map_err(fault)?;
-            transaction.execute_batch("DROP TABLE temp.incoming").map_err(fault)?;
+            let added = copy(&transaction).map_err(fault)?;
             transaction.commit().map_err(fault)?;
             Ok(Merged { added, known: total.cast_unsigned().saturating_sub(added) })
         });

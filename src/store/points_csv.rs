@@ -1,51 +1,52 @@
-//! Points of a calibration from a CSV file: `angle_deg` of a flex strip, or `load_kg` or `load_g` of a pad, beside `counts`.
-//! Columns `spread` (counts) and `readings` may stand beside them; several rows of one angle or weight are fine.
+//! Points of a calibration from a CSV file: `angle_deg` of a flex strip, or `load_kg` or `load_g` of a pad, beside
+//! `counts`. Columns `spread` (counts) and `readings` may stand beside them; several rows of one angle or weight are
+//! fine.
 
 use palpate_tactile::calibration::{Kind, Point};
 use std::path::{Path, PathBuf};
 
-/// Why points cannot be read.
+/// Error of reading points.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PointsError {
-    /// The file cannot be read at all.
+    /// The file cannot be read.
     #[error("cannot read the points \"{path}\": {cause}", path = path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Message of the system.
         cause: String,
     },
-    /// No column says what was set.
+    /// A required column is missing.
     #[error(
         "\"{path}\" has no column {wanted}; its first line must name the columns, as in \"{wanted},counts\" (it has: {found})",
         path = path.display()
     )]
     NoColumn {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is missing.
+        /// Name of the column.
         wanted: &'static str,
-        /// What is there.
+        /// Names of the columns that exist.
         found: String,
     },
-    /// A cell without a number.
+    /// A field without a number.
     #[error("\"{path}\", line {line}: {column} is \"{text}\", which is not a number", path = path.display())]
     NotANumber {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Line, from 1.
         line: u64,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Content of the field.
         text: String,
     },
 }
 
-/// Rows beyond which a file is no list of points.
+/// Most rows of a file of points.
 const MOST_ROWS: usize = 10_000;
 
-/// A column that says what was set, and the factor to degrees or kilograms.
+/// Names of the stimulus column, and the factor to degrees or kilograms.
 fn stimulus_columns(kind: Kind) -> &'static [(&'static str, f64)] {
     match kind {
         Kind::Flex => &[("angle_deg", 1.0)],
@@ -53,7 +54,7 @@ fn stimulus_columns(kind: Kind) -> &'static [(&'static str, f64)] {
     }
 }
 
-/// Reads the points of a sensor of some kind.
+/// Reads calibration points for a kind of sensor.
 pub fn read_points_csv(path: &Path, kind: Kind) -> Result<Vec<Point>, PointsError> {
     let unreadable = |cause: String| PointsError::Unreadable { path: path.to_owned(), cause };
     let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
@@ -89,7 +90,7 @@ pub fn read_points_csv(path: &Path, kind: Kind) -> Result<Vec<Point>, PointsErro
             readings: readings.map_or(Ok(1.0), number)?.clamp(1.0, 1e6) as u32,
         });
         if points.len() > MOST_ROWS {
-            return Err(unreadable(format!("more than {MOST_ROWS} rows are too many for points of a calibration")));
+            return Err(unreadable(format!("more than {MOST_ROWS} rows; a calibration needs only some points")));
         }
     }
     Ok(points)

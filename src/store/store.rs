@@ -1,25 +1,15 @@
-//! The SQLite store. A write-ahead log, so that a kill at any moment loses at most the chunk being written and never
-//! harms another trial, and so that several programs can work on one store.
+//! The SQLite store: its connection, and the trials in it. A write-ahead log, so that a kill at any moment loses at
+//! most the chunk being written and never harms another trial, and so that several programs can share one store.
 //!
-//! ```text
-//! trials   one row each: what is known of a trial; `state` is 'recording' until its last chunk is in
-//! chunks   its frames, about a second each, as described in `blob`
-//! readings channels of an imported trial, which has no frames
-//! calibrations, mountings, parts: what is known of the real gripper's sensors; see `calibrations`
-//! tares    what those showed at rest; see `tares`
-//! board_*  what the board of a real gripper sent; see `board_trials`
-//! guesses, label_plan, journal: labels and who changed what; see `labels` and `journal`
-//! ```
+//! Tables and migrations are in `schema`. Each group of tables beside trials has a repository: [`Store::labels`],
+//! [`Store::journal`], [`Store::calibrations`].
 //!
-//! Deleting marks; purging removes. Chunks are only ever added.
+//! Deleting marks a trial; purging removes it. Chunks are only ever added.
 
-use super::blob::{decode_frames, encode_frames};
-use super::board_trials::BOARD_TABLES;
-use super::calibrations::CALIBRATION_TABLES;
-use super::journal::{Change, JOURNAL_TABLES, JournalView, change, newest};
-use super::label_repository::LABEL_TABLES;
-use super::store_error::{StoreError, fault, plain};
-use super::tares::TARE_TABLES;
+use super::checksum::{checksum, is_intact};
+use super::frame_blob::{decode_frames, encode_frames};
+use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
+use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain};
 use crate::labels::{FlagRemark, flaws};
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Quality};
@@ -31,95 +21,43 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// "Palp" in ASCII, in the header of the SQLite file.
-pub(super) const APPLICATION_ID: i32 = 0x5061_6c70;
-/// Version of the tables below. A store from a newer program is refused, an older one is brought up to date.
-pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
-/// How long to wait for another program that is writing.
-pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 /// Samples per chunk when a whole trial is stored at once: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
 
-/// What makes each version out of the one before; the first makes the tables.
-const MIGRATIONS: [&str; 9] = [
-    TABLES,
-    "ALTER TABLE trials ADD COLUMN collection TEXT;
-     CREATE UNIQUE INDEX trials_by_collection ON trials (collection, object, seed) WHERE collection IS NOT NULL;",
-    "ALTER TABLE trials ADD COLUMN size TEXT;
-     ALTER TABLE trials ADD COLUMN shape TEXT;
-     CREATE TABLE readings (
-        trial INTEGER PRIMARY KEY REFERENCES trials (id) ON DELETE CASCADE,
-        channels TEXT NOT NULL,
-        samples BLOB NOT NULL
-     );",
-    "ALTER TABLE trials ADD COLUMN plan TEXT NOT NULL DEFAULT '[]';",
-    BOARD_TABLES,
-    CALIBRATION_TABLES,
-    LABEL_TABLES,
-    JOURNAL_TABLES,
-    TARE_TABLES,
-];
-
-pub(super) const TABLES: &str = "
-    CREATE TABLE trials (
-        id INTEGER PRIMARY KEY AUTOINCREMENT,
-        uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
-        created TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
-        state TEXT NOT NULL DEFAULT 'recording' CHECK (state IN ('recording', 'complete')),
-        rig TEXT NOT NULL,
-        object TEXT NOT NULL,
-        seed INTEGER NOT NULL,
-        scene TEXT NOT NULL,
-        world_from_gripper TEXT NOT NULL,
-        quality TEXT NOT NULL,
-        warnings TEXT NOT NULL,
-        version TEXT NOT NULL,
-        samples INTEGER NOT NULL DEFAULT 0,
-        deleted TEXT
-    );
-    CREATE TABLE chunks (
-        trial INTEGER NOT NULL REFERENCES trials (id) ON DELETE CASCADE,
-        number INTEGER NOT NULL,
-        frames BLOB NOT NULL,
-        PRIMARY KEY (trial, number)
-    ) WITHOUT ROWID;
-    CREATE INDEX trials_by_object ON trials (object);
-";
-
-/// A trial as lists show it.
+/// One row of the list of trials.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrialRow {
-    /// Its number.
+    /// Number in this store.
     pub id: TrialId,
-    /// When it began, UTC.
+    /// Time of its beginning, UTC.
     pub created: String,
     /// `recording`, or `complete`.
     pub state: String,
-    /// Where it came from.
+    /// Origin: `sim`, `serial` or `import`.
     pub rig: String,
-    /// Name of the object; empty where nobody has said yet what it is of.
+    /// Name of the object; empty while unlabelled.
     pub object: String,
     /// Seed of the pose.
     pub seed: u64,
-    /// The data set it was made for, if any.
+    /// Data set that it belongs to.
     pub collection: Option<String>,
-    /// Size and shape of the object where they came with the trial.
+    /// Size and shape of the object, for imported trials that state them.
     pub properties: Option<(String, String)>,
     /// Samples stored.
     pub samples: i64,
     /// Whether it stayed finite and converged.
     pub sound: bool,
-    /// How many warnings it carries.
+    /// Number of warnings.
     pub warnings: usize,
-    /// What somebody noted of it.
+    /// Note.
     pub note: String,
-    /// Its tags.
+    /// Tags.
     pub tags: Vec<String>,
-    /// Whoever gave its label was not sure.
+    /// The label is marked as unsure.
     pub unsure: bool,
-    /// What is wrong with it, where it is one of the real gripper.
+    /// Flags, for a trial of the real gripper.
     pub flags: Vec<FlagRemark>,
-    /// When it was deleted, if it was.
+    /// Time of deletion, UTC.
     pub deleted: Option<String>,
 }
 
@@ -129,11 +67,10 @@ pub struct Store {
     pub(super) connection: Connection,
     path: PathBuf,
     warnings: Vec<String>,
-    pub(super) journal: JournalView,
 }
 
 impl Store {
-    /// Where the store lies when nobody says otherwise: the platform's folder for application data.
+    /// Default path of the store: the platform's folder for application data.
     pub fn default_path() -> PathBuf {
         match directories::ProjectDirs::from("", "", "palpate") {
             Some(folders) => folders.data_dir().join("trials.sqlite"),
@@ -141,7 +78,7 @@ impl Store {
         }
     }
 
-    /// Opens a store, making it and its folder where they do not exist.
+    /// Opens a store; creates it and its folder where they do not exist.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)
@@ -149,18 +86,17 @@ impl Store {
         }
         let connection =
             Connection::open(path).map_err(|e| StoreError::Open { path: path.to_owned(), cause: plain(&e) })?;
-        let (path, journal) = (path.to_owned(), JournalView::default());
-        let mut store = Self { connection, path, warnings: Vec::new(), journal };
+        let mut store = Self { connection, path: path.to_owned(), warnings: Vec::new() };
         store.prepare()?;
         Ok(store)
     }
 
-    /// The file.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What is not as it should be about the store, in sentences.
+    /// Warnings from opening the store, one sentence each.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -168,12 +104,12 @@ impl Store {
     fn prepare(&mut self) -> Result<(), StoreError> {
         let path = self.path.clone();
         let fault = |e: rusqlite::Error| fault(&path, &e);
-        self.set_patience(PATIENCE)?;
+        self.set_busy_timeout(BUSY_TIMEOUT)?;
         self.check_identity()?;
         // The log lives in shared memory, which network file systems do not have.
         let mode = if on_network_file_system(&self.path) {
             self.warnings.push(format!(
-                "\"{}\" lies on a network file system: write-ahead logging is off, so keep to one program at a time",
+                "\"{}\" is on a network file system: write-ahead logging is off, so use one program at a time",
                 self.path.display()
             ));
             "DELETE"
@@ -184,44 +120,40 @@ impl Store {
         self.connection.pragma_update(None, "synchronous", "NORMAL").map_err(fault)?;
         self.connection.pragma_update(None, "foreign_keys", true).map_err(fault)?;
         let transaction = self.write()?;
-        let version: i32 = transaction.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fault)?;
-        if version == 0 {
-            transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(fault)?;
-        }
-        for migration in MIGRATIONS.iter().skip(usize::try_from(version).unwrap_or(0)) {
-            transaction.execute_batch(migration).map_err(fault)?;
-        }
-        if version < SCHEMA_VERSION {
-            transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
-        }
-        let seen = newest(&transaction).map_err(fault)?;
+        let copy = migrate(&transaction, &self.path)?;
         transaction.commit().map_err(fault)?;
-        self.journal.seen = seen;
+        self.warnings.extend(copy.map(|copy| {
+            format!(
+                "the store was updated to version {SCHEMA_VERSION}; a copy of the file before the update is \"{}\". Delete it \
+                 when you no longer need the older program",
+                copy.display()
+            )
+        }));
         Ok(())
     }
 
-    /// Changing the journal takes the lock without waiting for it, so that two programs which make one store together
-    /// would trip over each other; hence the waiting is done here.
+    /// Sets SQLite's journal mode. SQLite takes this lock without waiting for it; this waits, so that two programs can
+    /// create one store together.
     fn set_journal(&self, mode: &str) -> Result<(), StoreError> {
         let start = Instant::now();
         loop {
             match self.connection.pragma_update(None, "journal_mode", mode).map_err(|e| self.fault(&e)) {
-                Err(StoreError::Busy) if start.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(5)),
+                Err(StoreError::Busy) if start.elapsed() < BUSY_TIMEOUT => std::thread::sleep(Duration::from_millis(5)),
                 outcome => return outcome,
             }
         }
     }
 
-    /// How long it waits for another program that writes.
-    fn set_patience(&self, patience: Duration) -> Result<(), StoreError> {
-        self.connection.busy_timeout(patience).map_err(|e| self.fault(&e))
+    /// Sets how long to wait for another program that is writing.
+    fn set_busy_timeout(&self, timeout: Duration) -> Result<(), StoreError> {
+        self.connection.busy_timeout(timeout).map_err(|e| self.fault(&e))
     }
 
-    /// Does what can wait for later better than now: [`StoreError::Busy`] at once while another program writes.
+    /// Does some work without waiting: [`StoreError::Busy`] at once while another program is writing.
     pub fn at_once<T>(&mut self, work: impl FnOnce(&mut Self) -> Result<T, StoreError>) -> Result<T, StoreError> {
-        self.set_patience(Duration::ZERO)?;
+        self.set_busy_timeout(Duration::ZERO)?;
         let done = work(self);
-        self.set_patience(PATIENCE)?;
+        self.set_busy_timeout(BUSY_TIMEOUT)?;
         done
     }
 
@@ -240,22 +172,22 @@ impl Store {
             return Err(StoreError::Foreign { path: self.path.clone() });
         }
         if version > SCHEMA_VERSION {
-            return Err(StoreError::Newer { path: self.path.clone(), found: version });
+            return Err(StoreError::Newer { path: self.path.clone(), found: version, known: SCHEMA_VERSION });
         }
         Ok(())
     }
 
-    fn fault(&self, error: &rusqlite::Error) -> StoreError {
+    /// Translates an error of SQLite.
+    pub(super) fn fault(&self, error: &rusqlite::Error) -> StoreError {
         fault(&self.path, error)
     }
 
-    /// A transaction that takes the write lock at once, so that it cannot fail half-way for want of it.
-    pub(super) fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
-        let path = self.path.clone();
-        self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(|e| fault(&path, &e))
+    /// Begins a transaction that takes the write lock at once, so that it cannot fail half-way without it.
+    pub(super) fn write(&self) -> Result<Transaction<'_>, StoreError> {
+        Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate).map_err(|e| self.fault(&e))
     }
 
-    /// The time now, UTC, as trials are dated: `2026-11-21T15:36:00.123Z`.
+    /// Current time, UTC, in the format of [`TrialRow::created`]: `2026-11-21T15:36:00.123Z`.
     pub fn now(&self) -> Result<String, StoreError> {
         let sql = "SELECT strftime('%Y-%m-%dT%H:%M:%fZ', 'now')";
         self.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| fault(&self.path, &e))
@@ -298,7 +230,7 @@ impl Store {
         Ok(id)
     }
 
-    /// Stores the trials of a collection, all or nothing, but for those that are there already; returns how many.
+    /// Stores the trials of a collection that are not in the store yet, all or nothing; returns how many.
     pub fn insert_collected<'a>(&mut self, trials: impl Iterator<Item = &'a Trial>) -> Result<u32, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
@@ -313,7 +245,7 @@ impl Store {
         Ok(stored)
     }
 
-    /// Object and seed of every trial of a collection, deleted ones too: what is not wanted is not made again.
+    /// Object and seed of every trial of a collection; deleted ones too, so that they are not made again.
     pub fn collected(&self, collection: &str) -> Result<BTreeSet<(String, u64)>, StoreError> {
         let sql = "SELECT object, seed FROM trials WHERE collection = ?1";
         let rows = self.connection.prepare(sql).and_then(|mut statement| {
@@ -322,7 +254,7 @@ impl Store {
         rows.map_err(|e| self.fault(&e))
     }
 
-    /// All trials, oldest first; deleted ones only when asked for.
+    /// All trials, oldest first; with or without deleted ones.
     pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
         let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, \
                    collection, size, shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END
@@ -395,14 +327,17 @@ impl Store {
     }
 
     fn load_frames(&self, id: TrialId) -> Result<Vec<Frame>, StoreError> {
-        let sql = "SELECT number, frames FROM chunks WHERE trial = ?1 ORDER BY number";
-        let chunks: Vec<(i64, Vec<u8>)> = self
+        let sql = "SELECT number, frames, checksum FROM chunks WHERE trial = ?1 ORDER BY number";
+        let chunks: Vec<(i64, Vec<u8>, Option<u32>)> = self
             .connection
             .prepare(sql)
-            .and_then(|mut statement| statement.query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?.collect())
+            .and_then(|mut s| s.query_map([id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?.collect())
             .map_err(|e| self.fault(&e))?;
         let mut frames = Vec::new();
-        for (chunk, bytes) in chunks {
+        for (chunk, bytes, stored) in chunks {
+            if !is_intact(stored, &[&bytes]) {
+                return Err(StoreError::Checksum { id, what: "frames", chunk });
+            }
             frames.extend(decode_frames(&bytes).map_err(|cause| StoreError::Damaged { id, chunk, cause })?);
         }
         Ok(frames)
@@ -417,34 +352,7 @@ impl Store {
         }
     }
 
-    /// Marks trials as deleted, all or none of them. They can be restored until they are purged.
-    pub fn delete(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
-        self.change_each(ids, &Change::Discarded)
-    }
-
-    /// Takes deletions back, all or none of them.
-    pub fn restore(&mut self, ids: &[TrialId]) -> Result<(), StoreError> {
-        self.change_each(ids, &Change::Restored)
-    }
-
-    fn change_each(&mut self, ids: &[TrialId], what: &Change) -> Result<(), StoreError> {
-        let (path, writer) = (self.path.clone(), self.journal.writer.clone());
-        let transaction = self.write()?;
-        let mut missing = None;
-        for id in ids {
-            if !change(&transaction, &writer, *id, what, None).map_err(|e| fault(&path, &e))? {
-                missing = Some(*id);
-                break;
-            }
-        }
-        if let Some(id) = missing {
-            transaction.rollback().map_err(|e| fault(&path, &e))?;
-            return Err(self.no_trial(id));
-        }
-        transaction.commit().map_err(|e| fault(&path, &e))
-    }
-
-    /// Removes all trials marked as deleted for good; returns how many.
+    /// Removes all deleted trials for good; returns how many.
     pub fn purge(&mut self) -> Result<usize, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
@@ -464,7 +372,7 @@ fn insert_whole(transaction: &Transaction<'_>, trial: &Trial) -> rusqlite::Resul
     Ok(id)
 }
 
-/// True when another program has collected this trial meanwhile.
+/// True when another program has collected this trial in the meantime.
 fn is_collected(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<bool> {
     let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE collection = ?1 AND object = ?2 AND seed = ?3)";
     transaction.query_row(sql, params![info.collection, info.object, info.seed.cast_signed()], |row| row.get(0))
@@ -496,10 +404,11 @@ pub(super) fn json<T: Serialize + ?Sized>(value: &T) -> String {
 }
 
 fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) -> rusqlite::Result<()> {
+    let bytes = encode_frames(frames);
     transaction.execute(
-        "INSERT INTO chunks (trial, number, frames) \
-         VALUES (?1, (SELECT coalesce(max(number), -1) + 1 FROM chunks WHERE trial = ?1), ?2)",
-        params![id, encode_frames(frames)],
+        "INSERT INTO chunks (trial, number, frames, checksum) \
+         VALUES (?1, (SELECT coalesce(max(number), -1) + 1 FROM chunks WHERE trial = ?1), ?2, ?3)",
+        params![id, bytes, checksum(&[&bytes])],
     )?;
     transaction.execute("UPDATE trials SET samples = samples + ?2 WHERE id = ?1", params![id, frames.len() as i64])?;
     Ok(())
@@ -522,7 +431,7 @@ fn json_or_default<T: Default + serde::de::DeserializeOwned>(text: &str) -> T {
     serde_json::from_str(text).unwrap_or_default()
 }
 
-/// True where the file's mount is a network file system, as far as the system tells (Linux).
+/// True for a file on a network file system, as far as the system reports it (Linux).
 fn on_network_file_system(path: &Path) -> bool {
     const NETWORK: [&str; 9] = ["nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "afs", "lustre", "beegfs"];
     let Ok(mounts) = std::fs::read_to_string("/proc/self/mounts") else {

@@ -1,182 +1,209 @@
-//! What can go wrong with the store, in sentences for the user.
+//! Errors of the store, as sentences for the user.
 
-use super::blob::BlobError;
-use super::calibrations::CalibrationId;
-use super::disk::is_full;
-use super::store::{PATIENCE, SCHEMA_VERSION};
+use super::frame_blob::BlobError;
 use crate::labels::{ClassNameError, PlanError, shown_name};
 use palpate_tactile::trial::TrialId;
 use rusqlite::ErrorCode;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-/// Why the store cannot do what was asked.
+/// How long the store waits for another program that is writing, before [`StoreError::Busy`].
+pub(super) const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// With less free space than this a disk is full (bytes): SQLite's index of its log is 32 KiB.
+const FULL: u64 = 64 << 10;
+
+/// Error of a store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The folder cannot be made.
     #[error("cannot make the folder \"{path}\" for the store: {cause}", path = path.display())]
     Folder {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         cause: String,
     },
     /// SQLite cannot open the file.
     #[error("cannot open the store \"{path}\": {cause}", path = path.display())]
     Open {
-        /// The file.
+        /// Path of the store.
         path: PathBuf,
-        /// What SQLite says.
+        /// Message of SQLite.
         cause: String,
     },
     /// A file of another program, or no database at all.
-    #[error("\"{path}\" is not a store of Palpate's; choose another file with --store", path = path.display())]
+    #[error("\"{path}\" is not a store of Palpate; choose another file with --store", path = path.display())]
     Foreign {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// Written by a newer program.
     #[error(
-        "\"{path}\" was written by a newer Palpate (store version {found}, this program knows {SCHEMA_VERSION}); \
-         update Palpate",
+        "\"{path}\" was written by a newer Palpate (store version {found}, this program reads up to {known}); update \
+         Palpate",
         path = path.display()
     )]
     Newer {
-        /// The file.
+        /// Path of the store.
         path: PathBuf,
         /// Its version.
         found: i32,
+        /// Newest version that this program reads.
+        known: i32,
     },
-    /// Another program has kept the store locked.
-    #[error("the store is busy: another program has been writing to it for {} s; try again", PATIENCE.as_secs())]
+    /// An older store cannot be copied before its update.
+    #[error(
+        "the store is from an older Palpate, and its copy \"{path}\" cannot be written before the update: {cause}. Free \
+         some space or make the folder writable, then try again; the store is unchanged",
+        path = path.display()
+    )]
+    NotCopied {
+        /// Path of the copy.
+        path: PathBuf,
+        /// Message of the system.
+        cause: String,
+    },
+    /// Another program keeps the store locked.
+    #[error("the store is busy: another program has been writing to it for {} s; try again", BUSY_TIMEOUT.as_secs())]
     Busy,
-    /// No space is left.
+    /// The disk is full.
     #[error("the disk is full: the trial was not stored. Free some space and record again; earlier trials are safe")]
     DiskFull,
-    /// Too little space is left to begin.
+    /// Too little space to begin a trial.
     #[error(
         "the disk with the store \"{path}\" has {free_mb} MB free; the trial may need {needed_mb} MB and was not begun. Free \
          some space, or choose another disk with --store",
         path = path.display()
     )]
     NoRoom {
-        /// The store.
+        /// Path of the store.
         path: PathBuf,
-        /// What is free (MB).
+        /// Free space (MB).
         free_mb: u64,
-        /// What may be needed (MB).
+        /// Space that may be needed (MB).
         needed_mb: u64,
     },
-    /// The file cannot be written.
+    /// The file is read-only.
     #[error("the store \"{path}\" cannot be written: it or its folder is read-only", path = path.display())]
     ReadOnly {
-        /// The file.
+        /// Path of the store.
         path: PathBuf,
     },
     /// No such trial.
-    #[error("there is no trial {id} in the store{hint}")]
+    #[error("no trial {id} in the store{hint}")]
     NoTrial {
-        /// The number asked for.
+        /// Number of the trial.
         id: TrialId,
         /// Where it might be.
         hint: &'static str,
     },
-    /// A trial to be restored that is there.
+    /// A trial to be restored that is not deleted.
     #[error("trial {id} is not deleted")]
     NotDeleted {
-        /// The trial.
+        /// Number of the trial.
         id: TrialId,
     },
-    /// A trial whose frames cannot be read.
-    #[error("trial {id} is damaged in its part {chunk}: {cause}")]
+    /// A trial whose frames cannot be decoded.
+    #[error("trial {id} is damaged in its part {chunk}: {cause}. {REMEDY}")]
     Damaged {
-        /// The trial.
+        /// Number of the trial.
         id: TrialId,
-        /// Which chunk.
+        /// Number of the chunk.
         chunk: i64,
-        /// What is wrong with it.
+        /// What the decoder found.
         cause: BlobError,
     },
+    /// A trial whose data differ from their checksum.
+    #[error("trial {id} is damaged: its {what}, part {chunk}, do not match their checksum. {REMEDY}")]
+    Checksum {
+        /// Number of the trial.
+        id: TrialId,
+        /// Which of its data.
+        what: &'static str,
+        /// Number of the chunk.
+        chunk: i64,
+    },
     /// A trial whose description cannot be read.
-    #[error("the description of trial {id} is damaged: {cause}")]
+    #[error("the description of trial {id} is damaged: {cause}. {REMEDY}")]
     BadInfo {
-        /// The trial.
+        /// Number of the trial.
         id: TrialId,
         /// What is wrong with it.
         cause: String,
     },
     /// No such calibration.
-    #[error("there is no calibration {id} in the store; `palpate calibrate list` shows what is there")]
+    #[error("no calibration {id} in the store; `palpate calibrate list` shows all")]
     NoCalibration {
-        /// The number asked for.
-        id: CalibrationId,
+        /// Number of the calibration.
+        id: i64,
     },
     /// A calibration that cannot be read.
-    #[error("calibration {id} is damaged: {cause}")]
+    #[error("calibration {id} is damaged: {cause}. Withdraw it with `palpate calibrate withdraw {id}`")]
     BadCalibration {
-        /// The calibration.
-        id: CalibrationId,
+        /// Number of the calibration.
+        id: i64,
         /// What is wrong with it.
         cause: String,
     },
     /// A text that cannot be a label.
     #[error(transparent)]
     ClassName(#[from] ClassNameError),
-    /// A plan that cannot be.
+    /// An invalid plan.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// A trial whose label is not for people to give.
+    /// A trial whose label cannot be changed.
     #[error(
-        "trial {id} is of \"{object}\" by itself (it comes from \"{rig}\"): only trials of the real gripper are labelled",
+        "trial {id} is of \"{object}\" and comes from \"{rig}\": only trials of the real gripper can be labelled",
         object = shown_name(object)
     )]
     NotOfBoard {
-        /// The trial.
+        /// Number of the trial.
         id: TrialId,
-        /// What it is of.
+        /// Its object.
         object: String,
-        /// Where it comes from.
+        /// Its origin.
         rig: String,
     },
-    /// A note that is no note any more.
-    #[error("a note of {length} characters is too long: {most} are allowed; write what belongs elsewhere into a file")]
+    /// A note that is too long.
+    #[error("the note has {length} characters, {most} are allowed; keep longer texts in a file")]
     LongNote {
         /// Its length (characters).
         length: usize,
-        /// What is allowed (characters).
+        /// The limit (characters).
         most: usize,
     },
-    /// Probabilities that are none.
-    #[error("what \"{model}\" said is not kept: its probabilities do not lie between 0 and 1, or sum to {sum}")]
+    /// Invalid probabilities.
+    #[error("the prediction of \"{model}\" is not stored: its probabilities are outside 0 to 1, or sum to {sum}")]
     BadGuess {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// What they sum to.
+        /// Sum of the probabilities.
         sum: f64,
     },
-    /// Another program was there first.
-    #[error(
-        "\"{wanted}\" of trial {id} is not taken back: another program has changed the trial since ({since}). Look at it; \
-         what was done before can still be taken back"
-    )]
+    /// A trial that has changed outside the journal.
+    #[error("cannot undo \"{change}\" of trial {id}: the trial has changed since")]
     ChangedMeanwhile {
-        /// The trial.
+        /// Number of the trial.
         id: TrialId,
-        /// What was to be taken back.
-        wanted: String,
-        /// What was done since.
-        since: String,
+        /// The change to be undone.
+        change: String,
     },
-    /// Anything else SQLite reports.
+    /// Any other error of SQLite.
     #[error("the store \"{path}\" reports: {cause}", path = path.display())]
     Sqlite {
-        /// The file.
+        /// Path of the store.
         path: PathBuf,
-        /// What SQLite says.
+        /// Message of SQLite.
         cause: String,
     },
 }
 
-/// SQLite's faults in the words of this program.
+/// Advice for every kind of damage.
+const REMEDY: &str =
+    "Take the store from a backup, or delete this trial (`palpate trials delete`): other trials are not affected";
+
+/// Translates an error of SQLite.
 pub(super) fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
     match error.sqlite_error_code() {
         Some(ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
@@ -189,9 +216,20 @@ pub(super) fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
     }
 }
 
+/// Message of SQLite without rusqlite's codes.
 pub(super) fn plain(error: &rusqlite::Error) -> String {
     match error {
         rusqlite::Error::SqliteFailure(_, Some(message)) => message.clone(),
         other => other.to_string(),
     }
+}
+
+/// True where the disk has no room for another page of a store.
+fn is_full(store: &Path) -> bool {
+    fs4::available_space(folder_of(store)).is_ok_and(|free| free < FULL)
+}
+
+/// Folder of a store.
+pub(super) fn folder_of(store: &Path) -> &Path {
+    store.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -1,5 +1,7 @@
-//! Simulated trials for the tests of this package.
+//! Trials for the tests of this package.
 
+use palpate_geometry::Pose;
+use palpate_sim::frame::{Plan, Quality};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::run::SimRun;
 use palpate_sim::scene::Scene;
@@ -22,4 +24,25 @@ pub(crate) fn grasp(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> T
         version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     Trial { info, frames }
+}
+
+/// Description of a trial of the real gripper.
+pub(crate) fn board_info(object: &str) -> TrialInfo {
+    TrialInfo { rig: crate::BOARD_RIG.to_owned(), object: object.to_owned(), ..info("sim") }
+}
+
+/// Description of a trial without scene and frames.
+pub(crate) fn info(object: &str) -> TrialInfo {
+    TrialInfo {
+        rig: "sim".to_owned(),
+        object: object.to_owned(),
+        seed: 0,
+        collection: None,
+        scene: String::new(),
+        world_from_gripper: Pose::IDENTITY,
+        plan: Plan::default(),
+        quality: Quality::default(),
+        warnings: Vec::new(),
+        version: "0".to_owned(),
+    }
 }

@@ -195,9 +195,9 @@ impl Bench {
     /// What the plan has next.
     pub(crate) fn next_object(&self) -> String {
         let store = self.store();
-        let trials = store.labelled_trials().unwrap();
+        let trials = store.labels().trials().unwrap();
         let last = trials.iter().rev().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
-        store.label_plan().unwrap().progress(&trials).next(last).unwrap().object
+        store.labels().plan().unwrap().progress(&trials).next(last).unwrap().object
     }
 
     /// Runs the grasp up to `t` seconds and leaves it standing there.

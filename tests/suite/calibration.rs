@@ -334,8 +334,8 @@ fn a_tare_is_taken_kept_and_shown_beside_the_drift_of_trials() {
     refused(at, &["calibrate", "tare", "--port", "rest.bytes"], &["calibrated"]);
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {
-        store.add_calibration(&calibration.record).unwrap();
-        store.mount_part(*sensor, &calibration.record.part).unwrap();
+        store.calibrations().add(&calibration.record).unwrap();
+        store.calibrations().mount(*sensor, &calibration.record.part).unwrap();
     }
     // The left strip has slipped by 4 degrees, the right one by 17: too little to press on a pad.
     let scene = Scene::default();
@@ -352,7 +352,7 @@ fn a_tare_is_taken_kept_and_shown_beside_the_drift_of_trials() {
     let taken = json(at, &["calibrate", "tare", "--port", "rest.bytes", "--json"]);
     let levels: Vec<&str> = taken["drift"].as_array().unwrap().iter().map(|d| d["level"].as_str().unwrap()).collect();
     assert_eq!(levels, ["moved", "too-far", "steady", "steady"], "{taken}");
-    let offsets = store.tare().unwrap().unwrap().zero.offsets;
+    let offsets = store.calibrations().tare().unwrap().unwrap().zero.offsets;
     assert!((offsets[0].unwrap().to_degrees() - 4.0).abs() < 0.5 && offsets[1].is_none(), "{offsets:?}");
     let said = run(at, &["calibrate", "tare", "--port", "rest.bytes", "--seconds", "0.5"]);
     assert!(said.out.contains("corrected from now on") && said.out.contains("slipped"), "{said:?}");
@@ -406,12 +406,12 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
         stored(&mut store, &board, readings, &of(&known), object, 0.5);
     }
     drop(store);
-    refused(at, &["recognise", "1"], &["trial 1", "it is not known which part is the left flex strip"]);
+    refused(at, &["recognise", "1"], &["trial 1", "no part is mounted as the left flex strip"]);
     refused(at, &["fit", "1", "2"], &["no curvature"]);
-    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    let store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {
-        store.add_calibration(&calibration.record).unwrap();
-        store.mount_part(*sensor, &calibration.record.part).unwrap();
+        store.calibrations().add(&calibration.record).unwrap();
+        store.calibrations().mount(*sensor, &calibration.record.part).unwrap();
     }
     let kappa = |store: &Store| {
         let signals = store.board_signals(1, &[]).unwrap().unwrap().derived.signals;
@@ -428,7 +428,7 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     // Another strip calibration, and the old trial reads differently.
     let mut record = calibrations[0].1.record.clone();
     record.points.iter_mut().for_each(|point| point.stimulus *= 0.9);
-    store.add_calibration(&record).unwrap();
+    store.calibrations().add(&record).unwrap();
     assert!((kappa(&store) / before - 0.9).abs() < 0.01, "{} {before}", kappa(&store));
 }
 
@@ -540,7 +540,7 @@ fn the_window_calibrates_step_by_step() {
     bench.harness.step();
     bench.until_shown(true, "version 1 of \"P3\", the right pad");
     let store = bench.store();
-    let serving = store.serving(None, &[]).unwrap().calibrations;
+    let serving = store.calibrations().serving(None, &[]).unwrap().calibrations;
     let (_, pad) = serving.iter().find(|(sensor, _)| *sensor == Sensor::PadRight).unwrap();
     let bending = pad.record.bending.as_ref().expect("learned");
     let Curve::Pad(curve) = &pad.curve else { panic!("{pad:?}") };

@@ -16,8 +16,8 @@ use palpate_tactile::trial::Control;
 fn desk() -> Bench {
     let fill = |store: &mut Store| {
         for (sensor, calibration) in calibrated(&parts(1, false), 1).1 {
-            store.add_calibration(&calibration.record).unwrap();
-            store.mount_part(sensor, &calibration.record.part).unwrap();
+            store.calibrations().add(&calibration.record).unwrap();
+            store.calibrations().mount(sensor, &calibration.record.part).unwrap();
         }
     };
     let setup = BenchSetup { fill, listen: board(&parts(1, false)), size: [1400.0, 1000.0], ..BenchSetup::default() };
@@ -53,7 +53,7 @@ impl Bench {
     }
 
     fn labels(&self) -> Vec<(i64, Option<String>, bool)> {
-        let trials = self.store().labelled_trials().unwrap();
+        let trials = self.store().labels().trials().unwrap();
         trials.into_iter().map(|trial| (trial.id, trial.object, trial.discarded)).collect()
     }
 

@@ -155,10 +155,10 @@ impl Desk {
 }
 
 fn store_calibrations(path: &Path, parts: &HiddenParts) {
-    let mut store = Store::open(path).unwrap();
+    let store = Store::open(path).unwrap();
     for (sensor, calibration) in calibrated(parts, 1).1 {
-        store.add_calibration(&calibration.record).unwrap();
-        store.mount_part(sensor, &calibration.record.part).unwrap();
+        store.calibrations().add(&calibration.record).unwrap();
+        store.calibrations().mount(sensor, &calibration.record.part).unwrap();
     }
 }
 
@@ -224,7 +224,7 @@ fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
     // Another program throws it away for good: nothing more can be written of it.
     let id = pressed.trial.as_ref().and_then(|trial| trial.id).unwrap();
     let mut store = desk.store();
-    store.discard_trial(id).unwrap();
+    store.delete(&[id]).unwrap();
     store.purge().unwrap();
     desk.until_said("recording stopped");
     let view = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
@@ -386,7 +386,7 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
         // It was heard from its closing on, though that was found out a little later.
         let view = ended.identification.as_ref().unwrap();
         assert!(view.beliefs.len() == 1 && view.verdict.is_some(), "{:?}", ended.recognition_off);
-        assert!(store.guess(number).unwrap().is_some_and(|guess| guess.pmf.len() == 17));
+        assert!(store.labels().guess(number).unwrap().is_some_and(|guess| guess.pmf.len() == 17));
     }
     desk.wish(GripperWish::Watch(None));
     desk.until(|view| view.watching.is_none());
@@ -460,7 +460,7 @@ fn zeros_are_taken_from_open_hands_alone() {
     desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Free, adds: false }));
     desk.wish(GripperWish::Tare);
     desk.until_said("nothing was tared: a trial goes on");
-    assert!(desk.store().tare().unwrap().is_none());
+    assert!(desk.store().calibrations().tare().unwrap().is_none());
 }
 
 #[test]

@@ -114,9 +114,9 @@ fn an_afternoon_of_labels_from_the_terminal() {
     let journal = json(at, &["trials", "journal", "--json", "--last", "100"]);
     let journal = journal.as_array().unwrap();
     assert_eq!((journal.len(), &journal[0]["what"], &journal[1]["what"]), (13, &"plan".into(), &"plan".into()));
-    assert!(said(&["trials", "journal"]).contains("takes back 1"));
+    assert!(said(&["trials", "journal"]).contains("undoes 1"));
     refused(at, &["snapshot", "--trial", "1", "--out", "x.png"], &["was not simulated", "palpate trials export 1"]);
-    refused(at, &["recognise", "1"], &["trial 1", "it is not known which part"]);
+    refused(at, &["recognise", "1"], &["trial 1", "no part is mounted"]);
     refused(at, &["trials", "label", "9", "ball"], &["no trial 9"]);
 }
 
@@ -128,8 +128,8 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     let (board, calibrations) = calibrated(&parts, 8);
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {
-        store.add_calibration(&calibration.record).unwrap();
-        store.mount_part(*sensor, &calibration.record.part).unwrap();
+        store.calibrations().add(&calibration.record).unwrap();
+        store.calibrations().mount(*sensor, &calibration.record.part).unwrap();
     }
     let mut grasped = |object: &str, label: &str, seed: u64| {
         let script = format!("rest=0.5; grasp {object}");
@@ -138,7 +138,7 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     };
     let (kept, other, unknown, discarded) =
         (grasped("lemon", "lemon", 1), grasped("ball", "ball", 2), grasped("ball", "", 3), grasped("ball", "cube", 4));
-    store.discard_trial(discarded).unwrap();
+    store.delete(&[discarded]).unwrap();
     let read = |store: &Store| Source::default().read(store, &View::default(), &mut |_, _| ()).unwrap();
     let data = read(&store);
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();
@@ -147,8 +147,8 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     let said = json(at, &["recognise", &unknown.to_string(), "--json"]);
     assert!(said["trials"][0]["truth"].is_null() && said["trials"][0]["decided"].is_string(), "{said}");
     refused(at, &["recognise", &discarded.to_string()], &["restore"]);
-    store.set_guess(kept, "ds-lstm", &[("ball".to_owned(), 0.75), ("lemon".to_owned(), 0.25)]).unwrap();
-    store.set_note(kept, "with a \"quote\",\nand a line").unwrap();
+    store.labels().set_guess(kept, "ds-lstm", &[("ball".to_owned(), 0.75), ("lemon".to_owned(), 0.25)]).unwrap();
+    store.labels().set_note(kept, "with a \"quote\",\nand a line").unwrap();
     let told = run(at, &["trials", "export", "--labelled", "--out", "out"]);
     assert!(told.code == Some(0) && told.out.contains("2 trial(s), 2 of them"), "{told:?}");
     let names = |folder: &str| {
@@ -186,7 +186,7 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
         }
     }
     // Nothing is overwritten, and nothing half-made is left behind.
-    refused(at, &["trials", "export", "--labelled", "--out", "out"], &["out", "in it already"]);
+    refused(at, &["trials", "export", "--labelled", "--out", "out"], &["out", "is not empty"]);
     std::fs::write(at.join("file"), "mine").unwrap();
     refused(at, &["trials", "export", "--labelled", "--out", "file/out"], &["cannot write"]);
     refused(at, &["trials", "export", "--labelled", "--out", "new", "--store", "none.sqlite"], &["no trial", "label"]);

@@ -140,3 +140,33 @@ fn what_is_no_store_is_refused_and_left_alone() {
     assert_eq!(ran.code, Some(1));
     assert!(ran.err.contains("cannot make the folder"), "{ran:?}");
 }
+
+#[test]
+fn a_store_of_version_0_1_0_is_copied_updated_listed_and_exported() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("trials.sqlite");
+    std::fs::write(&path, include_bytes!("data/store_0_1.sqlite")).unwrap();
+    let list = run(folder.path(), &["trials", "list"]);
+    assert_eq!(list.code, Some(0), "{list:?}");
+    assert!(
+        list.err.contains("trials.before-v") && folder.path().join("trials.before-v10.sqlite").is_file(),
+        "{list:?}"
+    );
+    for row in ["lemon", "mug", "ball", "slipped a little", "[wet, late]", "unsure"] {
+        assert!(list.out.contains(row), "no {row}: {list:?}");
+    }
+    let export = run(folder.path(), &["trials", "export", "1", "2", "4", "5", "--out", "out"]);
+    assert_eq!((export.code, export.err.contains("before-v")), (Some(0), false), "{export:?}");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    assert_eq!(
+        read("trial_2_mug.csv"),
+        "t_s,pressure_left,pressure_right\n0,102.5,99.1\n0.02,103,99.4\n0.04,103,100.25\n"
+    );
+    assert_eq!(
+        (read("trial_1_lemon.csv").lines().count(), read("trial_1_lemon.contacts.csv").lines().count()),
+        (91, 166)
+    );
+    let row = "1.1599999999999997,1.1610256049999998,84,,1687.8,1618.1,842.3,946.1,0.6,close";
+    assert_eq!(read("trial_4_lemon.csv").lines().nth(59), Some(row));
+    assert_eq!(std::fs::metadata(folder.path().join("out/trial_4_lemon.bytes")).unwrap().len(), 17_083);
+}

@@ -42,8 +42,8 @@ fn calibrate(store: &mut Store) {
         let part = sensor.channel().to_owned();
         let input = Input::on(&Board::default(), sensor);
         let record = Record { part, kind, input, points, bending: None, note: String::new() };
-        store.add_calibration(&record).unwrap();
-        store.mount_part(sensor, &record.part).unwrap();
+        store.calibrations().add(&record).unwrap();
+        store.calibrations().mount(sensor, &record.part).unwrap();
     }
 }
 
@@ -173,10 +173,7 @@ fn too_little_to_learn_from_is_told() {
     let few = |store: &mut Store| (0..6).for_each(|number| trial(store, "ball", 60.0, 1.0, number));
     for (fill, told) in [
         (few as fn(&mut Store), "1 of the objects have 5 labelled trials or more, and two are needed"),
-        (
-            unmounted,
-            "none of the 60 trials of the real gripper can be read: it is not known which part is the left flex strip",
-        ),
+        (unmounted, "none of the 60 trials of the real gripper can be read: no part is mounted as the left flex strip"),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let (trainer, woken) = trainer(folder.path(), fill);

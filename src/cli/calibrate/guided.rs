@@ -129,7 +129,7 @@ fn with_empty_close(
     seconds: f64,
 ) -> Result<Record, Failure> {
     let pad = Calibration::fit(record.clone())?;
-    let serving = store.serving(None, &[])?.calibrations;
+    let serving = store.calibrations().serving(None, &[])?.calibrations;
     let close = EmptyClose::begin(&bench.link.status().board, (sensor, pad), &serving, seconds)?;
     Ok(Record { bending: Some(bench.empty_close(close, auto)?), ..record })
 }

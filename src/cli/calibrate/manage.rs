@@ -76,11 +76,11 @@ pub(super) fn run(command: &CalibrateCommand, store: &mut Store) -> Result<(), F
         CalibrateCommand::Tare(arguments) => zero::tare(arguments, store),
         CalibrateCommand::Drift(arguments) => zero::drift(arguments, store),
         CalibrateCommand::Withdraw { id } => {
-            store.withdraw_calibration(*id, true)?;
+            store.calibrations().withdraw(*id, true)?;
             say(format!("calibration {id} withdrawn; `palpate calibrate restore {id}` brings it back"))
         }
         CalibrateCommand::Restore { id } => {
-            store.withdraw_calibration(*id, false)?;
+            store.calibrations().withdraw(*id, false)?;
             say(format!("calibration {id} restored"))
         }
     }
@@ -105,9 +105,9 @@ struct Row {
 }
 
 fn list(store: &Store, part: Option<&str>, json: bool) -> Result<(), Failure> {
-    let parts = store.mounted_parts()?;
+    let parts = store.calibrations().mounted()?;
     let mounted = Sensor::ALL.into_iter().zip(parts).filter_map(|(sensor, part)| Some((sensor.channel(), part?)));
-    let rows = store.calibrations(part)?.into_iter().map(|stored| {
+    let rows = store.calibrations().list(part)?.into_iter().map(|stored| {
         let fitted = Calibration::fit(stored.record.clone());
         let summary = fitted.as_ref().ok().map(Calibration::summary);
         Row { stored, summary, fault: fitted.err().map(|fault| fault.to_string()) }
@@ -146,7 +146,7 @@ fn list(store: &Store, part: Option<&str>, json: bool) -> Result<(), Failure> {
 }
 
 fn show(store: &Store, id: CalibrationId, json: bool) -> Result<(), Failure> {
-    let stored = store.calibration(id)?;
+    let stored = store.calibrations().get(id)?;
     let calibration = Calibration::fit(stored.record.clone())?;
     if json {
         #[derive(Serialize)]
@@ -179,8 +179,8 @@ fn show(store: &Store, id: CalibrationId, json: bool) -> Result<(), Failure> {
 
 fn export(store: &Store, ids: &[CalibrationId], out: &Path) -> Result<(), Failure> {
     let chosen = match ids {
-        [] => store.calibrations(None)?,
-        ids => ids.iter().map(|id| store.calibration(*id)).collect::<Result<_, _>>()?,
+        [] => store.calibrations().list(None)?,
+        ids => ids.iter().map(|id| store.calibrations().get(*id)).collect::<Result<_, _>>()?,
     };
     let text = serde_json::to_string_pretty(&chosen)?;
     std::fs::write(out, text + "\n").map_err(|e| format!("cannot write \"{}\": {e}", out.display()))?;
@@ -203,7 +203,7 @@ fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
         Calibration::fit(other.record.clone())
             .map_err(|fault| refuse(format!("the calibration of \"{}\": {fault}", other.record.part)))?;
     }
-    let added = store.import_calibrations(&others)?;
+    let added = store.calibrations().import(&others)?;
     say(format!("{}: {added} calibration(s) added, {} already there", file.display(), others.len() - added))
 }
 
@@ -211,9 +211,9 @@ fn mount(store: &mut Store, sensor: Sensor, part: &str) -> Result<(), Failure> {
     if part.is_empty() {
         return Err("the part needs a name".into());
     }
-    store.mount_part(sensor, part)?;
+    store.calibrations().mount(sensor, part)?;
     say(format!("\"{part}\" mounted as the {}", sensor.label()))?;
-    let serving = store.serving(None, &[])?;
+    let serving = store.calibrations().serving(None, &[])?;
     serving.warnings.iter().filter(|warning| warning.contains(sensor.label())).for_each(|warning| warn(warning));
     Ok(())
 }

@@ -52,7 +52,7 @@ struct TareReport {
 }
 
 pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), Failure> {
-    let serving = store.serving(None, &[])?;
+    let serving = store.calibrations().serving(None, &[])?;
     if serving.calibrations.is_empty() {
         let why = serving.warnings.first().cloned().unwrap_or_default();
         return Err(format!("no mounted part is calibrated, so there is no zero: {why}").into());
@@ -61,7 +61,7 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
     let readout = Readout::new(&board, &serving.calibrations)?;
     let drift = readout.drift(&readout.zero_from(&readings));
     let zero = readout.tare(&readings)?;
-    let stored = if arguments.dry_run { None } else { Some(store.add_tare(&zero)?) };
+    let stored = if arguments.dry_run { None } else { Some(store.calibrations().add_tare(&zero)?) };
     let warnings = [readout.warnings(), &serving.warnings].concat();
     if arguments.json {
         return say_json(&TareReport { drift, stored, warnings });
@@ -134,7 +134,7 @@ pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Fai
         .collect();
     let names = Sensor::ALL.map(Sensor::channel);
     table(&["trial", "recorded (UTC)", "object", names[0], names[1], names[2], names[3]], &cells)?;
-    if let Some(tare) = store.tare()? {
+    if let Some(tare) = store.calibrations().tare()? {
         for part in &tare.parts {
             let date = part.taken.chars().take(19).collect::<String>().replace('T', " ");
             say(format!("\"{}\", the {}: tare {} of {date} applies", part.part, part.sensor.label(), part.version))?;

@@ -55,7 +55,7 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
     match command {
         LabelCommand::Label { id, name, unsure } => label(store, *id, name, *unsure),
         LabelCommand::Note { id, text } => {
-            store.set_note(*id, text)?;
+            store.labels().set_note(*id, text)?;
             say(if text.trim().is_empty() {
                 format!("trial {id}: note removed")
             } else {
@@ -63,27 +63,27 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
             })
         }
         LabelCommand::Tag { id, tags } => {
-            store.set_tags(*id, tags)?;
+            store.labels().set_tags(*id, tags)?;
             say(format!("trial {id}: tags [{}]", tags.join(", ")))
         }
-        LabelCommand::Undo => match store.undo()? {
+        LabelCommand::Undo => match store.journal().undo()? {
             Some(entry) => say(format!("undone: {}", entry.sentence())),
             None => say("nothing to undo"),
         },
-        LabelCommand::Redo => match store.redo()? {
+        LabelCommand::Redo => match store.journal().redo()? {
             Some(entry) => say(format!("redone: {}", entry.restored())),
             None => say("nothing to redo"),
         },
-        LabelCommand::Journal { last, json } => journal(&store.journal(*last)?, *json),
+        LabelCommand::Journal { last, json } => journal(&store.journal().entries(*last)?, *json),
     }
 }
 
 fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(), Failure> {
     let name = class_name(name)?;
-    let planned = store.label_plan()?.objects.iter().any(|object| object.name == name);
-    let known = planned || store.labelled_trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
-    store.label_trial(id, &name)?;
-    store.set_unsure(id, unsure)?;
+    let planned = store.labels().plan()?.objects.iter().any(|object| object.name == name);
+    let known = planned || store.labels().trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
+    store.labels().set_label(id, &name)?;
+    store.labels().set_unsure(id, unsure)?;
     if !known && name != EMPTY {
         warn(&format!("\"{name}\" is a new class: not in the plan, and no other trial has it (`palpate trials undo`)"));
     }

@@ -87,7 +87,7 @@ fn show_board(store: &Store, id: TrialId, trial: BoardTrial, json: bool) -> Resu
         about: trial.about,
         gaps: trial.gaps,
         warnings: info.warnings,
-        labels: store.labelled_trials()?.into_iter().find(|row| row.id == id).unwrap_or_default(),
+        labels: store.labels().trials()?.into_iter().find(|row| row.id == id).unwrap_or_default(),
     };
     if json {
         return say_json(&report);

@@ -195,7 +195,7 @@ impl BoardWriter {
     /// Flags and sparkline of the stored trial. Without calibrations raw counts are judged.
     fn judge(&mut self, store: &Store) -> Result<(), StoreError> {
         let Some(trial) = store.board_trial(self.id)? else { return Ok(()) };
-        let serving = store.serving(Some(self.id), &[]).unwrap_or_else(|error| {
+        let serving = store.calibrations().serving(Some(self.id), &[]).unwrap_or_else(|error| {
             tracing::warn!("trial {} is flagged without calibrations: {error}", self.id);
             Serving::default()
         });

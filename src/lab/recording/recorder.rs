@@ -234,13 +234,13 @@ impl Writer {
         let recorded = self.with_store(|store| board.finish(store, &end.status, &end.notes))?;
         let id = recorded.id;
         if end.discarded {
-            match self.with_store(|store| store.discard_trial(id)) {
+            match self.with_store(|store| store.delete(&[id])) {
                 Ok(()) => (self.notify)(RecorderNotice::Discarded(id)),
                 Err(error) => (self.notify)(RecorderNotice::Warning(format!("trial {id} was not discarded: {error}"))),
             }
         }
         if let Some((model, pmf)) = &end.guess
-            && let Err(error) = self.with_store(|store| store.set_guess(id, model, pmf))
+            && let Err(error) = self.with_store(|store| store.labels().set_guess(id, model, pmf))
         {
             (self.notify)(RecorderNotice::Warning(format!("the model's guess was not stored: {error}")));
         }

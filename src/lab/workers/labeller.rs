@@ -126,17 +126,17 @@ impl Clerk {
         let told = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
         let done: Result<Option<String>, StoreError> = match wish {
             LabelWish::Refresh => Ok(None),
-            LabelWish::Label(id, object) => store.label_trial(*id, object).map(|()| None),
+            LabelWish::Label(id, object) => store.labels().set_label(*id, object).map(|()| None),
             LabelWish::Discard(id) => {
                 let text = format!("trial {id} discarded; Ctrl+Z brings it back");
-                store.discard_trial(*id).map(|()| Some(text))
+                store.delete(&[*id]).map(|()| Some(text))
             }
-            LabelWish::Note(id, note) => store.set_note(*id, note).map(|()| None),
-            LabelWish::Tags(id, tags) => store.set_tags(*id, tags).map(|()| None),
-            LabelWish::Unsure(id, unsure) => store.set_unsure(*id, *unsure).map(|()| None),
-            LabelWish::Reviewed(id) => store.mark_reviewed(*id).map(|()| None),
-            LabelWish::Undo => store.undo().map(|entry| told(entry.map(undone), "nothing to take back")),
-            LabelWish::Redo => store.redo().map(|entry| told(entry.map(redone), "nothing to make again")),
+            LabelWish::Note(id, note) => store.labels().set_note(*id, note).map(|()| None),
+            LabelWish::Tags(id, tags) => store.labels().set_tags(*id, tags).map(|()| None),
+            LabelWish::Unsure(id, unsure) => store.labels().set_unsure(*id, *unsure).map(|()| None),
+            LabelWish::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
+            LabelWish::Undo => store.journal().undo().map(|entry| told(entry.map(undone), "nothing to take back")),
+            LabelWish::Redo => store.journal().redo().map(|entry| told(entry.map(redone), "nothing to make again")),
             LabelWish::Want(name, wanted) => return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err),
             LabelWish::Unplan(name) => return change_plan(store, |plan| plan.remove(name)).err().map(Err),
             LabelWish::Export(folder) => return Some(exported(store, folder)),
@@ -148,12 +148,12 @@ impl Clerk {
         let told = self.told.iter().cloned().collect();
         let store = self.store()?;
         let read = |store: &Store| -> Result<LabelView, StoreError> {
-            let mut trials = store.labelled_trials()?;
-            let progress = store.label_plan()?.progress(&trials);
+            let mut trials = store.labels().trials()?;
+            let progress = store.labels().plan()?.progress(&trials);
             trials.sort_by_key(|trial| std::cmp::Reverse(trial.id));
             let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
             let next = progress.next(last);
-            let journal = store.journal(ENTRIES)?;
+            let journal = store.journal().entries(ENTRIES)?;
             Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, told })
         };
         read(store).map_err(|error| error.to_string())
@@ -174,9 +174,9 @@ fn change_plan<E: std::fmt::Display>(
     store: &mut Store,
     change: impl FnOnce(&mut palpate_store::labels::LabelPlan) -> Result<(), E>,
 ) -> Result<(), String> {
-    let mut plan = store.label_plan().map_err(|error| error.to_string())?;
+    let mut plan = store.labels().plan().map_err(|error| error.to_string())?;
     change(&mut plan).map_err(|error| error.to_string())?;
-    store.set_label_plan(&plan).map_err(|error| error.to_string())
+    store.labels().set_plan(&plan).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

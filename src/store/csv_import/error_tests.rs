@@ -25,10 +25,26 @@ fn files_without_content() {
     refused("\n , ,\n", &["no header"]);
     refused("trial,label,t_s,p\n\n,,,\n", &["no row below its header"]);
     refused("a,x,0,1\n", &["line 1: there is no column \"trial\" and no \"label\" and no \"t_s\"", "has a, x, 0, 1"]);
-    refused("\n\ntrial;class;time;p\n", &["line 3: ", "\"class\" meant as \"label\"", "\"time\" meant as \"t_s\""]);
+    refused(
+        "\n\ntrial;class;time;p\n",
+        &["line 3: there is no column \"label\" and no \"t_s\"", "has trial, class, time, p"],
+    );
     refused("trial,label,t_s,phase\na,x,0,pre\na,x,1,post\n", &["no column holds numbers"]);
     assert!(refusal(b"\xFF\xFEt\0r\0i\0a\0l\0").contains("save the file as \"CSV UTF-8\""));
     assert!(refusal(b"trial,label,t_s,p\na,K\xE4se,0,1\n").contains("line 2: the column \"label\" holds bytes"));
+}
+
+#[test]
+fn doubtful_headers() {
+    let refused_header = |names: &str, essence: &str| refused(&format!("{names}\n"), &[essence]);
+    refused_header("trial,label,t_s,p [Pa],p", "two columns are called \"p\"");
+    refused_header("trial,label,t_s,T_s,p", "two columns are called \"t_s\"");
+    refused_header("trial,label,t_s [ms],p", "\"ms\"; times must be in seconds");
+    refused_header("trial,label,t_s,size", "one column per sensor channel");
+    refused_header(&format!("trial,label,t_s,{}", "x".repeat(201)), "201 characters");
+    let many = |count: usize| (0..count).map(|i| format!(",c{i}")).collect::<String>();
+    refused_header(&format!("trial,label,t_s{}", many(201)), "more than 200 columns of readings");
+    refused_header(&format!("trial,label,t_s{}", many(200)), "no row below its header");
 }
 
 #[test]
@@ -55,9 +71,15 @@ fn rows_that_do_not_fit() {
 }
 
 #[test]
+fn an_endless_row_is_cut() {
+    let said = read_trials(std::io::repeat(b'x'), "f").expect_err("never ends").to_string();
+    assert!(said.contains("longer than 1 MiB"), "{said}");
+}
+
+#[test]
 fn numbers_that_are_none() {
     rows_refused("a,x,0,,,1\na,x,1,,,oops\n", &["line 3: \"oops\" in the column \"p\" is not a number"]);
-    rows_refused("a,x,0,,,oops\na,x,1,,,1\n", &["line 2: \"oops\"", "remove the column"]);
+    rows_refused("a,x,0,,,oops\na,x,1,,,1\n", &["line 2: \"oops\"", "or remove the column"]);
     rows_refused("a,x,0,,,1\na,x,1,,,\"1,5\"\n", &["decimal commas need a semicolon"]);
     rows_refused("a,x,0,,,-inf\n", &["line 2: \"-inf\" in the column \"p\" is infinite"]);
     rows_refused("a,x,0,,,1e39\n", &["beyond 3.4e38"]);
@@ -80,7 +102,7 @@ fn trials_that_contradict_themselves() {
     rows_refused("a,x,0,,cubic,1\nb,x,0,,spherical,1\n", &["the shape of \"x\" is \"cubic\""]);
     rows_refused(
         "a,x,0,,,1\na,x,1,,,1\nb,y,0,,,\nb,y,1,,,nan\n",
-        &["line 4: the channel \"p\" has no reading in trial \"b\""],
+        &["line 4: trial \"b\" has no reading of the channel \"p\""],
     );
     rows_refused("a,x,0,,,1\na,x,1,,,1\nb,y,0,,,2\n", &["line 4: trial \"b\" has only 1 sample"]);
     rows_refused("a,x,0,,,1\na,x,0,,,2\n", &["trial \"a\" has only 1 sample", "at different times"]);

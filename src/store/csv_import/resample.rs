@@ -14,7 +14,7 @@ const SAME_RATE: f64 = 0.02;
 /// A rate may be moved by this part to get a round number.
 const ROUNDING: f64 = 0.01;
 
-/// The fastest that trials are kept (Hz).
+/// Highest rate (Hz).
 pub(super) const FASTEST_HZ: f64 = 1000.0;
 
 /// Typical rate of rising times (Hz): the median interval, made precise by the mean of all intervals within half of it,
@@ -32,7 +32,7 @@ pub(super) fn rate(t_s: &[f64]) -> f64 {
 
 /// The rate for all trials (Hz), given one rate or more: their median, rounded, within bounds.
 pub(super) fn common_rate(rates: &mut [f64]) -> f64 {
-    // Of two middle ones the lower, so that the common rate is somebody's.
+    // Of two middle ones the lower, so that one trial has the common rate.
     let middle = (rates.len() - 1) / 2;
     sensible(*rates.select_nth_unstable_by(middle, f64::total_cmp).1).min(FASTEST_HZ)
 }
@@ -43,7 +43,7 @@ fn sensible(hz: f64) -> f64 {
     near(5.0).or_else(|| near(1.0)).unwrap_or_else(|| three_digits(hz))
 }
 
-/// A number as one would say it.
+/// Rounds to three digits.
 pub(super) fn three_digits(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }

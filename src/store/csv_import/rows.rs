@@ -1,11 +1,21 @@
-//! Rows gathered into trials: every row is checked as it comes, and only numbers are kept.
+//! Rows of a file gathered into trials. Every row is checked as it comes, and only numbers are kept.
 
-use super::columns::Columns;
-use super::fields::{Numbers, Reading, SHAPES, SIZES, filled_name, word};
-use super::import_error::{ImportFault, Located, brief};
-use super::{MOST_SAMPLES, MOST_TRIALS, MOST_VALUES};
+use super::{
+    FARTHEST_TIME_S, ImportFault, LARGEST_FILE, LONGEST_NAME, LONGEST_ROW, MOST_CHANNELS, MOST_SAMPLES, MOST_TRIALS,
+    MOST_VALUES, brief,
+};
 use csv::ByteRecord;
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Read};
+use std::str::FromStr;
+
+/// A fault with its line.
+pub(super) type Fault = (Option<u64>, ImportFault);
+
+/// Sizes of an object.
+const SIZES: [&str; 2] = ["tiny", "large"];
+/// Shapes of an object.
+const SHAPES: [&str; 3] = ["cubic", "cylindrical", "spherical"];
 
 /// A trial as it stands in the file.
 pub(super) struct RawTrial {
@@ -21,175 +31,455 @@ pub(super) struct RawTrial {
     pub(super) repeated: usize,
 }
 
-/// What is said of a label's objects.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Words {
-    pub(super) size: Option<&'static str>,
-    pub(super) shape: Option<&'static str>,
-}
-
-/// What a column of readings has shown so far.
-#[derive(Default)]
-struct Seen {
-    number: bool,
-    /// Line and beginning of the first text.
+/// A column of readings.
+pub(super) struct ChannelColumn {
+    place: usize,
+    pub(super) name: String,
+    /// It holds a number.
+    pub(super) numeric: bool,
+    /// Line and beginning of its first text.
     text: Option<(u64, String)>,
 }
 
-/// All rows so far.
-pub(super) struct Rows<'a> {
-    columns: &'a Columns,
-    numbers: Numbers,
+/// All rows of a file.
+pub(super) struct Rows {
     /// In the order in which they begin.
     pub(super) trials: Vec<RawTrial>,
-    pub(super) labels: BTreeMap<String, Words>,
+    /// Size and shape of each label.
+    pub(super) labels: BTreeMap<String, [Option<&'static str>; 2]>,
+    pub(super) channels: Vec<ChannelColumn>,
+    /// Places of trial, label and time.
+    required: [usize; 3],
+    /// Places of size and shape.
+    words: [Option<usize>; 2],
+    /// Fields of the header.
+    width: usize,
+    decimal_comma: bool,
     by_name: BTreeMap<String, usize>,
-    latest: usize,
-    seen: Vec<Seen>,
     readings: usize,
-    row: Vec<f32>,
 }
 
-impl<'a> Rows<'a> {
-    pub(super) fn new(columns: &'a Columns, numbers: Numbers) -> Self {
-        Self {
-            columns,
-            numbers,
-            trials: Vec::new(),
-            labels: BTreeMap::new(),
-            by_name: BTreeMap::new(),
-            latest: 0,
-            seen: columns.channels.iter().map(|_| Seen::default()).collect(),
-            readings: 0,
-            row: Vec::new(),
+/// Reads all rows below a header.
+pub(super) fn read_rows(reader: impl Read, warnings: &mut Vec<String>) -> Result<Rows, Fault> {
+    let mut reader = BufReader::with_capacity(64 << 10, reader);
+    let separator = separator(reader.fill_buf().map_err(|e| (None, e.into()))?);
+    let source = Limited { bytes: reader.bytes(), after_return: false, ended: false, total: 0, row: 0 };
+    let mut reader =
+        csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(source);
+    let mut record = ByteRecord::new();
+    let empty = |what| (None, ImportFault::Empty { what });
+    let line = next_row(&mut reader, &mut record)?.ok_or(empty("header"))?;
+    let mut rows = Rows::below(&record, separator != b',', warnings).map_err(|fault| fault.at(line))?;
+    while let Some(line) = next_row(&mut reader, &mut record)? {
+        rows.add(line, &record)?;
+    }
+    if rows.trials.is_empty() { Err(empty("row below its header")) } else { Ok(rows) }
+}
+
+/// Reads the next row that is not blank and returns the line on which it begins, or none at the end.
+fn next_row<R: Read>(reader: &mut csv::Reader<Limited<R>>, record: &mut ByteRecord) -> Result<Option<u64>, Fault> {
+    loop {
+        reader.get_mut().row = 0;
+        // The reader stops on the line after the row; the record's own position may be a blank line before it.
+        let more = reader.read_byte_record(record);
+        let breaks = record.as_slice().iter().filter(|byte| **byte == b'\n').count() as u64;
+        let line = reader.position().line().saturating_sub(1 + breaks).max(1);
+        match more.map_err(csv::Error::into_kind) {
+            Ok(false) => return Ok(None),
+            Ok(true) if is_blank(record) => {}
+            Ok(true) => return Ok(Some(line)),
+            Err(csv::ErrorKind::Io(cause)) => {
+                return Err((None, cause.downcast::<ImportFault>().unwrap_or_else(ImportFault::Unreadable)));
+            }
+            Err(other) => return Err((None, std::io::Error::other(format!("{other:?}")).into())),
         }
     }
+}
 
-    /// Takes in the row that begins at `line`.
-    pub(super) fn add(&mut self, line: u64, record: &ByteRecord) -> Result<(), Located> {
-        self.check_width(record).map_err(|fault| fault.at(line))?;
-        self.read_row(line, record)?;
-        let trial = self.trial(line, record).map_err(|fault| fault.at(line))?;
-        self.check_words(&record[self.columns.label], record).map_err(|fault| fault.at(line))?;
-        self.store(trial, record).map_err(|fault| fault.at(line))
+/// True for a row of separators only, as spreadsheets write them.
+fn is_blank(record: &ByteRecord) -> bool {
+    record.as_slice().iter().all(|byte| byte.is_ascii_whitespace() || b",;".contains(byte))
+}
+
+/// Of comma, semicolon and tab, the one that finds most of the required columns in the header, or else most columns.
+fn separator(head: &[u8]) -> u8 {
+    let score = |separator: u8| {
+        let mut reader = csv::ReaderBuilder::new().delimiter(separator).has_headers(false).from_reader(head);
+        let header = reader.byte_records().filter_map(Result::ok).find(|r| !is_blank(r)).unwrap_or_default();
+        let names = header.iter().filter_map(|field| name(field, "header").ok()).map(|text| without_unit(text).0);
+        let required = names.filter(|name| ["trial", "label", "t_s"].iter().any(|r| r.eq_ignore_ascii_case(name)));
+        (required.count(), header.len())
+    };
+    // The last of equals wins, and a comma is the likeliest.
+    [b'\t', b';', b','].into_iter().max_by_key(|s| score(*s)).unwrap_or(b',')
+}
+
+/// `pressure_left [Pa]` is the name `pressure_left` and the unit `Pa`; also in round brackets.
+fn without_unit(text: &str) -> (&str, Option<&str>) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((name, unit)) = text.strip_suffix(close).and_then(|rest| rest.rsplit_once(open))
+            && !name.trim().is_empty()
+        {
+            return (name.trim(), Some(unit.trim()));
+        }
+    }
+    (text, None)
+}
+
+/// A name without the blanks around it; it may be empty.
+fn name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, ImportFault> {
+    let text = std::str::from_utf8(field).map_err(|_utf8| ImportFault::NotUtf8 { column: column.to_owned() })?;
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
+    let length = text.chars().count();
+    if length > LONGEST_NAME {
+        let problem =
+            format!("the name in \"{column}\" has {length} characters, the limit is {LONGEST_NAME}; shorten it");
+        return Err(ImportFault::TooLarge { problem });
+    }
+    if text.chars().any(char::is_control) {
+        let text = brief(text);
+        return Err(field_fault(format!(
+            "the name \"{text}\" in \"{column}\" has a line break or another control character in it; remove it"
+        )));
+    }
+    Ok(text)
+}
+
+/// A name that must not be empty.
+fn filled_name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, ImportFault> {
+    match name(field, column)? {
+        "" => Err(empty_field(column)),
+        text => Ok(text),
+    }
+}
+
+fn empty_field(column: &str) -> ImportFault {
+    field_fault(format!("the column \"{column}\" is empty; every row names its trial, label and time"))
+}
+
+fn field_fault(problem: String) -> ImportFault {
+    ImportFault::Field { problem }
+}
+
+impl Rows {
+    /// Finds the columns in a header.
+    fn below(header: &ByteRecord, decimal_comma: bool, warnings: &mut Vec<String>) -> Result<Self, ImportFault> {
+        let fault = |problem: String| Err(ImportFault::Header { problem });
+        let names = header.iter().map(|f| name(f, "header")).collect::<Result<Vec<_>, _>>()?;
+        let names: Vec<(&str, Option<&str>)> = names.into_iter().map(without_unit).collect();
+        let place = |wanted: &str| names.iter().position(|(name, _)| name.eq_ignore_ascii_case(wanted));
+        let missing: Vec<String> =
+            ["trial", "label", "t_s"].iter().filter(|n| place(n).is_none()).map(|n| format!("\"{n}\"")).collect();
+        let (Some(trial), Some(label), Some(time)) = (place("trial"), place("label"), place("t_s")) else {
+            let mut found: Vec<String> = names.iter().filter(|n| !n.0.is_empty()).map(|n| brief(n.0)).collect();
+            found.truncate(20);
+            let (missing, found) = (missing.join(" and no "), found.join(", "));
+            return fault(format!(
+                "there is no column {missing}. Required are trial, label, t_s (in seconds) and one column per sensor \
+                 channel; the file has {found}"
+            ));
+        };
+        if let Some(unit) = names[time].1
+            && !["s", "sec", "second", "seconds"].iter().any(|s| unit.eq_ignore_ascii_case(s))
+        {
+            return fault(format!("the unit of t_s is \"{}\"; times must be in seconds", brief(unit)));
+        }
+        let words = [place("size"), place("shape")];
+        let known = [Some(trial), Some(label), Some(time), words[0], words[1]];
+        let mut channels: Vec<ChannelColumn> = Vec::new();
+        for (at, (name, _)) in names.iter().enumerate().filter(|(at, n)| !n.0.is_empty() && !known.contains(&Some(*at)))
+        {
+            let reserved = ["trial", "label", "t_s", "size", "shape"].iter().find(|r| r.eq_ignore_ascii_case(name));
+            if reserved.is_some() || channels.iter().any(|other| other.name == *name) {
+                let name = brief(reserved.unwrap_or(name));
+                return fault(format!(
+                    "two columns are called \"{name}\"; rename or remove one (units in brackets do not count)"
+                ));
+            }
+            if channels.len() == MOST_CHANNELS {
+                let problem = format!("there are more than {MOST_CHANNELS} columns of readings; remove some");
+                return Err(ImportFault::TooLarge { problem });
+            }
+            channels.push(ChannelColumn { place: at, name: (*name).to_owned(), numeric: false, text: None });
+        }
+        if channels.is_empty() {
+            return Err(no_channels());
+        }
+        let nameless: Vec<usize> = (1..).zip(&names).filter(|(_, n)| n.0.is_empty()).map(|(at, _)| at).collect();
+        if let [first, others @ ..] = nameless.as_slice() {
+            let others = if others.is_empty() { String::new() } else { format!(" (and {} more)", others.len()) };
+            warnings.push(format!("column {first}{others} has no name in the header and was left out"));
+        }
+        let (trials, labels, by_name) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
+        let (required, width) = ([trial, label, time], names.len());
+        Ok(Self { trials, labels, channels, required, words, width, decimal_comma, by_name, readings: 0 })
     }
 
-    /// Empty fields beyond the header are the spreadsheet's.
-    fn check_width(&self, record: &ByteRecord) -> Result<(), ImportFault> {
-        let expected = self.columns.width;
+    /// Adds the row that begins at `line`.
+    fn add(&mut self, line: u64, record: &ByteRecord) -> Result<(), Fault> {
+        let expected = self.width;
+        // Empty fields beyond the header are the spreadsheet's.
         if record.len() < expected || record.iter().skip(expected).any(|field| !field.trim_ascii().is_empty()) {
-            return Err(ImportFault::UnevenRow { found: record.len(), expected });
+            return Err(ImportFault::UnevenRow { found: record.len(), expected }.at(line));
         }
-        Ok(())
+        let row = self.row(line, record)?;
+        self.store(line, record, &row).map_err(|fault| fault.at(line))
     }
 
     /// Reads the channels. A column may hold text as long as it holds no number.
-    fn read_row(&mut self, line: u64, record: &ByteRecord) -> Result<(), Located> {
-        self.row.clear();
-        for ((place, column), seen) in self.columns.channels.iter().zip(&mut self.seen) {
-            let field = String::from_utf8_lossy(&record[*place]);
-            let column = || brief(column);
-            self.row.push(match self.numbers.reading(&field) {
-                Reading::Number(value) => {
-                    seen.number = true;
-                    value
+    fn row(&mut self, line: u64, record: &ByteRecord) -> Result<Vec<f32>, Fault> {
+        let mut row = Vec::with_capacity(self.channels.len());
+        for channel in &mut self.channels {
+            let field = String::from_utf8_lossy(&record[channel.place]);
+            let field = field.trim();
+            let missing = ["", "na", "null"].iter().any(|word| field.eq_ignore_ascii_case(word));
+            let value = match number::<f32>(field, self.decimal_comma) {
+                _ if missing => f32::NAN,
+                Some(value) if value.is_infinite() => {
+                    return Err(field_fault(format!(
+                        "\"{}\" in the column \"{}\" is infinite or beyond 3.4e38; correct it, or leave the field empty",
+                        brief(field),
+                        brief(&channel.name)
+                    ))
+                    .at(line));
                 }
-                Reading::Missing => f32::NAN,
-                Reading::Infinite => {
-                    return Err(ImportFault::Infinite { column: column(), text: brief(&field) }.at(line));
-                }
-                Reading::Text => {
-                    seen.text.get_or_insert_with(|| (line, brief(&field)));
+                Some(value) => value,
+                None => {
+                    channel.text.get_or_insert_with(|| (line, brief(field)));
                     f32::NAN
                 }
-            });
-            if seen.number
-                && let Some((line, text)) = seen.text.take()
+            };
+            channel.numeric |= value.is_finite();
+            if channel.numeric
+                && let Some((line, text)) = channel.text.take()
             {
-                let advice = if self.numbers.decimal_comma || !text.contains(',') {
-                    ", or remove the column if it is not meant as a channel"
+                let advice = if self.decimal_comma || !text.contains(',') {
+                    ", or remove the column if it is not a channel"
                 } else {
                     "; decimal commas need a semicolon or a tab between the fields"
                 };
-                return Err(ImportFault::NotANumber { column: column(), text, advice }.at(line));
+                return Err(field_fault(format!(
+                    "\"{text}\" in the column \"{}\" is not a number; correct it, or leave the field empty{advice}",
+                    brief(&channel.name)
+                ))
+                .at(line));
             }
+            row.push(value);
         }
-        Ok(())
+        Ok(row)
     }
 
-    /// The trial that a row belongs to.
-    fn trial(&mut self, line: u64, record: &ByteRecord) -> Result<usize, ImportFault> {
-        let name = filled_name(&record[self.columns.trial], "trial")?;
-        let label = filled_name(&record[self.columns.label], "label")?;
-        let known = match self.trials.get(self.latest) {
-            Some(trial) if trial.name == name => Some(self.latest),
-            _ => self.by_name.get(name).copied(),
-        };
-        self.latest = match known {
-            Some(trial) if self.trials[trial].label == label => trial,
-            Some(trial) => {
-                let before = brief(&self.trials[trial].label);
-                return Err(ImportFault::LabelChanges { trial: brief(name), before, now: brief(label) });
-            }
-            None if self.trials.len() == MOST_TRIALS => return Err(ImportFault::TooManyTrials),
-            None => {
-                self.by_name.insert(name.to_owned(), self.trials.len());
-                let (name, label) = (name.to_owned(), label.to_owned());
-                self.trials.push(RawTrial { name, label, line, t_s: Vec::new(), values: Vec::new(), repeated: 0 });
-                self.trials.len() - 1
-            }
-        };
-        Ok(self.latest)
-    }
-
-    /// A label has one size and one shape; an empty field leaves it to other rows to say.
-    fn check_words(&mut self, label: &[u8], record: &ByteRecord) -> Result<(), ImportFault> {
-        let label = filled_name(label, "label")?;
-        if !self.labels.contains_key(label) {
-            self.labels.insert(label.to_owned(), Words::default());
-        }
-        let Some(words) = self.labels.get_mut(label) else { return Ok(()) };
-        let said = [
-            ("size", self.columns.size, SIZES.as_slice(), &mut words.size),
-            ("shape", self.columns.shape, SHAPES.as_slice(), &mut words.shape),
-        ];
-        for (column, place, allowed, known) in said {
-            let Some(place) = place else { continue };
-            let Some(now) = word(&record[place], column, allowed)? else { continue };
-            let before = *known.get_or_insert(now);
-            if before != now {
-                return Err(ImportFault::WordsDiffer { column, label: brief(label), before, now });
-            }
-        }
-        Ok(())
-    }
-
-    /// Adds the readings to their trial, or replaces those of the same time.
-    fn store(&mut self, trial: usize, record: &ByteRecord) -> Result<(), ImportFault> {
-        let now = self.numbers.time(&String::from_utf8_lossy(&record[self.columns.time]))?;
-        let trial = &mut self.trials[trial];
+    /// Adds readings to their trial, or replaces those of the same time.
+    fn store(&mut self, line: u64, record: &ByteRecord, row: &[f32]) -> Result<(), ImportFault> {
+        let at = self.trial(line, record)?;
+        self.check_words(record)?;
+        let now = self.time(&record[self.required[2]])?;
+        let readings = self.readings + row.len();
+        let trial = &mut self.trials[at];
+        let name = || brief(&trial.name);
         match trial.t_s.last() {
             Some(before) if *before > now => {
-                let trial = brief(&trial.name);
-                return Err(ImportFault::FallingTime { trial, before: *before, now });
+                return Err(ImportFault::Contradiction {
+                    problem: format!(
+                        "in trial \"{}\" the time falls from {before} s to {now} s; sort its rows, and give every grasp \
+                         a trial name of its own",
+                        name()
+                    ),
+                });
             }
             Some(before) if *before >= now => {
                 trial.repeated += 1;
-                trial.values.truncate(trial.values.len() - self.row.len());
+                trial.values.truncate(trial.values.len() - row.len());
             }
-            _ if trial.t_s.len() == MOST_SAMPLES => return Err(ImportFault::LongTrial { trial: brief(&trial.name) }),
-            _ if self.readings + self.row.len() > MOST_VALUES => return Err(ImportFault::TooManyValues),
+            _ if trial.t_s.len() == MOST_SAMPLES => {
+                let problem = format!(
+                    "trial \"{}\" has more than {MOST_SAMPLES} samples; give every grasp a trial name of its own",
+                    name()
+                );
+                return Err(ImportFault::TooLarge { problem });
+            }
+            _ if readings > MOST_VALUES => return Err(too_many_values()),
             _ => {
                 trial.t_s.push(now);
-                self.readings += self.row.len();
+                self.readings = readings;
             }
         }
-        trial.values.extend_from_slice(&self.row);
+        trial.values.extend_from_slice(row);
         Ok(())
     }
 
-    /// Which columns of readings hold a number at all.
-    pub(super) fn numeric(&self) -> Vec<bool> {
-        self.seen.iter().map(|seen| seen.number).collect()
+    /// The trial of a row.
+    fn trial(&mut self, line: u64, record: &ByteRecord) -> Result<usize, ImportFault> {
+        let name = filled_name(&record[self.required[0]], "trial")?;
+        let label = filled_name(&record[self.required[1]], "label")?;
+        let Some(at) = self.by_name.get(name).copied() else {
+            if self.trials.len() == MOST_TRIALS {
+                let problem = format!("there are more than {MOST_TRIALS} trials; split the file");
+                return Err(ImportFault::TooLarge { problem });
+            }
+            self.by_name.insert(name.to_owned(), self.trials.len());
+            let (name, label) = (name.to_owned(), label.to_owned());
+            self.trials.push(RawTrial { name, label, line, t_s: Vec::new(), values: Vec::new(), repeated: 0 });
+            return Ok(self.trials.len() - 1);
+        };
+        if self.trials[at].label != label {
+            return Err(ImportFault::Contradiction {
+                problem: format!(
+                    "the label of trial \"{}\" changes from \"{}\" to \"{}\"; one trial is one grasp of one object",
+                    brief(name),
+                    brief(&self.trials[at].label),
+                    brief(label)
+                ),
+            });
+        }
+        Ok(at)
+    }
+
+    /// A label has one size and one shape; an empty field leaves it to other rows.
+    fn check_words(&mut self, record: &ByteRecord) -> Result<(), ImportFault> {
+        let label = filled_name(&record[self.required[1]], "label")?;
+        if !self.labels.contains_key(label) {
+            self.labels.insert(label.to_owned(), [None, None]);
+        }
+        let Some(known) = self.labels.get_mut(label) else { return Ok(()) };
+        let allowed = [("size", SIZES.as_slice()), ("shape", SHAPES.as_slice())];
+        for (((column, allowed), place), known) in allowed.into_iter().zip(self.words).zip(known) {
+            let Some(place) = place else { continue };
+            let text = name(&record[place], column)?;
+            if text.is_empty() {
+                continue;
+            }
+            let Some(now) = allowed.iter().find(|word| word.eq_ignore_ascii_case(text)) else {
+                let (text, allowed) = (brief(text), allowed.join(", "));
+                return Err(field_fault(format!(
+                    "\"{text}\" is not a {column}; allowed are {allowed}, or an empty field"
+                )));
+            };
+            let before = *known.get_or_insert(now);
+            if before != *now {
+                return Err(ImportFault::Contradiction {
+                    problem: format!(
+                        "the {column} of \"{}\" is \"{before}\" in earlier rows and \"{now}\" here; a label has one \
+                         {column}, so correct the word or use two labels",
+                        brief(label)
+                    ),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// A time (s).
+    fn time(&self, field: &[u8]) -> Result<f64, ImportFault> {
+        let field = String::from_utf8_lossy(field);
+        let field = field.trim();
+        if field.is_empty() {
+            return Err(empty_field("t_s"));
+        }
+        match number::<f64>(field, self.decimal_comma) {
+            Some(t) if t.abs() <= FARTHEST_TIME_S => Ok(t),
+            Some(t) if t.is_finite() => Err(field_fault(format!(
+                "the time {t} s is beyond {FARTHEST_TIME_S} s; times are in seconds, not in milliseconds or microseconds"
+            ))),
+            _ => Err(field_fault(format!("the time \"{}\" is not a number of seconds", brief(field)))),
+        }
+    }
+}
+
+pub(super) fn no_channels() -> ImportFault {
+    let problem = "no column holds numbers apart from t_s; add one column per sensor channel".to_owned();
+    ImportFault::Header { problem }
+}
+
+pub(super) fn too_many_values() -> ImportFault {
+    let problem = format!("there are more than {MOST_VALUES} readings in all; split the file or remove channels");
+    ImportFault::TooLarge { problem }
+}
+
+pub(super) fn file_too_large() -> ImportFault {
+    ImportFault::TooLarge { problem: format!("the file is larger than {} GiB; split it", LARGEST_FILE >> 30) }
+}
+
+/// A number; with decimal commas `0,5` is one half.
+fn number<T: FromStr>(text: &str, decimal_comma: bool) -> Option<T> {
+    if decimal_comma && text.contains(',') && !text.contains('.') {
+        return text.replacen(',', ".", 1).parse().ok();
+    }
+    text.parse().ok()
+}
+
+/// A reader that ends every line with one line feed, so that lines can be counted, and that limits files and rows.
+struct Limited<R> {
+    bytes: std::io::Bytes<BufReader<R>>,
+    after_return: bool,
+    ended: bool,
+    /// Bytes handed out.
+    total: u64,
+    /// Bytes handed out since the present row began.
+    row: u64,
+}
+
+impl<R: Read> Read for Limited<R> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let mut count = 0;
+        while count < out.len() {
+            let byte = match self.bytes.next().transpose()? {
+                Some(byte) => byte,
+                None if std::mem::replace(&mut self.ended, true) => break,
+                None => b'\n',
+            };
+            let second_half = byte == b'\n' && self.after_return;
+            self.after_return = byte == b'\r';
+            if !second_half {
+                out[count] = if byte == b'\r' { b'\n' } else { byte };
+                count += 1;
+            }
+        }
+        self.total += count as u64;
+        self.row += count as u64;
+        if self.total > LARGEST_FILE {
+            return Err(std::io::Error::other(file_too_large()));
+        }
+        if self.row > LONGEST_ROW {
+            let limit = LONGEST_ROW >> 20;
+            let problem = format!("the row is longer than {limit} MiB; look for an unclosed quotation mark");
+            return Err(std::io::Error::other(ImportFault::TooLarge { problem }));
+        }
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_separator_is_the_one_that_finds_the_columns() {
+        assert_eq!(separator(b"trial,label,t_s,p"), b',');
+        assert_eq!(separator(b"\n\"trial\";label;t_s;a,b,c,d,e,f\n1,2,3,4"), b';');
+        assert_eq!(separator(b"\xEF\xBB\xBFtrial\tlabel\tt_s\tp [a;b]"), b'\t');
+        assert_eq!(separator(b"time;class;p"), b';');
+        assert_eq!(separator(b""), b',');
+    }
+
+    #[test]
+    fn columns_are_found_in_any_order_and_case() {
+        let header = ["", "Pressure_Left [Pa]", " T_S [s]", "LABEL", "shape", "Trial", "k (1/m)"];
+        let mut warnings = Vec::new();
+        let Ok(found) = Rows::below(&ByteRecord::from(header.to_vec()), false, &mut warnings) else {
+            panic!("all are there")
+        };
+        assert_eq!((found.required, found.words, found.width), ([5, 3, 2], [None, Some(4)], 7));
+        let channels: Vec<(usize, &str)> = found.channels.iter().map(|c| (c.place, c.name.as_str())).collect();
+        assert_eq!((channels, warnings.len()), (vec![(1, "Pressure_Left"), (6, "k")], 1));
+    }
+
+    #[test]
+    fn numbers_may_have_decimal_commas() {
+        assert_eq!((number("-0,5e1", true), number("0.5", true)), (Some(-5.0), Some(0.5)));
+        for text in ["0,5", "1,000.5", "1,2,3", "contact", "0x10", "1 000"] {
+            assert_eq!(number::<f32>(text, false), None, "{text}");
+        }
+        assert_eq!(number::<f32>("1.000,5", true), None);
     }
 }

@@ -115,8 +115,8 @@ fn gaps_and_repeated_times_are_mended_and_told() {
         [
             "trial \"a\": at 1 repeated time the last row was kept",
             "trial \"a\": 2 missing readings were interpolated in \"p\"",
-            "only one label: there is nothing to tell apart, and training will refuse",
-            "only 1 trial: too few to learn from one and be tested on another"
+            "only one label: a recogniser needs at least two",
+            "only 1 trial: too few to train and to test"
         ]
     );
 }
@@ -156,7 +156,7 @@ fn doubtful_rates_are_told() {
         ([0.0, 0.001].as_slice(), [1.0, 3.0].as_slice())
     );
     let slow = read("trial,label,t_s,p\na,x,0,1\na,x,13.3,2\nb,y,0,1\nb,y,13.3,2\n");
-    assert_eq!(slow.warnings[0], "the trials have only 0.0752 samples per second; is t_s really in seconds?");
+    assert_eq!(slow.warnings[0], "the trials have only 0.0752 samples per second; check that t_s is in seconds");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What a label may be: the name of a class, as it stands in files, tables and on the axes of a confusion matrix.
+//! Names of classes, which are the labels in files, tables and on the axes of a confusion matrix.
 
 /// Most characters of a name.
 pub const LONGEST_NAME: usize = 80;
@@ -6,26 +6,26 @@ pub const LONGEST_NAME: usize = 80;
 /// A text that cannot be a label.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ClassNameError {
-    /// Nothing but blanks.
+    /// Blanks only.
     #[error("a label cannot be empty; write a name, or \"empty\" for the empty hand")]
     Empty,
-    /// Too long for a table.
+    /// Too long.
     #[error("the label \"{beginning}...\" has {length} characters; {LONGEST_NAME} are allowed")]
     TooLong {
-        /// How it begins.
+        /// Its beginning.
         beginning: String,
         /// Its length (characters).
         length: usize,
     },
-    /// A tab, a line break or the like.
-    #[error("the label {name:?} holds a control character; write it in plain letters on one line")]
+    /// A control character, such as a tab or a line break.
+    #[error("the label {name:?} holds a control character; write it on one line without tabs")]
     Control {
-        /// The name.
+        /// Beginning of the name.
         name: String,
     },
 }
 
-/// A label as it is stored: without blanks around it.
+/// Checks a label and trims the blanks around it.
 pub fn class_name(text: &str) -> Result<String, ClassNameError> {
     let name = text.trim();
     let length = name.chars().count();
@@ -40,7 +40,7 @@ pub fn class_name(text: &str) -> Result<String, ClassNameError> {
     }
 }
 
-/// The object of a trial as it is shown: one without a label has an empty name in the store.
+/// Name of a trial's object for display: unlabelled trials have an empty name in the store.
 pub fn shown_name(object: &str) -> &str {
     if object.is_empty() { "unlabelled" } else { object }
 }

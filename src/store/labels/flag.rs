@@ -1,20 +1,20 @@
-//! Flags: what may be wrong with a recorded trial.
+//! Flags: faults of recorded trials.
 
 use palpate_sim::objects::EMPTY;
 use palpate_tactile::cadence::Cadence;
 use serde::{Deserialize, Serialize};
 
-/// What may be wrong with a trial.
+/// Fault of a recorded trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Flag {
-    /// Nothing was felt.
+    /// No sensor was touched.
     NoContact,
-    /// A sensor reached the end of its range.
+    /// A sensor saturated.
     Saturated,
-    /// Something is missing inside.
+    /// Readings are missing.
     Interrupted,
-    /// The board did not keep time.
+    /// The board's sample times are irregular.
     Cadence,
 }
 
@@ -22,7 +22,7 @@ impl Flag {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::NoContact, Self::Saturated, Self::Interrupted, Self::Cadence];
 
-    /// What it is called on screen.
+    /// Name on screen.
     pub fn label(self) -> &'static str {
         match self {
             Self::NoContact => "no contact",
@@ -33,21 +33,21 @@ impl Flag {
     }
 }
 
-/// A flag and why it was raised.
+/// A flag and its reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FlagRemark {
-    /// The flag.
+    /// Kind of fault.
     pub flag: Flag,
-    /// A sentence with the numbers.
+    /// Reason with numbers.
     pub remark: String,
 }
 
-/// Those flags that are a flaw of a trial of this object: an empty hand feels nothing, and should not.
+/// Flags that are faults for this object: an empty hand has no contact.
 pub fn flaws(flags: Vec<FlagRemark>, object: Option<&str>) -> Vec<FlagRemark> {
     flags.into_iter().filter(|found| found.flag != Flag::NoContact || object != Some(EMPTY)).collect()
 }
 
-/// How well a board kept time, in a sentence.
+/// Timing of a board in one line.
 pub fn cadence_line(cadence: &Cadence) -> String {
     let Cadence { rate_hz, jitter_p95_ms, lost, .. } = cadence;
     format!("{rate_hz:.2} Hz, jitter {jitter_p95_ms:.1} ms, {lost} lost")

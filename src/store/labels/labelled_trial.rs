@@ -1,26 +1,26 @@
-//! A trial of the real gripper as lists of labels show it.
+//! A trial of the real gripper in lists of labels.
 
 use super::flag::FlagRemark;
 use super::sparkline::Sparkline;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 
-/// What a model said of a trial when its label was given.
+/// Prediction of a model for a trial, made when its label was given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Guess {
-    /// The model's name.
+    /// Name of the model.
     pub model: String,
     /// Classes and their probabilities.
     pub pmf: Vec<(String, f64)>,
 }
 
 impl Guess {
-    /// The most likely class; of equals the first. None where there are no classes.
+    /// The most likely class, of equals the first; none without classes.
     pub fn top(&self) -> Option<&(String, f64)> {
         self.pmf.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The probability of a class; none where the model does not know it.
+    /// Probability of a class; none where the model does not know it.
     pub fn probability(&self, class: &str) -> Option<f64> {
         self.pmf.iter().find(|(name, _)| name == class).map(|(_, p)| *p)
     }
@@ -29,18 +29,18 @@ impl Guess {
 /// The most likely class of a [`Guess`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GuessTop {
-    /// The model's name.
+    /// Name of the model.
     pub model: String,
-    /// The class.
+    /// Name of the class.
     pub class: String,
-    /// Its probability.
+    /// Probability of the class.
     pub p: f64,
-    /// The probability of the trial's label; none where it has no label or the model does not know that class.
+    /// Probability of the trial's label; none without a label or where the model does not know it.
     pub label_p: Option<f64>,
 }
 
 impl GuessTop {
-    /// What a guess says of a trial with a label.
+    /// The top of a prediction for a trial with a label.
     pub fn of(guess: &Guess, label: Option<&str>) -> Option<Self> {
         let (class, p) = guess.top()?;
         let label_p = label.and_then(|label| guess.probability(label));
@@ -51,42 +51,42 @@ impl GuessTop {
 /// A trial of the real gripper with its label.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LabelledTrial {
-    /// Its number in this store.
+    /// Number in this store.
     pub id: TrialId,
-    /// Its identity in every store.
+    /// Identity in every store.
     pub uid: String,
-    /// When it began, UTC.
+    /// Time of its beginning, UTC.
     pub created: String,
-    /// Its label; none where nobody has said yet what it is of.
+    /// Label, if any.
     pub object: Option<String>,
-    /// False while it is being recorded, and for one whose recording was cut short.
+    /// Recorded to its end.
     pub complete: bool,
-    /// What somebody noted of it.
+    /// Note.
     pub note: String,
-    /// Tags, in the order in which they were given.
+    /// Tags, in the order given.
     pub tags: Vec<String>,
-    /// Whoever gave the label was not sure.
+    /// The label is marked as unsure.
     pub unsure: bool,
-    /// What is wrong with it, given its label.
+    /// Flags that are faults for its label.
     pub flags: Vec<FlagRemark>,
-    /// How well its board kept time, in a sentence.
+    /// Timing of its board in one line.
     pub cadence: String,
-    /// What the model said when the label was given.
+    /// Prediction made when the label was given.
     pub guess: Option<GuessTop>,
-    /// Somebody has looked at it again since.
+    /// Reviewed since.
     pub reviewed: bool,
-    /// Readings.
+    /// Number of readings.
     pub samples: u64,
-    /// How long it took (s).
+    /// Duration (s).
     pub seconds: f64,
-    /// It was discarded, and may be restored.
+    /// Deleted, can be restored.
     pub discarded: bool,
-    /// A small picture of it.
+    /// Small plot.
     pub sparkline: Sparkline,
 }
 
 impl LabelledTrial {
-    /// True where it counts: recorded to its end, labelled and kept.
+    /// True for a trial that counts: complete, labelled and not deleted.
     pub fn counts(&self) -> bool {
         self.complete && self.object.is_some() && !self.discarded
     }

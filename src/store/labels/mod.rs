@@ -1,4 +1,4 @@
-//! What a label is: names of classes, guesses, flags and the plan of a labelling session.
+//! Labels: class names, predictions, flags and the plan of a labelling session.
 
 mod class_name;
 mod flag;

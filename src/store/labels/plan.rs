@@ -1,9 +1,8 @@
-//! The plan of a labelling session: how many trials of each object are wanted (the paper took 40 to 55), which is to be
-//! taken next, and how the object is to be held.
+//! The plan of a labelling session: how many trials of each object are wanted (the paper took 40 to 55), which object
+//! is next, and its pose in the hand.
 //!
-//! The order matters: sensors warm up and creep, and where one object is taken after the other, a recogniser learns the
-//! hour instead of the object. So the object that is farthest behind comes next, by its share and not by its name, and
-//! none comes twice in a row while another is left.
+//! The order matters: sensors warm up and creep, and with objects in blocks a recogniser learns the time instead of the
+//! object. So the object with the smallest share done comes next, and none comes twice in a row while another is left.
 
 use super::class_name::{ClassNameError, class_name};
 use super::labelled_trial::LabelledTrial;
@@ -16,25 +15,25 @@ use std::collections::BTreeMap;
 /// Most trials of one object.
 pub const MOST_WANTED: u32 = 1000;
 
-/// Trials of each object unless it is said: within the 40 to 55 of the paper (section IV-B).
+/// Default number of trials per object: within the 40 to 55 of the paper (section IV-B).
 const USUALLY_WANTED: u32 = 50;
 
-/// What may be asked of a hand: whole steps of so many degrees.
+/// Step of the turn that a person is asked for (degrees).
 const TURN_STEP_DEG: f64 = 5.0;
 
 /// An object and how many trials of it are wanted.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlannedObject {
-    /// Its name, which becomes the label.
+    /// Name, which becomes the label.
     pub name: String,
-    /// How many trials, 1 to [`MOST_WANTED`].
+    /// Number of trials, 1 to [`MOST_WANTED`].
     pub wanted: u32,
 }
 
 /// How many trials of each object are wanted.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelPlan {
-    /// The objects, in the order in which they are shown.
+    /// Objects in the order of the list.
     pub objects: Vec<PlannedObject>,
 }
 
@@ -46,37 +45,37 @@ impl Default for LabelPlan {
     }
 }
 
-/// A plan that cannot be.
+/// Error of a plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
     /// A name that cannot be a label.
     #[error(transparent)]
     Name(#[from] ClassNameError),
-    /// Too many, or none.
+    /// Too many trials, or none.
     #[error("{wanted} trials of \"{name}\" are not possible: choose 1 to {MOST_WANTED}, or remove it from the plan")]
     Count {
-        /// The object.
+        /// Name of the object.
         name: String,
-        /// What was asked for.
+        /// Number of trials.
         wanted: u32,
     },
     /// An object that is in the plan twice.
     #[error("\"{name}\" is in the plan twice")]
     Twice {
-        /// The object.
+        /// Name of the object.
         name: String,
     },
     /// An object that is not in the plan.
-    #[error("\"{name}\" is not in the plan; `palpate plan` shows what is")]
+    #[error("\"{name}\" is not in the plan; `palpate plan` shows it")]
     NotPlanned {
-        /// The object.
+        /// Name of the object.
         name: String,
     },
 }
 
 impl LabelPlan {
-    /// The same plan with names as labels are stored; refused where a name cannot be a label, a count is out of range, or an
-    /// object comes twice.
+    /// The same plan with trimmed names; refused where a name cannot be a label, a count is out of range, or an object
+    /// comes twice.
     pub fn checked(&self) -> Result<Self, PlanError> {
         let mut sound = Self { objects: Vec::new() };
         for PlannedObject { name, wanted } in &self.objects {
@@ -102,14 +101,14 @@ impl LabelPlan {
         Ok(())
     }
 
-    /// Takes an object out of the plan; its trials stay.
+    /// Removes an object from the plan; its trials stay.
     pub fn remove(&mut self, name: &str) -> Result<(), PlanError> {
         let at = self.objects.iter().position(|object| object.name == name.trim());
         self.objects.remove(at.ok_or_else(|| PlanError::NotPlanned { name: name.trim().to_owned() })?);
         Ok(())
     }
 
-    /// How far the plan is done. Objects that were recorded but are not planned follow by name, with nothing wanted.
+    /// Progress of the plan. Recorded objects that are not planned follow by name, with no trials wanted.
     pub fn progress(&self, rows: &[LabelledTrial]) -> Progress {
         let mut met: BTreeMap<&str, (u32, u32)> = BTreeMap::new();
         for row in rows.iter().filter(|row| row.counts()) {
@@ -117,75 +116,74 @@ impl LabelPlan {
             *done += 1;
             *flagged += u32::from(!row.flags.is_empty());
         }
-        let mut told = |name: &str, wanted: u32| {
+        let mut row = |name: &str, wanted: u32| {
             let (done, flagged) = met.remove(name).unwrap_or_default();
             ObjectProgress { name: name.to_owned(), wanted, done, flagged }
         };
         let mut objects: Vec<ObjectProgress> =
-            self.objects.iter().map(|object| told(&object.name, object.wanted)).collect();
-        let stranger = |(name, (done, flagged)): (&str, (u32, u32))| {
+            self.objects.iter().map(|object| row(&object.name, object.wanted)).collect();
+        let unplanned = |(name, (done, flagged)): (&str, (u32, u32))| {
             let name = name.to_owned();
             ObjectProgress { name, wanted: 0, done, flagged }
         };
-        objects.extend(met.into_iter().map(stranger));
+        objects.extend(met.into_iter().map(unplanned));
         Progress { objects }
     }
 }
 
-/// How far one object is.
+/// Progress of one object.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ObjectProgress {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// How many trials are wanted.
+    /// Trials wanted.
     pub wanted: u32,
-    /// How many there are.
+    /// Trials done.
     pub done: u32,
-    /// How many of those are flagged.
+    /// Flagged trials among those done.
     pub flagged: u32,
 }
 
-/// How far a plan is.
+/// Progress of a plan.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Progress {
-    /// The objects of the plan, then others that were recorded.
+    /// Objects of the plan, then other recorded ones.
     pub objects: Vec<ObjectProgress>,
 }
 
-/// How an object is to be held, against lying in the middle between the fingers.
+/// Pose of an object in the hand, relative to the middle between the fingers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PoseCue {
-    /// Turned about the gripper's axis, counter-clockwise seen from the palm (degrees).
+    /// Turn about the gripper's axis, counter-clockwise seen from the palm (degrees).
     pub turn_deg: f64,
-    /// Shifted along the fingers' opening, towards the right finger, and across it (mm).
+    /// Shift along the fingers' opening, towards the right finger, and across it (mm).
     pub shift_mm: [f64; 2],
 }
 
-/// What to take next.
+/// Next trial of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextTrial {
-    /// The object.
+    /// Name of the object.
     pub object: String,
-    /// Which of its trials this will be, from 1.
+    /// Number of the trial among those of the object, from 1.
     pub number: u32,
-    /// How it is to be held.
+    /// Pose to hold it in.
     pub cue: PoseCue,
 }
 
 impl Progress {
-    /// Trials that there are of what is wanted, no object counting for more than its share.
+    /// Trials done, each object counting up to its number wanted.
     pub fn done(&self) -> u32 {
         self.objects.iter().map(|object| object.done.min(object.wanted)).sum()
     }
 
-    /// Trials that are wanted.
+    /// Trials wanted.
     pub fn wanted(&self) -> u32 {
         self.objects.iter().map(|object| object.wanted).sum()
     }
 
-    /// What to take after `last`: of the objects that are farthest behind one that is drawn, but never the same twice in a
-    /// row while another is left. It depends on nothing but what there is, so it stays while it is shown. None when all is
-    /// done.
+    /// The trial after `last`: drawn from the objects with the smallest share done, but not the same twice in a row
+    /// while another is left. The same progress gives the same trial. None when all are done.
     pub fn next(&self, last: Option<&str>) -> Option<NextTrial> {
         let left: Vec<&ObjectProgress> = self.objects.iter().filter(|object| object.done < object.wanted).collect();
         let others: Vec<&ObjectProgress> =
@@ -208,8 +206,8 @@ impl Progress {
 }
 
 impl PoseCue {
-    /// How an object is to be held in one of its trials: within preset M of the simulated grasps, in steps that a hand can
-    /// follow. The same object and trial give the same cue.
+    /// Pose for one trial of an object: within preset M of the simulated grasps, in steps that a person can follow. The
+    /// same object and trial give the same pose.
     pub fn drawn(object: &str, number: u32) -> Self {
         if object == EMPTY {
             return Self::default();
@@ -218,7 +216,7 @@ impl PoseCue {
         let mut stream = Stream::new(u64::from(number), object, "pose cue");
         let mut within = |most: f64, step: f64| (stream.within(-most, most) / step).round() * step;
         let turn_deg = within(spread.yaw_deg, TURN_STEP_DEG);
-        // Adding zero keeps a minus from standing before it.
+        // Adding zero turns -0 into 0.
         let shift_mm = [0, 1].map(|axis| within(spread.shift[axis] * 1e3, 1.0) + 0.0);
         Self { turn_deg: turn_deg + 0.0, shift_mm }
     }

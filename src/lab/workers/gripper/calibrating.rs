@@ -126,7 +126,7 @@ impl Calibrating {
     pub(super) fn close_empty(&mut self, board: &Board, store: &Store) {
         let Some(procedure) = &self.procedure else { return };
         let begun = procedure.fit().map_err(|fault| fault.to_string()).and_then(|pad| {
-            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
+            let serving = store.calibrations().serving(None, &[]).map_err(|error| error.to_string())?;
             let pad = (procedure.sensor(), pad);
             EmptyClose::begin(board, pad, &serving.calibrations, EmptyClose::SECONDS).map_err(|fault| fault.to_string())
         });
@@ -166,8 +166,8 @@ impl Calibrating {
     pub(super) fn keep(&self, store: &mut Store) -> Option<Result<String, String>> {
         let procedure = self.procedure.as_ref().filter(|_| self.closing.is_none())?;
         let stored = procedure.fit().map_err(|fault| fault.to_string()).and_then(|calibration| {
-            let stored = store.add_calibration(&calibration.record).map_err(|error| error.to_string())?;
-            store.mount_part(procedure.sensor(), &stored.record.part).map_err(|error| error.to_string())?;
+            let stored = store.calibrations().add(&calibration.record).map_err(|error| error.to_string())?;
+            store.calibrations().mount(procedure.sensor(), &stored.record.part).map_err(|error| error.to_string())?;
             Ok(stored)
         });
         Some(stored.map(|stored| {

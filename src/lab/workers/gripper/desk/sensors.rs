@@ -21,8 +21,8 @@ impl Desk {
         let Some(connection) = &self.connection else { return };
         let board = connection.board.clone();
         let read = open(&mut self.store, &self.path).and_then(|store| {
-            let tare = store.tare().map_err(|error| error.to_string())?;
-            let serving = store.serving(None, &[]).map_err(|error| error.to_string())?;
+            let tare = store.calibrations().tare().map_err(|error| error.to_string())?;
+            let serving = store.calibrations().serving(None, &[]).map_err(|error| error.to_string())?;
             Ok((serving, tare.map(|tare| tare.zero)))
         });
         let (read, zero) = match read {
@@ -96,7 +96,7 @@ impl Desk {
             self.outlets.tell(Notice::Warning(text));
         }
         let stored = open(&mut self.store, &self.path)
-            .and_then(|store| store.add_tare(&zero).map_err(|error| error.to_string()));
+            .and_then(|store| store.calibrations().add_tare(&zero).map_err(|error| error.to_string()));
         match stored {
             Ok(_) => {
                 self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()));

@@ -1,4 +1,4 @@
-//! Trials that were recorded elsewhere: their channels as they came, without frames of ours.
+//! Imported trials: recorded elsewhere, channels only, without frames.
 //!
 //! ```text
 //! magic "PPS1"       4 bytes
@@ -7,6 +7,7 @@
 //! per sample:        f64 time (s), then f32 per channel, little-endian
 //! ```
 
+use super::checksum::{checksum, is_intact};
 use super::csv_import::ImportedTrial;
 use super::store::Store;
 use super::store_error::{StoreError, fault};
@@ -49,8 +50,8 @@ fn decode(bytes: &[u8], channels: Vec<String>) -> Option<Signals> {
 }
 
 impl Store {
-    /// Stores trials that were recorded elsewhere under a collection's name, all or none; those of the same collection
-    /// and name that are there already stay as they are. Returns how many were added.
+    /// Stores imported trials as a collection, all or none; trials that the collection has already stay unchanged. Returns
+    /// how many were added.
     pub fn insert_imported(&mut self, collection: &str, trials: &[ImportedTrial]) -> Result<u32, StoreError> {
         let path = self.path().to_owned();
         let fault = |e: rusqlite::Error| fault(&path, &e);
@@ -78,8 +79,10 @@ impl Store {
             if inserted > 0 {
                 let id = transaction.last_insert_rowid();
                 let channels = serde_json::to_string(&trial.signals.channels).unwrap_or_default();
-                let sql = "INSERT INTO readings (trial, channels, samples) VALUES (?1, ?2, ?3)";
-                transaction.execute(sql, params![id, channels, encode(&trial.signals)]).map_err(fault)?;
+                let samples = encode(&trial.signals);
+                let sum = checksum(&[channels.as_bytes(), &samples]);
+                let sql = "INSERT INTO readings (trial, channels, samples, checksum) VALUES (?1, ?2, ?3, ?4)";
+                transaction.execute(sql, params![id, channels, samples, sum]).map_err(fault)?;
                 added += 1;
             }
         }
@@ -87,17 +90,20 @@ impl Store {
         Ok(added)
     }
 
-    /// The channels of a trial that was recorded elsewhere; `None` for one of our own.
+    /// Channels of an imported trial; none for a trial of another kind.
     pub fn readings(&self, id: TrialId) -> Result<Option<Signals>, StoreError> {
-        let sql = "SELECT channels, samples FROM readings WHERE trial = ?1";
-        let found: Option<(String, Vec<u8>)> = self
+        let sql = "SELECT CAST(channels AS BLOB), samples, checksum FROM readings WHERE trial = ?1";
+        let found: Option<(Vec<u8>, Vec<u8>, Option<u32>)> = self
             .connection
-            .query_row(sql, [id], |row| Ok((row.get(0)?, row.get(1)?)))
+            .query_row(sql, [id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
             .optional()
             .map_err(|e| fault(self.path(), &e))?;
-        let Some((channels, samples)) = found else { return Ok(None) };
+        let Some((channels, samples, stored)) = found else { return Ok(None) };
+        if !is_intact(stored, &[&channels, &samples]) {
+            return Err(StoreError::Checksum { id, what: "channels", chunk: 0 });
+        }
         let bad = |cause: String| StoreError::BadInfo { id, cause };
-        let channels = serde_json::from_str(&channels).map_err(|e| bad(e.to_string()))?;
+        let channels = serde_json::from_slice(&channels).map_err(|e| bad(e.to_string()))?;
         let signals = decode(&samples, channels).ok_or_else(|| bad("its readings are cut short".to_owned()))?;
         Ok(Some(signals))
     }

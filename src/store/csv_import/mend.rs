@@ -1,34 +1,30 @@
-//! From rows to trials that compare: gaps filled, columns without numbers left out, everybody at one rate. Whatever was
-//! changed on the way is said in a warning.
+//! Mends trials so that they compare: fills gaps, drops columns without numbers, resamples to one rate. Every change is a
+//! warning.
 
-use super::import_error::{ImportFault, Located, brief};
 use super::resample::{self, three_digits};
-use super::rows::{RawTrial, Rows};
-use super::{ImportedTrial, MOST_SAMPLES, MOST_VALUES};
+use super::rows::{Fault, RawTrial, Rows, no_channels, too_many_values};
+use super::{ImportFault, ImportedTrial, MOST_SAMPLES, MOST_VALUES, brief};
 use palpate_tactile::Signals;
 
-/// The most memory for the channels' names of all trials (bytes); a thousand times what a large study takes.
+/// Most memory for the names of the channels of all trials (bytes); a thousand times what a large study takes.
 const MOST_NAME_BYTES: usize = 1 << 30;
 
-/// So many warnings of one kind are listed before the rest is only counted.
+/// Most warnings of one kind; further ones are only counted.
 const MOST_ALIKE: usize = 100;
 
-/// Makes trials of the rows; `names` are those of all columns of readings.
-pub(super) fn finish(
-    rows: Rows<'_>,
-    names: &[String],
-    warnings: &mut Vec<String>,
-) -> Result<Vec<ImportedTrial>, Located> {
-    let numeric = rows.numeric();
+/// Makes trials of the rows.
+pub(super) fn finish(rows: Rows, warnings: &mut Vec<String>) -> Result<Vec<ImportedTrial>, Fault> {
+    let numeric: Vec<bool> = rows.channels.iter().map(|channel| channel.numeric).collect();
     if !numeric.contains(&true) {
-        return Err(ImportFault::NoChannels.into());
+        return Err((None, no_channels()));
     }
-    for (name, _) in names.iter().zip(&numeric).filter(|(_, numeric)| !**numeric) {
-        warnings.push(format!("the column \"{}\" holds no number and was left out", brief(name)));
+    for channel in rows.channels.iter().filter(|channel| !channel.numeric) {
+        warnings.push(format!("the column \"{}\" holds no number and was left out", brief(&channel.name)));
     }
-    let channels: Vec<String> = kept(names, &numeric).cloned().collect();
-    let Rows { mut trials, labels, .. } = rows;
-    check_names(&channels, trials.len())?;
+    let names: Vec<String> = rows.channels.into_iter().map(|channel| channel.name).collect();
+    let channels: Vec<String> = kept(&names, &numeric).cloned().collect();
+    let (mut trials, labels) = (rows.trials, rows.labels);
+    check_names(&channels, trials.len()).map_err(|fault| (None, fault))?;
     warn_of_repeated_times(&trials, warnings);
     if numeric.contains(&false) {
         for trial in &mut trials {
@@ -38,14 +34,9 @@ pub(super) fn finish(
     fill_gaps(&mut trials, &channels, warnings)?;
     let series = at_one_rate(trials, channels.len(), warnings)?;
     let with_words = |trial: RawTrial| {
-        let words = labels.get(&trial.label).copied().unwrap_or_default();
-        ImportedTrial {
-            name: trial.name,
-            label: trial.label,
-            size: words.size.map(str::to_owned),
-            shape: words.shape.map(str::to_owned),
-            signals: Signals { channels: channels.clone(), t_s: trial.t_s, values: trial.values },
-        }
+        let [size, shape] = labels.get(&trial.label).copied().unwrap_or_default().map(|word| word.map(str::to_owned));
+        let signals = Signals { channels: channels.clone(), t_s: trial.t_s, values: trial.values };
+        ImportedTrial { name: trial.name, label: trial.label, size, shape, signals }
     };
     let trials: Vec<ImportedTrial> = series.into_iter().map(with_words).collect();
     warn_of_lengths(&trials, warnings);
@@ -57,11 +48,15 @@ fn kept<'a, T>(all: &'a [T], keep: &'a [bool]) -> impl Iterator<Item = &'a T> {
     all.iter().zip(keep).filter(|(_, keep)| **keep).map(|(one, _)| one)
 }
 
-/// Every trial carries the names of its channels, which may be long, and the trials many.
+/// Every trial carries the names of its channels: long names in many trials take much memory.
 fn check_names(channels: &[String], trials: usize) -> Result<(), ImportFault> {
     let each: usize = channels.iter().map(|name| name.len() + size_of::<String>()).sum();
     if trials.saturating_mul(each) > MOST_NAME_BYTES {
-        return Err(ImportFault::TooManyNames { trials, channels: channels.len() });
+        let problem = format!(
+            "{trials} trials with {} channels each are too many; split the file or shorten the channels' names",
+            channels.len()
+        );
+        return Err(ImportFault::TooLarge { problem });
     }
     Ok(())
 }
@@ -77,18 +72,19 @@ fn warn_of_repeated_times(trials: &[RawTrial], warnings: &mut Vec<String>) {
     alike.close(warnings, "trials with repeated times");
 }
 
-fn fill_gaps(trials: &mut [RawTrial], channels: &[String], warnings: &mut Vec<String>) -> Result<(), Located> {
+fn fill_gaps(trials: &mut [RawTrial], channels: &[String], warnings: &mut Vec<String>) -> Result<(), Fault> {
     let mut alike = Alike::default();
     for trial in trials {
         // Counted before gaps are filled: a trial of one sample has no neighbours to fill from.
         if trial.t_s.len() < 2 {
-            let fault = ImportFault::ShortTrial { trial: brief(&trial.name), samples: trial.t_s.len() };
-            return Err(fault.at(trial.line));
+            let problem = "has only 1 sample; a trial needs at least two at different times".to_owned();
+            return Err(fault(trial, problem));
         }
         for (c, channel) in channels.iter().enumerate() {
             let Some(filled) = resample::fill_gaps(&trial.t_s, &mut trial.values, c) else {
-                let fault = ImportFault::EmptyChannel { trial: brief(&trial.name), channel: brief(channel) };
-                return Err(fault.at(trial.line));
+                let channel = brief(channel);
+                let problem = format!("has no reading of the channel \"{channel}\"; remove the trial or the column");
+                return Err(fault(trial, problem));
             };
             if filled > 0 {
                 let count = counted(filled, "missing reading was", "missing readings were");
@@ -102,8 +98,8 @@ fn fill_gaps(trials: &mut [RawTrial], channels: &[String], warnings: &mut Vec<St
     Ok(())
 }
 
-/// Resamples the trials that do not run at the common rate already.
-fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<String>) -> Result<Vec<RawTrial>, Located> {
+/// Resamples the trials that differ from the common rate.
+fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<String>) -> Result<Vec<RawTrial>, Fault> {
     let rates: Vec<f64> = trials.iter().map(|trial| resample::rate(&trial.t_s)).collect();
     let rate_hz = resample::common_rate(&mut rates.clone());
     // Every size is known and within bounds before any memory is asked for.
@@ -113,7 +109,7 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
     }
     let total: usize = trials.iter().zip(&lengths).map(|(trial, n)| n.unwrap_or(trial.t_s.len())).sum();
     if total.saturating_mul(width) > MOST_VALUES {
-        return Err(ImportFault::TooManyValues.into());
+        return Err((None, too_many_values()));
     }
     let mut changed_rates = Vec::new();
     for ((trial, samples), own_hz) in trials.iter_mut().zip(lengths).zip(rates) {
@@ -128,23 +124,32 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
     }
     if rate_hz < 1.0 {
         let rate_hz = three_digits(rate_hz);
-        warnings.push(format!("the trials have only {rate_hz} samples per second; is t_s really in seconds?"));
+        warnings.push(format!("the trials have only {rate_hz} samples per second; check that t_s is in seconds"));
     }
     Ok(trials)
 }
 
-/// How many samples a trial will have at the common rate.
-fn even_samples(trial: &RawTrial, rate_hz: f64) -> Result<usize, Located> {
+/// Samples of a trial at the common rate.
+fn even_samples(trial: &RawTrial, rate_hz: f64) -> Result<usize, Fault> {
     let samples = resample::even_samples(&trial.t_s, rate_hz);
-    let fault = if samples < 2.0 {
-        ImportFault::BriefTrial { trial: brief(&trial.name), span_s: resample::span(&trial.t_s), rate_hz }
+    let (from_s, to_s) = (trial.t_s[0], trial.t_s[trial.t_s.len() - 1]);
+    if samples < 2.0 {
+        let span_s = to_s - from_s;
+        let problem = format!("lasts {span_s} s, less than one step at the common rate of {rate_hz} Hz; remove it");
+        Err(fault(trial, problem))
     } else if samples > MOST_SAMPLES as f64 {
-        let (from_s, to_s) = (trial.t_s[0], trial.t_s[trial.t_s.len() - 1]);
-        ImportFault::WildTime { trial: brief(&trial.name), from_s, to_s, rate_hz }
+        let problem = format!(
+            "runs from {from_s} s to {to_s} s, which is more than {MOST_SAMPLES} samples at {rate_hz} Hz; look for a wrong \
+             time in it"
+        );
+        Err(fault(trial, problem))
     } else {
-        return Ok(samples as usize);
-    };
-    Err(fault.at(trial.line))
+        Ok(samples as usize)
+    }
+}
+
+fn fault(trial: &RawTrial, problem: String) -> Fault {
+    ImportFault::Trial { trial: brief(&trial.name), problem }.at(trial.line)
 }
 
 fn warn_of_lengths(trials: &[ImportedTrial], warnings: &mut Vec<String>) {
@@ -158,11 +163,11 @@ fn warn_of_lengths(trials: &[ImportedTrial], warnings: &mut Vec<String>) {
 
 fn warn_of_few(trials: usize, labels: usize, warnings: &mut Vec<String>) {
     if labels == 1 {
-        warnings.push("only one label: there is nothing to tell apart, and training will refuse".to_owned());
+        warnings.push("only one label: a recogniser needs at least two".to_owned());
     }
     if trials <= 2 {
         let count = counted(trials, "trial", "trials");
-        warnings.push(format!("only {count}: too few to learn from one and be tested on another"));
+        warnings.push(format!("only {count}: too few to train and to test"));
     }
 }
 
@@ -181,7 +186,7 @@ fn range(numbers: impl Iterator<Item = f64> + Clone, unit: &str) -> String {
     if least < most { format!("{least} to {most} {unit}") } else { format!("{least} {unit}") }
 }
 
-/// Warnings of one kind, so that a million of them do not bury the others.
+/// Warnings of one kind, limited so that they do not bury the others.
 #[derive(Default)]
 struct Alike {
     count: usize,
@@ -195,7 +200,7 @@ impl Alike {
         }
     }
 
-    /// Tells how many were not listed.
+    /// Warns how many were not listed.
     fn close(self, warnings: &mut Vec<String>, what: &str) {
         if self.count > MOST_ALIKE {
             warnings.push(format!("and {} more {what}", self.count - MOST_ALIKE));

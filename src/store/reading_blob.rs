@@ -19,7 +19,7 @@ const MAGIC: &[u8; 4] = b"PPR1";
 const HAS_SEQ: u8 = 1;
 const HAS_BAR: u8 = 2;
 
-/// Encodes readings; those with fewer channels than the last are from before it was known that there are more.
+/// Encodes readings; earlier ones may have fewer channels than later ones.
 pub(super) fn encode_readings(readings: &[Reading]) -> Vec<u8> {
     let channels = readings.iter().map(|reading| reading.counts.len()).max().unwrap_or(0);
     let mut out = Vec::with_capacity(10 + readings.len() * (33 + 4 * channels));
@@ -41,7 +41,7 @@ pub(super) fn encode_readings(readings: &[Reading]) -> Vec<u8> {
     out
 }
 
-/// Decodes what [`encode_readings`] wrote; none where the bytes are damaged.
+/// Decodes readings; none where the bytes are damaged.
 pub(super) fn decode_readings(bytes: &[u8]) -> Option<Vec<Reading>> {
     let mut rest = bytes.strip_prefix(MAGIC)?;
     let channels = usize::from(u16::from_le_bytes(take(&mut rest)?));

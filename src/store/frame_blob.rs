@@ -25,22 +25,22 @@ use palpate_sim::gripper::Phase;
 const MAGIC: &[u8; 4] = b"PPF1";
 const HEADER: usize = 12;
 
-/// Why bytes are not frames.
+/// Error of decoding frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BlobError {
-    /// Another format, or another version of this one.
-    #[error("they do not begin as recorded frames do")]
+    /// Another format or version.
+    #[error("its frames have an unknown format")]
     Magic,
-    /// Fewer bytes than announced.
-    #[error("they end in the middle of frame {frame}")]
+    /// Too few bytes.
+    #[error("its frames end in the middle of frame {frame}")]
     CutShort {
-        /// Where.
+        /// Number of the frame.
         frame: u32,
     },
-    /// More bytes than announced, or a value that cannot be.
-    #[error("frame {frame} holds a value that cannot be")]
+    /// Too many bytes, or an invalid value.
+    #[error("frame {frame} holds an invalid value")]
     BadValue {
-        /// Where.
+        /// Number of the frame.
         frame: u32,
     },
 }
@@ -81,7 +81,7 @@ pub fn encode_frames(frames: &[Frame]) -> Vec<u8> {
     out
 }
 
-/// Decodes what [`encode_frames`] wrote; never trusts a count it has not the bytes for.
+/// Decodes frames; allocates no more than the bytes hold.
 pub fn decode_frames(bytes: &[u8]) -> Result<Vec<Frame>, BlobError> {
     let mut reader = Reader { bytes, at: 0, frame: 0 };
     if reader.take::<4>().ok() != Some(*MAGIC) || bytes.len() < HEADER {
@@ -215,7 +215,7 @@ mod tests {
             let mut bytes = encode_frames(&frames()[140..145]);
             let at = at % bytes.len();
             bytes[at] = value;
-            // Whatever comes out, it comes out.
+            // Any outcome but a panic.
             let _outcome = decode_frames(&bytes);
             prop_assert!(decode_frames(&noise).is_err());
         }

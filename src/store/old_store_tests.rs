@@ -1,0 +1,130 @@
+//! A store that version 0.1.0 of the program made still opens, with everything in it. It holds a simulated grasp, two
+//! imported trials, two trials of the emulated board, calibrations, tares, labels, notes, a plan and their journal.
+
+use super::*;
+use crate::labels::Flag;
+use palpate_sim::scene::Scene;
+use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use std::path::{Path, PathBuf};
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+/// A copy of the file of version 0.1.0, which has the tables of version 9.
+fn copied(folder: &Path) -> std::io::Result<PathBuf> {
+    let path = folder.join("trials.sqlite");
+    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/suite/data/store_0_1.sqlite"), &path)?;
+    Ok(path)
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-6 * b.abs()
+}
+
+#[test]
+fn it_is_updated_listed_and_loaded() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = copied(folder.path())?;
+    let store = Store::open(&path)?;
+    assert!(store.warnings()[0].contains("before-v10.sqlite"), "{:?}", store.warnings());
+    let copy = std::fs::read(folder.path().join("trials.before-v10.sqlite"))?;
+    assert!(copy.len() > 100_000 && Store::open(&path)?.warnings().is_empty());
+
+    let rows = store.list(true)?;
+    let listed: Vec<_> = rows.iter().map(|row| (row.object.as_str(), row.rig.as_str(), row.samples)).collect();
+    let expected = [
+        ("lemon", "sim", 90),
+        ("mug", "import", 3),
+        ("key", "import", 2),
+        ("lemon", "serial", 161),
+        ("ball", "serial", 50),
+    ];
+    assert_eq!(listed, expected);
+    assert!(rows.iter().all(|row| row.state == "complete"));
+    assert_eq!((rows[0].seed, rows[0].note.as_str(), rows[0].warnings), (7, "simulated", 1));
+    assert_eq!(rows[1].properties, Some(("large".to_owned(), "cylindrical".to_owned())));
+    assert!(rows[2].deleted.is_some() && rows[4].unsure && rows[4].flags[0].flag == Flag::NoContact);
+    assert_eq!((rows[3].note.as_str(), rows[3].tags.join(" ")), ("slipped a little", "wet late".to_owned()));
+
+    let simulated = store.load(1)?;
+    assert_eq!((simulated.frames.len(), simulated.info.version.as_str()), (90, "0.1.0"));
+    let third_joint: f64 = simulated.frames.iter().map(|frame| frame.q[2]).sum();
+    assert!(near(third_joint, 2.968_052_614_650_289), "{third_joint}");
+    let stored: Vec<u8> = store.connection.query_row("SELECT frames FROM chunks", [], |row| row.get(0))?;
+    assert_eq!(encode_frames(&simulated.frames[..75]), stored, "to the bit");
+
+    let imported = store.readings(2)?.ok_or("imported")?;
+    assert_eq!(imported.channels, ["pressure_left", "pressure_right"]);
+    assert_eq!(imported.values, [102.5, 99.1, 103.0, 99.4, 103.0, 100.25]);
+
+    for (id, readings, bytes) in [(4, 161, 17_083), (5, 50, 4995)] {
+        let trial = store.board_trial(id)?.ok_or("of the board")?;
+        assert_eq!((trial.readings.len(), trial.gaps.len(), trial.about.board.channels.len()), (readings, 0, 4));
+        assert_eq!(store.board_bytes(id)?.map(|bytes| bytes.len()), Some(bytes));
+    }
+    let reading = &store.board_trial(4)?.ok_or("of the board")?.readings[58];
+    assert_eq!((reading.counts[0], reading.counts[3], reading.line_bar), (Some(1687.8), Some(946.1), Some(0.6)));
+    Ok(())
+}
+
+#[test]
+fn its_labels_journal_and_calibrations_are_kept() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let store = Store::open(&copied(folder.path())?)?;
+    let entries = store.journal().entries(99)?;
+    assert_eq!((entries.len(), entries[0].number), (10, 10));
+    assert_eq!(entries[0].sentence(), "plan changed to 840 trials of 17 objects");
+    assert_eq!(entries[2].sentence(), "trial 5: label marked as unsure (undoes 7)");
+    assert_eq!(store.labels().plan()?.objects.len(), 17);
+    // The history goes back to its beginning and forth again.
+    let before = store.labels().trials()?;
+    let mut undone = 0;
+    while store.journal().undo()?.is_some() {
+        undone += 1;
+    }
+    assert_eq!((undone, store.labels().trials()?[1].object.as_deref()), (7, None));
+    while store.journal().redo()?.is_some() {}
+    assert_eq!(store.labels().trials()?, before);
+
+    let parts: Vec<String> = store.calibrations().list(None)?.into_iter().map(|stored| stored.record.part).collect();
+    assert_eq!(parts, ["A7", "P3", "A8", "P4"]);
+    let tare = store.calibrations().tare()?.ok_or("tared")?;
+    assert_eq!(tare.parts.iter().map(|part| part.part.as_str()).collect::<Vec<_>>(), ["A7", "P3"]);
+    assert_eq!(store.calibrations().serving(Some(4), &[])?.ids, [1, 3, 4, 2]);
+    Ok(())
+}
+
+#[test]
+fn it_is_exported_with_the_same_numbers() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let store = Store::open(&copied(folder.path())?)?;
+    let out = folder.path().join("labelled");
+    let exported = export_labelled(&store, &out)?;
+    assert_eq!((exported.trials, exported.derived), (2, 2));
+    assert_eq!(std::fs::read(out.join("raw/trial_4_lemon.bytes"))?.len(), 17_083);
+    let raw = std::fs::read_to_string(out.join("raw/trial_4_lemon.csv"))?;
+    let row = "1.1599999999999997,1.1610256049999998,84,,1687.8,1618.1,842.3,946.1,0.6,close";
+    assert_eq!((raw.lines().count(), raw.lines().nth(59)), (162, Some(row)));
+    // Means over all derived samples, as version 0.1.0 exported them.
+    let mut reader = csv::Reader::from_path(out.join("signals.csv"))?;
+    let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>()?;
+    assert_eq!(rows.len(), 200);
+    let expected = [5.864397, 5.375993, 2879.532, 3135.197, 0.488705, 0.532095];
+    for (column, expected) in (5..).zip(expected) {
+        let values = rows.iter().map(|row| row[column].parse::<f64>()).collect::<Result<Vec<_>, _>>()?;
+        let mean = values.iter().sum::<f64>() / 200.0;
+        assert!((mean - expected).abs() < 1e-3 * expected, "column {column}: {mean}, not {expected}");
+    }
+
+    let trial = store.load(1)?;
+    let scene = Scene::from_toml(&trial.info.scene)?;
+    let layout = SensorLayout::named("C1+F")?;
+    let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation)?;
+    let path = folder.path().join("trial_1.csv");
+    write_trial_csv(&path, &trial, &scene, &sensors)?;
+    let mut reader = csv::Reader::from_path(&path)?;
+    let row = reader.records().nth(60).ok_or("90 rows")??;
+    let number = |column: usize| row[column].parse::<f64>();
+    assert!(near(number(3)?, 5.054_612_216_715_664) && near(number(5)?, 3_693.857_000_559_81), "{row:?}");
+    assert!(near(number(7)?, 0.090_442_039_072_513_58) && near(number(9)?, 0.041_673_644_267_971_426), "{row:?}");
+    Ok(())
+}
