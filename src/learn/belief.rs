@@ -1,6 +1,6 @@
 //! What successive grasps of one object come to, and when to stop.
 
-use super::Pmf;
+use crate::pmf::Pmf;
 use serde::{Deserialize, Serialize};
 
 /// What is believed after some grasps of the same object.
@@ -46,7 +46,7 @@ impl Belief {
     }
 }
 
-pub(super) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
+pub(crate) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
     let Some(belief) = belief.filter(|_| !alone.is_empty()) else { return 0.0 };
     let explained = |pmf: &Pmf| -> f64 {
         let p: f64 = belief.probabilities().iter().zip(pmf.probabilities()).map(|(b, p)| b * p).sum();

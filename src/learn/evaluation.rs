@@ -1,8 +1,10 @@
 //! How good a recogniser is on grasps it has not seen: one grasp, several grasps, stage one, calibration, cost.
 
-use super::data::Dataset;
-use super::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval};
-use super::{Belief, Pmf, Recogniser, StopReason, StopRule, Verdict};
+use crate::belief::{Belief, StopReason, StopRule};
+use crate::data::{Class, Dataset, Example};
+use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, Scores};
+use crate::pmf::Pmf;
+use crate::recogniser::{Recogniser, Verdict};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -104,7 +106,7 @@ pub struct Round {
 fn successions(data: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let by_class = data.by_class();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut after = |(first, example): (usize, &super::Example)| {
+    let mut after = |(first, example): (usize, &Example)| {
         let mut others: Vec<usize> = by_class[example.class].iter().copied().filter(|k| *k != first).collect();
         others.shuffle(&mut random);
         std::iter::once(first).chain(others).take(MOST_GRASPS).collect()
@@ -151,7 +153,7 @@ fn f1_over_occurring(confusion: &Confusion) -> Option<f64> {
     scores_over_occurring(confusion).map(|scores| scores.f1)
 }
 
-fn scores_over_occurring(confusion: &Confusion) -> Option<super::metrics::Scores> {
+fn scores_over_occurring(confusion: &Confusion) -> Option<Scores> {
     let occurring: Vec<usize> = (0..confusion.classes()).filter(|c| confusion.class(*c).trials > 0).collect();
     confusion.scores_over(&occurring)
 }
@@ -199,7 +201,7 @@ pub fn evaluate(
 
 fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
     let labels = &data.labels;
-    let f1 = |count: usize, pick: &dyn Fn(&super::Class) -> Option<usize>, pmf: &dyn Fn(&Verdict) -> Option<&Pmf>| {
+    let f1 = |count: usize, pick: &dyn Fn(&Class) -> Option<usize>, pmf: &dyn Fn(&Verdict) -> Option<&Pmf>| {
         let pairs = data.examples.iter().zip(verdicts).filter_map(|(example, verdict)| {
             Some((pick(&labels.classes[example.class])?, Some(pmf(verdict)?.top().0)))
         });
@@ -251,7 +253,7 @@ fn stopped(whole: &Belief, recogniser: &dyn Recogniser, stop: StopRule) -> (Beli
 
 /// Calibration error of what is said a share of the way through the grasps.
 pub fn prefix_calibration(recogniser: &dyn Recogniser, data: &Dataset, share: f32) -> Option<f64> {
-    let cut = |example: &super::Example| {
+    let cut = |example: &Example| {
         let end = example.grasp.t_s.last().copied().unwrap_or(0.0);
         recogniser.recognise(&example.grasp.until(share * end), None).pmf.probabilities().to_vec()
     };
