@@ -175,7 +175,7 @@ fn too_little_to_learn_from_is_told() {
         (few as fn(&mut Store), "1 of the objects have 5 labelled trials or more, and two are needed"),
         (
             unmounted,
-            "none of the 60 trials of the real gripper can be read: it is not known which part is the left flex strip",
+            "none of the 60 trials of the real gripper is calibrated: it is not known which part is the left flex strip",
         ),
     ] {
         let folder = tempfile::tempdir().unwrap();
