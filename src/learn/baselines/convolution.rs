@@ -15,7 +15,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Two convolutions over time, the mean over time, and a linear layer.
 pub(crate) struct Convolution {
@@ -197,7 +197,7 @@ fn train(data: &Dataset, learned: &Learned, fitting: &Fitting<'_>) -> Result<Arr
     let named = variables.data().lock();
     let named = named.map_err(|_poisoned| candle_core::Error::Msg("the variables are locked".to_owned()))?;
     let mut arrays = Arrays::default();
-    for (name, var) in named.iter() {
+    for (name, var) in named.iter().collect::<BTreeMap<_, _>>() {
         arrays.put(name.clone(), var.dims(), var.as_tensor().flatten_all()?.to_vec1()?);
     }
     Ok(arrays)
