@@ -3,7 +3,7 @@
 use super::Failure;
 use super::terminal::warn;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_lab::datasets::{Source, View};
+use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Dataset, METHODS, Method, method};
 use palpate_store::Store;
 use palpate_tactile::model::SensorModel;
@@ -39,8 +39,8 @@ fn parse_sensors(text: &str) -> Result<SensorModel, String> {
 }
 
 impl DataArguments {
-    pub(super) fn view(&self) -> View {
-        View { layout: self.layout.clone(), sensors: self.sensors }
+    pub(super) fn view(&self) -> SensorView {
+        SensorView { layout: self.layout.clone(), sensors: self.sensors }
     }
 
     /// Reads the grasps from the store.
@@ -51,7 +51,7 @@ impl DataArguments {
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
         let (collection, rig, objects) = (self.collection.clone(), self.rig.clone(), self.objects.clone());
-        let source = Source { collection, rig, objects, without_empty, most_of_each };
+        let source = DatasetQuery { collection, rig, objects, without_empty, most_of_each };
         let bar = progress_bar("reading trials")?;
         let data = source.read(store, &self.view(), &mut |done, of| {
             bar.set_length(of as u64);

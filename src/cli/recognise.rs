@@ -3,7 +3,7 @@
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
-use palpate_lab::datasets::{Source, View};
+use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Verdict, shipped_model};
 use palpate_store::labels::shown_name;
 use palpate_tactile::model::SensorModel;
@@ -88,10 +88,10 @@ pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
 }
 
 /// Layout and sensor model a recogniser expects of simulated trials.
-pub(super) fn view_of(model: &Model) -> View {
+pub(super) fn view_of(model: &Model) -> SensorView {
     let data = &model.card.data;
-    View {
-        layout: data.layout.clone().unwrap_or_else(|| View::default().layout),
+    SensorView {
+        layout: data.layout.clone().unwrap_or_else(|| SensorView::default().layout),
         sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
     }
 }
@@ -108,7 +108,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let mut belief = Belief::default();
     let mut trials = Vec::new();
     for id in &arguments.trials {
-        let data = Source::default().read_trial(&store, *id, &view_of(&model))?;
+        let data = DatasetQuery::default().read_trial(&store, *id, &view_of(&model))?;
         model.check_channels(&data.channels)?;
         let grasp = &data.examples[0].grasp;
         let alone = model.recogniser.recognise(grasp, None);

@@ -6,7 +6,7 @@ use super::setup::open_store;
 use super::terminal::{say, say_json, table};
 use palpate_lab::datasets::models_folder;
 use palpate_lab::study::{SearchRow, search};
-use palpate_learn::{Dataset, FitError, Fitting, METHODS, Method, Model};
+use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -125,8 +125,8 @@ fn fitted(
     data: &Dataset,
     arguments: &TrainArguments,
     settings: serde_json::Map<String, serde_json::Value>,
-) -> Result<Model, FitError> {
-    let bar = progress_bar("training").map_err(|e| FitError::Failed { cause: e.to_string() })?;
+) -> Result<Model, LearnError> {
+    let bar = progress_bar("training").map_err(|e| LearnError::Failed { cause: e.to_string() })?;
     bar.set_length(1000);
     let stop = AtomicBool::new(false);
     let fitting = Fitting {

@@ -1,35 +1,35 @@
-//! What successive grasps of one object come to, and when to stop.
+//! Belief after successive grasps of one object, and the rule when to stop.
 
-use super::Pmf;
+use crate::pmf::Pmf;
 use serde::{Deserialize, Serialize};
 
-/// What is believed after some grasps of the same object.
+/// Belief after successive grasps of the same object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Belief {
-    /// What the recogniser said after each grasp, with those before.
+    /// PMF after each grasp, combined with those before.
     steps: Vec<Pmf>,
-    /// What it said of each grasp by itself.
+    /// PMF of each grasp alone.
     alone: Vec<Pmf>,
 }
 
 impl Belief {
-    /// Takes in another grasp: what the recogniser says of it with those before, and alone.
+    /// Adds a grasp: its PMF combined with those before, and alone.
     pub fn add(&mut self, with_before: Pmf, alone: Pmf) {
         self.steps.push(with_before);
         self.alone.push(alone);
     }
 
-    /// What is believed now; none before the first grasp.
+    /// Current belief; `None` before the first grasp.
     pub fn now(&self) -> Option<&Pmf> {
         self.steps.last()
     }
 
-    /// What was believed after each grasp.
+    /// Belief after each grasp.
     pub fn steps(&self) -> &[Pmf] {
         &self.steps
     }
 
-    /// What was said after each grasp, with those before and alone.
+    /// PMFs of each grasp, combined with those before and alone.
     pub fn pairs(&self) -> impl Iterator<Item = (&Pmf, &Pmf)> {
         self.steps.iter().zip(&self.alone)
     }
@@ -39,14 +39,14 @@ impl Belief {
         self.steps.len()
     }
 
-    /// How well the belief explains the grasps it came from: mean logarithm of the probability that each of them alone
-    /// gives to what is believed in the end. Grasps of an unknown object contradict each other or convince nobody.
+    /// Agreement of the grasps with the belief (nat, at most 0): mean logarithm of the probability that each grasp alone
+    /// gives to it. Grasps of an unknown object contradict each other or are uncertain.
     pub fn agreement(&self) -> f64 {
         agreement(self.now(), &self.alone)
     }
 }
 
-pub(super) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
+pub(crate) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
     let Some(belief) = belief.filter(|_| !alone.is_empty()) else { return 0.0 };
     let explained = |pmf: &Pmf| -> f64 {
         let p: f64 = belief.probabilities().iter().zip(pmf.probabilities()).map(|(b, p)| b * p).sum();
@@ -55,30 +55,29 @@ pub(super) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
     alone.iter().map(explained).sum::<f64>() / alone.len() as f64
 }
 
-/// From which agreement on an object counts as known, calibrated on grasps of known objects that were held back from
-/// training.
+/// Smallest agreement of known objects, calibrated on held-out grasps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rejection {
-    /// Share of known objects that are taken for unknown.
+    /// Share of known objects rejected as unknown.
     pub share: f64,
-    /// Least agreement after one grasp, two, and so on; the last holds for more.
+    /// Smallest agreement after one grasp, two, and so on; the last applies to more.
     pub least: Vec<f64>,
 }
 
 impl Rejection {
-    /// True when the grasps of a belief are worse explained than those of known objects ever but for the share.
+    /// True if the agreement of a belief is below the threshold.
     pub fn rejects(&self, belief: &Belief) -> bool {
         let at = belief.grasps().clamp(1, self.least.len().max(1)) - 1;
         self.least.get(at).is_some_and(|least| belief.agreement() < *least)
     }
 }
 
-/// When to stop grasping.
+/// Stop rule for successive grasps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
-    /// Probability from which on the most likely class is taken as certain; at one nothing ever is.
+    /// Confidence threshold on the most likely class, 0 to 1; never reached at 1.
     pub threshold: f64,
-    /// Most grasps.
+    /// Largest number of grasps.
     pub most_grasps: usize,
 }
 
@@ -89,20 +88,20 @@ impl Default for StopRule {
     }
 }
 
-/// Why grasping ended.
+/// Reason why grasping stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
     /// One class reached the threshold.
     Sure,
-    /// The limit of grasps was reached first.
+    /// The grasp limit was reached first.
     GraspLimit,
-    /// The grasps agree on none of the known classes.
+    /// The grasps agree with no known class.
     Unknown,
 }
 
 impl StopReason {
-    /// The name used in files.
+    /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sure => "sure",
@@ -113,7 +112,7 @@ impl StopReason {
 }
 
 impl StopRule {
-    /// Whether to stop with a belief, and why; `None` to go on.
+    /// Decides whether to stop; `None` to grasp again.
     pub fn judge(&self, belief: &Belief, rejection: Option<&Rejection>) -> Option<StopReason> {
         let sure = belief.now()?.top().1 >= self.threshold && self.threshold < 1.0;
         let unknown = rejection.is_some_and(|rejection| rejection.rejects(belief));

@@ -1,4 +1,4 @@
-//! Labelled grasps as recognisers see them, and how they are split.
+//! Labelled grasps, and their splits into training and test sets.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -9,9 +9,9 @@ use std::sync::Arc;
 /// Readings of one grasp: rows of channels over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sequence {
-    /// Times since the start of the grasp, rising (s).
+    /// Times since the start of the grasp, ascending (s).
     pub t_s: Vec<f32>,
-    /// One row per time, in the order of the data set's channels.
+    /// Readings, `[samples][channels]`, in the units of the channels.
     pub values: Vec<f32>,
 }
 
@@ -21,18 +21,18 @@ impl Sequence {
         self.t_s.len()
     }
 
-    /// True when nothing was sampled.
+    /// True without samples.
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
     }
 
-    /// Samples in order: time (s) and one value per channel.
+    /// Iterates over samples: time (s) and one value per channel.
     pub fn rows(&self) -> impl Iterator<Item = (f32, &[f32])> {
         let width = self.values.len() / self.t_s.len().max(1);
         self.t_s.iter().copied().zip(self.values.chunks_exact(width.max(1)))
     }
 
-    /// The first part of it, up to a time (s).
+    /// Truncates the sequence after a time (s).
     pub fn until(&self, t: f32) -> Self {
         let count = self.t_s.partition_point(|&own| own <= t);
         let width = self.values.len() / self.t_s.len().max(1);
@@ -40,21 +40,21 @@ impl Sequence {
     }
 }
 
-/// What can be recognised, in words and as stage one sees it.
+/// Object class, with its size and shape class for stage one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Class {
-    /// Its label.
+    /// Name.
     pub name: String,
-    /// Its size class, where it has one: an index into [`Labels::sizes`].
+    /// Size class, an index into [`Labels::sizes`]; `None` if unknown.
     pub size: Option<usize>,
-    /// Its shape class, where it has one: an index into [`Labels::shapes`].
+    /// Shape class, an index into [`Labels::shapes`]; `None` if unknown.
     pub shape: Option<usize>,
 }
 
-/// All that a recogniser can answer.
+/// Classes, sizes and shapes that a recogniser distinguishes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Labels {
-    /// Classes by name.
+    /// Object classes.
     pub classes: Vec<Class>,
     /// Names of the size classes.
     pub sizes: Vec<String>,
@@ -68,7 +68,7 @@ impl Labels {
         self.classes.iter().position(|class| class.name == name)
     }
 
-    /// True when every class has a size and a shape, so that stage one has something to learn.
+    /// True if at least one class has a size and one a shape, as stage one requires.
     pub fn have_properties(&self) -> bool {
         self.classes.iter().any(|class| class.size.is_some()) && self.classes.iter().any(|class| class.shape.is_some())
     }
@@ -77,22 +77,22 @@ impl Labels {
 /// One labelled grasp.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Example {
-    /// What names it in its source: the trial's number in the store.
+    /// Number of the trial in the store.
     pub id: i64,
     /// Index of its class.
     pub class: usize,
-    /// Its readings.
+    /// Readings.
     pub grasp: Arc<Sequence>,
 }
 
-/// Where grasps come from, as told beside every number.
+/// Origin of a data set.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DataCard {
-    /// Collections the grasps are from.
+    /// Collections of the grasps.
     pub collections: Vec<String>,
-    /// Pose preset, where all grasps were simulated with the same one.
+    /// Pose preset; `None` unless all grasps were simulated with the same one.
     pub preset: Option<String>,
-    /// `free` or `fixed`, where all objects were simulated alike; `recorded` for imported grasps.
+    /// `free`, `fixed` or `free and fixed` for simulated grasps; `recorded` for others.
     pub object: String,
     /// Number of grasps.
     pub grasps: usize,
@@ -100,13 +100,13 @@ pub struct DataCard {
     pub layout: Option<String>,
     /// Sensor model of simulated grasps.
     pub sensors: Option<String>,
-    /// Grasps left out because their simulation did not stay finite or did not converge.
+    /// Number of grasps left out: diverged, not converged, or not calibrated.
     #[serde(default)]
     pub left_out: usize,
 }
 
 impl DataCard {
-    /// In a line: `preset B, object free, virtual sensors, C1+F`.
+    /// One-line summary: `preset B, object free, virtual sensors, C1+F`.
     pub fn described(&self) -> String {
         let mut parts = Vec::new();
         parts.extend(self.preset.as_ref().map(|preset| format!("preset {preset}")));
@@ -127,16 +127,16 @@ impl DataCard {
 pub struct Dataset {
     /// Names of the channels.
     pub channels: Vec<String>,
-    /// What there is to recognise.
+    /// Classes, sizes and shapes.
     pub labels: Labels,
     /// The grasps.
     pub examples: Vec<Example>,
-    /// Where they come from.
+    /// Origin.
     pub about: DataCard,
 }
 
 impl Dataset {
-    /// The same data set with some of its grasps.
+    /// Selects some of the grasps, by index.
     pub fn part(&self, of: &[usize]) -> Self {
         Self {
             channels: self.channels.clone(),
@@ -146,7 +146,7 @@ impl Dataset {
         }
     }
 
-    /// The same grasps with classes numbered as another list of labels has them; `None` where it does not know one.
+    /// Renumbers classes by another list of labels; `None` if that lacks one of the classes.
     pub fn relabelled(&self, labels: &Labels) -> Option<Self> {
         let known: Option<Vec<usize>> =
             self.examples.iter().map(|e| labels.class(&self.labels.classes[e.class].name)).collect();
@@ -155,7 +155,7 @@ impl Dataset {
         Some(other)
     }
 
-    /// The same grasps with their labels exchanged at random: a control, from which nothing can be learned.
+    /// Shuffles the labels among the grasps, as a control.
     pub fn with_shuffled_labels(&self, seed: u64) -> Self {
         let mut truth = self.truth();
         truth.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
@@ -164,7 +164,7 @@ impl Dataset {
         shuffled
     }
 
-    /// The class of every grasp.
+    /// Class of each grasp.
     pub fn truth(&self) -> Vec<usize> {
         self.examples.iter().map(|example| example.class).collect()
     }
@@ -178,7 +178,7 @@ impl Dataset {
         by_class
     }
 
-    /// Splits off the first `count` grasps of each class: what comes later never depends on how many come first.
+    /// Splits off the first `count` grasps of each class; the order of the rest does not depend on `count`.
     pub fn first_of_each(&self, count: usize) -> (Self, Self) {
         let (mut first, mut rest) = (Vec::new(), Vec::new());
         let mut met = vec![0; self.labels.classes.len()];
@@ -189,11 +189,11 @@ impl Dataset {
         (self.part(&first), self.part(&rest))
     }
 
-    /// A part number from 0 to `parts - 1` for every grasp: random, but as even within each class as can be.
+    /// Assigns each grasp a random part, 0 to `parts - 1`, stratified by class.
     pub fn folds(&self, parts: usize, seed: u64) -> Vec<usize> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut fold = vec![0; self.examples.len()];
-        // Classes begin at different parts, so that parts are even in all.
+        // Classes start at different parts, so that parts have equal size.
         for (class, mut members) in self.by_class().into_iter().enumerate() {
             members.shuffle(&mut random);
             for (n, k) in members.into_iter().enumerate() {
@@ -203,7 +203,7 @@ impl Dataset {
         fold
     }
 
-    /// Splits into shares of each class, as in the paper's 40/40/20; the last share takes what is left.
+    /// Splits each class into random shares, such as the paper's 40/40/20; the last share takes the remainder.
     pub fn shares(&self, shares: &[f64], seed: u64) -> Vec<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut parts = vec![Vec::new(); shares.len()];

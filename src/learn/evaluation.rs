@@ -1,57 +1,58 @@
-//! How good a recogniser is on grasps it has not seen: one grasp, several grasps, stage one, calibration, cost.
+//! Evaluation of a recogniser on test grasps: single and successive grasps, stage one, calibration, cost.
 
-use super::data::Dataset;
-use super::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval};
-use super::{Belief, Pmf, Recogniser, StopReason, StopRule, Verdict};
+use crate::belief::{Belief, StopReason, StopRule};
+use crate::data::{Class, Dataset, Example};
+use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, Scores};
+use crate::pmf::Pmf;
+use crate::recogniser::{Recogniser, Verdict};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// Answers of a recogniser to a data set's grasps, one by one.
+/// Verdicts of a recogniser on the grasps of a data set, one by one.
 #[derive(Clone, Debug)]
 pub struct Answers {
     /// True classes.
     pub truth: Vec<usize>,
-    /// What was answered to each grasp by itself.
+    /// Verdict on each grasp alone.
     pub verdicts: Vec<Verdict>,
-    /// CPU time of an answer to one sample (µs), where the recogniser answers while a grasp goes on, else of an answer
-    /// to a whole grasp divided by its samples.
+    /// Mean CPU time per sample (µs).
     pub step_us: f64,
 }
 
-/// Measures of one model on one test set.
+/// Test results of one model on one data set.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// Mean recall of the classes.
+    /// Mean recall over classes.
     pub macro_accuracy: f64,
-    /// Mean precision of the classes.
+    /// Mean precision over classes.
     pub precision: f64,
-    /// Mean F1 of the classes.
+    /// Mean F1 over classes.
     pub f1_macro: f64,
     /// 95 % interval of the macro F1, by bootstrap over trials within objects.
     pub ci95: [f64; 2],
     /// Expected calibration error over ten bins of equal mass.
     pub ece: f64,
-    /// Negative logarithm of the probability of the truth, mean.
+    /// Mean negative log-likelihood of the true class (nat).
     pub nll: f64,
-    /// Share of the grasps whose truth is among the three most likely classes.
+    /// Share of grasps whose true class is among the three most likely.
     pub top3: f64,
-    /// Of answers at least as sure as the threshold, the share that is wrong; null where there are none.
+    /// Share of wrong verdicts among those above the confidence threshold; null if there are none.
     pub confident_wrong: Option<f64>,
-    /// Share of answers at least as sure as the threshold.
+    /// Share of verdicts above the confidence threshold.
     pub confident: f64,
-    /// Macro F1 of sizes and shapes, where stage one answers.
+    /// Macro F1 of size and shape; null without stage one.
     pub stage_one: Option<StageOneScores>,
     /// Macro F1 after one grasp, two, and so on.
     pub f1_by_grasps: Vec<f64>,
-    /// The stop rule over successive grasps.
+    /// Results of the stop rule.
     pub stopping: Stopping,
     /// CPU time per sample (µs).
     pub step_us: f64,
-    /// Test grasps.
+    /// Number of test grasps.
     pub trials: usize,
-    /// Counts of decisions, rows are the truth.
+    /// Confusion matrix; rows: true class, columns: predicted.
     pub confusion: Confusion,
 }
 
@@ -64,25 +65,25 @@ pub struct StageOneScores {
     pub shape_f1: f64,
 }
 
-/// What the stop rule comes to.
+/// Results of the stop rule over successive grasps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Stopping {
-    /// Grasps until it stops, mean.
+    /// Mean number of grasps until it stops.
     pub mean_grasps: f64,
-    /// Share of objects on which it was sure before the limit.
+    /// Share of rounds that reached the confidence threshold.
     pub sure: f64,
-    /// Of those, the share it was wrong about; null where there are none.
+    /// Share of wrong decisions among those; null if there are none.
     pub sure_wrong: Option<f64>,
-    /// Share of known objects it called unknown.
+    /// Share of known objects rejected as unknown.
     pub unknown: f64,
-    /// Share of decisions that are right, `unknown` counting as wrong.
+    /// Share of right decisions; `unknown` counts as wrong.
     pub accuracy: f64,
 }
 
-/// Grasps after which accuracy is told at most.
+/// Largest number of successive grasps evaluated.
 pub const MOST_GRASPS: usize = 5;
 
-/// Answers every grasp of a data set by itself.
+/// Recognises each grasp of a data set alone.
 pub fn answer(recogniser: &dyn Recogniser, data: &Dataset) -> Answers {
     let start = cpu_time::ThreadTime::now();
     let verdicts: Vec<Verdict> = data.examples.iter().map(|e| recogniser.recognise(&e.grasp, None)).collect();
@@ -91,20 +92,20 @@ pub fn answer(recogniser: &dyn Recogniser, data: &Dataset) -> Answers {
     Answers { truth: data.truth(), verdicts, step_us }
 }
 
-/// Successive grasps of one object, and what is believed after each.
+/// Successive grasps of one object, with the belief after each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Round {
-    /// The object.
+    /// True class.
     pub truth: usize,
-    /// What is believed.
+    /// Belief.
     pub belief: Belief,
 }
 
-/// For every test grasp others of the same object that follow it, as indices: the same for every recogniser.
+/// Draws for each test grasp others of the same object to follow it, as indices; the same for every recogniser.
 fn successions(data: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let by_class = data.by_class();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut after = |(first, example): (usize, &super::Example)| {
+    let mut after = |(first, example): (usize, &Example)| {
         let mut others: Vec<usize> = by_class[example.class].iter().copied().filter(|k| *k != first).collect();
         others.shuffle(&mut random);
         std::iter::once(first).chain(others).take(MOST_GRASPS).collect()
@@ -112,12 +113,12 @@ fn successions(data: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     data.examples.iter().enumerate().map(&mut after).collect()
 }
 
-/// Follows the belief through successive grasps, one round for every test grasp.
+/// Runs successive grasps with feedback, one round starting at each test grasp.
 pub fn rounds(recogniser: &dyn Recogniser, data: &Dataset, answers: &Answers, seed: u64) -> Vec<Round> {
     followed(data, answers, seed, |before, k| recogniser.recognise(&data.examples[k].grasp, Some(before)).pmf)
 }
 
-/// The same rounds with grasps counted as independent observations: the Bayesian product of experts.
+/// Runs the same rounds with grasps as independent observations (product of experts).
 pub fn product_of_experts(data: &Dataset, answers: &Answers, seed: u64) -> Vec<Round> {
     followed(data, answers, seed, |before, k| before.times(&answers.verdicts[k].pmf))
 }
@@ -136,7 +137,7 @@ fn followed(data: &Dataset, answers: &Answers, seed: u64, next: impl Fn(&Pmf, us
     successions(data, seed).into_iter().map(follow).collect()
 }
 
-/// Macro F1 after each number of grasps, over the classes that occur.
+/// Computes the macro F1 after each number of grasps, over the classes that occur.
 pub fn f1_by_grasps(classes: usize, rounds: &[Round]) -> Vec<f64> {
     let of = |grasps: usize| {
         let pairs = rounds.iter().filter_map(|r| Some((r.truth, Some(r.belief.steps().get(grasps)?.top().0))));
@@ -146,17 +147,17 @@ pub fn f1_by_grasps(classes: usize, rounds: &[Round]) -> Vec<f64> {
     (0..most).map(of).collect()
 }
 
-/// Macro F1 over the classes that have trials: a class without any says nothing.
+/// Macro F1 over the classes with trials.
 fn f1_over_occurring(confusion: &Confusion) -> Option<f64> {
     scores_over_occurring(confusion).map(|scores| scores.f1)
 }
 
-fn scores_over_occurring(confusion: &Confusion) -> Option<super::metrics::Scores> {
+fn scores_over_occurring(confusion: &Confusion) -> Option<Scores> {
     let occurring: Vec<usize> = (0..confusion.classes()).filter(|c| confusion.class(*c).trials > 0).collect();
     confusion.scores_over(&occurring)
 }
 
-/// Judges answers and rounds. `None` where there is no grasp to judge by.
+/// Computes all test results; `None` without grasps.
 pub fn evaluate(
     recogniser: &dyn Recogniser,
     data: &Dataset,
@@ -199,7 +200,7 @@ pub fn evaluate(
 
 fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
     let labels = &data.labels;
-    let f1 = |count: usize, pick: &dyn Fn(&super::Class) -> Option<usize>, pmf: &dyn Fn(&Verdict) -> Option<&Pmf>| {
+    let f1 = |count: usize, pick: &dyn Fn(&Class) -> Option<usize>, pmf: &dyn Fn(&Verdict) -> Option<&Pmf>| {
         let pairs = data.examples.iter().zip(verdicts).filter_map(|(example, verdict)| {
             Some((pick(&labels.classes[example.class])?, Some(pmf(verdict)?.top().0)))
         });
@@ -237,7 +238,7 @@ fn stopping(recogniser: &dyn Recogniser, rounds: &[Round], stop: StopRule) -> St
     }
 }
 
-/// The part of a belief at which the rule stops, and why.
+/// Belief at which the rule stops, and the reason.
 fn stopped(whole: &Belief, recogniser: &dyn Recogniser, stop: StopRule) -> (Belief, StopReason) {
     let mut belief = Belief::default();
     for (with, alone) in whole.pairs() {
@@ -249,9 +250,9 @@ fn stopped(whole: &Belief, recogniser: &dyn Recogniser, stop: StopRule) -> (Beli
     (belief, StopReason::GraspLimit)
 }
 
-/// Calibration error of what is said a share of the way through the grasps.
+/// Computes the calibration error after a share of each grasp, 0 to 1; `None` without grasps.
 pub fn prefix_calibration(recogniser: &dyn Recogniser, data: &Dataset, share: f32) -> Option<f64> {
-    let cut = |example: &super::Example| {
+    let cut = |example: &Example| {
         let end = example.grasp.t_s.last().copied().unwrap_or(0.0);
         recogniser.recognise(&example.grasp.until(share * end), None).pmf.probabilities().to_vec()
     };

@@ -1,40 +1,41 @@
-//! A grasp as a row of numbers, for recognisers that know no time: its course in even windows, or a few hand-made
-//! measures of each channel.
+//! A grasp as a row of features, for classifiers without a notion of time: means over windows of time, or a few
+//! hand-crafted measures of each channel.
 
-use super::data::{Dataset, Sequence};
+use crate::data::{Dataset, Sequence};
+use crate::mirror::mirror;
 use serde::{Deserialize, Serialize};
 
-/// What the numbers are.
+/// Kind of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum FeatureKind {
-    /// Means of every channel over even windows of time.
+pub(crate) enum FeatureKind {
+    /// Means of each channel over 30 equal windows of time.
     Course,
-    /// Measures a person would take: when a channel rises, how far, how fast, where it ends, how fingers differ.
+    /// Hand-crafted measures of each channel: onset, height, slope, end value, difference between fingers.
     Measures,
 }
 
-/// How grasps become rows, learned from training data.
+/// Mapping from grasps to rows, fitted to training data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Features {
+pub(crate) struct Features {
     kind: FeatureKind,
-    /// Channels of a grasp.
+    /// Number of channels.
     channels: usize,
-    /// Length of the grasps learned from (s).
+    /// Median duration of the training grasps (s).
     duration_s: f32,
-    /// A tenth of the way from the lowest to the highest value that each channel had: it has risen beyond this.
+    /// Onset threshold of each channel, in its unit: a tenth of its range above its minimum.
     risen: Vec<f32>,
-    /// For each channel the one on the other finger.
+    /// Counterpart of each channel on the other finger.
     mirror: Option<Vec<usize>>,
 }
 
-/// Windows of the course: three a tenth of the default grasp.
+/// Number of windows: three per tenth of a grasp.
 const WINDOWS: usize = 30;
-/// Measures of each channel.
+/// Number of measures of each channel.
 const MEASURES: usize = 9;
 
 impl Features {
-    pub(super) fn fit(kind: FeatureKind, data: &Dataset) -> Self {
+    pub(crate) fn fit(kind: FeatureKind, data: &Dataset) -> Self {
         let channels = data.channels.len();
         let mut lengths: Vec<f32> = data.examples.iter().filter_map(|e| e.grasp.t_s.last().copied()).collect();
         lengths.sort_by(f32::total_cmp);
@@ -46,36 +47,37 @@ impl Features {
             }
         }
         let risen = range.iter().map(|(low, high)| if high > low { low + 0.1 * (high - low) } else { 0.0 }).collect();
-        Self { kind, channels, duration_s, risen, mirror: super::network::mirror(&data.channels) }
+        Self { kind, channels, duration_s, risen, mirror: mirror(&data.channels) }
     }
 
-    /// Numbers of a row.
-    pub(super) fn width(&self) -> usize {
+    /// Number of features.
+    pub(crate) fn width(&self) -> usize {
         match self.kind {
             FeatureKind::Course => self.channels * WINDOWS,
             FeatureKind::Measures => self.channels * (MEASURES + 1),
         }
     }
 
-    /// True when it can read grasps of so many channels: it may come from a file.
-    pub(super) fn is_sound(&self, channels: usize) -> bool {
-        self.channels == channels
+    /// True if a mapping from a file is valid for this number of channels.
+    pub(crate) fn is_sound(&self, channels: usize) -> bool {
+        channels > 0
+            && self.channels == channels
             && self.duration_s.is_finite()
             && self.duration_s > 0.0
             && self.risen.len() == channels
             && self.mirror.as_ref().is_none_or(|m| m.len() == channels && m.iter().all(|to| *to < channels))
     }
 
-    /// The row of a grasp.
-    pub(super) fn row(&self, grasp: &Sequence) -> Vec<f32> {
+    /// Features of a grasp.
+    pub(crate) fn row(&self, grasp: &Sequence) -> Vec<f32> {
         match self.kind {
             FeatureKind::Course => self.course(grasp),
             FeatureKind::Measures => self.measures(grasp),
         }
     }
 
-    /// The row of a grasp with left and right exchanged.
-    pub(super) fn mirrored(&self, grasp: &Sequence) -> Option<Vec<f32>> {
+    /// Features of a grasp with left and right exchanged; `None` without mirrored channels.
+    pub(crate) fn mirrored(&self, grasp: &Sequence) -> Option<Vec<f32>> {
         let mirror = self.mirror.as_ref()?;
         let exchanged = grasp.rows().flat_map(|(_, row)| mirror.iter().map(|from| row[*from]));
         Some(self.row(&Sequence { t_s: grasp.t_s.clone(), values: exchanged.collect() }))
@@ -91,7 +93,7 @@ impl Features {
         }
         let mut before = vec![0.0; self.channels];
         for (window, count) in sums.chunks_exact_mut(self.channels.max(1)).zip(counts) {
-            // A window without samples, of a grasp that ended early, holds what was there last.
+            // A window without samples, after the end of a short grasp, repeats the window before.
             if count == 0 {
                 window.copy_from_slice(&before);
             } else {
@@ -117,7 +119,7 @@ impl Features {
             let onset_t = onset.map_or(self.duration_s, |sample| grasp.t_s[sample]);
             let end = tail_mean(grasp, channel, self.channels, 0.1);
             let half = (0..grasp.len()).find(|sample| at(*sample, channel) > 0.5 * end).unwrap_or(last);
-            // How steeply it rises in the tenth of a grasp after its onset.
+            // Rise during a tenth of the grasp after onset.
             let from = onset.unwrap_or(last);
             let to = (from + grasp.len() / 10).min(last);
             let rise = at(to, channel) - at(from, channel);
@@ -144,8 +146,8 @@ fn tail_mean(grasp: &Sequence, channel: usize, channels: usize, share: f32) -> f
 
 #[cfg(test)]
 mod tests {
-    use super::super::data::{Class, DataCard, Example, Labels};
     use super::*;
+    use crate::data::{Class, DataCard, Example, Labels};
     use std::sync::Arc;
 
     /// A step to 2 at 0.5 s on the left, to 4 on the right.
@@ -177,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn courses_hold_what_was_there_last() {
+    fn windows_after_the_end_repeat_the_last_value() {
         let data = data();
         let features = Features::fit(FeatureKind::Course, &data);
         let whole = features.row(&data.examples[0].grasp);

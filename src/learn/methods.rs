@@ -1,53 +1,56 @@
-//! The list of recognisers. Adding one is adding a line.
+//! Table of recognition methods. To add one, add a line to [`METHODS`].
 
-use super::data::Dataset;
-use super::model_file::{Arrays, Model, ModelCard};
-use super::network::{Recipe, TactileNetwork};
-use super::rivals::{Convolution, Tabular, TabularKind, Warping};
-use super::{FitError, Fitting, Recogniser, StopRule};
+use crate::arrays::Arrays;
+use crate::baselines::{Convolution, Tabular, TabularKind, Warping};
+use crate::belief::StopRule;
+use crate::data::Dataset;
+use crate::fitting::{Fitting, LearnError};
+use crate::model::{LoadError, Model, ModelCard};
+use crate::network::{Recipe, TactileNetwork};
+use crate::recogniser::Recogniser;
 use std::sync::Arc;
 
-/// What a method is among the others.
+/// Group of a method in tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A network of the paper, or one that goes on from it.
+pub enum MethodKind {
+    /// Network of the paper or derived from one.
     Network,
-    /// A single model that the paper compares with.
+    /// Single model that the paper compares with (section III-A).
     Single,
-    /// An ensemble that the paper compares with.
+    /// Ensemble that the paper compares with (section III-A).
     Ensemble,
-    /// A rival that the paper does not name.
+    /// Baseline that the paper does not name.
     Further,
 }
 
-type Fit = fn(&Dataset, &Fitting<'_>) -> Result<Box<dyn Recogniser>, FitError>;
-type Load = fn(&ModelCard, &Arrays) -> Result<Box<dyn Recogniser>, String>;
+type Fit = fn(&Dataset, &Fitting<'_>) -> Result<Box<dyn Recogniser>, LearnError>;
+type Load = fn(&ModelCard, &Arrays) -> Result<Box<dyn Recogniser>, LoadError>;
 
-/// A way to recognise.
+/// Recognition method.
 #[derive(Clone, Copy, Debug)]
 pub struct Method {
-    /// Names it on the command line and in files.
+    /// Key on the command line and in files.
     pub key: &'static str,
-    /// What people call it.
+    /// Display name.
     pub title: &'static str,
-    /// What it is among the others.
-    pub kind: Kind,
-    /// What it is, in a sentence.
+    /// Group in tables.
+    pub kind: MethodKind,
+    /// One-line description.
     pub about: &'static str,
-    /// Its settings before anything is changed, for networks.
+    /// Default settings; networks only.
     pub recipe: Option<fn() -> Recipe>,
-    /// Fits it to data.
+    /// Fits a recogniser to data.
     pub fit: Fit,
-    /// Brings it back from a file; the text says what is wrong.
+    /// Restores a recogniser from the card and arrays of a model file.
     pub load: Load,
 }
 
 macro_rules! network {
-    ($key:literal, $title:literal, $about:literal, $recipe:expr) => {
+    ($key:literal, $title:literal, $kind:ident, $about:literal, $recipe:expr) => {
         Method {
             key: $key,
             title: $title,
-            kind: Kind::Network,
+            kind: MethodKind::$kind,
             about: $about,
             recipe: Some(|| $recipe),
             fit: |data, fitting| Ok(Box::new(TactileNetwork::fit(data, $recipe.adjusted(fitting)?, $title, fitting)?)),
@@ -56,26 +59,38 @@ macro_rules! network {
     };
 }
 
-macro_rules! tabular {
-    ($key:literal, $title:literal, $kind:ident, $about:literal, $tabular:ident) => {
+macro_rules! baseline {
+    ($key:literal, $title:literal, $kind:ident, $about:literal, $fit:expr, $type:ident) => {
         Method {
             key: $key,
             title: $title,
-            kind: Kind::$kind,
+            kind: MethodKind::$kind,
             about: $about,
             recipe: None,
-            fit: |data, fitting| Ok(Box::new(Tabular::fit(data, TabularKind::$tabular, fitting)?)),
-            load: |card, arrays| Ok(Box::new(Tabular::load(card, arrays)?)),
+            fit: |data, fitting| Ok(Box::new($fit(data, fitting)?)),
+            load: |card, arrays| Ok(Box::new($type::load(card, arrays)?)),
         }
     };
 }
 
+macro_rules! tabular {
+    ($key:literal, $title:literal, $kind:ident, $about:literal, $tabular:ident) => {
+        baseline!(
+            $key,
+            $title,
+            $kind,
+            $about,
+            |data, fitting| Tabular::fit(data, TabularKind::$tabular, fitting),
+            Tabular
+        )
+    };
+}
+
 impl Method {
-    /// Fits it to data and writes the card.
-    pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, FitError> {
-        // A pool of one thread: candle would spread over all cores and be slower for it, and its time is told whole.
-        let failed = |e: rayon::ThreadPoolBuildError| FitError::Failed { cause: e.to_string() };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(failed)?;
+    /// Fits a model to data and fills in its card. Runs on one thread, whose CPU time is recorded.
+    pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, LearnError> {
+        // candle and smartcore would spread over all cores, which is slower for models this small.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(LearnError::failed)?;
         let (recogniser, train_cpu_s) = pool.install(|| {
             let start = cpu_time::ThreadTime::now();
             (self.fit)(data, fitting).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
@@ -99,115 +114,106 @@ impl Method {
     }
 }
 
-/// All methods, the paper's own first.
+/// All methods: the paper's networks first, then its baselines, then further ones.
 pub const METHODS: [Method; 20] = [
     network!(
         "ds-lstm",
         "DS-LSTM",
-        "The paper's dual-stage LSTM: size and shape first, on one half of the data, then \
-        the class, on the other half",
+        Network,
+        "The paper's dual-stage LSTM: stage one estimates size and shape, stage two the class, each trained on one half \
+         of the data",
         Recipe::dual_stage()
     ),
     network!(
         "ids-lstm",
         "iDS-LSTM",
+        Network,
         "The paper's iterated DS-LSTM: the PMF of earlier grasps is fed back",
         Recipe::iterated()
     ),
     network!(
         "ds-lstm-cross",
         "DS-LSTM, cross-fitted",
-        "The dual-stage LSTM with both stages on all data: stage two \
-        learns from what first stages say of grasps they have not seen",
+        Network,
+        "Dual-stage LSTM with both stages trained on all data: stage two learns from first stages applied to held-out \
+         grasps",
         Recipe::dual_stage().cross_fitted()
     ),
     network!(
         "ids-lstm-cross",
         "iDS-LSTM, cross-fitted",
-        "The iterated DS-LSTM on all data, by cross-fitting; the live \
-        model is of this kind",
+        Network,
+        "Iterated DS-LSTM trained on all data by cross-fitting; used by the live model",
         Recipe::iterated().cross_fitted()
     ),
     network!(
         "macro-layer",
         "Macro-layer",
-        "The paper's recurrent macro-layer by itself: LSTM, fully connected, \
-        dropout, fully connected",
+        Network,
+        "The paper's recurrent macro-layer alone: LSTM, fully connected, dropout, fully connected",
         Recipe::macro_layer()
     ),
     network!(
         "committee",
         "Committee",
-        "Four macro-layers that began from other weights and answer together",
+        Network,
+        "Four macro-layers with different initial weights, outputs averaged",
         Recipe::committee()
     ),
     network!(
         "zuo",
         "Zuo et al.",
-        "The four-layer network from which the paper starts: LSTM, dropout, fully connected",
+        Network,
+        "The four-layer network that the paper builds on: LSTM, dropout, fully connected",
         Recipe::zuo()
     ),
-    tabular!("decision-tree", "Decision tree", Single, "One tree on the course of all channels", DecisionTree),
-    tabular!("knn", "KNN", Single, "Seven nearest neighbours on the course of all channels", Neighbours),
-    tabular!("svm", "SVM", Single, "Support vectors with a Gaussian kernel on the course of all channels", Svm),
-    Method {
-        key: "lstm",
-        title: "LSTM",
-        kind: Kind::Single,
-        about: "A plain LSTM, read out at the end, without augmentation or regularisation",
-        recipe: Some(Recipe::plain_lstm),
-        fit: |data, fitting| {
-            Ok(Box::new(TactileNetwork::fit(data, Recipe::plain_lstm().adjusted(fitting)?, "LSTM", fitting)?))
-        },
-        load: |card, arrays| Ok(Box::new(TactileNetwork::load(card, arrays)?)),
-    },
-    tabular!("random-forest", "Random forest", Ensemble, "200 trees on the course of all channels", RandomForest),
-    tabular!("bagged-trees", "Bagged trees", Ensemble, "100 bagged trees on the course of all channels", BaggedTrees),
+    tabular!("decision-tree", "Decision tree", Single, "One tree on windowed means of all channels", DecisionTree),
+    tabular!("knn", "KNN", Single, "Seven nearest neighbours on windowed means of all channels", Neighbours),
+    tabular!("svm", "SVM", Single, "Support vector machine, Gaussian kernel, on windowed means of all channels", Svm),
+    network!(
+        "lstm",
+        "LSTM",
+        Single,
+        "Plain LSTM with one output at the end, without augmentation or regularisation",
+        Recipe::plain_lstm()
+    ),
+    tabular!("random-forest", "Random forest", Ensemble, "200 trees on windowed means of all channels", RandomForest),
+    tabular!(
+        "bagged-trees",
+        "Bagged trees",
+        Ensemble,
+        "100 bagged trees on windowed means of all channels",
+        BaggedTrees
+    ),
     tabular!(
         "gradient-boosting",
         "Gradient boosting",
         Ensemble,
-        "100 rounds of regression trees on the softmax \
-        deviance",
+        "100 rounds of regression trees on the softmax deviance",
         GradientBoosting
     ),
-    tabular!(
-        "rusboost",
-        "RUSBoost (M2)",
-        Ensemble,
-        "AdaBoost.M2 over rounds with as many grasps of each class",
-        RusBoostM2
-    ),
+    tabular!("rusboost", "RUSBoost (M2)", Ensemble, "AdaBoost.M2 on class-balanced random subsets", RusBoostM2),
     tabular!(
         "rusboost-samme",
         "RUSBoost (SAMME)",
         Ensemble,
-        "The same in the SAMME form of imbalanced-learn",
+        "SAMME boosting on class-balanced random subsets, as in imbalanced-learn",
         RusBoostSamme
     ),
-    tabular!("measures-svm", "Measures + SVM", Further, "Support vectors on hand-made measures", MeasuresSvm),
-    tabular!("measures-forest", "Measures + forest", Further, "A random forest on hand-made measures", MeasuresForest),
-    Method {
-        key: "dtw-knn",
-        title: "DTW-kNN",
-        kind: Kind::Further,
-        about: "Five nearest neighbours by dynamic time warping",
-        recipe: None,
-        fit: |data, fitting| Ok(Box::new(Warping::fit(data, fitting)?)),
-        load: |card, arrays| Ok(Box::new(Warping::load(card, arrays)?)),
-    },
-    Method {
-        key: "convolution",
-        title: "Convolutional",
-        kind: Kind::Further,
-        about: "A small convolutional network over time, in plain candle",
-        recipe: None,
-        fit: |data, fitting| Ok(Box::new(Convolution::fit(data, fitting)?)),
-        load: |card, arrays| Ok(Box::new(Convolution::load(card, arrays)?)),
-    },
+    tabular!("measures-svm", "Measures + SVM", Further, "Support vector machine on hand-crafted features", MeasuresSvm),
+    tabular!("measures-forest", "Measures + forest", Further, "Random forest on hand-crafted features", MeasuresForest),
+    baseline!("dtw-knn", "DTW-kNN", Further, "Five nearest neighbours by dynamic time warping", Warping::fit, Warping),
+    baseline!(
+        "convolution",
+        "Convolutional",
+        Further,
+        "Small convolutional network over time, in plain candle",
+        Convolution::fit,
+        Convolution
+    ),
 ];
 
-/// A method by its key.
+/// Finds a method by its key.
 pub fn method(key: &str) -> Option<&'static Method> {
     METHODS.iter().find(|method| method.key == key)
 }

@@ -1,31 +1,29 @@
-//! A probability for each class.
+//! Probability mass functions over classes.
 
 use serde::{Deserialize, Serialize};
 
-/// Probabilities below this count as this when they are multiplied or taken to the logarithm: no single grasp may rule
-/// a class out for ever.
+/// Lower bound of probabilities in products and logarithms: no single grasp may exclude a class permanently.
 const FLOOR: f64 = 1e-6;
 
-/// A probability mass function over classes; never empty, sums to one.
+/// Probability mass function over classes; never empty, sums to one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Pmf(Vec<f64>);
 
 impl Pmf {
-    /// Every one of `classes` as likely as the others.
+    /// Creates a uniform PMF.
     pub fn uniform(classes: usize) -> Self {
         Self(vec![1.0 / classes.max(1) as f64; classes.max(1)])
     }
 
-    /// Softmax of scores.
+    /// Computes the softmax of scores.
     pub fn from_scores(scores: impl IntoIterator<Item = f64>) -> Self {
         let scores: Vec<f64> = scores.into_iter().collect();
         let highest = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self::from_weights(scores.into_iter().map(|s| (s - highest).exp()))
     }
 
-    /// Weights made to sum to one; weights that are negative or no numbers count as none, and where nothing is left
-    /// all classes are equally likely.
+    /// Normalises weights. Negative and non-finite weights count as zero; if all are zero, the PMF is uniform.
     pub fn from_weights(weights: impl IntoIterator<Item = f64>) -> Self {
         let mut weights: Vec<f64> =
             weights.into_iter().map(|w| if w > 0.0 && w.is_finite() { w } else { 0.0 }).collect();
@@ -38,7 +36,7 @@ impl Pmf {
         }
     }
 
-    /// One probability per class.
+    /// Probability of each class.
     pub fn probabilities(&self) -> &[f64] {
         &self.0
     }
@@ -48,7 +46,7 @@ impl Pmf {
         self.0.len()
     }
 
-    /// The most likely class (the first of several), and its probability.
+    /// Most likely class (the first of equals) and its probability.
     pub fn top(&self) -> (usize, f64) {
         let mut best = (0, self.0[0]);
         for (class, &p) in self.0.iter().enumerate() {
@@ -59,23 +57,22 @@ impl Pmf {
         best
     }
 
-    /// Natural logarithms, not below that of one in a million.
+    /// Natural logarithms, at least that of one in a million.
     pub fn logarithms(&self) -> impl Iterator<Item = f64> + '_ {
         self.0.iter().map(|p| p.max(FLOOR).ln())
     }
 
-    /// What two independent observations say together, where all classes were equally likely before: the product of
-    /// experts.
+    /// Combines two independent observations under a uniform prior (product of experts).
     pub fn times(&self, other: &Self) -> Self {
         Self::from_scores(self.logarithms().zip(other.logarithms()).map(|(a, b)| a + b))
     }
 
-    /// Sharper (below one) or flatter (above one) by a temperature.
+    /// Rescales by a temperature: sharper below one, flatter above one.
     pub fn at_temperature(&self, temperature: f64) -> Self {
         Self::from_scores(self.logarithms().map(|l| l / temperature))
     }
 
-    /// Mean of several.
+    /// Averages PMFs; `None` without any.
     pub fn mean<'a>(of: impl IntoIterator<Item = &'a Self>) -> Option<Self> {
         let mut of = of.into_iter();
         let mut sum = of.next()?.0.clone();
@@ -85,7 +82,7 @@ impl Pmf {
         Some(Self::from_weights(sum))
     }
 
-    /// Probabilities of groups of classes, where `group_of` says to which group, if any, a class belongs.
+    /// Sums probabilities over groups of classes; `group_of` maps a class to its group, if any.
     pub fn grouped(&self, groups: usize, group_of: impl Fn(usize) -> Option<usize>) -> Self {
         let mut weights = vec![0.0; groups];
         for (class, p) in self.0.iter().enumerate() {
@@ -112,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn one_grasp_rules_nothing_out_for_ever() {
+    fn one_grasp_does_not_exclude_a_class_permanently() {
         let sure = Pmf::from_weights([1.0, 0.0]);
         let mut belief = sure.clone();
         for _ in 0..3 {
@@ -122,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn strange_weights_still_sum_to_one() {
+    fn invalid_weights_still_sum_to_one() {
         for weights in
             [vec![f64::NAN, 1.0], vec![0.0; 3], vec![f64::INFINITY, 2.0], vec![-1.0, 4.0], vec![1e308, 1e308]]
         {

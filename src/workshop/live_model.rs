@@ -2,7 +2,7 @@
 //! with its card.
 
 use super::{Failure, report};
-use palpate_lab::datasets::{Source, View};
+use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::{CollectionPlan, Shard, all_objects, collect};
 use palpate_lab::study::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
@@ -29,8 +29,8 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
     for (trials, seed) in TRIALS.into_iter().zip(SEEDS) {
         let plan = CollectionPlan { scene: scene.clone(), objects: all_objects(), trials, seed, shard: Shard::WHOLE };
         let report = collect(&plan, store, threads, &mut |_| ());
-        let source = Source { collection: Some(report?.collection), ..Source::default() };
-        sets.push(source.read(store, &View::default(), &mut |_, _| ())?);
+        let source = DatasetQuery { collection: Some(report?.collection), ..DatasetQuery::default() };
+        sets.push(source.read(store, &SensorView::default(), &mut |_, _| ())?);
     }
     let [train, test]: [Dataset; 2] = sets.try_into().map_err(|_others| "two data sets were asked for")?;
     let method = method(METHOD).ok_or("the method is gone")?;

@@ -4,7 +4,7 @@
 use crate::calibration::{calibrated, parts, readings, scenes, stored};
 use crate::program::{json, refused, run};
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
-use palpate_lab::datasets::{Source, View};
+use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::{ExportError, Store, export_labelled};
@@ -139,7 +139,7 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     let (kept, other, unknown, discarded) =
         (grasped("lemon", "lemon", 1), grasped("ball", "ball", 2), grasped("ball", "", 3), grasped("ball", "cube", 4));
     store.delete(&[discarded]).unwrap();
-    let read = |store: &Store| Source::default().read(store, &View::default(), &mut |_, _| ()).unwrap();
+    let read = |store: &Store| DatasetQuery::default().read(store, &SensorView::default(), &mut |_, _| ()).unwrap();
     let data = read(&store);
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();
     assert_eq!((ids, data.labels.classes.len()), (vec![kept, other], 2));

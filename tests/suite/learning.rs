@@ -2,7 +2,7 @@
 
 use crate::allocations::allocations_in;
 use crate::program::{json, refused, run};
-use palpate_lab::datasets::Source;
+use palpate_lab::datasets::DatasetQuery;
 use palpate_learn::network::{LiveMacroLayer, MacroLayer, MacroShape};
 use palpate_sim::objects::catalogue;
 use palpate_store::Store;
@@ -74,7 +74,11 @@ fn from_nothing_to_a_table_and_a_model() {
     );
     let bytes = std::fs::read(at.join("models/own.safetensors")).unwrap();
     std::fs::write(at.join("cut.safetensors"), &bytes[..bytes.len() / 2]).unwrap();
-    refused(at, &["recognise", "1", "--model", "cut.safetensors"], &["cut.safetensors", "not a whole model"]);
+    refused(
+        at,
+        &["recognise", "1", "--model", "cut.safetensors"],
+        &["cut.safetensors", "not a complete Palpate model"],
+    );
     refused(at, &["recognise", "1", "--model", "gone.safetensors"], &["gone.safetensors"]);
     refused(at, &["recognise", "99"], &["no trial 99"]);
     refused(at, &["train", "oracle"], &["no method \"oracle\"", "ds-lstm"]);
@@ -191,7 +195,7 @@ fn no_pose_of_a_test_seed_is_in_the_training_set() {
     assert_eq!(collections.len(), 2);
     let first = rows[0].collection.clone();
     let store = Store::open(&at.join("trials.sqlite")).unwrap();
-    let source = Source { collection: first, ..Source::default() };
+    let source = DatasetQuery { collection: first, ..DatasetQuery::default() };
     let data = source.read(&store, &Default::default(), &mut |_, _| ()).unwrap();
     assert_eq!(data.examples.len(), 30);
 }

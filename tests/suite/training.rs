@@ -173,7 +173,10 @@ fn too_little_to_learn_from_is_told() {
     let few = |store: &mut Store| (0..6).for_each(|number| trial(store, "ball", 60.0, 1.0, number));
     for (fill, told) in [
         (few as fn(&mut Store), "1 of the objects have 5 labelled trials or more, and two are needed"),
-        (unmounted, "none of the 60 trials of the real gripper can be read: no part is mounted as the left flex strip"),
+        (
+            unmounted,
+            "none of the 60 trials of the real gripper is calibrated: no part is mounted as the left flex strip",
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let (trainer, woken) = trainer(folder.path(), fill);

@@ -3,7 +3,7 @@
 
 use crate::program::{json, refused, run};
 use glam::DVec3;
-use palpate_lab::datasets::{DatasetError, Source, View};
+use palpate_lab::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_lab::grasping::{grasp, prepare};
 use palpate_sim::frame::Quality;
 use palpate_sim::scene::Scene;
@@ -86,11 +86,11 @@ fn no_data_set_takes_what_cannot_be_trusted() {
     for row in &marked {
         assert!(!store.load(row.id).unwrap().info.quality.is_sound());
     }
-    let data = Source::default().read(&store, &View::default(), &mut |_, _| ()).unwrap();
+    let data = DatasetQuery::default().read(&store, &SensorView::default(), &mut |_, _| ()).unwrap();
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();
     assert_eq!((ids, data.about.left_out), (vec![kept[0].id], 2));
     assert!(data.about.described().contains("2 left out"), "{}", data.about.described());
-    let alone = Source::default().read_trial(&store, marked[0].id, &View::default());
+    let alone = DatasetQuery::default().read_trial(&store, marked[0].id, &SensorView::default());
     assert!(matches!(alone, Err(DatasetError::Unsound { left_out: 1, .. })), "{alone:?}");
 }
 

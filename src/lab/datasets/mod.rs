@@ -1,7 +1,7 @@
-//! Data sets out of the store: which trials, seen through which sensors; and where trained models are kept.
+//! Data sets from the store, and the folder of trained models.
 
-mod saved;
-mod source;
+mod query;
+mod saved_models;
 
-pub use saved::{SavedModel, models_folder, new_model_path, saved_models};
-pub use source::{DatasetError, Source, View, labels_of_catalogue, sequence_of};
+pub use query::{DatasetError, DatasetQuery, SensorView, labels_of_catalogue, sequence_of};
+pub use saved_models::{SavedModel, models_folder, new_model_path, saved_models};

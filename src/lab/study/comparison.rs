@@ -2,7 +2,7 @@
 
 use palpate_learn::evaluation::{Answers, Evaluation, Round, answer, evaluate, product_of_experts, rounds};
 use palpate_learn::metrics::{Bootstrap, Confusion, Interval, McNemar, holm};
-use palpate_learn::{DataCard, Dataset, FitError, Fitting, Kind, Method, Model, Pmf, StopRule};
+use palpate_learn::{DataCard, Dataset, Fitting, LearnError, Method, MethodKind, Model, Pmf, StopRule};
 use serde::Serialize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -76,7 +76,7 @@ pub enum ComparisonError {
         /// Its key.
         method: &'static str,
         /// Why.
-        cause: FitError,
+        cause: LearnError,
     },
     /// Nothing to judge by.
     #[error("no grasps are left to test with; collect more, or train on fewer with --train-trials")]
@@ -271,9 +271,9 @@ fn fed_back_against_independent(classes: usize, fed_back: &[Round], independent:
         .collect()
 }
 
-/// Methods in the order of a table: the paper's networks, single models, ensembles, further rivals.
+/// Methods in the order of a table: the paper's networks, single models, ensembles, further baselines.
 pub fn in_table_order() -> Vec<&'static Method> {
-    let order = [Kind::Network, Kind::Single, Kind::Ensemble, Kind::Further];
-    let of = |kind: Kind| palpate_learn::METHODS.iter().filter(move |m| m.kind == kind);
+    let order = [MethodKind::Network, MethodKind::Single, MethodKind::Ensemble, MethodKind::Further];
+    let of = |kind: MethodKind| palpate_learn::METHODS.iter().filter(move |m| m.kind == kind);
     order.into_iter().flat_map(of).collect()
 }

@@ -2,9 +2,9 @@
 //! and what was judged is what is kept.
 
 use super::comparison::{Comparison, ComparisonError};
-use crate::datasets::{DatasetError, Source, View};
+use crate::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_learn::evaluation::Evaluation;
-use palpate_learn::{Dataset, FitError, Fitting, Method, Model, StopRule};
+use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, StopRule};
 use palpate_store::{BOARD_RIG, Store, StoreError};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -117,7 +117,7 @@ pub enum TrainingError {
     Dataset(#[from] DatasetError),
     /// The fit.
     #[error(transparent)]
-    Fit(#[from] FitError),
+    Fit(#[from] LearnError),
     /// The model could not be judged.
     #[error(transparent)]
     Judge(#[from] ComparisonError),
@@ -132,14 +132,14 @@ impl LabelledTraining<'_> {
             return Err(TrainingError::TooFew { found: enough.len() });
         }
         let objects = enough.iter().map(|class| class.name.clone()).collect();
-        let source = Source { rig: Some(BOARD_RIG.to_owned()), objects, ..Source::default() };
-        let data = source.read(store, &View::default(), &mut |done, of| {
+        let source = DatasetQuery { rig: Some(BOARD_RIG.to_owned()), objects, ..DatasetQuery::default() };
+        let data = source.read(store, &SensorView::default(), &mut |done, of| {
             (self.tell)(TrainingStage::Reading(done, of));
         })?;
         let all = enough.iter().map(|class| class.trials).sum();
         let data = without_small_classes(&data, all, &mut too_few)?;
         let shares = data.shares(&[1.0 - HELD_BACK, HELD_BACK], self.seed);
-        let [learned, held_back] = shares.as_slice() else { return Err(FitError::NoData.into()) };
+        let [learned, held_back] = shares.as_slice() else { return Err(LearnError::NoData.into()) };
         let mut model = self.fitted(learned)?;
         let evaluation = self.judged(&model, learned, held_back)?;
         let trials = [learned.examples.len(), held_back.examples.len()];
@@ -155,7 +155,7 @@ impl LabelledTraining<'_> {
         Ok(JudgedModel { model, evaluation, trials, too_few, left_out: all - data.examples.len() })
     }
 
-    fn fitted(&self, data: &Dataset) -> Result<Model, FitError> {
+    fn fitted(&self, data: &Dataset) -> Result<Model, LearnError> {
         let fitting = Fitting {
             seed: self.seed,
             quick: self.quick,
@@ -169,7 +169,7 @@ impl LabelledTraining<'_> {
 
     fn judged(&self, model: &Model, train: &Dataset, test: &Dataset) -> Result<Evaluation, TrainingError> {
         if self.stop.load(Ordering::Relaxed) {
-            return Err(FitError::Stopped.into());
+            return Err(LearnError::Stopped.into());
         }
         (self.tell)(TrainingStage::Judging);
         let (seed, quick, stop) = (self.seed, self.quick, StopRule::default());

@@ -3,7 +3,7 @@
 
 use palpate_learn::evaluation::answer;
 use palpate_learn::metrics::Confusion;
-use palpate_learn::{Dataset, FitError, Fitting, Method};
+use palpate_learn::{Dataset, Fitting, LearnError, Method};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -29,10 +29,10 @@ pub fn search(
     quick: bool,
     given: &serde_json::Map<String, serde_json::Value>,
     tell: &dyn Fn(usize, usize),
-) -> Result<Vec<SearchRow>, FitError> {
+) -> Result<Vec<SearchRow>, LearnError> {
     if method.recipe.is_none() {
         let cause = "only networks have settings to search for".to_owned();
-        return Err(FitError::Setting { name: "of the search".to_owned(), cause });
+        return Err(LearnError::Setting { name: "of the search".to_owned(), cause });
     }
     let mut points = vec![given.clone()];
     for (name, values) in GRID.iter().filter(|(name, _)| !given.contains_key(*name)) {

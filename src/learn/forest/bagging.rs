@@ -1,50 +1,51 @@
-//! One tree, or many on rows drawn with replacement whose answers are averaged: bagging (Breiman 1996), and with few
-//! columns looked at in every node the random forest (Breiman 2001).
+//! One tree, or the average of many on rows drawn with replacement: bagging (Breiman 1996), and with few columns searched
+//! in every node the random forest (Breiman 2001).
 
-use super::arrays::{Array, ArrayError, Reader};
 use super::bins::Bins;
 use super::split::Target;
-use super::stored_trees::push_trees;
 use super::tree::{FeatureSampling, Ground, Tree, TreeSettings};
-use super::{Examples, FitError, normalise, random_of};
+use super::tree_arrays::{load_class_trees, save_trees};
+use super::{Examples, normalise, random_of};
+use crate::arrays::{ArrayError, Arrays};
+use crate::fitting::LearnError;
 use rand::RngExt;
 
-/// How a [`Forest`] is grown. Default: [`ForestSettings::random_forest`].
+/// Settings of a [`Forest`]. Default: [`ForestSettings::random_forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ForestSettings {
-    /// Trees, at least 1. More never harm but take time; the spread between seeds falls with their square root.
-    pub trees: usize,
-    /// Which rows a tree is grown from.
-    pub rows: RowSampling,
-    /// How each tree is grown.
-    pub tree: TreeSettings,
-    /// Other seeds draw other rows and columns.
-    pub seed: u64,
+pub(crate) struct ForestSettings {
+    /// Number of trees, at least 1. The spread between seeds falls with the square root.
+    pub(crate) trees: usize,
+    /// Rows that a tree is grown from.
+    pub(crate) rows: RowSampling,
+    /// Settings of each tree.
+    pub(crate) tree: TreeSettings,
+    /// Seed of the rows and columns drawn.
+    pub(crate) seed: u64,
 }
 
-/// Which rows a tree is grown from.
+/// Rows that a tree is grown from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RowSampling {
+pub(crate) enum RowSampling {
     /// All of them.
     All,
-    /// As many as there are, drawn with replacement: about 63 % of them, some several times.
+    /// As many as there are, drawn with replacement: about 63 % of them occur.
     Bootstrap,
 }
 
 impl ForestSettings {
-    /// A single tree of all rows and columns, grown until leaves are pure; there is no chance in it.
-    pub fn decision_tree() -> Self {
+    /// A single tree on all rows and columns, grown until leaves are pure; deterministic.
+    pub(crate) fn decision_tree() -> Self {
         Self { trees: 1, rows: RowSampling::All, tree: TreeSettings::default(), seed: 0 }
     }
 
-    /// 100 trees on bootstrapped rows that look at all columns.
-    pub fn bagged_trees() -> Self {
+    /// 100 trees on bootstrapped rows and all columns.
+    pub(crate) fn bagged_trees() -> Self {
         let tree = TreeSettings { features: FeatureSampling::Shuffled, ..TreeSettings::default() };
         Self { trees: 100, rows: RowSampling::Bootstrap, tree, seed: 0 }
     }
 
-    /// 200 trees on bootstrapped rows that look at the square root of the columns in every node.
-    pub fn random_forest() -> Self {
+    /// 200 trees on bootstrapped rows; each node searches the square root of the number of columns.
+    pub(crate) fn random_forest() -> Self {
         let tree = TreeSettings { features: FeatureSampling::Sqrt, ..TreeSettings::default() };
         Self { trees: 200, rows: RowSampling::Bootstrap, tree, seed: 0 }
     }
@@ -56,41 +57,32 @@ impl Default for ForestSettings {
     }
 }
 
-/// Trees whose leaves hold shares of the classes.
+/// Trees whose leaves hold the share of each class.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forest {
+pub(crate) struct Forest {
     columns: usize,
     classes: usize,
     trees: Vec<Tree>,
 }
 
 impl Forest {
-    /// Features of a row.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Number of classes.
-    pub fn classes(&self) -> usize {
-        self.classes
-    }
-
-    /// Grows the trees. Refuses examples that are no table, and a forest of no trees.
-    pub fn fit(examples: &Examples<'_>, settings: &ForestSettings) -> Result<Self, FitError> {
+    /// Grows the trees. Refuses features that are not finite.
+    ///
+    /// # Panics
+    /// If the examples contradict themselves, or there is no tree.
+    pub(crate) fn fit(examples: &Examples<'_>, settings: &ForestSettings) -> Result<Self, LearnError> {
         examples.check()?;
-        if settings.trees == 0 {
-            return Err(FitError::Setting { name: "the number of trees", range: "at least 1" });
-        }
+        assert!(settings.trees > 0, "at least one tree");
         let bins = Bins::new(&examples.table);
         let trees = (0..settings.trees).map(|number| grow_one(examples, &bins, settings, number)).collect();
         Ok(Self { columns: examples.table.columns, classes: examples.classes, trees })
     }
 
-    /// A probability for each class: the mean share over all trees.
+    /// Probability of each class: mean share over all trees.
     ///
     /// # Panics
-    /// If the row has not as many values as those the forest was grown from.
-    pub fn predict(&self, row: &[f32]) -> Vec<f64> {
+    /// If the row has another number of features than the training rows.
+    pub(crate) fn predict(&self, row: &[f32]) -> Vec<f64> {
         assert_eq!(row.len(), self.columns, "values of a row");
         let mut shares = vec![0.0; self.classes];
         for tree in &self.trees {
@@ -102,18 +94,14 @@ impl Forest {
         shares
     }
 
-    /// The whole forest, to be stored.
-    pub fn to_arrays(&self) -> Vec<(String, Array)> {
-        let mut arrays = vec![Array::shape(self.columns, self.classes)];
-        push_trees(&self.trees, &mut arrays);
-        arrays
+    /// Adds the trees to the arrays of a model file.
+    pub(crate) fn save(&self, arrays: &mut Arrays) {
+        save_trees(&self.trees, self.columns, self.classes, arrays);
     }
 
-    /// A forest from storage. Refuses arrays that are missing or contradict each other.
-    pub fn from_arrays(arrays: &[(String, Array)]) -> Result<Self, ArrayError> {
-        let reader = Reader::new(arrays);
-        let (columns, classes) = reader.shape()?;
-        Ok(Self { columns, classes, trees: reader.class_trees(columns, classes)? })
+    /// Restores a forest from a model file.
+    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
+        Ok(Self { columns, classes, trees: load_class_trees(arrays, columns, classes)? })
     }
 }
 
@@ -134,12 +122,12 @@ fn grow_one(examples: &Examples<'_>, bins: &Bins, settings: &ForestSettings, num
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Table, peers};
+    use super::super::{Table, scikit_learn_tests};
     use super::*;
 
     #[test]
-    fn weights_are_repetitions() -> Result<(), FitError> {
-        let data = peers::Data::new(0..120);
+    fn weights_are_repetitions() -> Result<(), LearnError> {
+        let data = scikit_learn_tests::Data::new(0..120);
         let weights: Vec<f64> = (0..120_u32).map(|row| f64::from(row % 4)).collect();
         let repeated: Vec<usize> = (0..120).flat_map(|row| std::iter::repeat_n(row, row % 4)).collect();
         let values: Vec<f32> = repeated.iter().flat_map(|&row| data.row(row).to_vec()).collect();
@@ -153,8 +141,8 @@ mod tests {
     }
 
     #[test]
-    fn seeds_decide_everything() -> Result<(), FitError> {
-        let data = peers::Data::new(0..200);
+    fn seeds_decide_everything() -> Result<(), LearnError> {
+        let data = scikit_learn_tests::Data::new(0..200);
         let settings = ForestSettings { trees: 5, ..ForestSettings::random_forest() };
         let forest = Forest::fit(&data.examples(), &settings)?;
         assert_eq!(forest, Forest::fit(&data.examples(), &settings)?);
@@ -169,25 +157,23 @@ mod tests {
     }
 
     #[test]
-    fn shuffled_labels_teach_nothing() -> Result<(), FitError> {
-        let train = peers::Data::new(0..360);
+    fn shuffled_labels_give_chance_level() -> Result<(), LearnError> {
+        let train = scikit_learn_tests::Data::new(0..360);
         let labels: Vec<usize> = (0..360).map(|row| train.labels[(row * 151 + 7) % 360]).collect();
         let settings = ForestSettings { trees: 30, ..ForestSettings::random_forest() };
         let forest = Forest::fit(&Examples { labels: &labels, ..train.examples() }, &settings)?;
-        let recall = peers::Data::new(360..1360).macro_recall(|row| forest.predict(row));
+        let recall = scikit_learn_tests::Data::new(360..1360).macro_recall(|row| forest.predict(row));
         assert!((recall - 1.0 / 6.0).abs() < 0.06, "{recall}");
         Ok(())
     }
 
     #[test]
-    fn classes_without_rows_are_never_predicted() -> Result<(), FitError> {
+    fn classes_without_rows_are_never_predicted() -> Result<(), LearnError> {
         let examples =
             Examples { table: Table { values: &[0.0, 1.0], columns: 1 }, labels: &[3, 1], classes: 5, weights: None };
         let tree = Forest::fit(&examples, &ForestSettings::decision_tree())?;
         assert_eq!(tree.predict(&[0.4]), [0.0, 0.0, 0.0, 1.0, 0.0]);
         assert_eq!(tree.predict(&[0.6]), [0.0, 1.0, 0.0, 0.0, 0.0]);
-        let none = ForestSettings { trees: 0, ..ForestSettings::default() };
-        assert!(matches!(Forest::fit(&examples, &none), Err(FitError::Setting { .. })));
         Ok(())
     }
 }

@@ -1,24 +1,24 @@
-//! Columns of features as codes of at most 255 bins: what a split does to training rows depends on their order alone.
+//! Columns of features as codes of at most 255 bins; splits of training rows depend on their order only.
 //!
-//! A column with no more distinct values than that has a bin for each, and loses nothing. Others are cut at quantiles:
-//! bins hold about equally many rows, and equal values always share one.
+//! A column with at most 255 distinct values has a bin for each, without loss. Others are cut at quantiles: bins hold
+//! about equally many rows, and equal values share a bin.
 
 use super::Table;
 
 const MOST_BINS: usize = 255;
 
-/// The training rows, column by column.
+/// Training rows, column by column.
 pub(super) struct Bins {
     pub(super) columns: Vec<Column>,
 }
 
-/// One feature of all training rows.
+/// Feature of all training rows.
 pub(super) struct Column {
-    /// Bin of each row; they ascend with the value.
+    /// Bin of each row, ascending with the value.
     pub(super) codes: Vec<u8>,
-    /// Least training value of each bin.
+    /// Smallest training value of each bin.
     least: Vec<f32>,
-    /// Greatest training value of each bin.
+    /// Largest training value of each bin.
     most: Vec<f32>,
 }
 
@@ -61,8 +61,8 @@ impl Column {
         self.most.len()
     }
 
-    /// What separates two bins: midway between their neighbouring values, rounded down, so that values up to it are
-    /// exactly those up to the unrounded middle.
+    /// Threshold between two bins: midway between their neighbouring values, rounded down, so that the same values lie
+    /// below it as below the exact middle.
     pub(super) fn threshold(&self, left: u8, right: u8) -> f32 {
         let middle = 0.5 * (f64::from(self.most[usize::from(left)]) + f64::from(self.least[usize::from(right)]));
         let rounded = middle as f32;
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_values_are_never_parted() {
+    fn equal_values_share_a_bin() {
         let values: Vec<f32> = (0..1000u32).map(|k| k.min(500) as f32).collect();
         let column = Column::new(&values);
         assert!(column.bins() <= 255);

@@ -1,42 +1,42 @@
-//! RUSBoost (Seiffert et al. 2010): before every round of boosting, rows of the larger classes are left out at random
-//! until all classes have as many as the smallest. A class with few rows is heard as much as one with many, and what
-//! one round leaves out, others see.
+//! RUSBoost (Seiffert et al. 2010): each round of boosting uses a random subset with equally many rows of each class, as
+//! many as the smallest class has. Rare classes count as much as common ones, and other rounds use other rows.
 
-use super::arrays::{Array, ArrayError, Reader};
 use super::bins::Bins;
-use super::reweighting::{M2, Reweighting, Samme, Verdict};
+use super::reweighting::{Judgement, M2, Reweighting, Samme};
 use super::split::Target;
-use super::stored_trees::push_trees;
 use super::tree::{FeatureSampling, Ground, Tree, TreeSettings};
-use super::{Examples, FitError, check_boosting, drawn, greatest, normalise, random_of, softmax};
+use super::tree_arrays::{load_class_trees, load_classes, save_trees};
+use super::{Examples, check_boosting, drawn, greatest, normalise, random_of, softmax};
+use crate::arrays::{ArrayError, Arrays, check_each};
+use crate::fitting::LearnError;
 use rand_chacha::ChaCha8Rng;
 
-/// How rows are weighed and trees heard.
+/// Rule for the weights of rows and trees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RusBoostForm {
-    /// AdaBoost.M2, as published: trees say how sure they are of every class, and pairs of row and class that are hard
-    /// to tell apart gain weight.
+pub(crate) enum RusBoostForm {
+    /// AdaBoost.M2, as published: trees give the probability of each class, and pairs of row and class that are easily
+    /// confused gain weight.
     #[default]
     M2,
-    /// As in imbalanced-learn: trees name a class, and rows named wrongly gain weight. Its probabilities are in the
-    /// right order, but with many classes all nearly equal, and it often ends after a few rounds.
+    /// SAMME, as in imbalanced-learn: trees vote for one class, and misclassified rows gain weight. Its probabilities
+    /// have the right order, but are nearly equal with many classes; it often ends after a few rounds.
     Samme,
 }
 
-/// How [`RusBoost`] is fitted.
+/// Settings of [`RusBoost`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RusBoostSettings {
-    /// How rows are weighed and trees heard. Default: as published.
-    pub form: RusBoostForm,
-    /// Rounds, at least 1, each of one tree. Default 200.
-    pub rounds: usize,
-    /// How fast weights change, above 0 and at most 10. Default 1, as published.
-    pub learning_rate: f64,
-    /// How each tree is grown. Default: until leaves are pure, columns shuffled. Depth matters more than all else: for
-    /// seventeen classes of synthetic rows, recall was 0.21, 0.75 and 0.90 at depths 1, 4 and 8.
-    pub tree: TreeSettings,
-    /// Other seeds leave out other rows.
-    pub seed: u64,
+pub(crate) struct RusBoostSettings {
+    /// Rule for the weights. Default: as published.
+    pub(crate) form: RusBoostForm,
+    /// Number of rounds, at least 1, each of one tree. Default 200.
+    pub(crate) rounds: usize,
+    /// Exponent of the change of weights, above 0 and at most 10. Default 1, as published.
+    pub(crate) learning_rate: f64,
+    /// Settings of each tree. Default: grown until leaves are pure, columns shuffled. Depth matters most: for seventeen
+    /// classes of synthetic rows, recall was 0.21, 0.75 and 0.90 at depths 1, 4 and 8.
+    pub(crate) tree: TreeSettings,
+    /// Seed of the rows drawn.
+    pub(crate) seed: u64,
 }
 
 impl Default for RusBoostSettings {
@@ -46,71 +46,63 @@ impl Default for RusBoostSettings {
     }
 }
 
-/// Trees and how much the word of each counts.
+/// Weighted trees.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RusBoost {
+pub(crate) struct RusBoost {
     columns: usize,
     classes: usize,
     form: RusBoostForm,
-    /// Classes that have rows, ascending; others are never predicted.
+    /// Classes with training rows, ascending; others are never predicted.
     present: Vec<usize>,
     trees: Vec<Tree>,
-    /// One for each tree, positive.
-    words: Vec<f64>,
+    /// Weight of each tree, positive.
+    tree_weights: Vec<f64>,
 }
 
 impl RusBoost {
-    /// Features of a row.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Number of classes.
-    pub fn classes(&self) -> usize {
-        self.classes
-    }
-
-    /// Grows the trees. Refuses examples that are no table, and settings out of range. If no tree is better than
-    /// chance, the first one speaks alone.
-    pub fn fit(examples: &Examples<'_>, settings: &RusBoostSettings) -> Result<Self, FitError> {
+    /// Grows the trees. Refuses features that are not finite. If no tree is better than chance, the first one is kept.
+    ///
+    /// # Panics
+    /// If the examples contradict themselves, or a setting is out of range.
+    pub(crate) fn fit(examples: &Examples<'_>, settings: &RusBoostSettings) -> Result<Self, LearnError> {
         examples.check()?;
-        check_boosting(settings.rounds, settings.learning_rate)?;
+        check_boosting(settings.rounds, settings.learning_rate);
         Ok(match settings.form {
             RusBoostForm::M2 => boost(examples, settings, M2::new(examples)),
             RusBoostForm::Samme => boost(examples, settings, Samme::new(examples)),
         })
     }
 
-    /// A probability for each class: for M2 the mean share of the trees by their words, for SAMME a softmax of votes.
+    /// Probability of each class: the weighted mean share (M2), or a softmax of weighted votes (SAMME).
     ///
     /// # Panics
-    /// If the row has not as many values as those the model was fitted to.
-    pub fn predict(&self, row: &[f32]) -> Vec<f64> {
+    /// If the row has another number of features than the training rows.
+    pub(crate) fn predict(&self, row: &[f32]) -> Vec<f64> {
         assert_eq!(row.len(), self.columns, "values of a row");
-        let mut heard = vec![0.0; self.classes];
-        for (tree, word) in self.trees.iter().zip(&self.words) {
+        let mut sums = vec![0.0; self.classes];
+        for (tree, weight) in self.trees.iter().zip(&self.tree_weights) {
             let leaf = tree.leaf(row);
             match self.form {
                 RusBoostForm::M2 => {
-                    for (sum, share) in heard.iter_mut().zip(leaf) {
-                        *sum += word * f64::from(*share);
+                    for (sum, share) in sums.iter_mut().zip(leaf) {
+                        *sum += weight * f64::from(*share);
                     }
                 }
-                RusBoostForm::Samme => heard[greatest(leaf)] += word,
+                RusBoostForm::Samme => sums[greatest(leaf)] += weight,
             }
         }
-        normalise(&mut heard);
+        normalise(&mut sums);
         match self.form {
-            RusBoostForm::M2 => heard,
-            RusBoostForm::Samme => self.softmax_of_votes(&heard),
+            RusBoostForm::M2 => sums,
+            RusBoostForm::Samme => self.softmax_of_votes(&sums),
         }
     }
 
     /// A tree votes 1 for its class and -1 / (K - 1) for others; with v the mean vote, p = softmax(v / (K - 1)).
-    fn softmax_of_votes(&self, heard: &[f64]) -> Vec<f64> {
+    fn softmax_of_votes(&self, sums: &[f64]) -> Vec<f64> {
         let others = (self.present.len() as f64 - 1.0).max(1.0);
         let mut votes: Vec<f64> =
-            self.present.iter().map(|&class| (heard[class] - (1.0 - heard[class]) / others) / others).collect();
+            self.present.iter().map(|&class| (sums[class] - (1.0 - sums[class]) / others) / others).collect();
         softmax(&mut votes);
         let mut probabilities = vec![0.0; self.classes];
         for (class, vote) in self.present.iter().zip(votes) {
@@ -119,79 +111,83 @@ impl RusBoost {
         probabilities
     }
 
-    /// The whole model, to be stored.
-    pub fn to_arrays(&self) -> Vec<(String, Array)> {
-        let present = self.present.iter().map(|&class| class as i32).collect();
+    /// Adds the model to the arrays of a model file.
+    pub(crate) fn save(&self, arrays: &mut Arrays) {
         let form = match self.form {
             RusBoostForm::M2 => 0,
             RusBoostForm::Samme => 1,
         };
-        let mut arrays = vec![
-            Array::shape(self.columns, self.classes),
-            ("form".to_owned(), Array::I32(vec![form])),
-            ("present".to_owned(), Array::I32(present)),
-            ("words".to_owned(), Array::F64(self.words.clone())),
-        ];
-        push_trees(&self.trees, &mut arrays);
-        arrays
+        arrays.put_integers("trees.form", [form]);
+        arrays.put_integers("trees.present", self.present.iter().copied());
+        arrays.put_f64("trees.words", self.tree_weights.clone());
+        save_trees(&self.trees, self.columns, self.classes, arrays);
     }
 
-    /// A model from storage. Refuses arrays that are missing or contradict each other.
-    pub fn from_arrays(arrays: &[(String, Array)]) -> Result<Self, ArrayError> {
-        let reader = Reader::new(arrays);
-        let (columns, classes) = reader.shape()?;
-        let form = match reader.i32s("form")? {
+    /// Restores a model from a model file.
+    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
+        let form = match *arrays.indices("trees.form", 2, "0 or 1")? {
             [0] => RusBoostForm::M2,
-            [1] => RusBoostForm::Samme,
-            [_] => return Err(ArrayError::Number { name: "form", index: 0, expected: "0 or 1" }),
-            other => return Err(ArrayError::Length { name: "form", length: other.len(), expected: "one" }),
+            [_] => RusBoostForm::Samme,
+            ref other => {
+                let (name, found) = ("trees.form".to_owned(), vec![other.len()]);
+                return Err(ArrayError::Shape { name, found, expected: vec![1] });
+            }
         };
-        let present = reader.ascending("present", classes)?;
-        let trees = reader.class_trees(columns, classes)?;
-        let words = reader.f64s("words", trees.len())?.to_vec();
+        arrays.require("trees.words", &[arrays.integers("trees.tree_nodes")?.len()], "trees.tree_nodes")?;
+        let trees = load_class_trees(arrays, columns, classes)?;
+        let tree_weights = arrays.f64_vector("trees.words")?;
         // Their sum must not overflow.
-        if let Some(index) = words.iter().position(|word| !(*word > 0.0 && *word <= MOST_WORD)) {
-            return Err(ArrayError::Number { name: "words", index, expected: "positive, and no more than 1e12" });
+        let allowed = |weight: &f64| *weight > 0.0 && *weight <= MOST_WEIGHT;
+        check_each("trees.words", tree_weights, "positive, at most 1e12", allowed)?;
+        // Every round draws rows of all present classes, so leaves have shares of exactly these.
+        let leaves = || trees.iter().flat_map(|tree| tree.values.chunks_exact(classes));
+        let occurs = |class: &usize| leaves().any(|shares| shares[*class] > 0.0);
+        let present: Vec<usize> = (0..classes).filter(occurs).collect();
+        arrays.require("trees.present", &[present.len()], "trees.leaf_values")?;
+        let expected = "the classes that the leaves have shares of";
+        let named = load_classes(arrays, "trees.present", classes)?;
+        if let Some(index) = named.iter().zip(&present).position(|(named, present)| named != present) {
+            return Err(ArrayError::Value { name: "trees.present".to_owned(), index, expected });
         }
-        Ok(Self { columns, classes, form, present, trees, words })
+        Ok(Self { columns, classes, form, present, trees, tree_weights: tree_weights.to_vec() })
     }
 }
 
-/// No tree that was ever fitted counts as much: errors are no smaller than rounding.
-const MOST_WORD: f64 = 1e12;
+/// Largest weight of a tree; no fit comes near it, because errors are no smaller than rounding.
+const MOST_WEIGHT: f64 = 1e12;
 
 fn boost(examples: &Examples<'_>, settings: &RusBoostSettings, mut rule: impl Reweighting) -> RusBoost {
     let bins = Bins::new(&examples.table);
     let by_class = rows_by_class(examples);
-    let (mut trees, mut words) = (Vec::new(), Vec::new());
+    let (mut trees, mut tree_weights) = (Vec::new(), Vec::new());
     let mut first = None;
     for round in 0..settings.rounds {
         let mut random = random_of(settings.seed, round);
         let rows = under_sampled(&by_class, &mut random);
         let weights = rule.weights();
-        // A row that has never been mistaken still is an example.
+        // A row that was never misclassified still is an example.
         let target = Target::classes(examples.labels, examples.classes, |row| weights[row].max(f64::EPSILON));
         let tree = Ground { bins: &bins, target: &target, settings: &settings.tree }.grow_classes(rows, &mut random);
-        let verdict = rule.judge(&tree, settings.learning_rate);
-        if let Verdict::Keep(word) | Verdict::KeepAsLast(word) = verdict {
+        let judgement = rule.judge(&tree, settings.learning_rate);
+        if let Judgement::Keep(weight) | Judgement::KeepAsLast(weight) = judgement {
             trees.push(tree);
-            words.push(word.clamp(f64::MIN_POSITIVE, MOST_WORD));
+            tree_weights.push(weight.clamp(f64::MIN_POSITIVE, MOST_WEIGHT));
         } else {
             first = first.or(Some(tree));
         }
-        if matches!(verdict, Verdict::KeepAsLast(_) | Verdict::Stop) {
+        if matches!(judgement, Judgement::KeepAsLast(_) | Judgement::Stop) {
             break;
         }
     }
     if trees.is_empty() {
         trees.extend(first);
-        words.push(1.0);
+        tree_weights.push(1.0);
     }
     let (columns, classes) = (examples.table.columns, examples.classes);
-    RusBoost { columns, classes, form: settings.form, present: examples.present(), trees, words }
+    RusBoost { columns, classes, form: settings.form, present: examples.present(), trees, tree_weights }
 }
 
-/// The rows of each class that has any.
+/// Rows of each class that has any.
 fn rows_by_class(examples: &Examples<'_>) -> Vec<Vec<u32>> {
     let mut by_class = vec![Vec::new(); examples.classes];
     for row in examples.rows() {
@@ -201,7 +197,7 @@ fn rows_by_class(examples: &Examples<'_>) -> Vec<Vec<u32>> {
     by_class
 }
 
-/// As many rows of each class as the smallest has, ascending.
+/// Draws as many rows of each class as the smallest class has; ascending.
 fn under_sampled(by_class: &[Vec<u32>], random: &mut ChaCha8Rng) -> Vec<u32> {
     let least = by_class.iter().map(Vec::len).min().unwrap_or_default();
     let mut rows: Vec<u32> = by_class.iter().flat_map(|rows| drawn(rows, least, random)).collect();
@@ -211,11 +207,11 @@ fn under_sampled(by_class: &[Vec<u32>], random: &mut ChaCha8Rng) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Forest, ForestSettings, Table, peers};
+    use super::super::{Forest, ForestSettings, Table, scikit_learn_tests};
     use super::*;
 
     #[test]
-    fn every_round_sees_classes_equally() {
+    fn every_round_draws_classes_equally() {
         let mut random = random_of(0, 0);
         let drawn = under_sampled(&[vec![0, 3], vec![1, 2, 4, 5, 6], vec![7, 8]], &mut random);
         assert_eq!(drawn.len(), 6);
@@ -223,10 +219,10 @@ mod tests {
     }
 
     #[test]
-    fn rare_classes_are_found() -> Result<(), FitError> {
+    fn rare_classes_are_found() -> Result<(), LearnError> {
         // Classes 4 and 5 have one row in twenty each.
-        let (train, test) = (peers::Data::new(0..360), peers::Data::new(360..1360));
-        let found = |recalls: [f64; peers::CLASSES]| 0.5 * (recalls[4] + recalls[5]);
+        let (train, test) = (scikit_learn_tests::Data::new(0..360), scikit_learn_tests::Data::new(360..1360));
+        let found = |recalls: [f64; scikit_learn_tests::CLASSES]| 0.5 * (recalls[4] + recalls[5]);
         let forest = Forest::fit(&train.examples(), &ForestSettings { trees: 50, ..ForestSettings::random_forest() })?;
         let without = found(test.recalls(|row| forest.predict(row)));
         for form in [RusBoostForm::M2, RusBoostForm::Samme] {
@@ -239,8 +235,8 @@ mod tests {
     }
 
     #[test]
-    fn seeds_decide_and_probabilities_sum_to_one() -> Result<(), FitError> {
-        let data = peers::Data::new(0..200);
+    fn seeds_decide_and_probabilities_sum_to_one() -> Result<(), LearnError> {
+        let data = scikit_learn_tests::Data::new(0..200);
         for form in [RusBoostForm::M2, RusBoostForm::Samme] {
             let tree = TreeSettings { max_depth: Some(4), ..TreeSettings::default() };
             let settings = RusBoostSettings { form, rounds: 5, tree, ..RusBoostSettings::default() };
@@ -255,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_class_and_rows_that_cannot_be_told_apart() -> Result<(), FitError> {
+    fn a_single_class_and_identical_rows_are_handled() -> Result<(), LearnError> {
         let table = Table { values: &[1.0, 1.0, 1.0], columns: 1 };
         for form in [RusBoostForm::M2, RusBoostForm::Samme] {
             let settings = RusBoostSettings { form, ..RusBoostSettings::default() };
@@ -263,7 +259,7 @@ mod tests {
             assert_eq!(RusBoost::fit(&one, &settings)?.predict(&[0.0]), [0.0, 0.0, 1.0]);
             let alike = Examples { labels: &[0, 1, 2], ..one };
             let model = RusBoost::fit(&alike, &settings)?;
-            assert_eq!((model.trees.len(), model.words.clone()), (1, vec![1.0]));
+            assert_eq!((model.trees.len(), model.tree_weights.clone()), (1, vec![1.0]));
             assert!((model.predict(&[0.0]).iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }
         Ok(())

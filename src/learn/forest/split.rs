@@ -1,39 +1,39 @@
-//! The best cut of one column for the rows of a node.
+//! Search for the best cut of one column for the rows of a node.
 //!
 //! A cut into sides L and R is scored by
 //!
 //!   S(L) / W(L) + S(R) / W(R),   S = sum over channels of (sum of amounts)²,   W = sum of weights,
 //!
-//! which is, up to what all cuts have in common, the weighted squared error that both sides' means leave. A regression
+//! which is, up to a term that all cuts share, the negative weighted squared error around the means of both sides. A regression
 //! target y has one channel and amounts w y. A class is the vector that is 1 in its own channel: amounts are w, the
 //! squared error is the Gini impurity, and one search serves both.
 //!
-//! Rows are brought into the order of their bins, by counting if they are many. Both sides are summed up from their own
-//! end: nothing is subtracted, and the tiny weights of boosting lose no digits to great ones.
+//! Rows are sorted by bin, by counting if they are many. Both sides are summed from their own end: nothing is
+//! subtracted, so the small weights of boosting lose no digits to large ones.
 
 use super::bins::Column;
 
-/// What is to be predicted for one row.
+/// Target of one row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
     /// Weight times target.
     pub(super) amount: f64,
-    /// Positive.
+    /// Weight, positive.
     pub(super) weight: f64,
-    /// Its class; 0 in regression.
+    /// Class; 0 in regression.
     pub(super) channel: usize,
 }
 
-/// What is to be predicted for all rows.
+/// Targets of all rows.
 pub(super) struct Target {
-    /// Classes; 1 in regression.
+    /// Number of classes; 1 in regression.
     pub(super) channels: usize,
     /// One for each row.
     pub(super) items: Vec<Item>,
 }
 
 impl Target {
-    /// Classes, with the weight of each row.
+    /// Classification targets with the weight of each row.
     pub(super) fn classes(labels: &[usize], classes: usize, weight: impl Fn(usize) -> f64) -> Self {
         let item = |(row, &channel): (usize, &usize)| Item { amount: weight(row), weight: weight(row), channel };
         Self { channels: classes, items: labels.iter().enumerate().map(item).collect() }
@@ -48,7 +48,7 @@ impl Target {
         shares.extend(sums.totals.iter().map(|total| (total / sums.weight) as f32));
     }
 
-    /// Whether no cut could tell these rows apart.
+    /// True if all these rows have the same target.
     pub(super) fn is_pure(&self, rows: &[u32]) -> bool {
         let first = self.items[rows[0] as usize];
         rows.iter()
@@ -62,7 +62,7 @@ impl Target {
 pub(super) struct Cut {
     pub(super) code: u8,
     pub(super) threshold: f32,
-    /// The greater the better; comparable within a node only.
+    /// Larger is better; comparable within a node only.
     pub(super) score: f64,
 }
 
@@ -96,16 +96,16 @@ impl Sums {
     }
 }
 
-/// Scratch memory of the search.
+/// Search with its scratch memory.
 pub(super) struct Search {
     sums: Sums,
-    /// Code and row, in the order of codes.
+    /// Code and row, sorted by code.
     ordered: Vec<(u8, u32)>,
-    /// Score of the rows from here on, where a bin begins.
+    /// Score of the rows from here to the end, at the start of each bin.
     right: Vec<f64>,
 }
 
-/// Fewer rows than this are sorted, more are counted; forests grow equally fast with 8 to 32, and 10 % slower with 128.
+/// Fewer rows than this are sorted, others counted; forests grow equally fast with 8 to 32, 10 % slower with 128.
 const FEW_ROWS: usize = 32;
 
 impl Search {
@@ -113,7 +113,7 @@ impl Search {
         Self { sums: Sums::new(channels), ordered: Vec::new(), right: Vec::new() }
     }
 
-    /// The best cut that leaves `min_leaf` rows on both sides; of equally good ones, that with the least threshold.
+    /// Finds the best cut with `min_leaf` rows on both sides; of equally good ones, that with the smallest threshold.
     pub(super) fn best_cut(&mut self, column: &Column, target: &Target, rows: &[u32], min_leaf: usize) -> Option<Cut> {
         if column.bins() < 2 || rows.len() < 2 {
             return None;
@@ -153,7 +153,7 @@ impl Search {
         }
     }
 
-    /// Sorts by code, rows of equal code as they come.
+    /// Sorts rows by code; stable.
     fn order(&mut self, column: &Column, rows: &[u32]) {
         let coded = rows.iter().map(|&row| (column.codes[row as usize], row));
         if rows.len() < FEW_ROWS {
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn classes_part_where_gini_is_least() {
+    fn classes_are_cut_where_gini_is_least() {
         // Two of class 0, then three of class 1 and one of class 2: 2²/2 + (3² + 1²)/4.
         let target = Target::classes(&[0, 0, 1, 1, 1, 2], 3, |_| 1.0);
         let values = [1.0, 2.0, 5.0, 6.0, 7.0, 8.0];
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_heavy_row_draws_the_cut() {
+    fn a_heavy_row_moves_the_cut() {
         // Unweighted, a cut beside either end is as good, and the first is taken.
         let light = Target::classes(&[0, 1, 0], 2, |_| 1.0);
         assert_eq!(cut_of(&[0.0, 1.0, 2.0], &light, 1).map(|cut| cut.threshold), Some(0.5));
@@ -224,8 +224,8 @@ mod tests {
     }
 
     #[test]
-    fn tiny_weights_count_among_great_ones() {
-        // Rows 3 and 4 weigh next to nothing, yet are told apart once the great ones are gone.
+    fn small_weights_count_beside_large_ones() {
+        // Rows 3 and 4 have tiny weights, yet are separated.
         let weights = [1.0, 1.0, 1.0, 1e-18, 1e-18];
         let target = Target::classes(&[0, 0, 0, 1, 2], 3, |row| weights[row]);
         let cut = cut_of(&[0.0, 1.0, 2.0, 3.0, 4.0], &target, 1).expect("a cut");

@@ -1,25 +1,25 @@
-//! A binary tree grown from the root: every node takes the best cut of the columns it looks at (CART, Breiman et al.
-//! 1984). What a leaf says is up to whoever grows the tree: shares of the classes, or a Newton step.
+//! A binary tree grown from the root: every node takes the best cut of the columns it searches (CART, Breiman et al.
+//! 1984). Leaves hold shares of the classes, or a Newton step, as the caller decides.
 //!
-//! Nodes stand in the order in which they are met walking down left sides first. The left child of a node is the node
-//! after it, the right child is somewhere behind, so a walk always ends.
+//! Nodes are stored in depth-first order, left side first. The left child of a node is the next node and the right child
+//! a later one, so a walk always ends.
 
 use super::bins::Bins;
 use super::split::{Cut, Search, Target};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// How a tree is grown.
+/// Settings of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TreeSettings {
-    /// Most cuts between root and leaf. Default `None`: rows are parted until a node holds one class only.
-    pub max_depth: Option<usize>,
-    /// Fewest rows of a leaf, whatever their weights. Default 1; more smooths, and forgets rare classes.
-    pub min_leaf: usize,
-    /// Fewest rows of a node that is cut. Default 2.
-    pub min_split: usize,
-    /// Which columns a node looks at. Default: all.
-    pub features: FeatureSampling,
+pub(crate) struct TreeSettings {
+    /// Largest number of cuts between root and leaf. Default `None`: grown until every leaf is pure.
+    pub(crate) max_depth: Option<usize>,
+    /// Smallest number of rows of a leaf, whatever their weights. Default 1; more smooths, but loses rare classes.
+    pub(crate) min_leaf: usize,
+    /// Smallest number of rows of a node that is cut. Default 2.
+    pub(crate) min_split: usize,
+    /// Columns that a node searches. Default: all.
+    pub(crate) features: FeatureSampling,
 }
 
 impl Default for TreeSettings {
@@ -28,19 +28,16 @@ impl Default for TreeSettings {
     }
 }
 
-/// How many columns, drawn anew in every node, are searched for the best cut. A node in which none of those drawn can
-/// be cut goes on drawing.
+/// Columns searched for the best cut, drawn anew in every node. If none of those drawn can be cut, more are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FeatureSampling {
-    /// Every one in turn, and of equally good cuts the first; nothing is left to chance.
+pub(crate) enum FeatureSampling {
+    /// All, in order; of equally good cuts the first. Deterministic.
     All,
-    /// Every one, and of equally good cuts any: trees of different seeds then differ more, which is what bagging lives
-    /// on. Over 300 seeds on the rows of `peers.rs`, mean recall was 0.612 instead of 0.610; scikit-learn has 0.613.
+    /// All, in random order; of equally good cuts any. Trees of different seeds differ more, which bagging relies on: over
+    /// 300 seeds on the rows of `scikit_learn_tests.rs`, mean recall was 0.612 instead of 0.610 (scikit-learn: 0.613).
     Shuffled,
-    /// The square root of their number, rounded down.
+    /// The square root of the number of columns, rounded down.
     Sqrt,
-    /// So many, or all if there are fewer.
-    Count(usize),
 }
 
 impl FeatureSampling {
@@ -48,7 +45,6 @@ impl FeatureSampling {
         match self {
             Self::All | Self::Shuffled => columns,
             Self::Sqrt => columns.isqrt(),
-            Self::Count(count) => count.clamp(1, columns),
         }
     }
 }
@@ -57,7 +53,7 @@ impl FeatureSampling {
 pub(super) enum Node {
     /// Values up to the threshold go to the next node, others to `right`.
     Cut { feature: u32, threshold: f32, right: u32 },
-    /// The number of the leaf in this tree.
+    /// Number of the leaf in this tree.
     Leaf(u32),
 }
 
@@ -65,13 +61,13 @@ pub(super) enum Node {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
-    /// Leaf after leaf, `width` values each.
+    /// `[leaves][width]`.
     pub(super) values: Vec<f32>,
     pub(super) width: usize,
 }
 
 impl Tree {
-    /// What the leaf says into which a row falls.
+    /// Values of the leaf that a row falls into.
     pub(super) fn leaf(&self, row: &[f32]) -> &[f32] {
         let mut at = 0;
         loop {
@@ -85,7 +81,7 @@ impl Tree {
     }
 }
 
-/// What trees are grown from.
+/// Training data and settings of a tree.
 pub(super) struct Ground<'a> {
     pub(super) bins: &'a Bins,
     pub(super) target: &'a Target,
@@ -93,7 +89,8 @@ pub(super) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// Grows a tree of some of the rows, ascending and at least one. `write_leaf` appends what a leaf of its rows says.
+    /// Grows a tree from some of the rows, ascending and at least one. `write_leaf` appends the values of a leaf, given its
+    /// rows.
     pub(super) fn grow(
         &self,
         rows: Vec<u32>,
@@ -139,7 +136,7 @@ impl Ground<'_> {
     }
 }
 
-/// Rows on their way into a tree.
+/// Rows of a node that is not grown yet.
 struct Waiting {
     rows: Vec<u32>,
     depth: usize,
@@ -150,7 +147,7 @@ struct NodeSearch<'a> {
     ground: &'a Ground<'a>,
     random: &'a mut ChaCha8Rng,
     search: Search,
-    /// All of them, in an order that drawing stirs.
+    /// All columns, in an order that drawing permutes.
     features: Vec<u32>,
 }
 
@@ -160,20 +157,20 @@ impl<'a> NodeSearch<'a> {
         Self { ground, random, search: Search::new(ground.target.channels), features }
     }
 
-    /// The best cut and its column; of equally good ones, the first looked at.
+    /// Finds the best cut and its column; of equally good ones, the first searched.
     fn best_cut(&mut self, rows: &[u32]) -> Option<(u32, Cut)> {
         let Ground { bins, target, settings } = self.ground;
         let columns = self.features.len();
         let enough = settings.features.count(columns);
         let mut best: Option<(u32, Cut)> = None;
-        for looked_at in 0..columns {
-            if looked_at >= enough && best.is_some() {
+        for searched in 0..columns {
+            if searched >= enough && best.is_some() {
                 break;
             }
             if settings.features != FeatureSampling::All {
-                self.features.swap(looked_at, self.random.random_range(looked_at..columns));
+                self.features.swap(searched, self.random.random_range(searched..columns));
             }
-            let feature = self.features[looked_at];
+            let feature = self.features[searched];
             let cut = self.search.best_cut(&bins.columns[feature as usize], target, rows, settings.min_leaf);
             best = match (best, cut) {
                 (Some((_, old)), Some(new)) if new.score > old.score => Some((feature, new)),
@@ -200,7 +197,7 @@ mod tests {
 
     #[test]
     fn exclusive_or_takes_two_levels() {
-        // No first cut helps; one is made all the same.
+        // No first cut helps; one is made nevertheless.
         let tree = grow(&[0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0], 2, &[0, 1, 1, 0], &TreeSettings::default());
         let cut = |feature, right| Node::Cut { feature, threshold: 0.5, right };
         let leaf = Node::Leaf;
@@ -211,7 +208,7 @@ mod tests {
 
     #[test]
     fn thresholds_lie_midway_between_the_rows_of_the_node() {
-        // 5 is in the other branch by the time its neighbours 1 and 9 are parted.
+        // The value 5 is in the other branch when its neighbours 1 and 9 are separated.
         let values = [0.0, 1.0, 1.0, 5.0, 0.0, 9.0, 1.0, 5.0, 1.0, 5.0];
         let tree = grow(&values, 2, &[0, 1, 2, 1, 1], &TreeSettings::default());
         assert_eq!(tree.nodes[0], Node::Cut { feature: 0, threshold: 0.5, right: 4 });
@@ -233,14 +230,13 @@ mod tests {
     }
 
     #[test]
-    fn drawing_goes_on_until_something_can_be_cut() {
-        // Nineteen constant columns and one that tells.
+    fn columns_are_drawn_until_one_can_be_cut() {
+        // Nineteen constant columns and one that differs.
         let mut values = vec![1.0; 80];
         values[27] = 2.0;
-        let settings = TreeSettings { features: FeatureSampling::Count(1), ..TreeSettings::default() };
+        let settings = TreeSettings { features: FeatureSampling::Sqrt, ..TreeSettings::default() };
         let tree = grow(&values, 20, &[0, 1, 0, 0], &settings);
         assert_eq!(tree.nodes[0], Node::Cut { feature: 7, threshold: 1.5, right: 2 });
         assert_eq!(FeatureSampling::Sqrt.count(20), 4);
-        assert_eq!(FeatureSampling::Count(30).count(20), 20);
     }
 }

@@ -1,4 +1,4 @@
-//! Whether the probabilities a recogniser gives are worth believing.
+//! Calibration of the probabilities of a recogniser.
 //!
 //! Confidence is the probability of the likeliest class (the first of equals), a hit is that class being the truth.
 //! The expected calibration error is the mean gap between confidence and accuracy over bins of trials of like
@@ -43,12 +43,12 @@ pub struct ReliabilityPoint {
     pub trials: usize,
 }
 
-/// What a confidence threshold lets through.
+/// Verdicts above a confidence threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confident {
     /// Share of all trials whose confidence reaches the threshold, 0 to 1.
     pub share: f64,
-    /// Share of those that are wrong all the same, 0 to 1; `None` if no trial is confident.
+    /// Share of wrong ones among them, 0 to 1; `None` if no trial is confident.
     pub wrong: Option<f64>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Forecasts<'a> {
         Some(Self { rows: rows.collect::<Option<_>>()? })
     }
 
-    /// The forecasts for some of the trials, each as often as named; `None` for no trials or one that is not there.
+    /// Selects trials, with repetition; `None` for no trials or an index out of range.
     pub fn at(&self, trials: &[usize]) -> Option<Self> {
         let rows: Vec<_> = trials.iter().map(|&trial| self.rows.get(trial).copied()).collect::<Option<_>>()?;
         (!rows.is_empty()).then_some(Self { rows })

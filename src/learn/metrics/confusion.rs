@@ -1,4 +1,4 @@
-//! Counts of what was decided for each object, and the scores made of them.
+//! Confusion matrix and the scores computed from it.
 //!
 //! With tp, fp and fn the right, wrongly claimed and missed trials of a class,
 //!
@@ -20,7 +20,7 @@ pub struct Confusion {
     rows: Vec<Vec<u32>>,
 }
 
-/// How well one class is recognised; shares from 0 to 1.
+/// Scores of one class, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClassScores {
     /// Share of the trials decided to be this class that were; 0 if there were none.
@@ -33,7 +33,7 @@ pub struct ClassScores {
     pub trials: u64,
 }
 
-/// How well a set of classes is recognised; shares from 0 to 1.
+/// Scores of a set of classes, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// Share of the trials of these classes that were right.

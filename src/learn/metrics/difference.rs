@@ -1,4 +1,4 @@
-//! Is one recogniser better than another, or lucky? Tests of a difference; every p-value is two-sided.
+//! Significance tests of the difference between recognisers; every p-value is two-sided.
 
 use super::{Interval, LEVEL};
 use serde::{Deserialize, Serialize};
@@ -236,7 +236,7 @@ mod tests {
         }
 
         #[test]
-        fn mcnemar_does_not_know_who_is_first(only_first in 0u32..400, only_second in 0u32..400) {
+        fn mcnemar_is_symmetric(only_first in 0u32..400, only_second in 0u32..400) {
             let p = McNemar { only_first, only_second }.p_value();
             prop_assert!((0.0..=1.0).contains(&p));
             prop_assert_eq!(p, McNemar { only_first: only_second, only_second: only_first }.p_value());

@@ -1,4 +1,4 @@
-//! An estimate and the range it is believed to lie in.
+//! An estimate with its confidence interval.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ pub const LEVEL: f64 = 0.95;
 /// An estimate with its two-sided interval of coverage [`LEVEL`], in the unit of the statistic.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// The statistic on the trials as they are.
+    /// Statistic on the original trials.
     pub estimate: f64,
     /// Lower end.
     pub low: f64,
@@ -17,12 +17,12 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Whether the value lies between the ends, which belong to the interval.
+    /// True if the value lies in the interval, ends included.
     pub fn holds(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Of an interval around a difference: whether its sign is settled.
+    /// True if zero lies outside: the sign of a difference is significant.
     pub fn excludes_zero(&self) -> bool {
         !self.holds(0.0)
     }

@@ -1,12 +1,12 @@
-//! How good a recogniser is, how much of that the number of trials supports, and whether one is better than another.
+//! Scores of a recogniser, their confidence intervals, and tests for differences between recognisers.
 //!
 //! - [`Confusion`] counts decisions: accuracy, precision, recall, F1.
-//! - [`Forecasts`] judges probabilities: calibration error, log-likelihood, Brier score, top-k accuracy.
+//! - [`Forecasts`] scores probabilities: calibration error, log-likelihood, Brier score, top-k accuracy.
 //! - [`Bootstrap`] puts an [`Interval`] around any of these, or around the difference of two models on the same trials.
 //! - [`McNemar`], [`corrected_t`] and [`holm`] test differences: on one test set, across splits, and many at a time.
 //!
-//! Objects and decisions are class numbers from zero, trials are positions in the slices handed in. Nothing here
-//! panics or returns NaN: where a number is undefined the answer is `None`.
+//! Objects and decisions are class numbers from zero, trials are indices of the slices passed in. Nothing here panics or
+//! returns NaN: undefined numbers are `None`.
 
 mod bootstrap;
 mod calibration;

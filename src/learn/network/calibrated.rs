@@ -1,182 +1,174 @@
-//! A macro-layer, or a committee of several that began from other weights, with temperatures that make its
-//! probabilities honest at every step, fitted on answers to grasps it had not seen. A committee's scores are the means
-//! of its members', and its temperatures are those of the means: members that are honest each for themselves are too
-//! modest together.
+//! Calibrated networks: one macro-layer, or a committee of several with different initial weights, and temperatures per
+//! time step that calibrate its probabilities. A committee averages the scores of its members; temperatures are fitted to
+//! these means, because members that are calibrated individually are underconfident together.
 //!
-//! A first network learns without a sixth of the grasps and answers them, then the one that is kept learns from
-//! everything. Cross-fitting besides leaves out each of several larger parts once, so that every grasp has answers from
-//! a network that has not seen it: these are what a next stage can learn from.
+//! Temperatures are fitted to held-out grasps: a first network is trained without a sixth of the grasps and evaluated on
+//! them; the final one is trained on all. Cross-fitting leaves out each of several larger parts once, so that every grasp
+//! has scores of a network that was not trained on it; the next stage is trained on these.
 
-use super::super::{FitError, Fitting, Pmf};
 use super::macro_layer::{LiveMacroLayer, MacroLayer, MacroShape};
-use super::training::{Lesson, Lessons, Training, train, train_on};
+use super::training::{Training, TrainingSequence, TrainingSet, train, train_on};
+use super::training_set::StageInputs;
+use crate::fitting::{Fitting, LearnError};
+use crate::pmf::Pmf;
 use std::ops::Range;
 
 /// Networks and their temperatures.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Calibrated {
-    /// At least one, all of one shape.
+    /// At least one, all of the same shape.
     pub(super) members: Vec<MacroLayer>,
-    /// One temperature per group and step; the last holds for later steps.
+    /// `[groups][steps]`; the last step applies to later ones.
     pub(super) temperatures: Vec<Vec<f32>>,
 }
 
-/// What is learned from, with random access to the sequences as they are answered: without augmentation.
-pub(super) trait Material: Lessons + Sync {
-    /// Inputs of a sequence as they will be met later, `[steps][inputs]`.
-    fn inputs(&self, k: usize) -> &[f32];
-
-    /// True class in each group.
-    fn targets(&self, k: usize) -> &[usize];
-}
-
-/// How a network is fitted.
+/// Settings of one fit.
 #[derive(Clone, Debug)]
 pub(super) struct Plan<'a> {
     pub(super) shape: MacroShape,
-    /// How many networks.
+    /// Number of networks in the committee.
     pub(super) members: usize,
     pub(super) training: &'a Training,
-    /// For each lesson a number; those of number zero are held back for calibration.
-    pub(super) held_back: &'a [usize],
+    /// Part of each sequence; part 0 is held out for calibration.
+    pub(super) held_out: &'a [usize],
     pub(super) seed: u64,
-    /// Which share of the whole fit this is.
+    /// Progress of the whole fit at the start and end of this one.
     pub(super) share: Range<f64>,
 }
 
-/// Scores at every step, `[steps][outputs]`, of grasps by networks that have not seen them; none where there is none.
-pub(super) type HeldBack = Vec<Option<Vec<f32>>>;
+/// Scores of each grasp, `[steps][outputs]`, by a network not trained on it; `None` for grasps that were never held out.
+pub(super) type HeldOut = Vec<Option<Vec<f32>>>;
 
-/// Some of the lessons.
-struct Without<'a> {
-    material: &'a dyn Material,
+/// Some of the sequences of a stage.
+struct Subset<'a> {
+    inputs: &'a StageInputs,
     kept: Vec<usize>,
 }
 
-impl Lessons for Without<'_> {
+impl TrainingSet for Subset<'_> {
     fn count(&self) -> usize {
         self.kept.len()
     }
 
-    fn draw(&self, k: usize, random: &mut dyn rand::Rng, lesson: &mut Lesson) {
-        self.material.draw(self.kept[k], random, lesson);
+    fn draw(&self, k: usize, random: &mut dyn rand::Rng, drawn: &mut TrainingSequence) {
+        self.inputs.draw(self.kept[k], random, drawn);
     }
 }
 
 impl Calibrated {
-    /// Learns from everything, calibrated on a part that was held back first. Gives scores of the grasps that were.
+    /// Trains on all sequences, with temperatures from held-out ones. Returns also the scores of the held-out ones.
     pub(super) fn fit(
         plan: &Plan<'_>,
-        material: &dyn Material,
+        inputs: &StageInputs,
         fitting: &Fitting<'_>,
-    ) -> Result<(Self, HeldBack), FitError> {
+    ) -> Result<(Self, HeldOut), LearnError> {
         let (middle, seed) = (0.5 * (plan.share.start + plan.share.end), plan.seed);
         let first = Plan { share: plan.share.start..middle, ..plan.clone() };
-        let fold_of = plan.held_back;
-        let members = first.learn(material, fitting, seed, &|k| fold_of[k] != 0)?;
-        let mut held_back: HeldBack = vec![None; material.count()];
-        for (k, held) in held_back.iter_mut().enumerate().filter(|(k, _)| fold_of[*k] == 0) {
-            *held = Some(scores_at_every_step(&members, material.inputs(k)));
+        let fold_of = plan.held_out;
+        let members = first.train(inputs, fitting, seed, &|k| fold_of[k] != 0)?;
+        let mut held_out: HeldOut = vec![None; inputs.count()];
+        for (k, held) in held_out.iter_mut().enumerate().filter(|(k, _)| fold_of[*k] == 0) {
+            *held = Some(scores_at_every_step(&members, &inputs.sequences[k]));
         }
         let second = Plan { share: middle..plan.share.end, ..plan.clone() };
-        let members = second.learn(material, fitting, seed + 1, &|_| true)?;
-        let answered: Vec<(&[f32], &[usize])> = held_back
+        let members = second.train(inputs, fitting, seed + 1, &|_| true)?;
+        let answered: Vec<(&[f32], &[usize])> = held_out
             .iter()
             .enumerate()
-            .filter_map(|(k, held)| Some((held.as_deref()?, material.targets(k))))
+            .filter_map(|(k, held)| Some((held.as_deref()?, inputs.targets[k].as_slice())))
             .collect();
         let temperatures = fit_temperatures(&answered, &plan.shape.groups);
-        Ok((Self { members, temperatures }, held_back))
+        Ok((Self { members, temperatures }, held_out))
     }
 
-    /// Scores of every grasp by a network that has learned from the other parts only.
+    /// Scores every sequence by a network trained on the other parts only.
     pub(super) fn cross_fit(
         plan: &Plan<'_>,
         (part_of, parts): (&[usize], usize),
-        material: &dyn Material,
+        inputs: &StageInputs,
         fitting: &Fitting<'_>,
-    ) -> Result<HeldBack, FitError> {
-        let mut held_back: HeldBack = vec![None; material.count()];
+    ) -> Result<HeldOut, LearnError> {
+        let mut held_out: HeldOut = vec![None; inputs.count()];
         let share = (plan.share.end - plan.share.start) / parts.max(1) as f64;
         for part in 0..parts {
             let from = plan.share.start + share * part as f64;
             let one = Plan { share: from..from + share, ..plan.clone() };
-            let members = one.learn(material, fitting, plan.seed + 10 + part as u64, &|k| part_of[k] != part)?;
-            for (k, held) in held_back.iter_mut().enumerate().filter(|(k, _)| part_of[*k] == part) {
-                *held = Some(scores_at_every_step(&members, material.inputs(k)));
+            let members = one.train(inputs, fitting, plan.seed + 10 + part as u64, &|k| part_of[k] != part)?;
+            for (k, held) in held_out.iter_mut().enumerate().filter(|(k, _)| part_of[*k] == part) {
+                *held = Some(scores_at_every_step(&members, &inputs.sequences[k]));
             }
         }
-        Ok(held_back)
+        Ok(held_out)
     }
 
-    /// Goes on learning from other material, from where it is; its temperatures stay.
+    /// Continues training on other inputs; temperatures stay.
     pub(super) fn refine(
         &mut self,
-        material: &dyn Material,
+        inputs: &StageInputs,
         training: &Training,
         seed: u64,
         share: Range<f64>,
         fitting: &Fitting<'_>,
-    ) -> Result<(), FitError> {
+    ) -> Result<(), LearnError> {
         let of_each = (share.end - share.start) / self.members.len() as f64;
         for (member, layer) in self.members.iter_mut().enumerate() {
             let from = share.start + of_each * member as f64;
-            let mut go_on = following(fitting, from, of_each, training.epochs);
-            train_on(layer, material, training, seed_of(seed, member), &mut go_on);
+            let mut go_on = progress_of(fitting, from, of_each, training.epochs);
+            train_on(layer, inputs, training, seed_of(seed, member), &mut go_on);
             fitting.check()?;
         }
         Ok(())
     }
 
-    /// Sizes of every member.
+    /// Shape of every member.
     pub(super) fn shape(&self) -> &MacroShape {
         self.members[0].shape()
     }
 
-    /// Changes every member.
+    /// Replaces every member.
     pub(super) fn change(&mut self, change: impl Fn(&MacroLayer) -> MacroLayer) {
         self.members.iter_mut().for_each(|layer| *layer = change(layer));
     }
 
-    /// Honest probabilities from scores after a step, one PMF per group.
-    pub(super) fn honest(&self, scores: &[f32], step: usize) -> Vec<Pmf> {
-        honest(scores, &self.shape().groups, &self.temperatures, step)
+    /// Calibrated PMF of each group from the scores after a step.
+    pub(super) fn pmfs(&self, scores: &[f32], step: usize) -> Vec<Pmf> {
+        calibrated_pmfs(scores, &self.shape().groups, &self.temperatures, step)
     }
 
-    /// Temperature of the first group at the end.
+    /// Temperature of the first group at the last step.
     pub(super) fn last_temperature(&self) -> f32 {
         self.temperatures.first().and_then(|of_group| of_group.last()).copied().unwrap_or(1.0)
     }
 }
 
 impl Plan<'_> {
-    /// Every member learns from some of the material.
-    fn learn(
+    /// Trains every member on some of the sequences.
+    fn train(
         &self,
-        material: &dyn Material,
+        inputs: &StageInputs,
         fitting: &Fitting<'_>,
         seed: u64,
         keeps: &dyn Fn(usize) -> bool,
-    ) -> Result<Vec<MacroLayer>, FitError> {
-        let lessons = Without { material, kept: (0..material.count()).filter(|k| keeps(*k)).collect() };
+    ) -> Result<Vec<MacroLayer>, LearnError> {
+        let subset = Subset { inputs, kept: (0..inputs.count()).filter(|k| keeps(*k)).collect() };
         let share = (self.share.end - self.share.start) / self.members.max(1) as f64;
         let learned = |member: usize| {
             let from = self.share.start + share * member as f64;
-            let mut go_on = following(fitting, from, share, self.training.epochs);
-            let layer = train(self.shape.clone(), &lessons, self.training, seed_of(seed, member), &mut go_on);
+            let mut go_on = progress_of(fitting, from, share, self.training.epochs);
+            let layer = train(self.shape.clone(), &subset, self.training, seed_of(seed, member), &mut go_on);
             fitting.check().map(|()| layer)
         };
         (0..self.members.max(1)).map(learned).collect()
     }
 }
 
-/// Members differ by their seeds alone.
+/// Seed of a member.
 fn seed_of(seed: u64, member: usize) -> u64 {
     seed.wrapping_add(1_000_003 * member as u64)
 }
 
-/// Passes progress on, and stops where that is asked for.
-fn following<'a>(
+/// Callback of the training loop: reports progress, and stops on request.
+fn progress_of<'a>(
     fitting: &'a Fitting<'_>,
     from: f64,
     share: f64,
@@ -193,7 +185,7 @@ fn temperature(of_group: &[f32], step: usize) -> f64 {
     of_group.get(step.min(of_group.len().saturating_sub(1))).map_or(1.0, |t| f64::from(*t))
 }
 
-fn honest(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>], step: usize) -> Vec<Pmf> {
+fn calibrated_pmfs(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>], step: usize) -> Vec<Pmf> {
     let mut rest = scores;
     groups
         .iter()
@@ -213,26 +205,25 @@ fn scores_at_every_step(members: &[MacroLayer], x: &[f32]) -> Vec<f32> {
     x.chunks_exact(members[0].shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()
 }
 
-/// Stretches of a grasp over which one temperature is fitted.
-const STRETCHES: usize = 8;
-/// Temperatures tried: from a half to eight.
+/// Number of equal sections of a grasp with one temperature each.
+const SECTIONS: usize = 8;
+/// Number of temperatures tried, from 0.5 to 8.
 const TRIED: usize = 60;
 
-/// Temperatures per group and step that make held-back answers most likely. Fitted over stretches of a grasp, joined
-/// by straight lines.
+/// Temperatures per group and step that maximise the likelihood of held-out scores: one per section, interpolated.
 fn fit_temperatures(answered: &[(&[f32], &[usize])], groups: &[usize]) -> Vec<Vec<f32>> {
     let outputs: usize = groups.iter().sum();
     let steps = answered.iter().map(|(scores, _)| scores.len() / outputs.max(1)).max().unwrap_or(0);
     let mut from = 0;
     let mut of_groups = Vec::new();
     for (group, &classes) in groups.iter().enumerate() {
-        let stretch = |number: usize| number * steps / STRETCHES..(number + 1) * steps / STRETCHES;
-        let knots: Vec<f64> = (0..STRETCHES)
+        let section = |number: usize| number * steps / SECTIONS..(number + 1) * steps / SECTIONS;
+        let knots: Vec<f64> = (0..SECTIONS)
             .map(|number| {
                 let rows: Vec<(&[f32], usize)> = answered
                     .iter()
                     .flat_map(|(scores, targets)| {
-                        let place = stretch(number);
+                        let place = section(number);
                         let rows = scores.chunks_exact(outputs).skip(place.start).take(place.len());
                         rows.map(|row| (&row[from..from + classes], targets[group]))
                     })
@@ -241,14 +232,15 @@ fn fit_temperatures(answered: &[(&[f32], &[usize])], groups: &[usize]) -> Vec<Ve
             })
             .collect();
         from += classes;
-        of_groups
-            .push((0..steps.max(1)).map(|step| joined(&knots, (step as f64 + 0.5) / steps.max(1) as f64)).collect());
+        of_groups.push(
+            (0..steps.max(1)).map(|step| interpolated(&knots, (step as f64 + 0.5) / steps.max(1) as f64)).collect(),
+        );
     }
     of_groups
 }
 
-/// The value at a share of the way along knots that stand in the middle of equal stretches.
-fn joined(knots: &[f64], share: f64) -> f32 {
+/// Linear interpolation at a share of the way between knots in the middle of equal sections.
+fn interpolated(knots: &[f64], share: f64) -> f32 {
     let at = (share * knots.len() as f64 - 0.5).clamp(0.0, knots.len() as f64 - 1.0);
     let (low, rest) = (at.floor() as usize, at.fract());
     let high = (low + 1).min(knots.len() - 1);
@@ -271,7 +263,7 @@ fn best_temperature(rows: &[(&[f32], usize)]) -> f64 {
     (0..TRIED).map(candidate).min_by(|a, b| loss(*a).total_cmp(&loss(*b))).unwrap_or(1.0)
 }
 
-/// Members that read one sample at a time.
+/// Committee that takes one sample at a time.
 #[derive(Clone, Debug)]
 struct LiveCommittee {
     members: Vec<LiveMacroLayer>,
@@ -284,7 +276,7 @@ impl LiveCommittee {
         Self { members: members.iter().map(LiveMacroLayer::new).collect(), mean: vec![0.0; outputs] }
     }
 
-    /// Mean scores after a sample.
+    /// Takes a sample; returns the mean scores, one per output.
     fn step(&mut self, x: &[f32], log_prior: &[f32]) -> &[f32] {
         let share = 1.0 / self.members.len().max(1) as f32;
         self.mean.fill(0.0);
@@ -296,7 +288,7 @@ impl LiveCommittee {
     }
 }
 
-/// Calibrated networks that read one sample at a time.
+/// Calibrated networks that take one sample at a time.
 #[derive(Clone, Debug)]
 pub(super) struct LiveCalibrated {
     committee: LiveCommittee,
@@ -320,11 +312,11 @@ impl LiveCalibrated {
         self.step = 0;
     }
 
-    /// Takes in one sample; gives one honest PMF per group.
+    /// Takes a sample; returns the calibrated PMF of each group.
     pub(super) fn step(&mut self, x: &[f32], log_prior: &[f32]) -> Vec<Pmf> {
-        let answers = honest(self.committee.step(x, log_prior), &self.groups, &self.temperatures, self.step);
+        let pmfs = calibrated_pmfs(self.committee.step(x, log_prior), &self.groups, &self.temperatures, self.step);
         self.step += 1;
-        answers
+        pmfs
     }
 }
 
@@ -333,8 +325,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_temperature_that_was_put_in_is_found() {
-        // Scores of a calibrated binary classifier, blown up threefold.
+    fn a_known_temperature_is_recovered() {
+        // Scores of a calibrated binary classifier, multiplied by three.
         let mut rows = Vec::new();
         for k in 0..400 {
             let p = 0.5 + 0.49 * (k as f32 / 400.0);
@@ -347,8 +339,8 @@ mod tests {
     }
 
     #[test]
-    fn knots_are_joined_by_lines() {
+    fn knots_are_interpolated_linearly() {
         let knots = [1.0, 3.0];
-        assert_eq!([0.0, 0.25, 0.5, 0.75, 1.0].map(|s| joined(&knots, s)), [1.0, 1.0, 2.0, 3.0, 3.0]);
+        assert_eq!([0.0, 0.25, 0.5, 0.75, 1.0].map(|s| interpolated(&knots, s)), [1.0, 1.0, 2.0, 3.0, 3.0]);
     }
 }

@@ -1,14 +1,13 @@
-//! The elementwise part of an LSTM, written once and compiled twice: for any processor, and for those with AVX2 and
-//! FMA, chosen when the program runs.
+//! Elementwise part of an LSTM, compiled twice: for any processor, and for AVX2 with FMA, chosen at run time.
 //!
-//! Gates stand in the order input, forget, candidate, output, as in PyTorch and candle:
+//! Gates are in the order input, forget, candidate, output, as in PyTorch and candle:
 //! c' = f c + i g, h = o tanh(c').
 
-/// Gradients smaller than this are dropped. Gradients of a late read-out decay into subnormal numbers on their way to
-/// the first steps, and processors are slower on those by a factor of five to ten.
+/// Gradients smaller than this are set to zero: those of a late read-out decay to subnormal numbers towards the first
+/// steps, on which processors are five to ten times slower.
 const NEGLIGIBLE: f32 = 1e-20;
 
-/// e^x by Cephes' polynomial, without branches; relative error below 2e-7 between -87 and 88, clamped beyond.
+/// Computes e^x by the polynomial of Cephes, without branches; relative error below 2e-7 from -87 to 88, clamped beyond.
 #[inline(always)]
 pub(super) fn exp(x: f32) -> f32 {
     // Rounds to the nearest integer by pushing the fraction out of the mantissa.
@@ -25,7 +24,7 @@ pub(super) fn exp(x: f32) -> f32 {
     p = p * r + 4.166_579_6e-2;
     p = p * r + 0.166_666_65;
     p = p * r + 0.5;
-    // Next to the rounder neighbouring numbers are one apart, so that n also stands in the lowest bits.
+    // Floats near the rounder are one apart, so the lowest bits hold n.
     let power = f32::from_bits(rounded.to_bits().wrapping_sub(ROUNDER.to_bits()).wrapping_add(127) << 23);
     (p * r * r + r + 1.0) * power
 }
@@ -40,7 +39,7 @@ pub(super) fn tanh(x: f32) -> f32 {
     1.0 - 2.0 / (1.0 + exp(2.0 * x))
 }
 
-/// Names a function once and compiles its body for AVX2 as well.
+/// Defines a function that runs its body compiled for AVX2 where available.
 macro_rules! dispatched {
     ($(#[$doc:meta])* $name:ident, $body:ident, ($($argument:ident: $kind:ty),*)) => {
         $(#[$doc])*
@@ -51,8 +50,8 @@ macro_rules! dispatched {
                 fn wide($($argument: $kind),*) {
                     $body($($argument),*);
                 }
-                #[expect(unsafe_code, reason = "code for AVX2 may run only where it exists")]
-                // SAFETY: the processor has just been asked for both features.
+                #[expect(unsafe_code, reason = "code for AVX2 may run only on processors that have it")]
+                // SAFETY: both features were detected above.
                 return unsafe { wide($($argument),*) };
             }
             $body($($argument),*);
@@ -61,14 +60,13 @@ macro_rules! dispatched {
 }
 
 dispatched! {
-    /// One time step forward for a batch. `gates` `[batch][4 units]` comes in as sums and leaves as activations;
-    /// `c_before`, `c`, `tanh_c`, `h` are `[batch][units]`.
+    /// Computes one time step forward for a batch. `gates`, `[batch][4 units]`, holds sums on entry and activations on
+    /// return; `c_before`, `c`, `tanh_c`, `h` are `[batch][units]`.
     step_forward, forward_body,
     (units: usize, gates: &mut [f32], c_before: &[f32], c: &mut [f32], tanh_c: &mut [f32], h: &mut [f32])
 }
 
-/// Units that are computed side by side: local arrays of this width, which no other memory can overlap, are what lets
-/// the compiler use whole vectors.
+/// Units computed together: local arrays of this width cannot alias other memory, so the compiler uses whole vectors.
 const LANES: usize = 16;
 
 #[inline(always)]
@@ -110,8 +108,8 @@ fn forward_body(units: usize, gates: &mut [f32], c_before: &[f32], c: &mut [f32]
 }
 
 dispatched! {
-    /// One time step back. `gates` comes in as activations and leaves as gradients of the sums; `dc` is the gradient
-    /// of the cell state, and leaves as that of the state before.
+    /// Computes one time step back. `gates` holds activations on entry and gradients of the sums on return; `dc` holds the
+    /// gradient of the cell state on entry and that of the state before on return.
     step_backward, backward_body,
     (units: usize, gates: &mut [f32], c_before: &[f32], tanh_c: &[f32], dh: &[f32], dc: &mut [f32])
 }
@@ -128,8 +126,8 @@ fn backward_body(units: usize, gates: &mut [f32], c_before: &[f32], tanh_c: &[f3
         let (c_before, tanh_c, dh, dc) = (&c_before[..units], &tanh_c[..units], &dh[..units], &mut dc[..units]);
         for j in 0..units {
             let (input, forget, candidate, output) = (i[j], f[j], g[j], o[j]);
-            let (t, dh) = (tanh_c[j], audible(dh[j]));
-            let of_cell = audible(dc[j] + dh * output * (1.0 - t * t));
+            let (t, dh) = (tanh_c[j], flushed(dh[j]));
+            let of_cell = flushed(dc[j] + dh * output * (1.0 - t * t));
             i[j] = of_cell * candidate * input * (1.0 - input);
             f[j] = of_cell * c_before[j] * forget * (1.0 - forget);
             g[j] = of_cell * input * (1.0 - candidate * candidate);
@@ -140,12 +138,12 @@ fn backward_body(units: usize, gates: &mut [f32], c_before: &[f32], tanh_c: &[f3
 }
 
 #[inline(always)]
-fn audible(x: f32) -> f32 {
+fn flushed(x: f32) -> f32 {
     if x.abs() < NEGLIGIBLE { 0.0 } else { x }
 }
 
 dispatched! {
-    /// sums += x w, where `w` is `[inputs][outputs]`: one row of a product, four inputs at a time.
+    /// Computes sums += x w, where `w` is `[inputs][outputs]`, four inputs at a time.
     add_row_product, row_product_body, (x: &[f32], w: &[f32], sums: &mut [f32])
 }
 

@@ -1,7 +1,6 @@
-//! Matrix products on slices, checked at the border and computed by `matrixmultiply`, which picks the widest
-//! instructions the processor has when the program runs.
+//! Matrix products on slices, bounds-checked here and computed by `matrixmultiply`, which selects SIMD at run time.
 
-/// A row-major matrix, or its transpose.
+/// Row-major matrix, or its transpose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matrix<'a> {
     values: &'a [f32],
@@ -11,13 +10,13 @@ pub(super) struct Matrix<'a> {
 }
 
 impl<'a> Matrix<'a> {
-    /// Values row by row.
+    /// Creates a matrix from its rows.
     pub(super) fn new(values: &'a [f32], rows: usize, columns: usize) -> Self {
         assert_eq!(values.len(), rows * columns, "a matrix of {rows} by {columns}");
         Self { values, rows, columns, transposed: false }
     }
 
-    /// The same numbers read column by column.
+    /// Transposes, without copying.
     pub(super) fn t(self) -> Self {
         Self { transposed: !self.transposed, ..self }
     }
@@ -32,14 +31,14 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// out = keep * out + a b, with `out` row-major.
+/// Computes out = keep * out + a b, with `out` row-major.
 pub(super) fn multiply(a: Matrix<'_>, b: Matrix<'_>, keep: f32, out: &mut [f32]) {
     let ((m, k), (inner, n)) = (a.shape(), b.shape());
     assert_eq!(k, inner, "inner sizes agree");
     assert_eq!(out.len(), m * n, "the product is {m} by {n}");
     let ((a_row, a_column), (b_row, b_column)) = (a.strides(), b.strides());
     #[expect(unsafe_code, reason = "matrixmultiply takes pointers")]
-    // SAFETY: the sizes of all three slices have just been compared with the shapes and strides given.
+    // SAFETY: the sizes of all three slices match the shapes and strides, as asserted above.
     unsafe {
         matrixmultiply::sgemm(
             m,

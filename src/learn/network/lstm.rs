@@ -1,13 +1,13 @@
-//! A long short-term memory layer: forward over whole batches, back-propagation through time, and single live steps, all
-//! in one workspace that is allocated once.
+//! Long short-term memory layer: forward pass and back-propagation through time over batches, and single live steps, in
+//! workspaces that are allocated once.
 //!
 //! Arrays are time-major, `[steps][batch][..]`. Weights have PyTorch's shapes and gate order (input, forget, candidate,
-//! output); its two biases, which only ever appear as their sum, are one here.
+//! output); its two biases, which occur only as their sum, are one here.
 
 use super::gates::{add_row_product, step_backward, step_forward};
 use super::gemm::{Matrix, multiply};
 
-/// Weights of a layer, or their gradients, in someone else's memory.
+/// Borrowed weights of a layer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LstmWeights<'a> {
     /// Input weights, `[4 units][inputs]`.
@@ -18,7 +18,7 @@ pub(super) struct LstmWeights<'a> {
     pub(super) b: &'a [f32],
 }
 
-/// Gradients, written over.
+/// Borrowed gradients of the weights, overwritten.
 #[derive(Debug)]
 pub(super) struct LstmGradients<'a> {
     pub(super) w: &'a mut [f32],
@@ -26,7 +26,7 @@ pub(super) struct LstmGradients<'a> {
     pub(super) b: &'a mut [f32],
 }
 
-/// Everything a forward and a backward pass write.
+/// Scratch memory of forward and backward passes.
 #[derive(Clone, Debug)]
 pub(super) struct LstmWorkspace {
     inputs: usize,
@@ -62,7 +62,7 @@ impl LstmWorkspace {
         }
     }
 
-    /// Makes room; memory only ever grows, so that a run over batches of one size allocates once.
+    /// Resizes for a batch; batches of one size allocate once.
     fn resize(&mut self, steps: usize, batch: usize) {
         (self.steps, self.batch) = (steps, batch);
         let state = batch * self.units;
@@ -76,7 +76,7 @@ impl LstmWorkspace {
         self.dc.resize(state, 0.0);
     }
 
-    /// Runs a batch of sequences `x` `[steps][batch][inputs]` from a state of zeros.
+    /// Runs a batch of sequences `x`, `[steps][batch][inputs]`, from zero states.
     pub(super) fn forward(&mut self, weights: LstmWeights<'_>, x: &[f32], steps: usize, batch: usize) {
         self.resize(steps, batch);
         let (units, state) = (self.units, batch * self.units);
@@ -108,8 +108,8 @@ impl LstmWorkspace {
         &self.h[(step + 1) * state..(step + 2) * state]
     }
 
-    /// Back through the batch that was last run forward. `read_out` adds the loss's gradient with respect to the
-    /// hidden states after a step, `[batch][units]`, to what it is given.
+    /// Back-propagates through the batch of the last forward pass. `read_out` adds the gradient of the loss with respect to
+    /// the hidden states after a step, `[batch][units]`, to its argument.
     pub(super) fn backward(
         &mut self,
         weights: LstmWeights<'_>,
@@ -144,7 +144,7 @@ impl LstmWorkspace {
     }
 }
 
-/// Weights in the order in which a single step reads them.
+/// Weights in the order in which a single step reads them (transposed).
 #[derive(Clone, Debug)]
 pub(super) struct LiveLstm {
     units: usize,
@@ -155,7 +155,7 @@ pub(super) struct LiveLstm {
     b: Vec<f32>,
 }
 
-/// The state of one sequence.
+/// State of one sequence.
 #[derive(Clone, Debug)]
 pub(super) struct LiveState {
     gates: Vec<f32>,
@@ -178,7 +178,7 @@ impl LiveLstm {
         LiveState { gates: self.b.clone(), h: zeros(), c: zeros(), c_before: zeros(), tanh_c: zeros() }
     }
 
-    /// Takes in one sample of all inputs; allocates nothing.
+    /// Takes one sample of all inputs; allocates nothing.
     pub(super) fn step(&self, state: &mut LiveState, x: &[f32]) {
         state.gates.copy_from_slice(&self.b);
         add_row_product(x, &self.w, &mut state.gates);
@@ -194,7 +194,7 @@ impl LiveState {
         &self.h
     }
 
-    /// Back to the beginning of a sequence.
+    /// Returns to the start of a sequence.
     pub(super) fn reset(&mut self) {
         self.h.fill(0.0);
         self.c.fill(0.0);

@@ -1,10 +1,10 @@
 //! The paper's recurrent macro-layer (Fig. 2a): LSTM, fully connected, dropout, fully connected, softmax. Without the
-//! first fully connected layer it is the four-layer network of Zuo et al. that the paper starts from.
+//! first fully connected layer it is the four-layer network of Zuo et al. that the paper builds on.
 //!
-//! It can be read out after any step, so that one network answers while the fingers still close and at the end. Its
-//! outputs may be several groups, each with a softmax of its own: size and shape in stage one. For iterated
-//! recognition, logarithms of the probabilities before can be added to the outputs through a learned gain, so that the
-//! network begins as the product of experts and learns where to depart from it.
+//! Outputs can be read after any step, so the same network serves during closing and at the end. Outputs may form
+//! several groups, each with its own softmax: size and shape in stage one. For iterated recognition, the logarithms of
+//! prior probabilities can be added to the outputs through a learned gain, so that the network starts as the product of
+//! experts and learns corrections.
 
 use super::gates;
 use super::gemm::{Matrix, multiply};
@@ -13,39 +13,39 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Sizes of a macro-layer.
+/// Shape of a macro-layer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MacroShape {
     /// Values per step.
     pub inputs: usize,
     /// LSTM units.
     pub units: usize,
-    /// Width of the first fully connected layer; none in Zuo's network.
+    /// Width of the first fully connected layer; `None` in Zuo's network.
     pub hidden: Option<usize>,
     /// Outputs in each group; each group is a PMF.
     pub groups: Vec<usize>,
-    /// Whether probabilities before are added to the outputs.
+    /// True if log prior probabilities are added to the outputs.
     pub with_prior: bool,
 }
 
-/// A named part of the parameters.
+/// Named block of parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Its name, as in files.
+    /// Name, as in files.
     pub name: &'static str,
-    /// Its shape, row-major.
+    /// Shape, row-major.
     pub shape: Vec<usize>,
-    /// Where it stands among all parameters.
+    /// Range among all parameters.
     pub place: Range<usize>,
 }
 
 impl MacroShape {
-    /// Sum of the groups.
+    /// Number of outputs: the sum of the groups.
     pub fn outputs(&self) -> usize {
         self.groups.iter().sum()
     }
 
-    /// All parameters, in the order in which they lie in memory.
+    /// Blocks of parameters, in memory order.
     pub fn blocks(&self) -> Vec<Block> {
         let (gates, outputs) = (4 * self.units, self.outputs());
         let mut parts = vec![
@@ -78,7 +78,7 @@ impl MacroShape {
     }
 }
 
-/// A macro-layer with its parameters.
+/// Macro-layer with its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MacroLayer {
     shape: MacroShape,
@@ -86,16 +86,16 @@ pub struct MacroLayer {
     values: Vec<f32>,
 }
 
-/// A batch of sequences, and where each is read out.
+/// Batch of sequences with the places of their outputs.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Inputs, `[steps][sequences][inputs]`; sequences that end early are padded with anything finite.
+    /// Inputs, `[steps][sequences][inputs]`; shorter sequences are padded with any finite values.
     pub x: Vec<f32>,
     /// Steps of the longest sequence.
     pub steps: usize,
     /// Number of sequences.
     pub sequences: usize,
-    /// Where outputs are wanted.
+    /// Places of the outputs, in the order of steps.
     pub read_outs: Vec<ReadOut>,
     /// True class per sequence and group, `[sequences][groups]`; only for training.
     pub targets: Vec<usize>,
@@ -123,7 +123,7 @@ pub struct Regular {
     pub smoothing: f32,
 }
 
-/// Memory of forward and backward passes, allocated once.
+/// Scratch memory of forward and backward passes.
 #[derive(Clone, Debug)]
 pub struct Pass {
     lstm: LstmWorkspace,
@@ -133,14 +133,14 @@ pub struct Pass {
     /// Outputs of the first fully connected layer, `[read-outs][hidden]`.
     hidden: Vec<f32>,
     d_hidden: Vec<f32>,
-    /// What became of each of them: zero, or the factor of dropout.
+    /// Factor of each of them: zero, or that of dropout.
     mask: Vec<f32>,
     /// Scores, then their gradients, `[read-outs][outputs]`.
     scores: Vec<f32>,
 }
 
 impl Pass {
-    /// For networks of one shape.
+    /// Creates scratch memory for networks of one shape.
     pub fn new(shape: &MacroShape) -> Self {
         let none = Vec::new;
         Self {
@@ -159,7 +159,7 @@ impl Pass {
         &self.scores
     }
 
-    /// Numbers of the last backward pass that are so small that processors are slow on them.
+    /// Number of subnormal gradients of the last backward pass.
     #[cfg(test)]
     pub(super) fn subnormal_gradients(&self) -> usize {
         self.lstm.subnormal_gradients()
@@ -167,8 +167,8 @@ impl Pass {
 }
 
 impl MacroLayer {
-    /// Random parameters: uniform within one over the root of the fan-in, as PyTorch's, and one added to the biases
-    /// of the forget gates, with which gradients survive long sequences.
+    /// Creates random parameters: uniform within one over the root of the fan-in, as in PyTorch, plus one on the biases of
+    /// the forget gates, which preserves gradients over long sequences.
     pub fn new(shape: MacroShape, random: &mut impl Rng) -> Self {
         let blocks = shape.blocks();
         let mut values = vec![0.0; shape.parameters()];
@@ -191,14 +191,14 @@ impl MacroLayer {
         Self { shape, blocks, values }
     }
 
-    /// A macro-layer from its parameters in the order of [`MacroShape::blocks`]; `None` when there are too many, too
-    /// few, or some that are no numbers.
+    /// Creates a macro-layer from parameters in the order of [`MacroShape::blocks`]; `None` if their number is wrong or one
+    /// is not finite.
     pub fn from_values(shape: MacroShape, values: Vec<f32>) -> Option<Self> {
         let fits = values.len() == shape.parameters() && values.iter().all(|v| v.is_finite());
         fits.then(|| Self { blocks: shape.blocks(), shape, values })
     }
 
-    /// The same network with more inputs, to which it is deaf at first.
+    /// Adds inputs with zero weights.
     pub fn with_inputs(&self, more: usize) -> Self {
         let shape = MacroShape { inputs: self.shape.inputs + more, ..self.shape.clone() };
         let mut values = Vec::with_capacity(shape.parameters());
@@ -210,14 +210,14 @@ impl MacroLayer {
         Self { blocks: shape.blocks(), shape, values }
     }
 
-    /// The same network with a prior that is added to its outputs at a gain.
+    /// Adds a prior with a gain to the outputs.
     pub fn with_prior(&self, gain: f32) -> Self {
         let shape = MacroShape { with_prior: true, ..self.shape.clone() };
         let values = self.values.iter().copied().chain([gain]).collect();
         Self { blocks: shape.blocks(), shape, values }
     }
 
-    /// Its sizes.
+    /// Shape.
     pub fn shape(&self) -> &MacroShape {
         &self.shape
     }
@@ -227,7 +227,7 @@ impl MacroLayer {
         &self.values
     }
 
-    /// All parameters, for an optimiser.
+    /// All parameters, mutable, for an optimiser.
     pub fn values_mut(&mut self) -> &mut [f32] {
         &mut self.values
     }
@@ -241,8 +241,7 @@ impl MacroLayer {
         LstmWeights { w: self.block("lstm.weight_ih"), u: self.block("lstm.weight_hh"), b: self.block("lstm.bias") }
     }
 
-    /// Runs a batch forward; the scores stand in `pass`. With `dropout`, a random share of the hidden layer is left
-    /// out.
+    /// Runs a batch forward and leaves the scores in `pass`; `dropout` is a share and its random generator.
     fn forward(&self, batch: &Batch, dropout: Option<(f32, &mut dyn Rng)>, pass: &mut Pass) {
         let (shape, count) = (&self.shape, batch.read_outs.len());
         pass.lstm.forward(self.lstm_weights(), &batch.x, batch.steps, batch.sequences);
@@ -270,7 +269,7 @@ impl MacroLayer {
             pass.mask.fill_with(|| if random.random::<f32>() < share { 0.0 } else { keep });
         }
         for (value, factor) in last.iter_mut().zip(&mut pass.mask) {
-            // The rectifier belongs to the first fully connected layer.
+            // ReLU of the first fully connected layer.
             if shape.hidden.is_some() && *value <= 0.0 {
                 *factor = 0.0;
             }
@@ -288,12 +287,12 @@ impl MacroLayer {
         }
     }
 
-    /// Scores (logits) at the read-outs of a batch, `[read-outs][outputs]`, in `pass`.
+    /// Computes the scores (logits) at the read-outs of a batch, `[read-outs][outputs]`, and leaves them in `pass`.
     pub fn score(&self, batch: &Batch, pass: &mut Pass) {
         self.forward(batch, None, pass);
     }
 
-    /// Weighted cross-entropy of a batch, and its gradient with respect to all parameters, written over `gradient`.
+    /// Computes the weighted cross-entropy of a batch; overwrites `gradient` with its gradient for all parameters.
     pub fn loss(
         &self,
         batch: &Batch,
@@ -334,7 +333,7 @@ impl MacroLayer {
         }
         let [w, u, b] = ["lstm.weight_ih", "lstm.weight_hh", "lstm.bias"].map(|name| parts.take(name));
         let (units, d_read) = (shape.units, &pass.d_read);
-        // Read-outs come in the order of their steps, and are met from the last.
+        // Read-outs are sorted by step and visited from the last.
         let mut left = batch.read_outs.len();
         let read_out = |step: usize, dh: &mut [f32]| {
             while left > 0 && batch.read_outs[left - 1].step == step {
@@ -347,7 +346,7 @@ impl MacroLayer {
         loss
     }
 
-    /// Turns scores into the loss's gradient with respect to them.
+    /// Replaces the scores by the gradient of the loss with respect to them.
     fn score_gradients(&self, batch: &Batch, smoothing: f32, pass: &mut Pass) -> f64 {
         debug_assert!(batch.read_outs.is_sorted_by_key(|at| at.step));
         let groups = &self.shape.groups;
@@ -386,7 +385,7 @@ fn sum_rows(rows: &[f32], sums: &mut [f32]) {
     }
 }
 
-/// A flat gradient seen as its named parts.
+/// Flat gradient split into its named blocks.
 struct Parts<'a>(Vec<(&'static str, &'a mut [f32])>);
 
 fn split<'a>(mut flat: &'a mut [f32], blocks: &[Block]) -> Parts<'a> {
@@ -410,7 +409,7 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// A macro-layer that reads one sample at a time; a step allocates nothing.
+/// Macro-layer that takes one sample at a time; a step allocates nothing.
 #[derive(Clone, Debug)]
 pub struct LiveMacroLayer {
     shape: MacroShape,
@@ -428,7 +427,7 @@ pub struct LiveMacroLayer {
 }
 
 impl LiveMacroLayer {
-    /// Ready for the first sample of a sequence.
+    /// Prepares for the first sample of a sequence.
     pub fn new(layer: &MacroLayer) -> Self {
         let shape = layer.shape.clone();
         let lstm = LiveLstm::new(layer.lstm_weights(), shape.inputs, shape.units);
@@ -450,12 +449,13 @@ impl LiveMacroLayer {
         }
     }
 
-    /// Back to the beginning of a sequence.
+    /// Returns to the start of a sequence.
     pub fn reset(&mut self) {
         self.state.reset();
     }
 
-    /// Takes in one sample; gives the scores (logits) after it. `log_prior` has one value per output, or none.
+    /// Takes one sample of all inputs; returns the scores (logits), one per output. `log_prior` has one value per output,
+    /// or is empty.
     pub fn step(&mut self, x: &[f32], log_prior: &[f32]) -> &[f32] {
         self.lstm.step(&mut self.state, x);
         if self.shape.hidden.is_some() {

@@ -1,36 +1,36 @@
-//! From readings to a network's inputs: even steps, compressed and standardised channels. Everything is learned from
-//! training data, kept with the network, and done sample by sample in the same way when readings arrive live.
+//! From readings to a network's inputs: equal time steps, compressed and standardised channels. Scales are fitted to
+//! training data and stored with the network; live readings are processed sample by sample in the same way.
 //!
-//! Each channel becomes two inputs: its scaled value, and how far it departs from the mean course of all training
-//! grasps at that step, in deviations at that step. What is common to all grasps, the closing itself, is much larger
-//! than what tells objects apart.
+//! Each channel becomes two inputs: its scaled value, and its deviation from the mean course of all training grasps at
+//! that step, in standard deviations at that step. The closing motion common to all grasps is much larger than the
+//! differences between objects.
 
-use super::super::data::{Dataset, Sequence};
+use crate::data::{Dataset, Sequence};
 use serde::{Deserialize, Serialize};
 
-/// How readings become inputs.
+/// Mapping from readings to inputs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Preparation {
-    /// Inputs per second.
-    pub rate_hz: f32,
-    /// One scale per channel.
-    pub scales: Vec<Scale>,
-    /// Mean scaled value per step and channel; the last step holds for later ones.
-    pub course: Vec<Vec<f32>>,
-    /// One over the deviation from it per step and channel.
-    pub factors: Vec<Vec<f32>>,
+pub(crate) struct Preparation {
+    /// Rate of time steps (Hz).
+    pub(crate) rate_hz: f32,
+    /// Scale of each channel.
+    pub(crate) scales: Vec<Scale>,
+    /// Mean scaled value, `[steps][channels]`; the last step applies to later ones.
+    pub(crate) course: Vec<Vec<f32>>,
+    /// One over the standard deviation from it, `[steps][channels]`.
+    pub(crate) factors: Vec<Vec<f32>>,
 }
 
-/// How values of one channel are scaled: asinh(x / knee), then mean and deviation. Pressures span decades; below the
-/// knee the scale is linear, above it logarithmic.
+/// Scale of one channel: asinh(x / knee), then mean and standard deviation. Linear below the knee, logarithmic above,
+/// because pressures span decades.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Scale {
-    /// Where the logarithm begins, in the channel's unit; zero for a linear scale.
-    pub knee: f32,
+pub(crate) struct Scale {
+    /// Start of the logarithmic range, in the channel's unit; zero for a linear scale.
+    pub(crate) knee: f32,
     /// Mean of the compressed values.
-    pub mean: f32,
+    pub(crate) mean: f32,
     /// One over their standard deviation.
-    pub factor: f32,
+    pub(crate) factor: f32,
 }
 
 impl Scale {
@@ -43,14 +43,14 @@ impl Scale {
     }
 }
 
-/// A channel whose largest value is this many times its typical one is compressed.
+/// A channel is compressed if its largest value is more than this many times its median.
 const WIDE: f32 = 4.0;
-/// Scaled values are kept within this many deviations, whatever comes in.
+/// Bound of scaled values (standard deviations).
 const MOST_DEVIATIONS: f32 = 20.0;
 
 impl Preparation {
-    /// Learns scales from training data.
-    pub fn fit(data: &Dataset, rate_hz: f32) -> Self {
+    /// Fits scales to training data; `rate_hz` is the rate of time steps (Hz).
+    pub(crate) fn fit(data: &Dataset, rate_hz: f32) -> Self {
         let channels = data.channels.len();
         let mut columns: Vec<Vec<f32>> = vec![Vec::new(); channels];
         for example in &data.examples {
@@ -64,13 +64,13 @@ impl Preparation {
         Self { rate_hz, scales, course, factors }
     }
 
-    /// Inputs per step.
-    pub fn width(&self) -> usize {
+    /// Number of inputs per step.
+    pub(crate) fn width(&self) -> usize {
         2 * self.scales.len()
     }
 
-    /// True when all parts have sizes that fit each other and hold numbers: preparations come from files.
-    pub fn is_sound(&self) -> bool {
+    /// True if a mapping from a file is valid for this number of channels.
+    pub(crate) fn is_sound(&self, channels: usize) -> bool {
         let finite = |rows: &[Vec<f32>]| rows.iter().flatten().all(|x| x.is_finite());
         let fits = |rows: &[Vec<f32>]| !rows.is_empty() && rows.iter().all(|row| row.len() == self.scales.len());
         let scales = self.scales.iter().all(|s| s.knee.is_finite() && s.mean.is_finite() && s.factor.is_finite());
@@ -78,21 +78,22 @@ impl Preparation {
         self.rate_hz > 0.0
             && self.rate_hz <= 1000.0
             && scales
-            && !self.scales.is_empty()
+            && channels > 0
+            && self.scales.len() == channels
             && parts.iter().all(|rows| fits(rows) && finite(rows))
             && self.course.len() == self.factors.len()
     }
 
-    /// Inputs of a whole sequence, `[steps][width]`.
-    pub fn inputs(&self, sequence: &Sequence) -> Vec<f32> {
+    /// Inputs of a sequence, `[steps][width]`.
+    pub(crate) fn inputs(&self, sequence: &Sequence) -> Vec<f32> {
         Binner::new(self).whole(sequence)
     }
 }
 
-/// Departures smaller than this share of a channel's deviation over all are not enlarged to a whole one.
+/// Smallest standard deviation at a step, as a share of the channel's overall one; it bounds the amplification.
 const LEAST_DEPARTURE: f64 = 0.02;
 
-/// Mean and one over the deviation of scaled values at each step, over all sequences that reach it.
+/// Mean and one over the standard deviation of scaled values at each step, over all sequences that reach it.
 fn mean_course(data: &Dataset, rate_hz: f32, scales: &[Scale]) -> (Vec<Vec<f32>>, Vec<Vec<f32>>) {
     let channels = scales.len();
     let mut sums: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
@@ -110,7 +111,7 @@ fn mean_course(data: &Dataset, rate_hz: f32, scales: &[Scale]) -> (Vec<Vec<f32>>
             }
         }
     }
-    // Steps that few sequences reach say little.
+    // Drop steps that fewer than a quarter of the sequences reach.
     let most = sums.first().map_or(0.0, |(count, _)| *count);
     sums.retain(|(count, _)| *count >= 0.25 * most);
     let mean = |(count, of_step): &(f64, Vec<[f64; 2]>)| of_step.iter().map(|s| (s[0] / count) as f32).collect();
@@ -132,22 +133,22 @@ fn fitted(column: &mut [f32]) -> Scale {
     let count = column.len().max(1) as f64;
     let mean = column.iter().map(|x| f64::from(*x)).sum::<f64>() / count;
     let variance = column.iter().map(|x| (f64::from(*x) - mean).powi(2)).sum::<f64>() / count;
-    // A channel that never changes tells nothing, and rounding errors should not be blown up into something.
+    // A constant channel is ignored; its rounding errors must not be amplified.
     let deviation = variance.sqrt();
     let factor = if deviation > 1e-6 * mean.abs().max(1e-30) { 1.0 / deviation } else { 0.0 };
     Scale { knee, mean: mean as f32, factor: factor as f32 }
 }
 
-/// Means of readings over even steps of time, as they arrive.
+/// Averages readings over equal time steps as they arrive, and scales them.
 #[derive(Clone, Debug)]
-pub struct Binner {
+pub(crate) struct Binner {
     rate_hz: f32,
-    /// None where readings are taken as they are.
+    /// `None` for unscaled means.
     scales: Option<Vec<Scale>>,
-    /// Means and factors per step; none where only scaled values are wanted.
+    /// Means and factors per step; empty for scaled values only.
     course: Vec<(Vec<f32>, Vec<f32>)>,
-    /// Steps given so far.
-    given: usize,
+    /// Number of steps completed.
+    completed: usize,
     step: u32,
     sums: Vec<f32>,
     count: u32,
@@ -155,17 +156,17 @@ pub struct Binner {
 }
 
 impl Binner {
-    /// At the start of a sequence.
-    pub fn new(preparation: &Preparation) -> Self {
+    /// Creates a binner at the start of a sequence.
+    pub(crate) fn new(preparation: &Preparation) -> Self {
         let scales = Some(preparation.scales.clone());
         let course = preparation.course.iter().cloned().zip(preparation.factors.iter().cloned()).collect();
         let out = vec![0.0; preparation.width()];
         Self { scales, course, out, ..Self::plain(preparation.rate_hz, preparation.scales.len()) }
     }
 
-    /// Back to the start of a sequence.
-    pub fn reset(&mut self) {
-        (self.step, self.count, self.given) = (0, 0, 0);
+    /// Returns to the start of a sequence.
+    pub(crate) fn reset(&mut self) {
+        (self.step, self.count, self.completed) = (0, 0, 0);
         self.sums.fill(0.0);
     }
 
@@ -174,7 +175,7 @@ impl Binner {
             rate_hz,
             scales: None,
             course: Vec::new(),
-            given: 0,
+            completed: 0,
             step: 0,
             sums: vec![0.0; channels],
             count: 0,
@@ -195,9 +196,9 @@ impl Binner {
         inputs
     }
 
-    /// Takes in a reading at a time (s); gives the inputs of the step before when it is the first of another one.
-    pub fn push(&mut self, t: f32, row: &[f32]) -> Option<&[f32]> {
-        // A reading on the border belongs to the step before: the sample at 0.04 s ends the first 25th of a second.
+    /// Takes a reading at a time (s); returns the inputs of the step before if this is the first reading of a new step.
+    pub(crate) fn push(&mut self, t: f32, row: &[f32]) -> Option<&[f32]> {
+        // A reading on the border belongs to the step before: at 25 Hz the sample at 0.04 s ends the first step.
         let step = ((t * self.rate_hz - 1e-3).floor().clamp(0.0, 1e9)) as u32;
         let complete = step != self.step && self.count > 0;
         if complete {
@@ -209,8 +210,8 @@ impl Binner {
         complete.then_some(&self.out[..])
     }
 
-    /// The inputs of the last step, if anything was read in it.
-    pub fn finish(&mut self) -> Option<&[f32]> {
+    /// Returns the inputs of the last step; `None` if it has no reading.
+    pub(crate) fn finish(&mut self) -> Option<&[f32]> {
         let complete = self.count > 0;
         if complete {
             self.close();
@@ -225,36 +226,27 @@ impl Binner {
             *out = scale.map_or(*sum * share, |scale| scale.apply(*sum * share));
             *sum = 0.0;
         }
-        if let Some((means, factors)) = self.course.get(self.given.min(self.course.len().saturating_sub(1))) {
+        if let Some((means, factors)) = self.course.get(self.completed.min(self.course.len().saturating_sub(1))) {
             let (scaled, departures) = self.out.split_at_mut(self.sums.len());
             for (((departure, x), mean), factor) in departures.iter_mut().zip(scaled).zip(means).zip(factors) {
                 *departure = ((*x - mean) * factor).clamp(-MOST_DEVIATIONS, MOST_DEVIATIONS);
             }
         }
-        self.given += 1;
+        self.completed += 1;
         self.count = 0;
     }
 }
 
-/// For each channel the one on the other finger, where every channel has one: `.._left..` and `.._right..`.
-pub fn mirror(channels: &[String]) -> Option<Vec<usize>> {
-    let other = |name: &String| {
-        let swapped = if name.contains("left") { name.replace("left", "right") } else { name.replace("right", "left") };
-        channels.iter().position(|c| *c == swapped && swapped != *name)
-    };
-    channels.iter().map(other).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::super::conformance::made_up;
     use super::*;
+    use crate::conformance_tests::made_up;
 
     #[test]
     fn inputs_have_no_mean_and_unit_deviation() {
         let data = made_up(10, 1);
         let preparation = Preparation::fit(&data, 10.0);
-        assert!(preparation.is_sound());
+        assert!(preparation.is_sound(data.channels.len()));
         let rows: Vec<f32> = data.examples.iter().flat_map(|e| preparation.inputs(&e.grasp)).collect();
         let width = preparation.width();
         for input in 0..width {
@@ -268,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_are_averaged_over_even_steps_whatever_their_rate() {
+    fn step_means_do_not_depend_on_the_sampling_rate() {
         let ramp = |hz: f32| {
             let t_s: Vec<f32> = (1..=(2.0 * hz) as usize).map(|k| k as f32 / hz).collect();
             let values = t_s.iter().map(|t| t - 0.5 / hz).collect();
@@ -281,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_channels_are_compressed_and_dead_ones_silenced() {
+    fn wide_channels_are_compressed_and_constant_ones_ignored() {
         let mut wide: Vec<f32> = (0..1000).map(|k| 10f32.powf(k as f32 / 250.0)).collect();
         let scale = fitted(&mut wide);
         assert!(scale.knee > 0.0, "four decades");
@@ -290,12 +282,5 @@ mod tests {
         assert_eq!((scale.knee, scale.apply(7.0), scale.apply(1e30)), (0.0, 0.0, 0.0));
         let mut even: Vec<f32> = (0..100).map(|k| k as f32).collect();
         assert_eq!(fitted(&mut even).knee, 0.0);
-    }
-
-    #[test]
-    fn mirrors_pair_the_fingers() {
-        let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
-        assert_eq!(mirror(&names(&["bend_left", "bend_right", "grip_right", "grip_left"])), Some(vec![1, 0, 3, 2]));
-        assert_eq!(mirror(&names(&["bend_left", "grip"])), None);
     }
 }

@@ -1,49 +1,49 @@
-//! Everything about a network that is chosen rather than learned.
+//! Settings of a network and its training.
 
-use super::super::{FitError, Fitting};
 use super::training::Training;
+use crate::fitting::{Fitting, LearnError};
 use serde::{Deserialize, Serialize};
 
-/// How a network is built and trained.
+/// Structure and training of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// Inputs per second: readings are averaged down to this.
+    /// Rate of time steps, to which readings are averaged (Hz).
     pub rate_hz: f32,
     /// LSTM units of each macro-layer.
     pub units: usize,
-    /// Width of the first fully connected layer; zero leaves it out.
+    /// Width of the first fully connected layer; zero to omit it.
     pub hidden: usize,
-    /// Networks of each stage that begin from other weights and answer together.
+    /// Number of networks in each stage's committee.
     #[serde(default = "one")]
     pub members: usize,
-    /// Whether size and shape are learned first and handed on to the second stage.
+    /// True to estimate size and shape in a first stage (section III).
     pub two_stages: bool,
-    /// Whether the PMF of earlier grasps is fed back.
+    /// True to feed back the PMF of earlier grasps (section III).
     pub iterated: bool,
-    /// Parts of the data. Where networks are cross-fitted each is left out once; otherwise one is, for calibration.
+    /// Number of parts for cross-fitting, each of which is held out once.
     pub parts: usize,
-    /// Whether both stages learn from all grasps, the second from answers of first stages that had not seen them;
-    /// otherwise each stage has one half of the grasps, as in the paper (section V-C).
+    /// True to train both stages on all grasps, the second on outputs of first stages for held-out grasps; false to train
+    /// each stage on one half of the grasps, as in the paper (section V-C).
     pub cross_fitted: bool,
-    /// Whether grasps are also shown with left and right exchanged.
+    /// True to augment by exchanging left and right.
     pub mirror: bool,
-    /// Deviation of the noise added to inputs while training, in deviations of the input.
+    /// Standard deviation of the noise added to inputs while training, in standard deviations of the input.
     pub noise: f32,
-    /// How weights are found.
+    /// Training.
     pub training: Training,
 }
 
-/// Networks that can answer together.
+/// Largest committee.
 pub(super) const MOST_MEMBERS: usize = 20;
 
-/// Members where a file does not say.
+/// Committee size in files without one.
 pub(super) fn one() -> usize {
     1
 }
 
 impl Recipe {
-    /// The macro-layer by itself (Fig. 2a).
+    /// The macro-layer alone (Fig. 2a).
     pub fn macro_layer() -> Self {
         Self {
             rate_hz: 8.0,
@@ -70,61 +70,60 @@ impl Recipe {
         }
     }
 
-    /// Several macro-layers that answer together.
+    /// A committee of four macro-layers.
     pub fn committee() -> Self {
         Self { members: 4, ..Self::macro_layer() }
     }
 
-    /// Zuo et al.'s four layers, from which the paper starts: fewer units, no first fully connected layer, more
+    /// The four-layer network of Zuo et al., which the paper builds on: fewer units, no first fully connected layer, more
     /// dropout.
     pub fn zuo() -> Self {
         let base = Self::macro_layer();
         Self { units: 64, hidden: 0, training: Training { dropout: 0.6, ..base.training.clone() }, ..base }
     }
 
-    /// A plain LSTM: one layer and its read-out at the end, nothing else.
+    /// A plain LSTM with one output at the end.
     pub fn plain_lstm() -> Self {
         let base = Self::macro_layer();
         let training = Training { dropout: 0.0, early_read_outs: 0, weight_decay: 0.01, ..base.training.clone() };
         Self { hidden: 0, mirror: false, noise: 0.0, training, ..base }
     }
 
-    /// The dual-stage LSTM as the paper has it (Fig. 2b).
+    /// The paper's dual-stage LSTM (Fig. 2b).
     pub fn dual_stage() -> Self {
         Self { two_stages: true, ..Self::macro_layer() }
     }
 
-    /// The iterated dual-stage LSTM (Fig. 2c).
+    /// The paper's iterated dual-stage LSTM (Fig. 2c).
     pub fn iterated() -> Self {
         Self { iterated: true, ..Self::dual_stage() }
     }
 
-    /// The same network by cross-fitting.
+    /// The same network, trained by cross-fitting.
     pub fn cross_fitted(self) -> Self {
         Self { cross_fitted: true, ..self }
     }
 
-    /// How a network that has learned from single grasps goes on learning with what earlier grasps said: a little, and
-    /// gently.
+    /// Fine-tuning with further inputs: an eighth of the epochs, a tenth of the learning rate.
     pub(super) fn refining(&self) -> Training {
         let base = &self.training;
         Training { epochs: base.epochs.div_ceil(8), learning_rate: 0.1 * base.learning_rate, ..base.clone() }
     }
 
-    /// With the settings that were asked for instead of its own, and shorter where that was asked for.
-    pub fn adjusted(self, fitting: &Fitting<'_>) -> Result<Self, FitError> {
-        let mut value = serde_json::to_value(&self).map_err(|e| FitError::Failed { cause: e.to_string() })?;
+    /// Applies the settings of a fit, and shortens it if quick. Refuses settings that are unknown or out of range.
+    pub fn adjusted(self, fitting: &Fitting<'_>) -> Result<Self, LearnError> {
+        let mut value = serde_json::to_value(&self).map_err(LearnError::failed)?;
         for (name, wanted) in &fitting.settings {
             let known = value.get(name).is_some();
             let place = if known { value.get_mut(name) } else { value["training"].get_mut(name) };
             let Some(place) = place.filter(|place| !place.is_object()) else {
-                let cause = "there is no such setting; `palpate train --print-settings` lists them".to_owned();
-                return Err(FitError::Setting { name: name.clone(), cause });
+                let cause = "no such setting; `palpate train --print-settings` lists them".to_owned();
+                return Err(LearnError::Setting { name: name.clone(), cause });
             };
             *place = wanted.clone();
         }
         let mut recipe: Self = serde_json::from_value(value)
-            .map_err(|e| FitError::Setting { name: "of the network".to_owned(), cause: e.to_string() })?;
+            .map_err(|e| LearnError::Setting { name: "of the network".to_owned(), cause: e.to_string() })?;
         if fitting.quick {
             recipe.units = recipe.units.min(32);
             recipe.hidden = recipe.hidden.min(32);
@@ -136,14 +135,14 @@ impl Recipe {
         Ok(recipe)
     }
 
-    /// Refuses what cannot work.
-    pub fn check(&self) -> Result<(), FitError> {
+    /// Refuses values out of range.
+    pub fn check(&self) -> Result<(), LearnError> {
         let within = |name: &str, value: f64, least: f64, most: f64| {
             if (least..=most).contains(&value) {
                 Ok(())
             } else {
                 let cause = format!("{value} is not between {least} and {most}");
-                Err(FitError::Setting { name: name.to_owned(), cause })
+                Err(LearnError::Setting { name: name.to_owned(), cause })
             }
         };
         let training = &self.training;

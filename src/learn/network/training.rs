@@ -1,4 +1,4 @@
-//! Training a macro-layer: AdamW on a one-cycle schedule, one thread, every random number from one seed.
+//! Training of a macro-layer: AdamW with a one-cycle learning rate, on one thread; one seed determines the result.
 
 use super::macro_layer::{Batch, MacroLayer, MacroShape, Pass, ReadOut, Regular};
 use rand::seq::SliceRandom;
@@ -7,55 +7,55 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// What a network learns from: numbered lessons, each drawn anew whenever it is its turn.
-pub trait Lessons {
-    /// How many there are.
+/// Numbered training sequences, augmented anew whenever they are drawn.
+pub(super) trait TrainingSet {
+    /// Number of sequences.
     fn count(&self) -> usize;
 
-    /// Writes lesson `k` as it is to be learned this time.
-    fn draw(&self, k: usize, random: &mut dyn Rng, lesson: &mut Lesson);
+    /// Writes an augmented copy of sequence `k`.
+    fn draw(&self, k: usize, random: &mut dyn Rng, drawn: &mut TrainingSequence);
 }
 
-/// One sequence and what it is.
+/// One augmented sequence and its targets.
 #[derive(Clone, Debug, Default)]
-pub struct Lesson {
+pub(super) struct TrainingSequence {
     /// Inputs, `[steps][inputs]`.
-    pub x: Vec<f32>,
+    pub(super) x: Vec<f32>,
     /// True class in each group.
-    pub targets: Vec<usize>,
-    /// Logarithms of the probabilities before, one per output; only with a prior.
-    pub log_prior: Vec<f32>,
+    pub(super) targets: Vec<usize>,
+    /// Logarithm of the prior probability of each output; empty without a prior.
+    pub(super) log_prior: Vec<f32>,
 }
 
-/// How a network is trained.
+/// Settings of the training of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
-    /// Times every lesson is taken.
+    /// Passes over the training set.
     pub epochs: usize,
-    /// Lessons per step of the optimiser.
+    /// Sequences per optimiser step.
     pub batch: usize,
-    /// Highest learning rate of the cycle.
+    /// Peak learning rate.
     pub learning_rate: f64,
-    /// Share of each weight that decays per step and unit of learning rate.
+    /// Weight decay per step and unit of learning rate.
     pub weight_decay: f64,
-    /// Share of the hidden layer that is dropped.
+    /// Dropout share of the hidden layer, 0 to 0.95.
     pub dropout: f32,
-    /// Share of each target that is spread over all classes.
+    /// Label smoothing: share of each target spread over all classes.
     pub smoothing: f32,
-    /// Read-outs before the last at which an answer is asked for as well.
+    /// Number of additional outputs before the last step that enter the loss.
     pub early_read_outs: usize,
-    /// Share of the loss that those have together.
+    /// Their share of the loss.
     pub early_share: f32,
-    /// Gradients longer than this are shortened to it.
+    /// Largest norm of a gradient; longer ones are scaled down.
     pub longest_gradient: f64,
 }
 
-/// Share of a run in which the learning rate rises.
+/// Share of the training in which the learning rate rises.
 const WARM_UP: f64 = 0.3;
 
 impl Training {
-    /// Learning rate at a share of the run: up along half a cosine from a 25th, down along another to almost nothing.
+    /// Learning rate at a share of the training: half a cosine up from peak / 25, another down to 1e-4 peak.
     fn rate(&self, share: f64) -> f64 {
         let half_cosine = |from: f64, to: f64, x: f64| from + (to - from) * 0.5 * (1.0 - (PI * x).cos());
         let peak = self.learning_rate;
@@ -67,23 +67,23 @@ impl Training {
     }
 }
 
-/// Trains a network from random parameters. `go_on` hears of every epoch with its mean loss, and may end the run.
-pub fn train(
+/// Trains a network from random parameters. `go_on` gets the number and mean loss of each epoch and returns false to stop.
+pub(super) fn train(
     shape: MacroShape,
-    lessons: &dyn Lessons,
+    set: &dyn TrainingSet,
     training: &Training,
     seed: u64,
     go_on: &mut dyn FnMut(usize, f64) -> bool,
 ) -> MacroLayer {
     let mut layer = MacroLayer::new(shape, &mut ChaCha8Rng::seed_from_u64(seed));
-    train_on(&mut layer, lessons, training, seed ^ 0x7ea1, go_on);
+    train_on(&mut layer, set, training, seed ^ 0x7ea1, go_on);
     layer
 }
 
-/// Goes on training a network from where it is.
-pub fn train_on(
+/// Continues training a network.
+pub(super) fn train_on(
     layer: &mut MacroLayer,
-    lessons: &dyn Lessons,
+    set: &dyn TrainingSet,
     training: &Training,
     seed: u64,
     go_on: &mut dyn FnMut(usize, f64) -> bool,
@@ -92,8 +92,8 @@ pub fn train_on(
     let mut pass = Pass::new(layer.shape());
     let mut optimiser = AdamW::new(layer.values().len());
     let mut gradient = vec![0.0; layer.values().len()];
-    let (mut batch, mut drawn) = (Batch::default(), vec![Lesson::default(); training.batch.max(1)]);
-    let mut order: Vec<usize> = (0..lessons.count()).collect();
+    let (mut batch, mut drawn) = (Batch::default(), vec![TrainingSequence::default(); training.batch.max(1)]);
+    let mut order: Vec<usize> = (0..set.count()).collect();
     let steps = training.epochs * order.len().div_ceil(training.batch.max(1));
     let regular = Regular { dropout: training.dropout, smoothing: training.smoothing };
     let mut taken = 0;
@@ -101,8 +101,8 @@ pub fn train_on(
         order.shuffle(&mut random);
         let mut sum = 0.0;
         for group in order.chunks(training.batch.max(1)) {
-            for (k, lesson) in group.iter().zip(&mut drawn) {
-                lessons.draw(*k, &mut random, lesson);
+            for (k, sequence) in group.iter().zip(&mut drawn) {
+                set.draw(*k, &mut random, sequence);
             }
             fill(&mut batch, &drawn[..group.len()], layer.shape().inputs, training);
             let loss = layer.loss(&batch, regular, &mut random, &mut gradient, &mut pass);
@@ -122,38 +122,39 @@ pub fn train_on(
     }
 }
 
-/// Lays lessons side by side, time-major, with their read-outs in the order of steps.
-fn fill(batch: &mut Batch, lessons: &[Lesson], inputs: usize, training: &Training) {
-    let lengths = || lessons.iter().map(|lesson| lesson.x.len() / inputs);
-    (batch.steps, batch.sequences) = (lengths().max().unwrap_or(0), lessons.len());
+/// Packs sequences into a time-major batch with their outputs in the order of steps.
+fn fill(batch: &mut Batch, drawn: &[TrainingSequence], inputs: usize, training: &Training) {
+    let lengths = || drawn.iter().map(|sequence| sequence.x.len() / inputs);
+    (batch.steps, batch.sequences) = (lengths().max().unwrap_or(0), drawn.len());
     batch.x.clear();
     batch.x.resize(batch.steps * batch.sequences * inputs, 0.0);
-    for (sequence, lesson) in lessons.iter().enumerate() {
-        for (step, row) in lesson.x.chunks_exact(inputs).enumerate() {
+    for (sequence, source) in drawn.iter().enumerate() {
+        for (step, row) in source.x.chunks_exact(inputs).enumerate() {
             let at = (step * batch.sequences + sequence) * inputs;
             batch.x[at..at + inputs].copy_from_slice(row);
         }
     }
-    let of_lesson = 1.0 / lessons.len().max(1) as f32;
+    let of_sequence = 1.0 / drawn.len().max(1) as f32;
     batch.read_outs.clear();
     for (sequence, steps) in lengths().enumerate().filter(|(_, steps)| *steps > 0) {
         let early = training.early_read_outs.min(steps - 1);
         let early_share = if early == 0 { 0.0 } else { training.early_share };
         for k in 0..early {
-            // Evenly over the whole sequence.
+            // Spread evenly over the sequence.
             let step = (k + 1) * steps / (early + 1);
-            let weight = of_lesson * early_share / early as f32;
+            let weight = of_sequence * early_share / early as f32;
             batch.read_outs.push(ReadOut { step: step.saturating_sub(1), sequence, weight });
         }
-        batch.read_outs.push(ReadOut { step: steps - 1, sequence, weight: of_lesson * (1.0 - early_share) });
+        batch.read_outs.push(ReadOut { step: steps - 1, sequence, weight: of_sequence * (1.0 - early_share) });
     }
     batch.read_outs.sort_by_key(|at| at.step);
     batch.targets.clear();
-    batch.targets.extend(lessons.iter().flat_map(|lesson| &lesson.targets));
+    batch.targets.extend(drawn.iter().flat_map(|sequence| &sequence.targets));
     batch.log_prior.clear();
-    batch.log_prior.extend(lessons.iter().flat_map(|lesson| &lesson.log_prior));
+    batch.log_prior.extend(drawn.iter().flat_map(|sequence| &sequence.log_prior));
 }
 
+/// Scales a gradient down to a largest norm.
 fn shorten(gradient: &mut [f32], longest: f64) {
     let length = gradient.iter().map(|g| f64::from(*g) * f64::from(*g)).sum::<f64>().sqrt();
     if length > longest {
@@ -162,7 +163,7 @@ fn shorten(gradient: &mut [f32], longest: f64) {
     }
 }
 
-/// Adam with weight decay apart from the gradient (Loshchilov and Hutter 2019), in PyTorch's form.
+/// Adam with decoupled weight decay (Loshchilov and Hutter 2019), as in PyTorch.
 #[derive(Clone, Debug)]
 pub struct AdamW {
     mean: Vec<f32>,
@@ -170,8 +171,8 @@ pub struct AdamW {
     steps: i32,
 }
 
-/// Means that fade away are dropped before they become subnormal, on which processors are slow.
-fn audible(x: f32) -> f32 {
+/// Replaces subnormal numbers, on which processors are slow, by zero.
+fn flushed(x: f32) -> f32 {
     if x.abs() < f32::MIN_POSITIVE { 0.0 } else { x }
 }
 
@@ -180,20 +181,20 @@ impl AdamW {
     const SQUARE_MEMORY: f32 = 0.999;
     const EPSILON: f32 = 1e-8;
 
-    /// For so many parameters.
+    /// Creates the optimiser of a number of parameters.
     pub fn new(parameters: usize) -> Self {
         Self { mean: vec![0.0; parameters], square: vec![0.0; parameters], steps: 0 }
     }
 
-    /// Moves values against a gradient.
+    /// Updates values against their gradient, at a learning rate and weight decay.
     pub fn step(&mut self, values: &mut [f32], gradient: &[f32], rate: f64, decay: f64) {
         self.steps += 1;
         let unbias = 1.0 / (1.0 - Self::MEMORY.powi(self.steps));
         let unbias_square = 1.0 / (1.0 - Self::SQUARE_MEMORY.powi(self.steps));
         let (rate, keep) = (rate as f32, 1.0 - (rate * decay) as f32);
         for (((value, g), mean), square) in values.iter_mut().zip(gradient).zip(&mut self.mean).zip(&mut self.square) {
-            *mean = audible(Self::MEMORY * *mean + (1.0 - Self::MEMORY) * g);
-            *square = audible(Self::SQUARE_MEMORY * *square + (1.0 - Self::SQUARE_MEMORY) * g * g);
+            *mean = flushed(Self::MEMORY * *mean + (1.0 - Self::MEMORY) * g);
+            *square = flushed(Self::SQUARE_MEMORY * *square + (1.0 - Self::SQUARE_MEMORY) * g * g);
             *value = keep * *value - rate * *mean * unbias / ((*square * unbias_square).sqrt() + Self::EPSILON);
         }
     }

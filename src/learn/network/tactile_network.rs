@@ -1,4 +1,4 @@
-//! The recognisers of the paper: a macro-layer by itself, the dual-stage LSTM, and its iterated form.
+//! The paper's recognisers: the macro-layer alone, the dual-stage LSTM, and its iterated form (Fig. 2).
 //!
 //! ```text
 //! readings --+--> stage one: macro-layer --> PMF of size, PMF of shape --+
@@ -8,24 +8,28 @@
 //!                                            (iterated) PMF before ------+<---------------+
 //! ```
 //!
-//! Both stages run step by step: after every step stage two sees what stage one says by then. So the same network
-//! answers while the fingers close and at the end.
+//! Both stages run step by step: at every step stage two takes the output of stage one at that step, so the same network
+//! gives a PMF during closing and at the end.
 
-use super::super::belief::{Rejection, StopRule, agreement};
-use super::super::data::{Dataset, Sequence};
-use super::super::model_file::{Arrays, ModelCard};
-use super::super::{FitError, Fitting, LiveRecogniser, Pmf, Properties, Recogniser, Verdict, check_enough};
-use super::calibrated::{Calibrated, HeldBack, LiveCalibrated, Plan};
-use super::lessons::{Book, Earlier};
+use super::calibrated::{Calibrated, HeldOut, LiveCalibrated, Plan};
 use super::macro_layer::{MacroLayer, MacroShape};
-use super::preparation::{Binner, Preparation, mirror};
+use super::preparation::{Binner, Preparation};
 use super::recipe::{MOST_MEMBERS, Recipe};
+use super::training_set::{Earlier, StageInputs};
+use crate::arrays::Arrays;
+use crate::belief::{Rejection, StopRule, agreement};
+use crate::data::{Dataset, Sequence};
+use crate::fitting::{Fitting, LearnError, check_enough};
+use crate::mirror::mirror;
+use crate::model::{LoadError, ModelCard};
+use crate::pmf::Pmf;
+use crate::recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// One of the paper's networks, fitted.
+/// Fitted network of the paper, with one stage or two.
 #[derive(Clone, Debug)]
 pub struct TactileNetwork {
     learned: Learned,
@@ -34,17 +38,17 @@ pub struct TactileNetwork {
     rejection: Option<Rejection>,
 }
 
-/// What is learned besides weights.
+/// Settings and fitted values other than weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Learned {
     recipe: Recipe,
     preparation: Preparation,
-    /// Shapes and temperatures of the stages.
+    /// Shape and temperatures of each stage.
     stage_one: Option<NetworkCard>,
     stage_two: NetworkCard,
 }
 
-/// Everything about a network but its weights.
+/// Shape and temperatures of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct NetworkCard {
     shape: MacroShape,
@@ -63,39 +67,44 @@ impl NetworkCard {
     }
 }
 
-/// One in so many grasps is held back for calibration.
+/// One in this many grasps is held out for calibration.
 const CALIBRATION: usize = 6;
-/// Share of known objects that may be taken for unknown.
+/// Share of known objects that may be rejected as unknown.
 const REJECTED_SHARE: f64 = 0.02;
-/// Grasps from which on the share is more than a part of one grasp.
+/// Fewest held-out grasps of which this share is a whole grasp.
 const LEAST_FOR_REJECTION: usize = (1.0 / REJECTED_SHARE) as usize - 1;
-/// Beliefs drawn to calibrate the rejection for each number of grasps.
+/// Number of beliefs drawn to calibrate the rejection after each number of grasps.
 const DRAWN_BELIEFS: usize = 4000;
-/// Numbers of grasps for which it is calibrated.
+/// Largest number of grasps for which the rejection is calibrated.
 const MOST_GRASPS: usize = 6;
 
 impl TactileNetwork {
-    /// Fits a network as a recipe says.
-    pub fn fit(data: &Dataset, recipe: Recipe, method: &'static str, fitting: &Fitting<'_>) -> Result<Self, FitError> {
-        // Without a part that is held back, every class must still have a grasp.
+    /// Fits a network. `method` is its title in errors.
+    pub fn fit(
+        data: &Dataset,
+        recipe: Recipe,
+        method: &'static str,
+        fitting: &Fitting<'_>,
+    ) -> Result<Self, LearnError> {
+        // Every class must have a grasp outside the held-out part.
         let halves = if recipe.two_stages && !recipe.cross_fitted { 2 } else { 1 };
         check_enough(data, 2 * halves)?;
         if recipe.two_stages && !data.labels.have_properties() {
-            return Err(FitError::NoProperties { method });
+            return Err(LearnError::NoProperties { method });
         }
-        let work = Work { data, recipe: &recipe, fitting, preparation: Preparation::fit(data, recipe.rate_hz) };
-        let pages: Vec<Vec<f32>> = data.examples.iter().map(|e| work.preparation.inputs(&e.grasp)).collect();
-        let everything: Vec<usize> = (0..pages.len()).collect();
+        let work = StageFitting { data, recipe: &recipe, fitting, preparation: Preparation::fit(data, recipe.rate_hz) };
+        let readings: Vec<Vec<f32>> = data.examples.iter().map(|e| work.preparation.inputs(&e.grasp)).collect();
+        let everything: Vec<usize> = (0..readings.len()).collect();
         let (for_one, for_two) = if halves == 2 { work.halves() } else { (everything.clone(), everything) };
         let end_of_one = if recipe.two_stages { if recipe.iterated { 0.4 } else { 0.6 } } else { 0.0 };
         let (stage_one, beside) = if recipe.two_stages {
-            let (network, held_back) = work.fit_stage_one(&pages, &for_one, 0.0..end_of_one)?;
-            let beside = work.beside(&network, &held_back, &pages, &for_two);
+            let (network, held_out) = work.fit_stage_one(&readings, &for_one, 0.0..end_of_one)?;
+            let beside = work.beside(&network, &held_out, &readings, &for_two);
             (Some(network), beside)
         } else {
             (None, vec![Vec::new(); for_two.len()])
         };
-        let (stage_two, alone) = work.fit_stage_two(&pages, &for_two, &beside, &(end_of_one..1.0))?;
+        let (stage_two, alone) = work.fit_stage_two(&readings, &for_two, &beside, &(end_of_one..1.0))?;
         let rejection = calibrated_rejection(&alone, fitting.seed);
         let learned = Learned {
             preparation: work.preparation,
@@ -106,13 +115,12 @@ impl TactileNetwork {
         Ok(Self { learned, stage_one, stage_two, rejection })
     }
 
-    /// Brings a network back from its card and arrays.
-    pub fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, String> {
-        let learned: Learned =
-            serde_json::from_value(card.settings.clone()).map_err(|e| format!("its settings: {e}"))?;
-        learned.recipe.check().map_err(|e| e.to_string())?;
-        if !learned.preparation.is_sound() || learned.preparation.scales.len() != card.channels.len() {
-            return Err("its preparation does not fit its channels".to_owned());
+    /// Restores a network from a model file.
+    pub fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
+        let learned: Learned = card.settings_as()?;
+        learned.recipe.check()?;
+        if !learned.preparation.is_sound(card.channels.len()) {
+            return Err(LoadError::Card { part: "the input scaling" });
         }
         let labels = &card.labels;
         let readings = learned.preparation.width();
@@ -126,7 +134,7 @@ impl TactileNetwork {
         let classes = [labels.classes.len()];
         let stage_two = read_network(arrays, "stage_two", &learned.stage_two, readings + beside + before, &classes)?;
         if stage_two.shape().with_prior != learned.recipe.iterated {
-            return Err("its second stage is not what its recipe says".to_owned());
+            return Err(LoadError::Card { part: "the second stage" });
         }
         Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone() })
     }
@@ -153,9 +161,9 @@ fn read_network(
     card: &NetworkCard,
     inputs: usize,
     groups: &[usize],
-) -> Result<Calibrated, String> {
+) -> Result<Calibrated, LoadError> {
     let shape = &card.shape;
-    let whole = shape.inputs == inputs
+    let valid = shape.inputs == inputs
         && shape.groups == groups
         && (1..=MOST_MEMBERS).contains(&card.members)
         && (1..=4096).contains(&shape.units)
@@ -163,42 +171,42 @@ fn read_network(
         && groups.iter().all(|classes| *classes > 0)
         && card.temperatures.len() == groups.len()
         && card.temperatures.iter().flatten().all(|t| t.is_finite() && *t > 0.0);
-    if !whole {
-        return Err(format!("the sizes of {name} do not fit the model's channels and labels"));
+    if !valid {
+        return Err(LoadError::Card { part: "the shape of the network" });
     }
-    let read = |member: usize| -> Result<MacroLayer, String> {
+    let read = |member: usize| -> Result<MacroLayer, LoadError> {
         let mut values = Vec::new();
         for block in shape.blocks() {
-            values.extend(arrays.get(&array_name(name, member, block.name), &block.shape)?);
+            values.extend(arrays.f32s(&array_name(name, member, block.name), &block.shape)?);
         }
-        MacroLayer::from_values(shape.clone(), values).ok_or("an array does not fit".to_owned())
+        MacroLayer::from_values(shape.clone(), values).ok_or(LoadError::Card { part: "the shape of the network" })
     };
-    let members: Result<Vec<MacroLayer>, String> = (0..card.members).map(read).collect();
+    let members: Result<Vec<MacroLayer>, LoadError> = (0..card.members).map(read).collect();
     Ok(Calibrated { members: members?, temperatures: card.temperatures.clone() })
 }
 
-/// Names an array in a file; those of a single network carry no number.
+/// Name of an array in a file; the first member has no number.
 fn array_name(stage: &str, member: usize, block: &str) -> String {
     if member == 0 { format!("{stage}.{block}") } else { format!("{stage}.{}.{block}", member + 1) }
 }
 
-/// What fitting needs at every stage.
-struct Work<'a> {
+/// Data and settings shared by the stages of a fit.
+struct StageFitting<'a> {
     data: &'a Dataset,
     recipe: &'a Recipe,
     fitting: &'a Fitting<'a>,
     preparation: Preparation,
 }
 
-impl Work<'_> {
-    /// Grasps for the first stage and for the second.
+impl StageFitting<'_> {
+    /// Indices of the grasps for stage one and for stage two.
     fn halves(&self) -> (Vec<usize>, Vec<usize>) {
         let half_of = self.data.folds(2, self.fitting.seed ^ 0x5eed);
         let of = |half: usize| (0..half_of.len()).filter(|k| half_of[*k] == half).collect();
         (of(0), of(1))
     }
 
-    /// Parts among some grasps, as even within each class as can be.
+    /// Part of each of some grasps, stratified by class.
     fn parts(&self, grasps: &[usize], parts: usize) -> Vec<usize> {
         self.data.part(grasps).folds(parts, self.fitting.seed ^ 0xf01d)
     }
@@ -208,32 +216,32 @@ impl Work<'_> {
         MacroShape { inputs, units: self.recipe.units, hidden, groups, with_prior }
     }
 
-    /// How readings, and what stands beside them, are exchanged when left and right are.
+    /// Index of each input's counterpart when left and right are exchanged; `beside` further inputs stay in place.
     fn mirror(&self, beside: usize) -> Option<Vec<usize>> {
         let channels = self.data.channels.len();
         let of_channels = mirror(&self.data.channels).filter(|_| self.recipe.mirror)?;
         let scaled = of_channels.iter().copied();
-        let departures = of_channels.iter().map(|to| to + channels);
-        Some(scaled.chain(departures).chain(2 * channels..2 * channels + beside).collect())
+        let deviations = of_channels.iter().map(|to| to + channels);
+        Some(scaled.chain(deviations).chain(2 * channels..2 * channels + beside).collect())
     }
 
     fn fit_stage_one(
         &self,
-        pages: &[Vec<f32>],
+        readings: &[Vec<f32>],
         grasps: &[usize],
         share: Range<f64>,
-    ) -> Result<(Calibrated, HeldBack), FitError> {
+    ) -> Result<(Calibrated, HeldOut), LearnError> {
         let labels = &self.data.labels;
         let properties = |k: usize| {
             let class = &labels.classes[self.data.examples[k].class];
             Some(vec![class.size?, class.shape?])
         };
-        // The empty hand has neither size nor shape, and nothing to teach here.
-        let taught: Vec<usize> = grasps.iter().copied().filter(|k| properties(*k).is_some()).collect();
-        let book = Book {
+        // The empty hand has neither size nor shape and is left out.
+        let labelled: Vec<usize> = grasps.iter().copied().filter(|k| properties(*k).is_some()).collect();
+        let inputs = StageInputs {
             width: self.preparation.width(),
-            pages: taught.iter().map(|k| pages[*k].clone()).collect(),
-            targets: taught.iter().filter_map(|k| properties(*k)).collect(),
+            sequences: labelled.iter().map(|k| readings[*k].clone()).collect(),
+            targets: labelled.iter().filter_map(|k| properties(*k)).collect(),
             mirror: self.mirror(0),
             readings: self.preparation.width(),
             noise: self.recipe.noise,
@@ -241,33 +249,33 @@ impl Work<'_> {
         };
         let middle = if self.recipe.cross_fitted { 0.5 * (share.start + share.end) } else { share.end };
         let plan = Plan {
-            shape: self.shape(book.width, vec![labels.sizes.len(), labels.shapes.len()], false),
+            shape: self.shape(inputs.width, vec![labels.sizes.len(), labels.shapes.len()], false),
             members: self.recipe.members,
             training: &self.recipe.training,
-            held_back: &self.parts(&taught, CALIBRATION),
+            held_out: &self.parts(&labelled, CALIBRATION),
             seed: self.fitting.seed.wrapping_mul(1000),
             share: share.start..middle,
         };
-        let (network, _) = Calibrated::fit(&plan, &book, self.fitting)?;
-        let mut held_back: HeldBack = vec![None; pages.len()];
+        let (network, _) = Calibrated::fit(&plan, &inputs, self.fitting)?;
+        let mut held_out: HeldOut = vec![None; readings.len()];
         if self.recipe.cross_fitted {
             let plan = Plan { share: middle..share.end, ..plan };
-            let parts = self.parts(&taught, self.recipe.parts);
-            let of_taught = Calibrated::cross_fit(&plan, (&parts, self.recipe.parts), &book, self.fitting)?;
-            for (k, scores) in taught.into_iter().zip(of_taught) {
-                held_back[k] = scores;
+            let parts = self.parts(&labelled, self.recipe.parts);
+            let of_labelled = Calibrated::cross_fit(&plan, (&parts, self.recipe.parts), &inputs, self.fitting)?;
+            for (k, scores) in labelled.into_iter().zip(of_labelled) {
+                held_out[k] = scores;
             }
         }
-        Ok((network, held_back))
+        Ok((network, held_out))
     }
 
-    /// What stage one says of the grasps of stage two after every step, without having seen them: held-back answers
-    /// where it was cross-fitted, its own where they are of the other half, or of things without size and shape.
+    /// Outputs of stage one, `[steps][outputs]`, for each grasp of stage two, by a network not trained on it: held-out
+    /// scores if cross-fitted, otherwise and for objects without size and shape those of the final network.
     fn beside(
         &self,
         network: &Calibrated,
-        held_back: &HeldBack,
-        pages: &[Vec<f32>],
+        held_out: &HeldOut,
+        readings: &[Vec<f32>],
         for_two: &[usize],
     ) -> Vec<Vec<f32>> {
         let (width, outputs) = (self.preparation.width(), network.shape().outputs());
@@ -276,49 +284,49 @@ impl Work<'_> {
             pmfs.iter().flat_map(|pmf| pmf.probabilities().iter().map(|p| *p as f32)).collect()
         };
         let of_grasp = |k: &usize| -> Vec<f32> {
-            match held_back[*k].as_ref().filter(|_| self.recipe.cross_fitted) {
+            match held_out[*k].as_ref().filter(|_| self.recipe.cross_fitted) {
                 Some(scores) => {
                     let rows = scores.chunks_exact(outputs).enumerate();
-                    rows.flat_map(|(step, row)| flat(network.honest(row, step))).collect()
+                    rows.flat_map(|(step, row)| flat(network.pmfs(row, step))).collect()
                 }
                 None => {
                     live.reset();
-                    pages[*k].chunks_exact(width).flat_map(|row| flat(live.step(row, &[]))).collect()
+                    readings[*k].chunks_exact(width).flat_map(|row| flat(live.step(row, &[]))).collect()
                 }
             }
         };
         for_two.iter().map(of_grasp).collect()
     }
 
-    /// Fits the second stage; gives also what held-back networks say of single grasps, with their true classes.
+    /// Fits stage two. Returns also the true class and PMF of each grasp by a network not trained on it.
     fn fit_stage_two(
         &self,
-        pages: &[Vec<f32>],
+        readings: &[Vec<f32>],
         grasps: &[usize],
         beside: &[Vec<f32>],
         share: &Range<f64>,
-    ) -> Result<(Calibrated, Vec<(usize, Pmf)>), FitError> {
-        let readings = self.preparation.width();
+    ) -> Result<(Calibrated, Vec<(usize, Pmf)>), LearnError> {
+        let width = self.preparation.width();
         let classes = self.data.labels.classes.len();
-        let steps = |k: usize| pages[k].len() / readings;
+        let steps = |k: usize| readings[k].len() / width;
         let added = grasps.iter().zip(beside).find(|(k, _)| steps(**k) > 0).map_or(0, |(k, b)| b.len() / steps(*k));
-        let book_with = |beside_them: bool, before: Option<Earlier>| {
+        let inputs_with = |beside_them: bool, before: Option<Earlier>| {
             let (added, extra) = (if beside_them { added } else { 0 }, before.as_ref().map_or(0, |e| e.classes));
-            let page = |(k, beside): (&usize, &Vec<f32>)| -> Vec<f32> {
-                let mut page = Vec::with_capacity(steps(*k) * (readings + added + extra));
+            let sequence = |(k, beside): (&usize, &Vec<f32>)| -> Vec<f32> {
+                let mut sequence = Vec::with_capacity(steps(*k) * (width + added + extra));
                 for step in 0..steps(*k) {
-                    page.extend_from_slice(&pages[*k][step * readings..(step + 1) * readings]);
-                    page.extend_from_slice(&beside[step * added..(step + 1) * added]);
-                    page.extend(std::iter::repeat_n(1.0 / extra.max(1) as f32, extra));
+                    sequence.extend_from_slice(&readings[*k][step * width..(step + 1) * width]);
+                    sequence.extend_from_slice(&beside[step * added..(step + 1) * added]);
+                    sequence.extend(std::iter::repeat_n(1.0 / extra.max(1) as f32, extra));
                 }
-                page
+                sequence
             };
-            Book {
-                width: readings + added + extra,
-                pages: grasps.iter().zip(beside).map(page).collect(),
+            StageInputs {
+                width: width + added + extra,
+                sequences: grasps.iter().zip(beside).map(sequence).collect(),
                 targets: grasps.iter().map(|k| vec![self.data.examples[*k].class]).collect(),
                 mirror: self.mirror(added + extra),
-                readings,
+                readings: width,
                 noise: self.recipe.noise,
                 earlier: before,
             }
@@ -327,42 +335,41 @@ impl Work<'_> {
         let refining = recipe.refining();
         let at = |share_of_it: f64| share.start + share_of_it * (share.end - share.start);
         let seed = self.fitting.seed.wrapping_mul(1000) + 500;
-        // On all data, stage two first learns from readings alone, and then what stage one adds to them; as in the
-        // paper, it learns from both at once.
-        let at_once = book_with(!recipe.cross_fitted, None);
+        // Cross-fitted, stage two is trained on readings alone and then fine-tuned with the outputs of stage one; otherwise
+        // it is trained on both at once, as in the paper.
+        let at_once = inputs_with(!recipe.cross_fitted, None);
         let plan = Plan {
             shape: self.shape(at_once.width, vec![classes], false),
             members: recipe.members,
             training: &recipe.training,
-            held_back: &self.parts(grasps, CALIBRATION),
+            held_out: &self.parts(grasps, CALIBRATION),
             seed,
             share: at(0.0)..at(if recipe.iterated { 0.45 } else { 0.9 }),
         };
-        let (mut network, held_back) = Calibrated::fit(&plan, &at_once, self.fitting)?;
+        let (mut network, held_out) = Calibrated::fit(&plan, &at_once, self.fitting)?;
         let complete = if recipe.cross_fitted && added > 0 {
-            let book = book_with(true, None);
+            let inputs = inputs_with(true, None);
             network.change(|layer| layer.with_inputs(added));
-            network.refine(&book, &refining, seed + 50, plan.share.end..plan.share.end + 0.05, self.fitting)?;
-            book
+            network.refine(&inputs, &refining, seed + 50, plan.share.end..plan.share.end + 0.05, self.fitting)?;
+            inputs
         } else {
             at_once.clone()
         };
         let truth = |n: usize| self.data.examples[grasps[n]].class;
-        let last_of = |network: &Calibrated, held_back: &HeldBack| -> Vec<(usize, Pmf)> {
+        let last_of = |network: &Calibrated, held_out: &HeldOut| -> Vec<(usize, Pmf)> {
             let last = |n: usize| {
-                let scores = held_back[n].as_ref()?;
+                let scores = held_out[n].as_ref()?;
                 let steps = scores.len() / classes;
                 let row = scores.get(steps.checked_sub(1)? * classes..)?;
-                network.honest(row, steps - 1).pop()
+                network.pmfs(row, steps - 1).pop()
             };
             (0..grasps.len()).filter_map(|n| Some((n, last(n)?))).collect()
         };
         let named = |alone: Vec<(usize, Pmf)>| alone.into_iter().map(|(n, pmf)| (truth(n), pmf)).collect();
         if !recipe.iterated {
-            return Ok((network.clone(), named(last_of(&network, &held_back))));
+            return Ok((network.clone(), named(last_of(&network, &held_out))));
         }
-        // The mock networks of the paper (section V-E): what they say of grasps they have not seen stands for the
-        // grasps that came before.
+        // The mock networks of the paper (section V-E): their PMFs of held-out grasps stand for earlier grasps.
         let mock = Plan {
             shape: self.shape(complete.width, vec![classes], false),
             share: at(0.5)..at(0.95),
@@ -379,16 +386,16 @@ impl Work<'_> {
             same[*n] = of_class[truth(*n)].iter().copied().filter(|other| *other != place).collect();
         }
         let earlier = Earlier { alone: alone.iter().map(|(_, pmf)| pmf.clone()).collect(), same, classes };
-        // It begins as the product of experts, and learns where to depart from it.
+        // The network starts as the product of experts and learns corrections.
         let gain = network.last_temperature();
         network.change(|layer| layer.with_inputs(classes).with_prior(gain));
-        network.refine(&book_with(true, Some(earlier)), &refining, seed + 100, at(0.95)..at(1.0), self.fitting)?;
+        network.refine(&inputs_with(true, Some(earlier)), &refining, seed + 100, at(0.95)..at(1.0), self.fitting)?;
         Ok((network, named(alone)))
     }
 }
 
-/// Draws beliefs of several held-back grasps of the same object, and finds the agreement that all but a share of them
-/// reach. Among fewer grasps than [`LEAST_FOR_REJECTION`] nobody can tell where that share begins.
+/// Draws beliefs after several held-out grasps of the same object and finds the agreement that all but a share of them
+/// reach. `None` for fewer grasps than [`LEAST_FOR_REJECTION`].
 fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Option<Rejection> {
     if alone.len() < LEAST_FOR_REJECTION {
         return None;
@@ -400,7 +407,7 @@ fn calibrated_rejection(alone: &[(usize, Pmf)], seed: u64) -> Option<Rejection> 
         of_class[*class].push(pmf);
     }
     of_class.retain(|pmfs| !pmfs.is_empty());
-    // What is as sure as it takes to stop is no unknown object, however sure everything was that was seen.
+    // A belief that reaches the default confidence threshold is never unknown, however confident the held-out grasps were.
     let certain = 2.0 * StopRule::default().threshold.ln();
     let least = (1..=MOST_GRASPS)
         .map(|grasps| {
@@ -443,7 +450,7 @@ impl Recogniser for TactileNetwork {
             for (member, layer) in network.members.iter().enumerate() {
                 for block in layer.shape().blocks() {
                     let values = &layer.values()[block.place.clone()];
-                    arrays.put(array_name(name, member, block.name), &block.shape, values);
+                    arrays.put(array_name(name, member, block.name), &block.shape, values.to_vec());
                 }
             }
         }
@@ -468,7 +475,7 @@ impl Recogniser for TactileNetwork {
     }
 }
 
-/// Both stages, reading sample by sample.
+/// Both stages, one sample at a time.
 struct LiveTactile {
     binner: Binner,
     stage_one: Option<LiveCalibrated>,
@@ -486,7 +493,7 @@ impl LiveTactile {
         self
     }
 
-    fn answer(&mut self) -> Verdict {
+    fn verdict(&mut self) -> Verdict {
         let properties = self.stage_one.as_mut().and_then(|stage_one| {
             let readings = self.row.len();
             let pmfs = stage_one.step(&self.row[..readings], &[]);
@@ -501,7 +508,7 @@ impl LiveTactile {
         }
         let pmf = self.stage_two.step(&self.row, &self.log_before).pop();
         let pmf = pmf.unwrap_or_else(|| self.before.clone());
-        // A network that is not iterated knows nothing of earlier grasps: they count as independent observations.
+        // Without feedback, earlier grasps count as independent observations.
         let pmf = if self.iterated { pmf } else { self.before.times(&pmf) };
         let verdict = Verdict { pmf, properties };
         self.latest = Some(verdict.clone());
@@ -529,7 +536,7 @@ impl LiveRecogniser for LiveTactile {
         let inputs = self.binner.push(t, row)?;
         self.row.clear();
         self.row.extend_from_slice(inputs);
-        Some(self.answer())
+        Some(self.verdict())
     }
 
     fn finish(&mut self) -> Option<Verdict> {
@@ -537,7 +544,7 @@ impl LiveRecogniser for LiveTactile {
             Some(inputs) => {
                 self.row.clear();
                 self.row.extend_from_slice(inputs);
-                Some(self.answer())
+                Some(self.verdict())
             }
             None => self.latest.clone(),
         }
@@ -546,8 +553,8 @@ impl LiveRecogniser for LiveTactile {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::Belief;
     use super::*;
+    use crate::belief::Belief;
 
     fn rejects(rejection: &Rejection, p: f64) -> bool {
         let pmf = Pmf::from_weights([p, 1.0 - p, 0.0]);
@@ -557,11 +564,11 @@ mod tests {
     }
 
     #[test]
-    fn few_grasps_teach_nothing_of_unknown_objects() {
+    fn few_grasps_give_no_rejection_threshold() {
         let sure = |class: usize| (class, Pmf::from_weights([0, 1, 2].map(|k| if k == class { 1.0 } else { 1e-6 })));
         let of = |grasps: usize| -> Vec<(usize, Pmf)> { (0..grasps).map(|n| sure(n % 3)).collect() };
         assert_eq!(calibrated_rejection(&of(LEAST_FOR_REJECTION - 1), 1), None);
-        // All that was seen was surer than a model ever is of real grasps: what it takes to stop is enough still.
+        // Held-out grasps were more confident than real ones ever are; the stop threshold still suffices.
         let rejection = calibrated_rejection(&of(LEAST_FOR_REJECTION), 1).expect("enough");
         assert!(!rejects(&rejection, 0.999) && !rejects(&rejection, 0.9));
         assert!(rejects(&rejection, 0.5));

@@ -1,4 +1,4 @@
-//! The kernel against finite differences, against candle's own autograd, and against itself step by step.
+//! Comparison of the kernel with finite differences, with candle's autograd, and of live steps with whole sequences.
 
 use super::macro_layer::{Batch, LiveMacroLayer, MacroLayer, MacroShape, Pass, ReadOut, Regular};
 use candle_core::{DType, Device, Result, Tensor, Var};
@@ -136,7 +136,7 @@ fn loss_and_gradients_agree_with_candle() -> Result<()> {
 }
 
 #[test]
-fn single_steps_say_what_whole_sequences_say() {
+fn live_steps_agree_with_whole_sequences() {
     for shape in shapes() {
         let batch = batch(&shape, 5);
         let layer = MacroLayer::new(shape.clone(), &mut random(6));
@@ -164,7 +164,7 @@ fn single_steps_say_what_whole_sequences_say() {
 fn gradients_of_long_sequences_do_not_become_subnormal() {
     let shape = MacroShape { inputs: 2, units: 8, hidden: None, groups: vec![3], with_prior: false };
     let mut layer = MacroLayer::new(shape.clone(), &mut random(7));
-    // Forget gates that close: what the last step teaches dies out quickly on its way back.
+    // Closed forget gates: the gradient of the last step decays quickly.
     let bias = shape.blocks()[2].place.clone();
     layer.values_mut()[bias.start + shape.units..bias.start + 2 * shape.units].fill(-3.0);
     let steps = 300;
@@ -183,7 +183,7 @@ fn gradients_of_long_sequences_do_not_become_subnormal() {
 }
 
 #[test]
-fn dropout_leaves_out_a_share_and_keeps_the_mean() {
+fn dropout_keeps_the_mean_loss() {
     let shape = MacroShape { inputs: 3, units: 6, hidden: Some(50), groups: vec![4], with_prior: false };
     let layer = MacroLayer::new(shape.clone(), &mut random(8));
     let batch = batch(&shape, 9);

@@ -1,10 +1,10 @@
-//! Agreement with scikit-learn 1.9.1 and imbalanced-learn 0.14.2 on a made data set. `peer/peers.py` makes the same
-//! rows and has printed every number below.
+//! Agreement with scikit-learn 1.9.1 and imbalanced-learn 0.14.2 on a synthetic data set. `scikit_learn_tests.py`
+//! makes the same rows and printed every number below.
 
 use super::*;
 use std::ops::Range;
 
-const COLUMNS: usize = 10;
+pub(super) const COLUMNS: usize = 10;
 pub(super) const CLASSES: usize = 6;
 
 /// Six overlapping classes, from common to rare, each of two clusters; the last two columns are noise. All integers.
@@ -53,7 +53,7 @@ impl Data {
         (0..self.labels.len()).map(|row| greatest(&predict(self.row(row)))).collect()
     }
 
-    /// The share of each class's rows that is recognised.
+    /// Recall of each class.
     pub(super) fn recalls(&self, predict: impl Fn(&[f32]) -> Vec<f64>) -> [f64; CLASSES] {
         let (mut right, mut of) = ([0.0; CLASSES], [0.0; CLASSES]);
         for (label, predicted) in self.labels.iter().zip(self.predicted(predict)) {
@@ -63,7 +63,7 @@ impl Data {
         std::array::from_fn(|class| right[class] / of[class])
     }
 
-    /// Their mean.
+    /// Mean recall over classes.
     pub(super) fn macro_recall(&self, predict: impl Fn(&[f32]) -> Vec<f64>) -> f64 {
         self.recalls(predict).iter().sum::<f64>() / CLASSES as f64
     }
@@ -82,15 +82,15 @@ fn test() -> Data {
     Data::new(360..2360)
 }
 
-/// Irregular, or many columns would part the rows of a node equally well.
+/// Irregular weights: with equal ones many columns would split a node equally well.
 fn weights() -> Vec<f64> {
     (0..360).map(|row| (512 + hash(row) % 1024) as f64).collect()
 }
 
 #[test]
-fn trees_predict_exactly_alike() -> Result<(), FitError> {
+fn trees_predict_exactly_alike() -> Result<(), LearnError> {
     let (train, test, weights) = (train(), test(), weights());
-    let print = |examples: &Examples<'_>, tree: TreeSettings| -> Result<u64, FitError> {
+    let print = |examples: &Examples<'_>, tree: TreeSettings| -> Result<u64, LearnError> {
         let forest = Forest::fit(examples, &ForestSettings { tree, ..ForestSettings::decision_tree() })?;
         Ok(fingerprint(&test.predicted(|row| forest.predict(&row[..examples.table.columns]))))
     };
@@ -106,7 +106,7 @@ fn trees_predict_exactly_alike() -> Result<(), FitError> {
 }
 
 #[test]
-fn gradient_boosting_predicts_exactly_alike() -> Result<(), FitError> {
+fn gradient_boosting_predicts_exactly_alike() -> Result<(), LearnError> {
     let (train, test, weights) = (train(), test(), weights());
     let mut settings = GradientBoostingSettings { rounds: 20, ..GradientBoostingSettings::default() };
     settings.tree.min_leaf = 10;
@@ -119,14 +119,14 @@ fn gradient_boosting_predicts_exactly_alike() -> Result<(), FitError> {
     Ok(())
 }
 
-/// Where chance plays a part, the mean macro recall of a few seeds on unseen rows agrees with that of twenty seeds of
-/// the peer. The band is four deviations of the difference of those means, and no less than a point.
+/// Compares the mean macro recall of a few seeds on unseen rows with that of twenty seeds of the peer. The band is four
+/// standard deviations of the difference, at least 0.01.
 fn agree(
     name: &str,
     peer: f64,
     deviation: f64,
-    recall_of: impl Fn(u64) -> Result<f64, FitError>,
-) -> Result<(), FitError> {
+    recall_of: impl Fn(u64) -> Result<f64, LearnError>,
+) -> Result<(), LearnError> {
     const SEEDS: u64 = 4;
     let mut ours = 0.0;
     for seed in 0..SEEDS {
@@ -139,7 +139,7 @@ fn agree(
 }
 
 #[test]
-fn forests_are_as_good() -> Result<(), FitError> {
+fn forests_are_as_good() -> Result<(), LearnError> {
     let (train, test) = (train(), test());
     let recall = |settings: &ForestSettings| {
         Forest::fit(&train.examples(), settings).map(|forest| test.macro_recall(|row| forest.predict(row)))
@@ -157,7 +157,7 @@ fn forests_are_as_good() -> Result<(), FitError> {
 }
 
 #[test]
-fn boosting_is_as_good() -> Result<(), FitError> {
+fn boosting_is_as_good() -> Result<(), LearnError> {
     let (train, test) = (train(), test());
     agree("gradient boosting", 0.5955, 0.0094, |seed| {
         let settings = GradientBoostingSettings { rounds: 50, subsample: 0.5, seed, ..Default::default() };

@@ -1,4 +1,4 @@
-"""Prints the numbers that peers.rs compares with; needs scikit-learn 1.9.1 and imbalanced-learn 0.14.2."""
+"""Prints the numbers that scikit_learn_tests.rs compares with; needs scikit-learn 1.9.1 and imbalanced-learn 0.14.2."""
 
 import numpy as np
 from imblearn.ensemble import RUSBoostClassifier
@@ -39,7 +39,7 @@ def fingerprint(labels):
 
 x, y = data(range(360))
 tx, ty = data(range(360, 2360))
-# Irregular, or many columns would part the rows of a node equally well.
+# Irregular, or many columns would split a node equally well.
 weights = np.array([512.0 + hash64(row) % 1024 for row in range(len(y))])
 
 

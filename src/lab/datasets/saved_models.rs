@@ -1,28 +1,28 @@
-//! Where trained models are kept, and which there are.
+//! Folder of trained models.
 
 use palpate_learn::ModelCard;
 use palpate_store::Store;
 use std::path::{Path, PathBuf};
 
-/// Where trained models are kept: beside the store.
+/// Folder of trained models, beside the default store.
 pub fn models_folder() -> PathBuf {
     let store = Store::default_path();
     store.parent().map_or_else(|| PathBuf::from("models"), |folder| folder.join("models"))
 }
 
-/// A model on disk, as lists show it.
+/// Model file with its description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedModel {
-    /// Its file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What it is, from the card beside it; or that there is none.
+    /// Summary from the card beside it; a note if there is none.
     pub about: String,
 }
 
-/// Models that are listed at most; the newest come first.
+/// Largest number of models listed.
 const MOST_LISTED: usize = 50;
 
-/// The models in a folder, newest first; none where there is no such folder.
+/// Lists the models in a folder, newest first; empty if the folder does not exist.
 pub fn saved_models(folder: &Path) -> Vec<SavedModel> {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_model = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "safetensors");
@@ -31,12 +31,11 @@ pub fn saved_models(folder: &Path) -> Vec<SavedModel> {
         .filter(|(_, path)| is_model(path))
         .collect();
     found.sort_by(|a, b| b.cmp(a));
-    let about =
-        |path: &Path| ModelCard::beside(path).map_or_else(|_| "no card beside it".to_owned(), |c| c.described());
+    let about = |path: &Path| ModelCard::beside(path).map_or_else(|_| "no card".to_owned(), |c| c.described());
     found.into_iter().take(MOST_LISTED).map(|(_, path)| SavedModel { about: about(&path), path }).collect()
 }
 
-/// A file for a new model of a method: named after the method and a time as the store writes it, and not there yet.
+/// Path for a new model, named after its method and a time in the store's format; does not exist yet.
 pub fn new_model_path(folder: &Path, method: &str, now: &str) -> PathBuf {
     // 2026-11-21T15:36:00.123Z is 2026-11-21-153600.
     let date: String = now.chars().take(19).filter(|c| *c != ':').map(|c| if c == 'T' { '-' } else { c }).collect();
@@ -53,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_tell_method_and_time_and_are_free() -> std::io::Result<()> {
+    fn new_paths_have_method_and_time_and_are_unused() -> std::io::Result<()> {
         let folder = tempfile::tempdir()?;
         let now = "2026-11-21T15:36:00.123Z";
         let first = new_model_path(folder.path(), "knn", now);
@@ -63,7 +62,7 @@ mod tests {
         assert!(second.ends_with("knn-2026-11-21-153600-2.safetensors"), "{second:?}");
         std::fs::write(folder.path().join("notes.txt"), "x")?;
         let found = saved_models(folder.path());
-        assert!(found.len() == 1 && found[0].path == first && found[0].about == "no card beside it", "{found:?}");
+        assert!(found.len() == 1 && found[0].path == first && found[0].about == "no card", "{found:?}");
         assert_eq!(saved_models(&folder.path().join("gone")), []);
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Data sets out of the store: which trials, seen through which sensors.
+//! Data sets from the store: a query for trials, and the sensors through which simulated trials are read.
 
 use palpate_learn::{Class, DataCard, Dataset, Example, Labels, Sequence};
 use palpate_sim::gripper::{Gripper, Phase};
@@ -13,49 +13,49 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Through which sensors simulated trials are seen. Imported trials bring their own channels.
+/// Sensors through which simulated trials are read. Imported trials have their own channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct View {
+pub struct SensorView {
     /// Name of the sensor layout: `C1+F`.
     pub layout: String,
-    /// Perfect sensors, or such as the real gripper has.
+    /// Sensor model: ideal, or like those of the real gripper.
     pub sensors: SensorModel,
 }
 
-impl Default for View {
+impl Default for SensorView {
     fn default() -> Self {
         Self { layout: "C1+F".to_owned(), sensors: SensorModel::Virtual }
     }
 }
 
-/// Which trials make a data set.
+/// Query for the trials of a data set.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Source {
-    /// Only trials of this collection, by its name or the beginning of it.
+pub struct DatasetQuery {
+    /// Only trials of collections whose name starts with this.
     pub collection: Option<String>,
     /// Only trials of this rig: [`BOARD_RIG`] for those of the real gripper.
     pub rig: Option<String>,
     /// Only these objects; all where the list is empty.
     pub objects: Vec<String>,
-    /// Leave the empty hand out: it is never confused with anything and would flatter a table.
+    /// True to leave out the empty hand, which is never confused with an object and would raise mean scores.
     pub without_empty: bool,
-    /// At most this many trials of each object, oldest first.
+    /// Largest number of trials of each object, oldest first.
     pub most_of_each: Option<usize>,
 }
 
-/// Why there is no data set.
+/// Reason why there is no data set.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The store.
+    /// The store failed.
     #[error("{cause}")]
     Store {
-        /// What it says.
+        /// Error of the store.
         cause: StoreError,
     },
-    /// A layout that does not fit.
+    /// The sensor layout does not fit.
     #[error("{cause}")]
     Layout {
-        /// What is wrong.
+        /// Error of the layout.
         cause: LayoutError,
     },
     /// A trial's scene that cannot be read.
@@ -63,41 +63,38 @@ pub enum DatasetError {
     Scene {
         /// The trial.
         id: TrialId,
-        /// What is wrong.
+        /// Error of the parser.
         cause: String,
     },
-    /// No trial fits.
-    #[error(
-        "no trial in the store fits{about}; `palpate collect` makes some, `palpate trials list` shows what is there"
-    )]
+    /// No trial matches.
+    #[error("no trial in the store matches{about}; `palpate collect` makes trials, `palpate trials list` lists them")]
     Nothing {
-        /// What was asked for.
+        /// The query.
         about: String,
     },
-    /// Trials fit, but none that may be learned from.
+    /// Trials match, but none is sound.
     #[error(
-        "no trial that fits{about} may be learned from: {left_out} did not stay finite or did not converge; `palpate \
-         trials show` says where"
+        "no matching trial{about} is usable: {left_out} diverged or did not converge; `palpate trials show` says where"
     )]
     Unsound {
-        /// What was asked for.
+        /// The query.
         about: String,
-        /// How many fit.
+        /// Matching trials.
         left_out: usize,
     },
-    /// Trials that cannot stand in one data set.
+    /// Trials with different channels.
     #[error(
         "the trials do not have the same channels: trial {first} has {first_channels}, trial {other} has \
          {other_channels}; choose one kind with --collection"
     )]
     Mixed {
-        /// A trial.
+        /// First trial.
         first: TrialId,
         /// Its channels.
         first_channels: String,
-        /// Another one.
+        /// Second trial.
         other: TrialId,
-        /// And its channels.
+        /// Its channels.
         other_channels: String,
     },
     /// A trial of the real gripper whose channels cannot be derived.
@@ -105,31 +102,31 @@ pub enum DatasetError {
     Uncalibrated {
         /// The trial.
         id: TrialId,
-        /// What was wanted.
+        /// Sensor layout.
         layout: String,
-        /// What is missing, in words.
+        /// Missing parts.
         why: String,
     },
     /// Trials of the real gripper, none of which can be derived.
     #[error(
-        "none of the {left_out} trials of the real gripper can be read: {why}; `palpate calibrate list` shows which parts are \
-         calibrated"
+        "none of the {left_out} trials of the real gripper is calibrated: {why}; `palpate calibrate list` lists the \
+         calibrations"
     )]
     NoneCalibrated {
-        /// How many fit.
+        /// Matching trials.
         left_out: usize,
-        /// What is missing of the first, in words.
+        /// Missing parts of the first trial.
         why: String,
     },
-    /// An object in the list that no trial is of.
-    #[error("no trial in the store is of \"{object}\"; `palpate trials list` shows what is there")]
+    /// An object of the query without trials.
+    #[error("the store has no trial of \"{object}\"; `palpate trials list` lists the trials")]
     NoSuchObject {
         /// The object.
         object: String,
     },
 }
 
-/// The sixteen with their sizes and shapes, and the empty hand with neither.
+/// Labels of the sixteen built-in objects, and of the empty hand, which has neither size nor shape.
 pub fn labels_of_catalogue() -> Labels {
     let all = catalogue().iter().map(|built_in| {
         let class = built_in.class();
@@ -138,9 +135,9 @@ pub fn labels_of_catalogue() -> Labels {
     labels(&all.chain([(EMPTY.to_owned(), None)]).collect())
 }
 
-/// Labels from names and, where known, their size and shape.
+/// Labels from class names and, where known, size and shape.
 fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
-    // The paper's words come first, in its order; others follow by name.
+    // The paper's terms come first, in its order; others follow by name.
     let listed = |known: &[&str], pick: &dyn Fn(&(String, String)) -> String| -> Vec<String> {
         let found: BTreeSet<String> = named.values().flatten().map(pick).collect();
         let mut list: Vec<String> = known.iter().filter(|w| found.contains(**w)).map(|w| (*w).to_owned()).collect();
@@ -161,7 +158,7 @@ fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
     Labels { classes, sizes, shapes }
 }
 
-impl Source {
+impl DatasetQuery {
     fn fits(&self, row: &TrialRow) -> bool {
         let in_collection =
             |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
@@ -186,26 +183,26 @@ impl Source {
         about
     }
 
-    /// Reads the data set. Trials without a label are no part of it; those that did not stay finite or did not converge are left
-    /// out and counted. `tell` hears how many of how many trials have been read.
+    /// Reads the data set of all labelled trials that match. Trials that diverged or did not converge are left out and
+    /// counted. `progress` gets the number of trials read and their total.
     pub fn read(
         &self,
         store: &Store,
-        view: &View,
-        tell: &mut dyn FnMut(usize, usize),
+        view: &SensorView,
+        progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
         let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
-        // Nobody has said yet what they are of.
+        // Unlabelled trials.
         rows.retain(|row| !row.object.is_empty());
-        self.read_rows(store, &rows, view, tell)
+        self.read_rows(store, &rows, view, progress)
     }
 
-    /// Reads one trial as a data set of its own, labelled or not.
-    pub fn read_trial(&self, store: &Store, id: TrialId, view: &View) -> Result<Dataset, DatasetError> {
+    /// Reads one trial, labelled or not, as a data set.
+    pub fn read_trial(&self, store: &Store, id: TrialId, view: &SensorView) -> Result<Dataset, DatasetError> {
         let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
         rows.retain(|row| row.id == id);
         if rows.is_empty() {
-            // Loading it says why it cannot be had.
+            // Loading returns the reason.
             store.load(id).map_err(|cause| DatasetError::Store { cause })?;
         }
         self.read_rows(store, &rows, view, &mut |_, _| ())
@@ -215,8 +212,8 @@ impl Source {
         &self,
         store: &Store,
         rows: &[TrialRow],
-        view: &View,
-        tell: &mut dyn FnMut(usize, usize),
+        view: &SensorView,
+        progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
         let mut met: BTreeMap<String, usize> = BTreeMap::new();
         let mut few_enough = |row: &&TrialRow| {
@@ -243,9 +240,9 @@ impl Source {
         let mut read = Vec::new();
         let (mut origins, mut uncalibrated, mut missing) = (BTreeSet::new(), 0, String::new());
         for (k, row) in rows.iter().enumerate() {
-            tell(k, rows.len());
+            progress(k, rows.len());
             let (signals, origin) = match signals_of(store, row, view) {
-                // Counts of a board mean nothing without a calibration; others may have one.
+                // Skip boards without a calibration, unless it is the only trial.
                 Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
                     if uncalibrated == 0 {
                         missing = why;
@@ -284,14 +281,14 @@ impl Source {
     }
 }
 
-/// How a trial came about: its pose preset, and whether its object was free.
+/// Origin of a trial: simulated with a pose preset and a free or fixed object, or recorded.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Origin {
     Simulated { preset: Option<&'static str>, fixed: bool },
     Recorded,
 }
 
-fn card(origins: &BTreeSet<Origin>, view: &View, collections: Vec<String>, grasps: usize) -> DataCard {
+fn card(origins: &BTreeSet<Origin>, view: &SensorView, collections: Vec<String>, grasps: usize) -> DataCard {
     let simulated: Vec<(Option<&'static str>, bool)> = origins
         .iter()
         .filter_map(|origin| match origin {
@@ -326,8 +323,8 @@ fn known_properties(row: &TrialRow) -> Option<(String, String)> {
     row.properties.clone().or_else(of_catalogue)
 }
 
-/// What is read of a trial: its own channels where it was imported, those of a view where it was simulated.
-fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Origin), DatasetError> {
+/// Reads the signals of a trial: its own channels if imported, calibrated ones if recorded, those of the view if simulated.
+fn signals_of(store: &Store, row: &TrialRow, view: &SensorView) -> Result<(Signals, Origin), DatasetError> {
     if let Some(signals) = store.readings(row.id).map_err(|cause| DatasetError::Store { cause })? {
         return Ok((signals, Origin::Recorded));
     }
@@ -343,12 +340,10 @@ fn signals_of(store: &Store, row: &TrialRow, view: &View) -> Result<(Signals, Or
     Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
 }
 
-/// What a real gripper felt, by the calibrations of its parts, in the channels of the layout.
-fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, DatasetError> {
+/// Reads the signals of a real gripper, calibrated, in the channels of the layout.
+fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<Signals, DatasetError> {
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
-    // One that says it is of a board, and has nothing of it, has nothing at all.
-    let read =
-        read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "nothing was heard of its board".to_owned() })?;
+    let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
     let channels = layout.channels(&Gripper::default()).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
@@ -359,15 +354,16 @@ fn board_signals(store: &Store, id: TrialId, view: &View) -> Result<Signals, Dat
     })
 }
 
-impl View {
-    /// What a simulated trial looks like through these sensors, from its start to the end of the hold. The release is
-    /// left out: it tells classes apart only by what integrators and dampers leave behind.
+impl SensorView {
+    /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it differs
+    /// between classes only by residues of integrators and dampers.
     pub fn signals(&self, trial: &Trial, scene: &Scene) -> Result<Signals, LayoutError> {
         let layout = SensorLayout::named(&self.layout)?;
         let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation)?;
         let clean = sensors.signals(trial);
         let end = trial.frames.iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
-        // Poses of different objects may share a seed; their noise should not.
+        // Poses of different objects may share a seed; their noise must not. FNV-1a of the name: changing it would change
+        // every data set with noisy sensors.
         let seed = trial
             .info
             .object
@@ -377,7 +373,7 @@ impl View {
     }
 }
 
-/// Signals in the form recognisers take.
+/// Converts signals to the input of recognisers.
 pub fn sequence_of(signals: &Signals) -> Sequence {
     Sequence { t_s: signals.t_s.iter().map(|t| *t as f32).collect(), values: signals.values.clone() }
 }
@@ -387,8 +383,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shipped_model_knows_the_sixteen_and_the_empty_hand() {
-        let model = palpate_learn::shipped_model().expect("whole");
+    fn the_shipped_model_knows_all_objects_and_the_empty_hand() {
+        let model = palpate_learn::shipped_model().expect("valid");
         assert_eq!(model.card.labels, labels_of_catalogue());
     }
 }

@@ -1,0 +1,262 @@
+//! Named arrays of numbers: what a recogniser has learned, and the tensors of a model file.
+//!
+//! Arrays from a file are untrusted. Every accessor checks type, shape and finiteness, so that a recogniser built from
+//! them cannot panic later.
+
+use std::collections::BTreeMap;
+
+/// Numbers of one type.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Numbers {
+    /// Single precision.
+    F32(Vec<f32>),
+    /// Double precision.
+    F64(Vec<f64>),
+    /// Counts and indices.
+    I64(Vec<i64>),
+}
+
+impl Numbers {
+    /// Type name: `f32`, `f64` or `i64`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::F32(_) => "f32",
+            Self::F64(_) => "f64",
+            Self::I64(_) => "i64",
+        }
+    }
+
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::F64(values) => values.len(),
+            Self::I64(values) => values.len(),
+        }
+    }
+
+    /// True without elements.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Index of the first element that is NaN or infinite.
+    fn first_not_finite(&self) -> Option<usize> {
+        match self {
+            Self::F32(values) => values.iter().position(|x| !x.is_finite()),
+            Self::F64(values) => values.iter().position(|x| !x.is_finite()),
+            Self::I64(_) => None,
+        }
+    }
+}
+
+/// Dense array, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Length of each axis; the product is the number of elements.
+    pub shape: Vec<usize>,
+    /// The elements.
+    pub numbers: Numbers,
+}
+
+/// Arrays by name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arrays(pub BTreeMap<String, Array>);
+
+/// Reason for refusing an array of a model file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ArrayError {
+    /// A required array is absent.
+    #[error("array \"{name}\" is missing")]
+    Missing {
+        /// Array name.
+        name: String,
+    },
+    /// An array that the method does not use.
+    #[error("array \"{name}\" of shape {found:?} is not part of this method")]
+    Unexpected {
+        /// Array name.
+        name: String,
+        /// Its shape.
+        found: Vec<usize>,
+    },
+    /// Wrong element type.
+    #[error("array \"{name}\" holds {found} instead of {expected}")]
+    Kind {
+        /// Array name.
+        name: String,
+        /// Type in the file.
+        found: String,
+        /// Required type.
+        expected: &'static str,
+    },
+    /// Wrong shape.
+    #[error("array \"{name}\" has shape {found:?} instead of {expected:?}")]
+    Shape {
+        /// Array name.
+        name: String,
+        /// Shape in the file.
+        found: Vec<usize>,
+        /// Required shape.
+        expected: Vec<usize>,
+    },
+    /// Shape that contradicts another array.
+    #[error("array \"{name}\" has shape {found:?}, but array \"{other}\" requires {expected:?}")]
+    Mismatch {
+        /// Array name.
+        name: String,
+        /// Shape in the file.
+        found: Vec<usize>,
+        /// Array that determines the shape.
+        other: &'static str,
+        /// Shape it requires.
+        expected: Vec<usize>,
+    },
+    /// NaN or infinite element.
+    #[error("element {index} of array \"{name}\" is not finite")]
+    NotFinite {
+        /// Array name.
+        name: String,
+        /// Index among the elements.
+        index: usize,
+    },
+    /// Element out of range.
+    #[error("element {index} of array \"{name}\" must be {expected}")]
+    Value {
+        /// Array name.
+        name: String,
+        /// Index among the elements.
+        index: usize,
+        /// Allowed values.
+        expected: &'static str,
+    },
+}
+
+impl Arrays {
+    /// Adds single-precision numbers of a shape.
+    pub fn put(&mut self, name: impl Into<String>, shape: &[usize], values: Vec<f32>) {
+        assert_eq!(shape.iter().product::<usize>(), values.len(), "elements of shape {shape:?}");
+        self.0.insert(name.into(), Array { shape: shape.to_vec(), numbers: Numbers::F32(values) });
+    }
+
+    /// Adds a vector of double-precision numbers.
+    pub fn put_f64(&mut self, name: impl Into<String>, values: Vec<f64>) {
+        self.0.insert(name.into(), Array { shape: vec![values.len()], numbers: Numbers::F64(values) });
+    }
+
+    /// Adds a vector of integers.
+    pub fn put_integers(&mut self, name: impl Into<String>, values: impl IntoIterator<Item = usize>) {
+        self.put_signed(name, values.into_iter().map(|value| value as i64).collect());
+    }
+
+    /// Adds a vector of integers that may be negative.
+    pub fn put_signed(&mut self, name: impl Into<String>, values: Vec<i64>) {
+        self.0.insert(name.into(), Array { shape: vec![values.len()], numbers: Numbers::I64(values) });
+    }
+
+    /// Number of elements of all arrays.
+    pub fn elements(&self) -> usize {
+        self.0.values().map(|array| array.numbers.len()).sum()
+    }
+
+    /// Finite single-precision numbers of a shape.
+    pub fn f32s(&self, name: &str, shape: &[usize]) -> Result<&[f32], ArrayError> {
+        match &self.of_shape(name, shape)?.numbers {
+            Numbers::F32(values) => Ok(values),
+            other => Err(wrong_kind(name, other, "f32")),
+        }
+    }
+
+    /// Finite single-precision numbers, `[rows][columns]` with any number of rows.
+    pub fn f32_rows(&self, name: &str, columns: usize) -> Result<&[f32], ArrayError> {
+        let rows = self.array(name)?.numbers.len() / columns.max(1);
+        self.f32s(name, &[rows, columns])
+    }
+
+    /// Vector of finite single-precision numbers.
+    pub fn f32_vector(&self, name: &str) -> Result<&[f32], ArrayError> {
+        self.f32s(name, &[self.array(name)?.numbers.len()])
+    }
+
+    /// Vector of finite double-precision numbers.
+    pub fn f64_vector(&self, name: &str) -> Result<&[f64], ArrayError> {
+        match &self.of_shape(name, &[self.array(name)?.numbers.len()])?.numbers {
+            Numbers::F64(values) => Ok(values),
+            other => Err(wrong_kind(name, other, "f64")),
+        }
+    }
+
+    /// Vector of integers.
+    pub fn integers(&self, name: &str) -> Result<&[i64], ArrayError> {
+        match &self.of_shape(name, &[self.array(name)?.numbers.len()])?.numbers {
+            Numbers::I64(values) => Ok(values),
+            other => Err(wrong_kind(name, other, "i64")),
+        }
+    }
+
+    /// Vector of indices below a bound.
+    pub fn indices(&self, name: &str, below: usize, expected: &'static str) -> Result<Vec<usize>, ArrayError> {
+        let index = |(index, value): (usize, &i64)| {
+            let value = usize::try_from(*value).ok().filter(|value| *value < below);
+            value.ok_or_else(|| ArrayError::Value { name: name.to_owned(), index, expected })
+        };
+        self.integers(name)?.iter().enumerate().map(index).collect()
+    }
+
+    /// Refuses an array whose shape contradicts another array.
+    pub fn require(&self, name: &str, shape: &[usize], other: &'static str) -> Result<(), ArrayError> {
+        let found = &self.array(name)?.shape;
+        if found == shape {
+            return Ok(());
+        }
+        Err(ArrayError::Mismatch { name: name.to_owned(), found: found.clone(), other, expected: shape.to_vec() })
+    }
+
+    /// Refuses arrays that a recogniser made from these would not save in the same form.
+    pub fn require_same_form(&self, saved: &Self) -> Result<(), ArrayError> {
+        for (name, array) in &self.0 {
+            let (name, found) = (name.clone(), array.shape.clone());
+            match saved.0.get(&name) {
+                None => return Err(ArrayError::Unexpected { name, found }),
+                Some(own) if own.shape != found => {
+                    return Err(ArrayError::Shape { name, found, expected: own.shape.clone() });
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn array(&self, name: &str) -> Result<&Array, ArrayError> {
+        self.0.get(name).ok_or_else(|| ArrayError::Missing { name: name.to_owned() })
+    }
+
+    fn of_shape(&self, name: &str, shape: &[usize]) -> Result<&Array, ArrayError> {
+        let array = self.array(name)?;
+        if array.shape != shape {
+            let (name, found) = (name.to_owned(), array.shape.clone());
+            return Err(ArrayError::Shape { name, found, expected: shape.to_vec() });
+        }
+        match array.numbers.first_not_finite() {
+            Some(index) => Err(ArrayError::NotFinite { name: name.to_owned(), index }),
+            None => Ok(array),
+        }
+    }
+}
+
+fn wrong_kind(name: &str, found: &Numbers, expected: &'static str) -> ArrayError {
+    ArrayError::Kind { name: name.to_owned(), found: found.kind().to_owned(), expected }
+}
+
+/// Refuses the first element that is out of range.
+pub(crate) fn check_each<T>(
+    name: &str,
+    values: &[T],
+    expected: &'static str,
+    is_allowed: impl Fn(&T) -> bool,
+) -> Result<(), ArrayError> {
+    match values.iter().position(|value| !is_allowed(value)) {
+        Some(index) => Err(ArrayError::Value { name: name.to_owned(), index, expected }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,13 @@
+//! Baselines for the paper's networks: those of the paper (section III-A) and later ones. Trees and their ensembles,
+//! nearest neighbours and support vector machines on features, dynamic time warping, and a convolutional network.
+
+mod convolution;
+mod neighbours;
+mod row_model;
+mod svm;
+mod tabular;
+mod warping;
+
+pub(super) use convolution::Convolution;
+pub(super) use tabular::{Tabular, TabularKind};
+pub(super) use warping::Warping;

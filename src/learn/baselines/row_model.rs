@@ -1,0 +1,25 @@
+//! The interface of models that classify a row of features.
+
+use crate::arrays::Arrays;
+use std::fmt::Debug;
+
+/// Training rows.
+pub(super) struct Rows {
+    /// Features, `[rows][columns]`.
+    pub(super) values: Vec<f32>,
+    /// Features of a row.
+    pub(super) columns: usize,
+    /// Class of each row.
+    pub(super) labels: Vec<usize>,
+    /// Number of classes.
+    pub(super) classes: usize,
+}
+
+/// Fitted classifier of rows.
+pub(super) trait RowModel: Debug + Send + Sync {
+    /// Weight of each class for a row of features, not negative and not normalised.
+    fn predict(&self, row: &[f32]) -> Vec<f64>;
+
+    /// Adds the learned parameters.
+    fn save(&self, arrays: &mut Arrays);
+}

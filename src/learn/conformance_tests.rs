@@ -1,0 +1,341 @@
+//! Tests that every recogniser must pass, on synthetic grasps: accuracy, repeatability, storage, invalid input.
+
+use crate::evaluation::{MOST_GRASPS, answer, evaluate, product_of_experts, rounds};
+use crate::metrics::{Bootstrap, Confusion};
+use crate::{
+    ArrayError, Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, LoadError, METHODS, Method, Model,
+    ModelCard, ModelError, Numbers, Pmf, Sequence, StopRule, method, shipped_model,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+fn quick(seed: u64) -> Fitting<'static> {
+    Fitting { seed, quick: true, settings: serde_json::Map::new(), progress: &|_| (), stop: &NEVER }
+}
+
+/// Synthetic grasps of four objects: contact is earlier with large ones, force rises faster with cubic ones, with noise.
+pub(crate) fn made_up(of_each: usize, seed: u64) -> Dataset {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let class = |name: &str, size, shape| Class { name: name.to_owned(), size: Some(size), shape: Some(shape) };
+    let classes = vec![class("ball", 1, 1), class("brick", 1, 0), class("cube", 0, 0), class("marble", 0, 1)];
+    let words = |list: &[&str]| list.iter().map(|w| (*w).to_owned()).collect();
+    let labels = Labels { classes, sizes: words(&["tiny", "large"]), shapes: words(&["cubic", "spherical"]) };
+    let mut examples = Vec::new();
+    for number in 0..of_each {
+        for (index, class) in labels.classes.iter().enumerate() {
+            let onset = if class.size == Some(1) { 0.6 } else { 1.1 } + 0.2 * random.random::<f32>();
+            let press = if class.shape == Some(0) { 2.0 } else { 1.2 } + 0.4 * random.random::<f32>();
+            let t_s: Vec<f32> = (1..=40).map(|k| k as f32 * 0.05).collect();
+            let mut values = Vec::new();
+            for t in &t_s {
+                let after = (t - onset).max(0.0);
+                for side in [1.0, 0.9] {
+                    values.push(side * (t.min(onset) * 8.0 + after * press) + 0.05 * random.random::<f32>());
+                }
+                for side in [1.0, 0.9] {
+                    values.push(side * press * after + 0.02 * random.random::<f32>());
+                }
+            }
+            let id = (number * labels.classes.len() + index) as i64;
+            examples.push(Example { id, class: index, grasp: Arc::new(Sequence { t_s, values }) });
+        }
+    }
+    let channels = words(&["curvature_left", "curvature_right", "force_left", "force_right"]);
+    Dataset { channels, labels, about: DataCard { grasps: examples.len(), ..DataCard::default() }, examples }
+}
+
+fn accuracy(model: &Model, data: &Dataset) -> f64 {
+    let answers = answer(model.recogniser.as_ref(), data);
+    let pairs = answers.truth.iter().zip(&answers.verdicts).map(|(t, v)| (*t, Some(v.pmf.top().0)));
+    Confusion::from_pairs(data.labels.classes.len(), pairs).and_then(|c| c.macro_accuracy()).expect("has trials")
+}
+
+fn trained(method: &Method, data: &Dataset) -> Model {
+    method.train(data, &quick(1)).unwrap_or_else(|error| panic!("{}: {error}", method.key))
+}
+
+#[test]
+fn every_method_learns_repeatably_and_reloads_exactly() {
+    let (train, test) = (made_up(12, 1), made_up(6, 2));
+    for method in &METHODS {
+        let model = trained(method, &train);
+        let reached = accuracy(&model, &test);
+        assert!(reached > 0.7, "{} reaches only {reached}", method.key);
+        let again = trained(method, &train);
+        let loaded = Model::from_bytes("model", &model.to_bytes().expect("writes")).expect(method.key);
+        assert_eq!(loaded.card, model.card, "{}", method.key);
+        for example in &test.examples {
+            let verdict = model.recogniser.recognise(&example.grasp, None);
+            assert!((verdict.pmf.probabilities().iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            assert_eq!(again.recogniser.recognise(&example.grasp, None), verdict, "{} is repeatable", method.key);
+            assert_eq!(loaded.recogniser.recognise(&example.grasp, None), verdict, "{} reloads exactly", method.key);
+        }
+        // Empty, short and extreme grasps give a valid PMF.
+        let first = &test.examples[0].grasp;
+        let extreme = Sequence { t_s: first.t_s.clone(), values: first.values.iter().map(|x| x * 1e30).collect() };
+        for grasp in [Sequence::default(), first.until(0.1), extreme] {
+            let pmf = model.recogniser.recognise(&grasp, None).pmf;
+            assert!(pmf.probabilities().iter().all(|p| (0.0..=1.0).contains(p)), "{}", method.key);
+        }
+    }
+}
+
+#[test]
+fn shuffled_labels_give_chance_level() {
+    let (train, test) = (made_up(20, 3), made_up(25, 4));
+    for key in ["ds-lstm-cross", "random-forest"] {
+        let method = method(key).expect("in the list");
+        let reached = accuracy(&trained(method, &train.with_shuffled_labels(5)), &test);
+        // Chance level is 0.25; test grasps of one class resemble each other, so it varies widely.
+        assert!(reached < 0.6, "{key} reaches {reached} on shuffled labels");
+    }
+}
+
+#[test]
+fn no_grasp_is_on_both_sides_of_a_split() {
+    let data = made_up(10, 6);
+    let (first, rest) = data.first_of_each(7);
+    let ids = |data: &Dataset| data.examples.iter().map(|e| e.id).collect::<std::collections::BTreeSet<i64>>();
+    assert!(ids(&first).is_disjoint(&ids(&rest)));
+    assert_eq!((first.examples.len(), rest.examples.len()), (28, 12));
+    let shares = data.shares(&[0.4, 0.4, 0.2], 1);
+    assert_eq!(shares.iter().map(|s| s.examples.len()).collect::<Vec<_>>(), [16, 16, 8]);
+    let all: std::collections::BTreeSet<i64> = shares.iter().flat_map(ids).collect();
+    assert_eq!(all.len(), 40, "every grasp once");
+    let folds = data.folds(4, 2);
+    for class in data.by_class() {
+        let mut counts = [0; 4];
+        class.iter().for_each(|k| counts[folds[*k]] += 1);
+        assert!(counts.iter().all(|c| (2..=3).contains(c)), "{counts:?}");
+    }
+}
+
+#[test]
+fn more_grasps_do_not_reduce_f1() {
+    let (train, test) = (made_up(12, 7), made_up(8, 8));
+    let model = trained(method("ids-lstm").expect("in the list"), &train);
+    let recogniser = model.recogniser.as_ref();
+    let answers = answer(recogniser, &test);
+    let followed = rounds(recogniser, &test, &answers, 1);
+    assert!(followed.iter().all(|round| round.belief.grasps() == MOST_GRASPS));
+    let independent = product_of_experts(&test, &answers, 1);
+    assert!(
+        followed
+            .iter()
+            .zip(&independent)
+            .all(|(a, b)| a.truth == b.truth && a.belief.steps()[0] == b.belief.steps()[0])
+    );
+    let bootstrap = Bootstrap { resamples: 200, seed: 1 };
+    let evaluation =
+        evaluate(recogniser, &test, &answers, &followed, StopRule::default(), &bootstrap).expect("has trials");
+    assert_eq!(evaluation.f1_by_grasps.len(), MOST_GRASPS);
+    assert!(evaluation.f1_by_grasps[MOST_GRASPS - 1] + 0.05 >= evaluation.f1_macro, "{evaluation:?}");
+    assert!(evaluation.ci95[0] <= evaluation.f1_macro && evaluation.f1_macro <= evaluation.ci95[1]);
+    assert!(evaluation.stage_one.is_some_and(|s| s.size_f1 > 0.8 && s.shape_f1 > 0.7));
+}
+
+#[test]
+fn live_recognition_ends_with_the_verdict_on_the_whole_grasp() {
+    let train = made_up(10, 9);
+    let model = trained(method("ids-lstm-cross").expect("in the list"), &train);
+    let mut live = model.recogniser.live().expect("networks are live");
+    let before = Pmf::from_weights([0.1, 0.2, 0.3, 0.4]);
+    for (example, before) in train.examples.iter().take(5).zip([None, Some(&before), None, Some(&before), None]) {
+        live.begin(before);
+        let pushed = example.grasp.rows().filter(|(t, row)| live.push(*t, row).is_some()).count();
+        assert!(pushed >= 10, "verdicts during the grasp: {pushed}");
+        assert_eq!(live.finish(), Some(model.recogniser.recognise(&example.grasp, before)));
+    }
+}
+
+#[test]
+fn unsuitable_data_are_refused_with_a_reason() {
+    let data = made_up(6, 10);
+    for method in &METHODS {
+        let refused = |data: &Dataset| method.train(data, &quick(1)).err().map(|e| e.to_string());
+        let only_balls: Vec<usize> = data.by_class()[0].clone();
+        let one_class = refused(&data.part(&only_balls)).expect("refused");
+        assert!(one_class.contains("only one class, \"ball\""), "{}: {one_class}", method.key);
+        assert!(refused(&data.part(&[])).is_some(), "{}", method.key);
+        // Two trials of different objects suffice for dtw-knn only.
+        let two = refused(&data.part(&[0, 1]));
+        assert!(two.is_some_and(|text| text.contains("only 1 grasps")) || method.key == "dtw-knn", "{}", method.key);
+        let stopped = AtomicBool::new(true);
+        let fitting = Fitting { stop: &stopped, ..quick(1) };
+        if method.recipe.is_some() {
+            assert_eq!(method.train(&data, &fitting).err(), Some(LearnError::Stopped));
+            let settings = serde_json::json!({ "unitz": 3 }).as_object().cloned().expect("an object");
+            let fitting = Fitting { settings, ..quick(1) };
+            assert!(matches!(method.train(&data, &fitting), Err(LearnError::Setting { name, .. }) if name == "unitz"));
+        }
+    }
+    let mut bare = data;
+    bare.labels.classes.iter_mut().for_each(|class| (class.size, class.shape) = (None, None));
+    let error = method("ds-lstm").expect("in the list").train(&bare, &quick(1)).err();
+    assert!(matches!(error, Some(LearnError::NoProperties { .. })));
+    assert!(method("macro-layer").expect("in the list").train(&bare, &quick(1)).is_ok());
+}
+
+#[test]
+fn truncated_or_altered_models_are_refused() {
+    let data = made_up(6, 11);
+    for method in &METHODS {
+        let model = trained(method, &data);
+        let bytes = model.to_bytes().expect("writes");
+        for part in 0..24 {
+            let cut = bytes.len() * part / 24;
+            assert!(Model::from_bytes("cut", &bytes[..cut]).is_err(), "{} cut at {cut}", method.key);
+        }
+        // A card with other channels, or an unknown method.
+        let with = |change: &dyn Fn(&mut ModelCard)| {
+            let mut altered = model.clone();
+            change(&mut altered.card);
+            Model::from_bytes("altered", &altered.to_bytes().expect("writes"))
+        };
+        assert!(with(&|card| card.channels.push("grip".to_owned())).is_err(), "{}", method.key);
+        assert!(with(&|card| card.settings = serde_json::Value::Null).is_err(), "{}", method.key);
+        let unknown = with(&|card| card.method = "oracle".to_owned());
+        assert!(matches!(unknown, Err(ModelError::UnknownMethod { method, .. }) if method == "oracle"));
+        let other = ["curvature_left", "curvature_right", "force_left", "grip"].map(str::to_owned);
+        let text = model.check_channels(&other).expect_err("other channels").to_string();
+        assert!(text.contains("needs force_right") && text.contains("does not know grip"), "{text}");
+    }
+}
+
+#[test]
+fn the_shipped_model_is_live_and_rejects_unknown_objects() {
+    let model = shipped_model().expect("valid");
+    assert!(model.recogniser.live().is_some() && model.card.rejection.is_some());
+    assert!(!model.card.quick, "a quick model must not ship");
+}
+
+/// Models of every method, trained by version 0.1.0 on `made_up(3, 1)` (dual-stage networks: `made_up(5, 1)`), with their
+/// PMFs of `made_up(1, 2)` in `expected.json`.
+const SAVED: &[(&str, &[u8])] = &[
+    ("ds-lstm", include_bytes!("saved_models/ds-lstm.safetensors")),
+    ("ids-lstm", include_bytes!("saved_models/ids-lstm.safetensors")),
+    ("ds-lstm-cross", include_bytes!("saved_models/ds-lstm-cross.safetensors")),
+    ("ids-lstm-cross", include_bytes!("saved_models/ids-lstm-cross.safetensors")),
+    ("macro-layer", include_bytes!("saved_models/macro-layer.safetensors")),
+    ("committee", include_bytes!("saved_models/committee.safetensors")),
+    ("zuo", include_bytes!("saved_models/zuo.safetensors")),
+    ("decision-tree", include_bytes!("saved_models/decision-tree.safetensors")),
+    ("knn", include_bytes!("saved_models/knn.safetensors")),
+    ("svm", include_bytes!("saved_models/svm.safetensors")),
+    ("lstm", include_bytes!("saved_models/lstm.safetensors")),
+    ("random-forest", include_bytes!("saved_models/random-forest.safetensors")),
+    ("bagged-trees", include_bytes!("saved_models/bagged-trees.safetensors")),
+    ("gradient-boosting", include_bytes!("saved_models/gradient-boosting.safetensors")),
+    ("rusboost", include_bytes!("saved_models/rusboost.safetensors")),
+    ("rusboost-samme", include_bytes!("saved_models/rusboost-samme.safetensors")),
+    ("measures-svm", include_bytes!("saved_models/measures-svm.safetensors")),
+    ("measures-forest", include_bytes!("saved_models/measures-forest.safetensors")),
+    ("dtw-knn", include_bytes!("saved_models/dtw-knn.safetensors")),
+    ("convolution", include_bytes!("saved_models/convolution.safetensors")),
+];
+
+#[test]
+fn saved_models_of_version_0_1_still_load_with_the_same_results() {
+    let expected: std::collections::BTreeMap<String, Vec<Vec<f64>>> =
+        serde_json::from_str(include_str!("saved_models/expected.json")).expect("valid JSON");
+    assert!(METHODS.iter().map(|method| method.key).eq(SAVED.iter().map(|(key, _)| *key)), "a model of every method");
+    let test = made_up(1, 2);
+    for (key, bytes) in SAVED {
+        let model = Model::from_bytes(key, bytes).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(model.card.parameters, model.recogniser.parameters(), "{key}");
+        assert!(model.to_bytes().expect("encodes") == *bytes, "{key} is saved as it was");
+        for (example, expected) in test.examples.iter().zip(&expected[*key]) {
+            let pmf = model.recogniser.recognise(&example.grasp, None).pmf;
+            let differs = pmf.probabilities().iter().zip(expected).any(|(p, e)| (p - e).abs() > 1e-5);
+            assert!(!differs, "{key}: {pmf:?} instead of {expected:?}");
+        }
+    }
+}
+
+/// Decodes a model after a change of its arrays.
+fn with_arrays(bytes: &[u8], change: impl FnOnce(&mut crate::Arrays)) -> Result<Model, ModelError> {
+    let model = Model::from_bytes("original", bytes)?;
+    let mut arrays = model.recogniser.arrays();
+    change(&mut arrays);
+    let card = serde_json::to_string(&model.card).expect("encodes");
+    let header = std::collections::HashMap::from([("palpate".to_owned(), card)]);
+    Model::from_bytes("changed", &safetensors::serialize(&arrays.0, Some(header)).expect("encodes"))
+}
+
+#[test]
+fn damaged_arrays_are_refused_by_name_and_shape() {
+    for (key, bytes) in SAVED {
+        let names: Vec<String> =
+            Model::from_bytes(key, bytes).expect("valid").recogniser.arrays().0.keys().cloned().collect();
+        let refused = |name: &str, what: &str, change: &dyn Fn(&mut crate::Array)| {
+            let result = with_arrays(bytes, |arrays| change(arrays.0.get_mut(name).expect("in the file")));
+            match result {
+                Err(ModelError::Invalid { cause: LoadError::Array(error), .. }) => {
+                    let text = error.to_string();
+                    assert!(text.contains(&format!("\"{name}\"")), "{key}, {name} {what}: {text}");
+                    error
+                }
+                other => panic!("{key}, {name} {what}: {other:?}"),
+            }
+        };
+        for name in &names {
+            let missing = with_arrays(bytes, |arrays| drop(arrays.0.remove(name)));
+            let expected = LoadError::Array(ArrayError::Missing { name: name.clone() });
+            assert_eq!(missing.err(), Some(ModelError::Invalid { name: "changed".to_owned(), cause: expected }));
+
+            let is_shape = |error: &ArrayError, shape: &[usize]| {
+                matches!(error, ArrayError::Shape { found, expected, .. } | ArrayError::Mismatch { found, expected, .. }
+                    if found == shape && expected != shape)
+            };
+            let mut shape = Vec::new();
+            with_arrays(bytes, |arrays| shape.clone_from(&arrays.0[name].shape)).expect("unchanged");
+            shape.insert(0, 1);
+            let error = refused(name, "with another axis", &|array| array.shape.insert(0, 1));
+            assert!(is_shape(&error, &shape), "{key}: {error}");
+
+            refused(name, "with a repeated first element or row", &|array| {
+                let row: usize = array.shape[1..].iter().product();
+                array.shape[0] += 1;
+                match &mut array.numbers {
+                    Numbers::F32(values) => values.extend_from_within(..row),
+                    Numbers::F64(values) => values.extend_from_within(..row),
+                    Numbers::I64(values) => values.extend_from_within(..row),
+                }
+            });
+            refused(name, "without its last element or row", &|array| {
+                let row: usize = array.shape[1..].iter().product();
+                array.shape[0] -= 1;
+                match &mut array.numbers {
+                    Numbers::F32(values) => values.truncate(values.len() - row),
+                    Numbers::F64(values) => values.truncate(values.len() - row),
+                    Numbers::I64(values) => values.truncate(values.len() - row),
+                }
+            });
+            refused(name, "of another type", &|array| {
+                array.numbers = match &array.numbers {
+                    Numbers::F32(values) => Numbers::I64(vec![0; values.len()]),
+                    Numbers::F64(values) => Numbers::F32(vec![0.0; values.len()]),
+                    Numbers::I64(values) => Numbers::F64(vec![0.0; values.len()]),
+                };
+            });
+            for number in [f64::NAN, f64::INFINITY] {
+                let change = |array: &mut crate::Array| match &mut array.numbers {
+                    Numbers::F32(values) => values[0] = number as f32,
+                    Numbers::F64(values) => values[0] = number,
+                    // Integers are always finite; a huge one is out of range.
+                    Numbers::I64(values) => values[0] = i64::MAX,
+                };
+                let error = refused(name, "with a number that is not finite", &change);
+                let is_value = matches!(error, ArrayError::NotFinite { .. } | ArrayError::Value { .. });
+                assert!(is_value, "{key}: {error}");
+            }
+        }
+        let extra = with_arrays(bytes, |arrays| arrays.put("extra", &[2], vec![0.0; 2]));
+        let expected = LoadError::Array(ArrayError::Unexpected { name: "extra".to_owned(), found: vec![2] });
+        assert_eq!(extra.err(), Some(ModelError::Invalid { name: "changed".to_owned(), cause: expected }), "{key}");
+    }
+}

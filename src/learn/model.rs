@@ -1,0 +1,170 @@
+//! A trained model: a recogniser and its card.
+
+use crate::arrays::ArrayError;
+use crate::belief::{Rejection, StopRule};
+use crate::data::{DataCard, Labels};
+use crate::fitting::LearnError;
+use crate::recogniser::Recogniser;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Description of a model: everything except its learned parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelCard {
+    /// Key of the method.
+    pub method: String,
+    /// Input channels, in order.
+    pub channels: Vec<String>,
+    /// Classes, sizes and shapes it distinguishes.
+    pub labels: Labels,
+    /// Training data.
+    pub data: DataCard,
+    /// Settings chosen or found while fitting.
+    pub settings: serde_json::Value,
+    /// Stop rule for successive grasps.
+    pub stop: StopRule,
+    /// Threshold that separates known from unknown objects.
+    pub rejection: Option<Rejection>,
+    /// Seed of the fit.
+    pub seed: u64,
+    /// True after a quick fit.
+    #[serde(default)]
+    pub quick: bool,
+    /// Number of learned parameters.
+    pub parameters: usize,
+    /// CPU time of the fit (s).
+    pub train_cpu_s: f64,
+    /// Results on test grasps; null if not measured.
+    #[serde(default)]
+    pub metrics: serde_json::Value,
+    /// Program version that trained it.
+    pub version: String,
+}
+
+impl ModelCard {
+    /// Reads the method's own settings from the card.
+    pub(crate) fn settings_as<T: DeserializeOwned>(&self) -> Result<T, LoadError> {
+        serde_json::from_value(self.settings.clone()).map_err(|error| LoadError::Settings { cause: error.to_string() })
+    }
+}
+
+/// Recogniser with its card.
+#[derive(Clone)]
+pub struct Model {
+    /// Description.
+    pub card: ModelCard,
+    /// Recogniser.
+    pub recogniser: Arc<dyn Recogniser>,
+}
+
+impl std::fmt::Debug for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Model").field("card", &self.card).finish_non_exhaustive()
+    }
+}
+
+impl Model {
+    /// Compares the model's channels with those available. The error names missing and unknown channels.
+    pub fn check_channels(&self, channels: &[String]) -> Result<(), ModelError> {
+        let own = &self.card.channels;
+        if own == channels {
+            return Ok(());
+        }
+        let only =
+            |a: &[String], b: &[String]| -> Vec<String> { a.iter().filter(|c| !b.contains(c)).cloned().collect() };
+        let (missing, extra) = (only(own, channels), only(channels, own));
+        let mut parts = Vec::new();
+        if !missing.is_empty() {
+            parts.push(format!("it needs {}", missing.join(", ")));
+        }
+        if !extra.is_empty() {
+            parts.push(format!("it does not know {}", extra.join(", ")));
+        }
+        if parts.is_empty() {
+            parts.push(format!("the order differs; it reads {}", own.join(", ")));
+        }
+        Err(ModelError::Channels { difference: parts.join(", and ") })
+    }
+}
+
+/// Reason why a recogniser could not be restored from a model file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LoadError {
+    /// An array is missing, unexpected, of the wrong shape or has invalid elements.
+    #[error(transparent)]
+    Array(#[from] ArrayError),
+    /// The settings on the card cannot be read.
+    #[error("invalid settings on its card: {cause}")]
+    Settings {
+        /// Message of the parser.
+        cause: String,
+    },
+    /// A setting out of range.
+    #[error(transparent)]
+    Recipe(#[from] LearnError),
+    /// A part of the card is invalid or contradicts the channels or labels.
+    #[error("{part} on its card is invalid or does not match its channels and labels")]
+    Card {
+        /// The part, as a noun phrase.
+        part: &'static str,
+    },
+    /// A library failed.
+    #[error("{cause}")]
+    Failed {
+        /// Message of the library.
+        cause: String,
+    },
+}
+
+/// Reason why a model cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// The file cannot be read.
+    #[error("cannot read the model \"{path}\": {cause}", path = path.display())]
+    Unreadable {
+        /// Path of the file.
+        path: PathBuf,
+        /// Message of the operating system.
+        cause: String,
+    },
+    /// The file cannot be written.
+    #[error("cannot write the model \"{path}\": {cause}", path = path.display())]
+    Unwritable {
+        /// Path of the file.
+        path: PathBuf,
+        /// Message of the operating system.
+        cause: String,
+    },
+    /// Not a complete safetensors file with a card.
+    #[error("\"{name}\" is not a complete Palpate model: {cause}; train or copy it again")]
+    Malformed {
+        /// File name.
+        name: String,
+        /// Problem.
+        cause: String,
+    },
+    /// Card and parameters contradict each other or the method.
+    #[error("\"{name}\" is not a valid Palpate model: {cause}; train or copy it again")]
+    Invalid {
+        /// File name.
+        name: String,
+        /// Problem.
+        cause: LoadError,
+    },
+    /// A method unknown to this version.
+    #[error("\"{name}\" uses the method \"{method}\", which this version does not know; update Palpate")]
+    UnknownMethod {
+        /// File name.
+        name: String,
+        /// Key of the method.
+        method: String,
+    },
+    /// Other channels than the model was trained on.
+    #[error("the model needs other channels: {difference}")]
+    Channels {
+        /// Missing and unknown channels.
+        difference: String,
+    },
+}
