@@ -3,7 +3,9 @@
 
 use crate::frame::Frame;
 use crate::objects::ObjectModel;
-use crate::physics::{natural_rotations, random_rotation};
+#[cfg(feature = "rapier")]
+use crate::physics::natural_rotations;
+use crate::physics::random_rotation;
 use crate::run::SimRun;
 use crate::scene::{Between, Faces, ObjectSetup, Scene, SupportKind};
 use glam::{DQuat, DVec2, EulerRot};
@@ -24,13 +26,7 @@ pub struct PoseSampler {
 impl PoseSampler {
     /// Prepares to draw; finding the natural faces takes some tenths of a second.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> Self {
-        // A free object cannot lie anyhow: it would fall off its pedestal before the fingers come.
-        let lies_naturally = match scene.pose.faces {
-            Faces::Nominal => false,
-            Faces::Natural => true,
-            Faces::Any => !scene.holds_object(),
-        };
-        let natural = object.filter(|_| lies_naturally).map(natural_rotations).unwrap_or_default();
+        let natural = object.filter(|_| scene.uses_resting_faces()).map(natural_rotations).unwrap_or_default();
         Self { scene: scene.clone(), natural }
     }
 
@@ -101,6 +97,12 @@ impl PoseSampler {
     }
 }
 
+/// Without the feature no object can be dropped; [`Scene::check`] refuses scenes that need it.
+#[cfg(not(feature = "rapier"))]
+fn natural_rotations(_object: &ObjectModel) -> Vec<DQuat> {
+    Vec::new()
+}
+
 /// Lays the object as a rotation says.
 fn lay(scene: &mut Scene, rotation: DQuat) {
     let (yaw, pitch, roll) = rotation.to_euler(EulerRot::ZYX);
@@ -115,6 +117,7 @@ pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scen
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "rapier")]
     use crate::scene::{PRESETS, PosePreset};
     use glam::DVec3;
     use palpate_geometry::Primitive;
@@ -123,6 +126,7 @@ mod tests {
         ObjectModel::from_primitive("brick", Primitive::Cuboid { half: DVec3::new(0.015, 0.03, 0.006) }, 500.0, 0.5)
     }
 
+    #[cfg(feature = "rapier")]
     #[test]
     fn a_seed_names_a_pose_within_its_range() {
         for preset in PRESETS {
@@ -139,6 +143,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "rapier")]
     #[test]
     fn natural_faces_are_flat_ones() {
         let poses = PosePreset::named("B").expect("in the list").poses();

@@ -3,7 +3,9 @@
 use crate::frame::{Frame, Plan, Quality};
 use crate::gripper::{Phase, Programme};
 use crate::objects::ObjectModel;
-use crate::physics::{Engine, Placement, RapierSimulation, Refinement, Simulation, SimulationError};
+#[cfg(feature = "rapier")]
+use crate::physics::RapierSimulation;
+use crate::physics::{Engine, Placement, Refinement, Simulation, SimulationError};
 use crate::scene::{EngineKind, Scene};
 use glam::DVec3;
 
@@ -35,6 +37,7 @@ pub struct SimRun {
 #[derive(Clone, Debug)]
 enum EngineRun {
     Palpate(Box<Simulation>),
+    #[cfg(feature = "rapier")]
     Rapier(Box<RapierSimulation>),
 }
 
@@ -45,16 +48,20 @@ impl EngineRun {
                 let (simulation, placement) = Simulation::refined(scene, object, refinement);
                 (Self::Palpate(Box::new(simulation)), placement)
             }
+            #[cfg(feature = "rapier")]
             EngineKind::Rapier => {
                 let (simulation, placement) = RapierSimulation::refined(scene, object, refinement);
                 (Self::Rapier(Box::new(simulation)), placement)
             }
+            #[cfg(not(feature = "rapier"))]
+            EngineKind::Rapier => panic!("Scene::check refuses the engine rapier in a build without it"),
         }
     }
 
     fn get(&self) -> &dyn Engine {
         match self {
             Self::Palpate(simulation) => simulation.as_ref(),
+            #[cfg(feature = "rapier")]
             Self::Rapier(simulation) => simulation.as_ref(),
         }
     }
@@ -62,6 +69,7 @@ impl EngineRun {
     fn get_mut(&mut self) -> &mut dyn Engine {
         match self {
             Self::Palpate(simulation) => simulation.as_mut(),
+            #[cfg(feature = "rapier")]
             Self::Rapier(simulation) => simulation.as_mut(),
         }
     }

@@ -1,5 +1,5 @@
-//! What a simulated gripper asks of whatever computes its motion. Two engines answer: [`super::Simulation`], which is
-//! Palpate's own convex step, and [`super::RapierSimulation`], which is rapier3d.
+//! Interface of a physics engine. Implemented by [`super::Simulation`], Palpate's own convex step, and by
+//! `RapierSimulation`, which is rapier3d (feature `rapier`).
 
 use super::simulation::SimulationError;
 use crate::frame::{Frame, Plan, Quality};

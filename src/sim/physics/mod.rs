@@ -13,8 +13,8 @@
 //!
 //! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
 //! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
-//! long), [`Simulation`] (a grasp in time). A second engine, [`RapierSimulation`], computes the same scenes independently;
-//! both are an [`Engine`].
+//! long), [`Simulation`] (a grasp in time). A second engine, `RapierSimulation` (feature `rapier`), computes the same scenes
+//! independently; both are an [`Engine`].
 //! [`SteppedScene`] takes steps of any length, for tests and hard cases; `explicit` is there to be compared with.
 
 mod balance;
@@ -34,7 +34,9 @@ mod explicit;
 mod integrator;
 mod model;
 mod placement;
+#[cfg(feature = "rapier")]
 mod rapier_engine;
+#[cfg(feature = "rapier")]
 mod resting;
 mod simulation;
 mod skyline;
@@ -50,9 +52,11 @@ mod workspace;
 
 pub use engine::Engine;
 pub use model::Model;
-pub use placement::Placement;
+pub use placement::{Placement, random_rotation};
+#[cfg(feature = "rapier")]
 pub use rapier_engine::RapierSimulation;
-pub use resting::{natural_rotations, random_rotation};
+#[cfg(feature = "rapier")]
+pub use resting::natural_rotations;
 pub use simulation::{Refinement, Simulation, SimulationError};
 pub use state::State;
 pub use step::{Drive, NotFinite, StepReport, Unbalanced, step};

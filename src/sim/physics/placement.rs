@@ -4,6 +4,8 @@ use crate::objects::ObjectModel;
 use crate::scene::{Scene, SupportKind};
 use glam::{DQuat, DVec3};
 use palpate_geometry::Pose;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 
 /// The start of a scene, in world coordinates. The world's origin is the middle of the table, z up.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,6 +69,14 @@ fn put_down(scene: &Scene, object: &ObjectModel, surface: f64) -> (Pose, f64) {
     let [x, y] = scene.object.shift;
     let position = DVec3::new(x - centre.x, y - centre.y, surface + below);
     (Pose { position, rotation: turned.rotation }, below + above)
+}
+
+/// A rotation, all equally likely (Shoemake 1992).
+pub fn random_rotation(random: &mut ChaCha8Rng) -> DQuat {
+    let [u, v, w] = [(); 3].map(|()| random.random::<f64>());
+    let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
+    let (v, w) = (v * std::f64::consts::TAU, w * std::f64::consts::TAU);
+    DQuat::from_xyzw(a * v.sin(), a * v.cos(), b * w.sin(), b * w.cos())
 }
 
 #[cfg(test)]

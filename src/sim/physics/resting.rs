@@ -4,9 +4,10 @@
 //! The object is scaled to unit size first: rapier's tolerances are made for bodies of about a metre, and a drop of a
 //! scaled body under the same gravity only takes another time.
 
+use super::placement::random_rotation;
 use crate::objects::ObjectModel;
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rapier3d::prelude::{ColliderBuilder, MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, SharedShape};
 
@@ -30,14 +31,6 @@ pub fn natural_rotations(object: &ObjectModel) -> Vec<DQuat> {
     let mut random = ChaCha8Rng::seed_from_u64(0);
     let found: Vec<DQuat> = (0..DROPS).filter_map(|_| body.drop_from(random_rotation(&mut random))).collect();
     if found.is_empty() { vec![DQuat::IDENTITY] } else { found }
-}
-
-/// A rotation, all equally likely (Shoemake 1992).
-pub fn random_rotation(random: &mut ChaCha8Rng) -> DQuat {
-    let [u, v, w] = [(); 3].map(|()| random.random::<f64>());
-    let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
-    let (v, w) = (v * std::f64::consts::TAU, w * std::f64::consts::TAU);
-    DQuat::from_xyzw(a * v.sin(), a * v.cos(), b * w.sin(), b * w.cos())
 }
 
 /// An object of unit size, ready to be dropped again and again.

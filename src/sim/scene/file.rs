@@ -27,6 +27,12 @@ pub enum SceneError {
         /// The known key that looks most like it.
         nearest: Option<String>,
     },
+    /// A scene that needs an optional part of this program.
+    #[error("{setting} needs rapier, which this build leaves out; build with the feature `rapier`")]
+    NeedsRapier {
+        /// The setting, as a scene file writes it.
+        setting: &'static str,
+    },
     /// A number outside what is possible.
     #[error("{key} = {value} is not possible; it must be {wanted}")]
     OutOfRange {

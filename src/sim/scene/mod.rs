@@ -71,6 +71,16 @@ impl Scene {
         }
     }
 
+    /// True where random poses put the object on the faces that it comes to rest on. A free object cannot lie on any
+    /// other: it would fall off its pedestal before the fingers come.
+    pub fn uses_resting_faces(&self) -> bool {
+        match self.pose.faces {
+            Faces::Nominal => false,
+            Faces::Natural => true,
+            Faces::Any => !self.holds_object(),
+        }
+    }
+
     /// Holds the object in place, or lets it rest freely; takes back what `effects.free-object` may have said.
     pub fn set_object_fixed(&mut self, fixed: bool) {
         self.object.fixed = fixed;
