@@ -5,12 +5,14 @@ mod catalogue;
 mod files;
 mod load;
 mod model;
+mod options;
 mod urdf;
 mod urdf_text;
 
 pub use catalogue::{BuiltIn, catalogue, thumbnail};
-pub use load::{CollisionShape, EMPTY, LoadOptions, anchored, load};
+pub use load::{EMPTY, anchored, load};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
+pub use options::{CollisionShape, LoadOptions};
 
 use palpate_geometry::{BakeError, MeshError, MeshFileError};
 use std::path::PathBuf;

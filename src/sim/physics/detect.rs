@@ -15,7 +15,8 @@
 //! that swing then gain energy while they press, and what they hold rings and wanders.
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
-use super::effects::{FingerContact, Fronts, OtherFinger, in_series};
+use super::effects::FingerContact;
+use super::finger_pair::{Fronts, OtherFinger, in_series};
 use super::model::{Body, Model};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};

@@ -1,11 +1,23 @@
 //! Interface of a physics engine. Implemented by [`super::Simulation`], Palpate's own convex step, and by
 //! `RapierSimulation`, which is rapier3d (feature `rapier`).
 
-use super::simulation::SimulationError;
+use super::step::NotFinite;
 use crate::frame::{Frame, Plan, Quality};
 use crate::gripper::Phase;
 use crate::scene::Clock;
 use glam::DVec3;
+
+/// A simulation that had to stop.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the simulation stopped after {seconds:.3} s (step {tick}): {cause}")]
+pub struct SimulationError {
+    /// The step that failed.
+    pub tick: u64,
+    /// Its time (s).
+    pub seconds: f64,
+    /// What went wrong.
+    pub cause: NotFinite,
+}
 
 /// A gripper and an object in motion, on a clock of whole ticks.
 pub trait Engine {

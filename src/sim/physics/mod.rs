@@ -31,6 +31,7 @@ mod energy;
 mod engine;
 mod environment;
 mod explicit;
+mod finger_pair;
 mod integrator;
 mod model;
 mod placement;
@@ -50,15 +51,16 @@ mod stepper_tests;
 mod strands;
 mod workspace;
 
-pub use engine::Engine;
+pub use engine::{Engine, SimulationError};
 pub use model::Model;
 pub use placement::{Placement, random_rotation};
 #[cfg(feature = "rapier")]
 pub use rapier_engine::RapierSimulation;
 #[cfg(feature = "rapier")]
 pub use resting::natural_rotations;
-pub use simulation::{Refinement, Simulation, SimulationError};
+pub use simulation::{Refinement, Simulation};
+pub use solve::Unbalanced;
 pub use state::State;
-pub use step::{Drive, NotFinite, StepReport, Unbalanced, step};
+pub use step::{Drive, NotFinite, StepReport, step};
 pub use stepped::{SkinForce, SteppedScene, Stepping};
 pub use workspace::Workspace;

@@ -3,14 +3,15 @@
 use super::balance::static_residual;
 use super::contact::{Acting, Against, Contact};
 use super::detect::detect;
-use super::effects::{FingerContact, OtherFinger};
-use super::engine::Engine;
+use super::effects::FingerContact;
+use super::engine::{Engine, SimulationError};
+use super::finger_pair::OtherFinger;
 use super::integrator::Surroundings;
 use super::model::Model;
 use super::placement::Placement;
-use super::solve::segment_velocities;
+use super::solve::{Unbalanced, segment_velocities};
 use super::state::State;
-use super::step::{self, Drive, StepReport, Unbalanced, segment_axes_of};
+use super::step::{self, Drive, StepReport, segment_axes_of};
 use super::stepper::Stepper;
 use super::workspace::{Spatial, Workspace};
 use crate::frame::{Frame, Imbalance, Plan, Quality, TaxelLoad};
@@ -47,18 +48,6 @@ pub enum Refinement {
     None,
     /// More finely, to estimate an error from; see [`crate::scene::Solver::companion`].
     Companion,
-}
-
-/// A simulation that had to stop.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the simulation stopped after {seconds:.3} s (step {tick}): {cause}")]
-pub struct SimulationError {
-    /// The step that failed.
-    pub tick: u64,
-    /// Its time (s).
-    pub seconds: f64,
-    /// What went wrong.
-    pub cause: step::NotFinite,
 }
 
 impl Simulation {

@@ -13,7 +13,6 @@
 use super::contact::{Acting, Against, Contact};
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::model::Model;
-use super::step::Unbalanced;
 use super::workspace::{Block, PerLink, Spatial, Workspace};
 use glam::DVec3;
 
@@ -25,6 +24,26 @@ pub(super) struct SolveReport {
     pub(super) converged: bool,
     /// What was farthest from balance where it did not converge.
     pub(super) unbalanced: Option<Unbalanced>,
+}
+
+/// Forces that did not balance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unbalanced {
+    /// Which unknown of the step: joint rates of both fingers, then the six velocities of a free object. See
+    /// [`super::State::place_of`].
+    pub unknown: u32,
+    /// What was left over there, as a multiple of what the tolerance allows.
+    pub excess: f64,
+}
+
+impl Unbalanced {
+    /// The one that is farther from balance, if any is.
+    pub(super) fn worse(one: Option<Self>, other: Option<Self>) -> Option<Self> {
+        match (one, other) {
+            (Some(a), Some(b)) => Some(if b.excess > a.excess { b } else { a }),
+            (a, b) => a.or(b),
+        }
+    }
 }
 
 /// A gradient this small compared with nothing at all counts as zero.

@@ -4,7 +4,7 @@ use super::chain::turning;
 use super::contact::Acting;
 use super::detect::{detect, segment_axes};
 use super::model::Model;
-use super::solve::{minimise, segment_velocities};
+use super::solve::{Unbalanced, minimise, segment_velocities};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
 use glam::{DVec2, DVec3};
@@ -27,16 +27,6 @@ pub struct StepReport {
     pub unbalanced: Option<Unbalanced>,
 }
 
-/// Forces that did not balance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unbalanced {
-    /// Which unknown of the step: joint rates of both fingers, then the six velocities of a free object. See
-    /// [`State::place_of`].
-    pub unknown: u32,
-    /// What was left over there, as a multiple of what the tolerance allows.
-    pub excess: f64,
-}
-
 impl StepReport {
     /// Of two steps in a row: sums, the worse of both, and the contacts of the second.
     pub(super) fn followed_by(&self, next: &Self) -> Self {
@@ -47,16 +37,6 @@ impl StepReport {
             contacts: next.contacts,
             friction_residual: self.friction_residual.max(next.friction_residual),
             unbalanced: Unbalanced::worse(self.unbalanced, next.unbalanced),
-        }
-    }
-}
-
-impl Unbalanced {
-    /// The one that is farther from balance, if any is.
-    pub(super) fn worse(one: Option<Self>, other: Option<Self>) -> Option<Self> {
-        match (one, other) {
-            (Some(a), Some(b)) => Some(if b.excess > a.excess { b } else { a }),
-            (a, b) => a.or(b),
         }
     }
 }

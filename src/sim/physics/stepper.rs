@@ -14,8 +14,9 @@
 use super::energy::{mechanical_energy, work_done};
 use super::integrator::{Integrator, Surroundings};
 use super::model::Model;
+use super::solve::Unbalanced;
 use super::state::State;
-use super::step::{NotFinite, StepReport, Unbalanced};
+use super::step::{NotFinite, StepReport};
 use super::workspace::Workspace;
 use crate::gripper::SegmentPose;
 use crate::scene::Method;

@@ -62,7 +62,9 @@ impl Scene {
             return Err(SceneError::NeedsRapier { setting: "solver.engine = \"rapier\"" });
         }
         if self.uses_resting_faces() {
-            return Err(SceneError::NeedsRapier { setting: "pose.faces = \"natural\" (and \"any\" for a free object)" });
+            return Err(SceneError::NeedsRapier {
+                setting: "pose.faces = \"natural\" (and \"any\" for a free object)",
+            });
         }
         Ok(())
     }

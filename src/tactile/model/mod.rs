@@ -24,6 +24,7 @@
 //! A number without a source is marked as assumed. They were settled from data sheets and from what is known of the
 //! real recordings, before any recogniser saw the result.
 
+mod chain;
 mod flex;
 mod force_pad;
 mod input;

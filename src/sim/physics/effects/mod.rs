@@ -20,7 +20,7 @@ mod situation;
 mod support;
 
 pub(super) use creep::Relaxation;
-pub(super) use finger_contact::{FingerContact, Fronts, OtherFinger, in_series};
+pub(super) use finger_contact::FingerContact;
 pub(super) use pneumatic_lag::{Chamber, went_on};
 use situation::Situation;
 

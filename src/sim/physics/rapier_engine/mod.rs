@@ -42,10 +42,10 @@ mod world;
 
 use super::chain::{ChainModel, turning};
 use super::effects::plan;
-use super::engine::Engine;
+use super::engine::{Engine, SimulationError};
 use super::environment::Environment;
 use super::placement::Placement;
-use super::simulation::{Refinement, SimulationError};
+use super::simulation::Refinement;
 use super::step::NotFinite;
 use crate::frame::{Frame, Plan, Quality};
 use crate::gripper::{Actuation, FingerPlane, Phase, SegmentPose, Side};
