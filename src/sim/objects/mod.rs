@@ -7,7 +7,7 @@ mod load;
 mod model;
 mod options;
 mod urdf;
-mod urdf_text;
+mod xml;
 
 pub use catalogue::{BuiltIn, catalogue, thumbnail};
 pub use load::{EMPTY, anchored, load};
