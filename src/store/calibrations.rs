@@ -391,7 +391,7 @@ pub(super) mod tests {
         };
         let degrees = |store: &Store, asked: &[CalibrationId]| -> Result<f64, Box<dyn std::error::Error>> {
             let serving = store.serving(Some(trial), asked)?;
-            let felt = Readout::new(&Board::default(), &serving.calibrations)?.felt(&reading);
+            let felt = Readout::new(&Board::default(), &serving.calibrations)?.estimate(&reading);
             Ok(felt.angle[0].ok_or("calibrated")?.to_degrees())
         };
         // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.

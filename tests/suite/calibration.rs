@@ -128,8 +128,8 @@ fn errors(parts: &HiddenParts, seed: u64) -> [f64; 2] {
             };
             let (kind, shown) = stimulus;
             let error = match kind {
-                0 => mean(&|reading| readout.felt(reading).angle[side]).to_degrees() - shown,
-                _ => mean(&|reading| readout.felt(reading).force[side]) / Kind::Pad.stimulus(shown) - 1.0,
+                0 => mean(&|reading| readout.estimate(reading).angle[side]).to_degrees() - shown,
+                _ => mean(&|reading| readout.estimate(reading).force[side]) / Kind::Pad.stimulus(shown) - 1.0,
             };
             worst[kind] = worst[kind].max(error.abs());
         }

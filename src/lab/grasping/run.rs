@@ -26,7 +26,7 @@ pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspR
 
 /// The same grasp computed more finely, sampled at the same times: what the error of the other is estimated from.
 pub fn prepare_companion(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimRun> {
-    prepare_refined(scene, object, seed, Refinement::Companion)
+    prepare_refined(scene, object, seed, Refinement::Refined)
 }
 
 fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refinement: Refinement) -> GraspRun<SimRun> {

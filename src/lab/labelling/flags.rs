@@ -109,7 +109,7 @@ impl Observed<'_> {
             let readout = Readout::new(self.board, self.calibrations).ok()?;
             let readout = readout.clone().with_zero(readout.zero_from(rest));
             let side = usize::from(pad == Sensor::PadRight);
-            let rise = lasting_peak(pressed.iter().map(|reading| readout.felt(reading).force[side]));
+            let rise = lasting_peak(pressed.iter().map(|reading| readout.estimate(reading).force[side]));
             let least = if calibration.record.bending.is_some() { PadPart::LEAST_FORCE } else { BENT_FORCE };
             return Some(PadRise { pad, rise: rise?, least, unit: "N" });
         }

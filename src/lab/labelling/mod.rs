@@ -7,18 +7,18 @@
 //! | `plan` | how many trials of each object are wanted, which is next, and how it is to be held |
 //! | `labelled_trial` | a trial as lists of labels show it |
 //! | `flags` | what is wrong with a trial, from what was heard during it |
-//! | `thinned` | a trial of any length in bounded memory, and its small picture |
+//! | `decimated` | a trial of any length in bounded memory, and its small picture |
 //! | `segmentation` | beginning, phases and end of grasps in a stream |
 //! | `disagreement` | trials to look at again |
 
+mod decimated;
 mod disagreement;
 mod flags;
 mod segmentation;
 #[cfg(test)]
 mod segmentation_tests;
-mod thinned;
 
+pub use decimated::{Decimated, sparkline};
 pub use disagreement::{Disagreement, disagreements};
 pub use flags::{Observed, flags_of};
 pub use segmentation::{LOOK_BACK_S, PRE_ROLL_S, SegmentEvent, Segmenter};
-pub use thinned::{Thinned, sparkline};

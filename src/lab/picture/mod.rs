@@ -1,14 +1,14 @@
 //! From a scene and a frame to a list of things to draw. No window and no graphics card: a live simulation, a stored
 //! trial and a test all make their pictures here.
 
+mod annotations;
 mod fingers;
 mod forces;
-mod furniture;
 mod ghost;
 mod gripper_model;
 mod reconstructed;
 
-pub use furniture::SCALE_STEPS;
+pub use annotations::SCALE_STEPS;
 
 use glam::{Mat4, Vec2, Vec3};
 use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid};
@@ -32,7 +32,7 @@ pub struct PictureView {
     /// Draw force arrows.
     pub forces: bool,
     /// Draw the axis gizmo, scale bar and legend.
-    pub furniture: bool,
+    pub annotations: bool,
     /// Pressure that has the brightest colour (Pa).
     pub full_scale: f32,
     /// Words in the top left corner: where the data come from.
@@ -46,7 +46,7 @@ impl Default for PictureView {
             theme: Theme::Dark,
             size: Vec2::new(960.0, 600.0),
             forces: true,
-            furniture: true,
+            annotations: true,
             full_scale: 40e3, // taxel pressures of an ordinary hold reach some 30 kPa
             badge: None,
         }
@@ -88,8 +88,8 @@ impl Stage {
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
         let mut overlay = Overlay::default();
-        if view.furniture {
-            furniture::add(&mut overlay, view);
+        if view.annotations {
+            annotations::add(&mut overlay, view);
         }
         let palm = self.world_from_gripper.position.as_vec3();
         DrawList {

@@ -1,7 +1,7 @@
 //! Records what a link hears as a trial. Whoever holds the link hands over its events and calls
 //! [`BoardRecorder::flush_if_due`] after each, so that a kill loses at most a second.
 
-use crate::labelling::{Observed, Thinned, flags_of, sparkline};
+use crate::labelling::{Decimated, Observed, flags_of, sparkline};
 use palpate_device::serial::{LinkEvent, LinkStatus};
 use palpate_device::wire::Heard;
 use palpate_geometry::Pose;
@@ -41,7 +41,7 @@ pub struct BoardRecorder {
     gaps: u64,
     interrupted: Vec<String>,
     /// What its flags and its small picture are made from.
-    kept: Thinned,
+    kept: Decimated,
     newest_s: Option<f64>,
     missing: Vec<Gap>,
     /// The newest reading's time (s), and why none has come since, where that is known.
@@ -116,7 +116,7 @@ impl BoardRecorder {
             lost: 0,
             gaps: 0,
             interrupted: Vec::new(),
-            kept: Thinned::default(),
+            kept: Decimated::default(),
             newest_s: None,
             missing: Vec::new(),
             last: None,

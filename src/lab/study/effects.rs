@@ -118,7 +118,7 @@ pub struct Measuring<'a> {
 /// Explains every effect of a scene; `None` when cancelled.
 pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measuring<'_>) -> Option<Explanation> {
     let (base, cpu_s) = run(scene, object, how.cancelled)?;
-    let base = Felt::new(scene, base);
+    let base = GraspOutcome::new(scene, base);
     let done = AtomicUsize::new(0);
     (how.progress)(0, Effect::ALL.len());
     let one = |effect: &Effect| {
@@ -144,7 +144,7 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
 fn explain_one(
     scene: &Scene,
     object: Option<&ObjectModel>,
-    base: &Felt,
+    base: &GraspOutcome,
     effect: Effect,
     cancelled: &AtomicBool,
 ) -> Option<ExplainedEffect> {
@@ -166,7 +166,7 @@ fn explain_one(
         about: rule.about,
         number_is: rule.number,
         cost_share: sign * (here - there) / here,
-        change: base.change_to(&Felt::new(&other_scene, other?), scene),
+        change: base.change_to(&GraspOutcome::new(&other_scene, other?), scene),
         planned,
     })
 }
@@ -192,12 +192,12 @@ fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> O
 }
 
 /// A trial, and when its first contact was (s).
-struct Felt {
+struct GraspOutcome {
     trial: Trial,
     onset_s: Option<f64>,
 }
 
-impl Felt {
+impl GraspOutcome {
     fn new(scene: &Scene, trial: Trial) -> Self {
         Self { onset_s: GraspSummary::new(&trial, scene).contact_onset_s, trial }
     }
@@ -322,8 +322,8 @@ mod tests {
         let (mut scene, ball) = (draft(), ball(0.020, 400.0));
         scene.object.fixed = true;
         let told = explained(&scene, Some(&ball));
-        let free = Felt::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
-        let held = Felt::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
+        let free = GraspOutcome::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
+        let held = GraspOutcome::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
         // An object let go has its weight, and rests.
         let expected = held.change_to(&free, &scene);
         assert_eq!(told.of(Effect::FreeObject).change, expected);

@@ -57,7 +57,7 @@ pub(super) struct Contact {
     pub(super) law: PadLaw,
     /// Small-strain stiffness along the normal (N/m).
     pub(super) stiffness: f64,
-    /// Rest length of the strand along the normal (m).
+    /// Rest length of the contact spring along the normal (m).
     pub(super) height: f64,
     /// Stiffness of the skin in shear, k_t (N/m).
     pub(super) shear_stiffness: f64,

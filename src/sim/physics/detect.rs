@@ -1,17 +1,17 @@
-//! Finding contacts: every strand of the pads casts a short ray from its foot along its axis.
+//! Finding contacts: every contact spring of the pads casts a short ray from its foot along its axis.
 //!
-//! The ray is thick: a ball of the strand's radius moves from the foot outwards by sphere tracing until it touches
+//! The ray is thick: a ball of the contact spring's radius moves from the foot outwards by sphere tracing until it touches
 //! something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels; rays
-//! that are as thick as the gaps between strands do not.
+//! that are as thick as the gaps between contact springs do not.
 //!
-//! With the rest position of the ball's centre at s and the touch at t, the strand is compressed by x = s - t along its
+//! With the rest position of the ball's centre at s and the touch at t, the contact spring is compressed by x = s - t along its
 //! axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A relative motion v
-//! of the surfaces changes x by -n . v / c, whatever the shape of what is touched. The strand stores the energy U(x) of its
-//! law, so that it presses along n with U'(x) / c: the pressure in the strand on the slanted surface it meets, which is
-//! larger than its own section by 1 / c. The same force, as a function of the compression along n, is that of a strand of
+//! of the surfaces changes x by -n . v / c, whatever the shape of what is touched. The contact spring stores the energy U(x) of its
+//! law, so that it presses along n with U'(x) / c: the pressure in the contact spring on the slanted surface it meets, which is
+//! larger than its own section by 1 / c. The same force, as a function of the compression along n, is that of a contact spring of
 //! stiffness k / c² and length c H, since U depends on k H² and x / H alone. That is what a contact is given.
 //!
-//! It matters: a strand pressed along n by the force of its axial compression alone is the gradient of no energy. Fingers
+//! It matters: a contact spring pressed along n by the force of its axial compression alone is the gradient of no energy. Fingers
 //! that swing then gain energy while they press, and what they hold rings and wanders.
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
@@ -30,7 +30,7 @@ const SPEED_MARGIN: f64 = 0.1;
 /// How much faster than now a body may become within a step before contacts are found one step late.
 const SPEED_FACTOR: f64 = 1.5;
 
-/// A surface that a strand has met.
+/// A surface that a contact spring has met.
 struct Hit {
     /// Compression along the surface normal (m), negative while apart.
     compression: f64,
@@ -38,7 +38,7 @@ struct Hit {
     normal: DVec3,
     /// Where the surface is met.
     point: DVec3,
-    /// How squarely the strand meets the surface, c: from [`LEAST_COSINE`] to one.
+    /// How squarely the contact spring meets the surface, c: from [`LEAST_COSINE`] to one.
     cosine: f64,
 }
 
@@ -50,7 +50,7 @@ enum Met {
     Behind { gap: f64 },
 }
 
-/// A strand that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays finite, and
+/// A contact spring that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays finite, and
 /// its force vanishes with the compression along the normal.
 const LEAST_COSINE: f64 = 0.25;
 
@@ -67,7 +67,7 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
             let link = first_link + j;
             let segment = workspace.segments[link];
             let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
-            let reach = model.strands.reach[j] + model.strands.radius;
+            let reach = model.springs.reach[j] + model.springs.radius;
             let link_velocity = workspace.spatial[link];
             let speed =
                 link_velocity.linear_at(middle - workspace.reference).length() + link_velocity.angular.length() * reach;
@@ -124,14 +124,14 @@ struct Place {
 fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
     let plane = model.planes[place.finger];
     let local_axes = segment_axes(&plane, &place.segment);
-    for k in model.strands.of_segment(place.segment_index) {
-        let strand = &model.strands.all[k];
-        let (foot, axis) = strand.ray(&place.segment);
+    for k in model.springs.of_segment(place.segment_index) {
+        let spring = &model.springs.all[k];
+        let (foot, axis) = spring.ray(&place.segment);
         let ray = Ray {
-            foot: plane.point(foot, strand.across),
+            foot: plane.point(foot, spring.across),
             axis: plane.direction(axis),
-            radius: model.strands.radius,
-            rest: strand.height - model.strands.radius,
+            radius: model.springs.radius,
+            rest: spring.height - model.springs.radius,
         };
         let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, margin));
         let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
@@ -154,15 +154,15 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
         }
         let Some(hit) = hit else { continue };
         workspace.fingers_meet |= matches!(against, Against::Finger(_));
-        let site = place.finger * model.strands.all.len() + k;
+        let site = place.finger * model.springs.all.len() + k;
         let mu = match against {
             Against::Object => model.pad_friction.on_object,
             Against::World => model.pad_friction.on_world,
             Against::Finger(_) => model.pad_friction.on_pad,
         };
         let (stiffness, height) = match against {
-            Against::Finger(_) => in_series(strand.stiffness, strand.height),
-            _ => (strand.stiffness, strand.height),
+            Against::Finger(_) => in_series(spring.stiffness, spring.height),
+            _ => (spring.stiffness, spring.height),
         };
         let shear = local_axes * state.shear[site];
         let shear_stiffness = SHEAR_SHARE * stiffness;
@@ -201,7 +201,7 @@ fn fronts_of_near_fingers(model: &Model, workspace: &mut Workspace) -> Option<(F
             let middle = workspace.segments[link].point(0.5 * model.chain.lengths[j], 0.0);
             let arm = model.planes[finger].point(middle, 0.0) - workspace.reference;
             let velocity = &workspace.spatial[link];
-            velocity.linear_at(arm).length() + velocity.angular.length() * model.strands.reach[j]
+            velocity.linear_at(arm).length() + velocity.angular.length() * model.springs.reach[j]
         };
         (0..links).map(speed).fold(0.0, f64::max)
     });
@@ -239,7 +239,7 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// The path of a strand's round end.
+/// The path of a contact spring's round end.
 struct Ray {
     foot: DVec3,
     axis: DVec3,
@@ -253,7 +253,7 @@ struct Ray {
 const CLOSE: f64 = 1e-5;
 /// Steps of sphere tracing before a ray that grazes along a surface is taken to touch where it is.
 const MOST_STEPS: usize = 32;
-/// A surface whose normal points ahead along the strand by more than this was passed, not met sideways: things
+/// A surface whose normal points ahead along the contact spring by more than this was passed, not met sideways: things
 /// beside a finger have a normal across it.
 const FROM_BEHIND: f64 = -0.7;
 
@@ -288,7 +288,7 @@ impl Ray {
         Some(self.in_front_or_pushed(met))
     }
 
-    /// What has no thickness to go back through, a table or the front of a finger, pushes along the strand.
+    /// What has no thickness to go back through, a table or the front of a finger, pushes along the contact spring.
     fn in_front_or_pushed(&self, met: Met) -> Hit {
         match met {
             Met::InFront(hit) => hit,
@@ -298,7 +298,7 @@ impl Ray {
         }
     }
 
-    /// The foot has come through a thin body: the strand is compressed down to where it went in, and pushes back the way it
+    /// The foot has come through a thin body: the contact spring is compressed down to where it went in, and pushes back the way it
     /// came.
     #[cold]
     fn trace_back(
@@ -373,7 +373,7 @@ fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body:
     }
     let gripper_from_object = state.body.matrix();
     let place = |p: DVec3| gripper_from_object * (p - body.centre) + state.body.position;
-    let first_site = 2 * model.strands.all.len();
+    let first_site = 2 * model.springs.all.len();
     let mut touch = |site: usize, compression: f64, normal: DVec3, point: DVec3| {
         let shear = state.shear[site];
         workspace.contacts.push(Contact {

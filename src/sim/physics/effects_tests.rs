@@ -232,7 +232,7 @@ fn two_flat_pads_share_what_they_overlap() {
         let force: f64 = run.ws.contacts.iter().map(|c| c.force(run.ws.step).0).sum();
         let want = law.force(modulus * length * width / height, height, d).0;
         assert!((force / want - 1.0).abs() < 0.01, "{law:?}: {force} N instead of {want}");
-        // Each finger feels all of it: its own strands, and those of the other.
+        // Each finger feels all of it: its own contact springs, and those of the other.
         run.steps(1, &Drive::default());
         let mut simulation = Simulation::new(&scene, None).0;
         simulation.advance().expect("finite");
@@ -319,7 +319,7 @@ fn a_push_from_one_side_is_passed_on() {
         let contacts = run.ws.contacts.iter().map(|c| {
             let (normal, tangential) = c.force(run.ws.step);
             let force = c.normal * normal + tangential;
-            let left_acts = c.site < run.model.strands.all.len() as u32;
+            let left_acts = c.site < run.model.springs.all.len() as u32;
             let force = if left_acts == (finger == 0) { force } else { -force };
             let arm =
                 run.ws.reference + c.arm - run.model.planes[finger].point(run.ws.segments[finger * 11 + 1].start, 0.0);

@@ -1,7 +1,7 @@
 //! Geometry and stiffness of two fingers in contact with each other.
 //!
-//! Two pads that press on each other are two strands in series, and every place of contact is found twice, once from
-//! either side. A strand that overlaps the other skin by x is therefore given half the force at half the compression:
+//! Two pads that press on each other are two contact springs in series, and every place of contact is found twice, once from
+//! either side. A contact spring that overlaps the other skin by x is therefore given half the force at half the compression:
 //!
 //! ```text
 //!   f(x) = 1/2 f_{k,H}(x / 2) = f_{k/4, 2H}(x)          exactly, for the linear and the neo-Hookean law
@@ -11,14 +11,14 @@
 //! Neither finger is preferred: a mirrored scene stays mirrored. Forces act on both fingers at the same point.
 //!
 //! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
-//! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its strands. Both fingers bend in one plane, so that nothing
+//! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs. Both fingers bend in one plane, so that nothing
 //! moves across.
 
 use super::model::Model;
 use crate::gripper::{FingerPlane, SegmentPose};
 use glam::{DVec2, DVec3};
 
-/// Strand of a pad against another strand like it, as seen from one of them: small-strain stiffness (N/m) and rest
+/// Contact spring of a pad against another contact spring like it, as seen from one of them: small-strain stiffness (N/m) and rest
 /// length (m). See the top of this file.
 pub(super) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
     (0.25 * stiffness, 2.0 * height)
@@ -117,7 +117,7 @@ impl<'a> OtherFinger<'a> {
     /// How far a point lies beyond the core of the rounded box, along the finger and away from its middle (m).
     fn excess(&self, place: &Place, across: f64) -> (f64, f64, bool) {
         let skin = &self.model.skin;
-        let radius = self.model.strands.radius;
+        let radius = self.model.springs.radius;
         let front = place.height - (skin.height(across) - radius);
         let back = -place.height - (skin.back - radius).max(0.0);
         (place.beyond_tip + skin.last_row, front.max(back), front >= back)
@@ -127,7 +127,7 @@ impl<'a> OtherFinger<'a> {
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (along, away, _) = self.excess(&self.place(p), p.y);
         let outside = along.max(0.0).hypot(away.max(0.0));
-        outside + along.max(away).min(0.0) - self.model.strands.radius
+        outside + along.max(away).min(0.0) - self.model.springs.radius
     }
 
     /// Outward normal of the skin nearest to a point.

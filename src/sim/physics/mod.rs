@@ -11,7 +11,7 @@
 //!
 //! What of all this a scene calls for is decided in [`effects`].
 //!
-//! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
+//! Read in this order: `chain` (what a finger resists), `contact springs` and `detect` (where it touches), `contact` (what
 //! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
 //! long), [`Simulation`] (a grasp in time). A second engine, `RapierSimulation` (feature `rapier`), computes the same scenes
 //! independently; both are an [`Engine`].
@@ -22,6 +22,7 @@ mod chain;
 #[cfg(test)]
 mod closed_form;
 mod contact;
+mod contact_springs;
 mod coupling;
 mod detect;
 pub mod effects;
@@ -48,7 +49,6 @@ mod stepped;
 mod stepper;
 #[cfg(test)]
 mod stepper_tests;
-mod strands;
 mod workspace;
 
 pub use engine::{Engine, SimulationError};

@@ -2,10 +2,10 @@
 
 use super::chain::ChainModel;
 use super::contact::ContactStep;
+use super::contact_springs::ContactSprings;
 use super::effects::{Chamber, FingerContact, Relaxation, plan};
 use super::environment::Environment;
 use super::placement::Placement;
-use super::strands::Strands;
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, Gripper, PadLaw, Side};
 use crate::objects::{ObjectModel, Resting};
@@ -20,7 +20,7 @@ pub struct Model {
     pub(super) contact: ContactStep,
     pub(super) chain: ChainModel,
     pub(super) planes: [FingerPlane; 2],
-    pub(super) strands: Strands,
+    pub(super) springs: ContactSprings,
     pub(super) pad_law: PadLaw,
     /// Friction of the pads against the object and against the environment.
     pub(super) pad_friction: PadFriction,
@@ -64,7 +64,7 @@ pub(super) struct Skin {
     pub(super) width: f64,
     pub(super) rows: usize,
     pub(super) columns: usize,
-    /// Distance of the last row of strands from the tip (m).
+    /// Distance of the last row of contact springs from the tip (m).
     pub(super) last_row: f64,
 }
 
@@ -144,7 +144,7 @@ impl Model {
             },
             chain: ChainModel::new(&gripper.finger, &gripper.pad),
             planes: Side::BOTH.map(|side| gripper.plane(side)),
-            strands: Strands::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
+            springs: ContactSprings::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
             pad_law: gripper.pad.law,
             pad_friction: PadFriction {
                 on_object: object.map_or(0.0, |o| mu(gripper.pad.friction, surface_friction(o))),
@@ -193,9 +193,9 @@ impl Model {
         self.body.as_ref().filter(|body| body.free)
     }
 
-    /// Places where contact can be remembered: strands of both fingers, resting points, rim of the pedestal.
+    /// Places where contact can be remembered: contact springs of both fingers, resting points, rim of the pedestal.
     pub(super) fn sites(&self) -> usize {
-        2 * self.strands.all.len() + self.resting_points() + self.environment.rim().len()
+        2 * self.springs.all.len() + self.resting_points() + self.environment.rim().len()
     }
 
     pub(super) fn resting_points(&self) -> usize {

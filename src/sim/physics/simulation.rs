@@ -46,8 +46,8 @@ pub struct Simulation {
 pub enum Refinement {
     /// As the scene says.
     None,
-    /// More finely, to estimate an error from; see [`crate::scene::Solver::companion`].
-    Companion,
+    /// More finely, to estimate an error from; see [`crate::scene::Solver::refined`].
+    Refined,
 }
 
 impl Simulation {
@@ -61,7 +61,7 @@ impl Simulation {
         let placement = Placement::new(scene, object);
         let (parts, solver) = match refinement {
             Refinement::None => (1, scene.solver.clone()),
-            Refinement::Companion => (2, scene.solver.companion()),
+            Refinement::Refined => (2, scene.solver.refined()),
         };
         let clock = scene.timing.clock(solver.accuracy).refined(parts);
         let model = Model::new(scene, object, &placement);
@@ -166,7 +166,7 @@ impl Simulation {
         };
     }
 
-    /// Deepest compression of a strand in the state as it is, before any step (m).
+    /// Deepest compression of a contact spring in the state as it is, before any step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         step::lay_out(&self.model, &self.state, &mut self.workspace);
         segment_velocities(&self.model, &self.state.velocity, &mut self.workspace);
@@ -225,20 +225,20 @@ impl Simulation {
 
     /// Forces on the loaded taxels in the last step.
     fn taxel_loads(&self) -> Vec<TaxelLoad> {
-        let strands = &self.model.strands;
+        let springs = &self.model.springs;
         let mut loads: Vec<TaxelLoad> = Vec::new();
         for contact in &self.workspace.contacts {
             let Acting::Segment(link) = contact.acting else {
                 continue;
             };
-            let (side, strand) = (contact.site as usize / strands.all.len(), contact.site as usize % strands.all.len());
+            let (side, spring) = (contact.site as usize / springs.all.len(), contact.site as usize % springs.all.len());
             let (normal, tangential) = contact.force(self.workspace.step);
             if normal <= 0.0 {
                 continue;
             }
             let force = contact.normal * normal + tangential;
-            if strand < strands.on_pad {
-                loads.push(self.taxel_load(side, strand, link, force));
+            if spring < springs.on_pad {
+                loads.push(self.taxel_load(side, spring, link, force));
             }
             if let Against::Finger(other) = contact.against {
                 let met = OtherFinger::opposite(&self.model, &self.workspace.segments, side);
@@ -266,7 +266,7 @@ impl Simulation {
         let [along, across, inward] =
             (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
         TaxelLoad {
-            taxel: (side * self.model.strands.on_pad + taxel) as u16,
+            taxel: (side * self.model.springs.on_pad + taxel) as u16,
             normal: -inward as f32,
             along: along as f32,
             across: across as f32,
@@ -290,7 +290,7 @@ impl Simulation {
         (total.linear, total.angular)
     }
 
-    /// Deepest compression of any pad strand (m) and the largest ratio of friction to mu times normal force over
+    /// Deepest compression of any pad contact spring (m) and the largest ratio of friction to mu times normal force over
     /// loaded contacts, in the last step.
     pub fn contact_extremes(&self) -> (f64, f64) {
         let mut extremes = (0.0f64, 0.0f64);

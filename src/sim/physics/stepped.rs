@@ -183,7 +183,7 @@ impl SteppedScene {
         super::energy::mechanical_energy(&self.model, &self.state, &mut Workspace::new(&self.model)).total
     }
 
-    /// Deepest compression of any strand of a finger in the last step (m).
+    /// Deepest compression of any contact spring of a finger in the last step (m).
     pub fn deepest(&self) -> f64 {
         let on_finger = self.ws.contacts.iter().filter(|c| c.acting != Acting::Object);
         on_finger.map(|c| c.compression).fold(0.0, f64::max)

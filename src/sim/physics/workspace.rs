@@ -74,7 +74,7 @@ impl Block {
 pub(super) struct PerLink<T> {
     pub(super) object: T,
     pub(super) world: T,
-    /// Found by the other finger's strands. Kept apart, so that both fingers add up alike and mirrored scenes stay so.
+    /// Found by the other finger's contact springs. Kept apart, so that both fingers add up alike and mirrored scenes stay so.
     pub(super) met: T,
 }
 

@@ -213,7 +213,7 @@ impl Solver {
     /// What errors are estimated from: a tenth of a tolerance. Named steps have a tolerance beside them, since Euler damps
     /// the ringing of the fingers at one step and at half of it alike: these agree more closely than either with the truth.
     #[must_use]
-    pub fn companion(&self) -> Self {
+    pub fn refined(&self) -> Self {
         let (accuracy, integrator) = match self.accuracy {
             Accuracy::Draft | Accuracy::Standard => (Accuracy::Tolerance(1e-4), Integrator::Auto),
             Accuracy::Reference => (Accuracy::Tolerance(1e-6), Integrator::Auto),

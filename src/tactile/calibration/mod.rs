@@ -36,7 +36,7 @@ pub use input::{Input, Rail};
 pub use pad_curve::{ACTIVE_AREA, BendingZero, PadCurve};
 pub use point::{Kind, Point};
 pub use procedure::{Procedure, Settling, Unsettled, plan};
-pub use readout::{Derived, Felt, Readout};
+pub use readout::{Derived, Readout, SensorEstimate};
 pub use record::{Calibration, Curve, Record};
 pub use straight_line::StraightLine;
 pub use zero::{Drift, DriftLevel, Unrest, Zero};

@@ -13,7 +13,7 @@ use palpate_sim::gripper::Side;
 
 /// What one reading comes to; left and right. None where a sensor is missing, not calibrated, or at an end of its range.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Felt {
+pub struct SensorEstimate {
     /// Angle over the active length of each strip (rad).
     pub angle: [Option<f64>; 2],
     /// Curvature of each finger (1/m).
@@ -24,7 +24,7 @@ pub struct Felt {
     pub pressure: [Option<f64>; 2],
 }
 
-impl Felt {
+impl SensorEstimate {
     /// The value of a channel of the layout C1+F, in its unit.
     pub fn of(&self, channel: &Channel) -> Option<f64> {
         let side = channel.side.index();
@@ -183,8 +183,8 @@ impl Readout {
     }
 
     /// What one reading comes to.
-    pub fn felt(&self, reading: &Reading) -> Felt {
-        let mut felt = Felt::default();
+    pub fn estimate(&self, reading: &Reading) -> SensorEstimate {
+        let mut felt = SensorEstimate::default();
         for side in Side::BOTH {
             let side = side.index();
             let angle = self.raw(reading, side).map(|angle| angle - self.offset(side));
@@ -200,7 +200,7 @@ impl Readout {
 
     /// Which sensors, in the order of [`Sensor::ALL`], show more than they were calibrated with, by more than what a
     /// calibration promises: what is told of them is read off the curve's extension.
-    pub fn beyond(&self, felt: &Felt) -> [bool; 4] {
+    pub fn beyond(&self, felt: &SensorEstimate) -> [bool; 4] {
         let values = [felt.angle[0], felt.angle[1], felt.force[0], felt.force[1]];
         std::array::from_fn(|place| {
             let (Some(wired), Some(value)) = (&self.wired[place], values[place]) else { return false };
@@ -213,7 +213,7 @@ impl Readout {
     }
 
     /// What of a trial was beyond the calibrations, in sentences.
-    fn beyond_remarks(&self, felt: &[Felt]) -> Vec<String> {
+    fn beyond_remarks(&self, felt: &[SensorEstimate]) -> Vec<String> {
         let mut counts = [0; 4];
         for felt in felt {
             counts.iter_mut().zip(self.beyond(felt)).for_each(|(count, beyond)| *count += u32::from(beyond));
@@ -254,9 +254,9 @@ impl Readout {
         let drift = self.drift(&zero);
         let mut warnings = self.warnings.clone();
         warnings.extend(drift.iter().filter_map(Drift::remark));
-        let felt: Vec<Felt> = {
+        let felt: Vec<SensorEstimate> = {
             let zeroed = self.clone().with_zero(zero);
-            readings.iter().map(|reading| zeroed.felt(reading)).collect()
+            readings.iter().map(|reading| zeroed.estimate(reading)).collect()
         };
         warnings.extend(self.saturated(readings));
         warnings.extend(self.beyond_remarks(&felt));

@@ -89,7 +89,7 @@ fn a_calibration_recovers_angle_within_a_degree_and_force_within_5_per_cent() {
             // What a finger at rest reads in half a second.
             let mut mean = [0.0; 4];
             for _ in 0..25 {
-                let felt = readout.felt(&parts.read(0.0, [degrees; 2], [force; 2]));
+                let felt = readout.estimate(&parts.read(0.0, [degrees; 2], [force; 2]));
                 for side in 0..2 {
                     mean[side] += felt.angle[side].unwrap().to_degrees() / 25.0;
                     mean[2 + side] += felt.force[side].unwrap() / 25.0;
@@ -124,7 +124,7 @@ fn a_bent_finger_feels_nothing_once_its_zero_is_known() {
     }
     let zeroed = Readout::new(&Board::default(), &calibrations).unwrap();
     for degrees in [10.0, 30.0, 50.0] {
-        let felt = |readout: &Readout, reading: &Reading| readout.felt(reading).force.map(|force| force.unwrap());
+        let felt = |readout: &Readout, reading: &Reading| readout.estimate(reading).force.map(|force| force.unwrap());
         let empty = parts.read(0.0, [degrees; 2], [0.0; 2]);
         let nothing = felt(&zeroed, &empty);
         assert!(nothing.iter().all(|force| *force < 0.03), "{degrees} degrees: {nothing:?}");
@@ -245,7 +245,7 @@ fn a_tare_wants_an_open_hand_at_rest() {
     let levels: Vec<&str> = readout.drift(&zero).iter().map(Drift::badge).collect();
     assert_eq!(levels, ["moved", "steady", "steady", "steady"]);
     // Subtracted, it is straight.
-    let felt = readout.clone().with_zero(zero).felt(&steady[7]);
+    let felt = readout.clone().with_zero(zero).estimate(&steady[7]);
     assert!(felt.angle[0].unwrap().to_degrees().abs() < 1.0, "{felt:?}");
     assert_eq!(readout.tare(&rest(&|_| [30.0, 0.0])).unwrap().offsets[0], None, "a bent finger is no drift");
     assert_eq!(readout.tare(&rest(&|t| [6.0 * t, 0.0])), Err(Unrest::Moving { sensor: Sensor::FlexLeft }));
@@ -259,7 +259,7 @@ fn what_is_beyond_the_calibrated_range_is_told() {
     let mut parts = Parts::new(6);
     let readout = parts.readout();
     let mut beyond = |degrees, force| {
-        let felt = readout.felt(&parts.read(0.0, degrees, force));
+        let felt = readout.estimate(&parts.read(0.0, degrees, force));
         readout.beyond(&felt)
     };
     assert_eq!(beyond([90.0, 0.0], [4.9, 0.0]), [false; 4]);

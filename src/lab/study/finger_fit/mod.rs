@@ -1,7 +1,7 @@
 //! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so that the
 //! simulated finger lies on the real one.
 //!
-//! The twin is simulated with what the control box did, and its curvature and force laid over what was recorded; see
+//! The fitted model is simulated with what the control box did, and its curvature and force laid over what was recorded; see
 //! `least_squares` for how the difference is made least. Fitted in logarithms: bending stiffness EI, damping time, the torques at
 //! points of the curve every 0.2 bar; and the time in which a chamber fills. Beside them, and only as far as their
 //! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and when
@@ -13,12 +13,12 @@
 //! calibrated pad measures a force, and so the scale itself. The intervals say how much of this was in the data.
 
 mod course;
+mod fitted_model;
 mod least_squares;
 mod observation;
 mod recorded;
 #[cfg(test)]
 mod tests;
-mod twin;
 mod watched;
 
 pub use course::Course;
@@ -27,12 +27,14 @@ pub use observation::Observation;
 pub use recorded::{RecordedGraspError, RecordedGrasps};
 pub use watched::FitWatch;
 
+use fitted_model::{
+    DAMPING, FittedModel, LAG, PAD_BENDING, PAD_GAIN, SHIFT, STIFFNESS, STRIP_GAIN, STRIP_OFFSET, TORQUES,
+};
 use least_squares::{Minimum, Prior, minimise};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::Gripper;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
-use twin::{DAMPING, LAG, PAD_BENDING, PAD_GAIN, SHIFT, STIFFNESS, STRIP_GAIN, STRIP_OFFSET, TORQUES, Twin};
 use watched::Watched;
 
 /// How well the sensors are known: one deviation each, left and right.
@@ -80,7 +82,7 @@ pub struct Estimate {
     pub known: Known,
 }
 
-/// What is left between twin and recording.
+/// What is left between fitted and recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remainder {
     /// The recording.
@@ -100,7 +102,7 @@ pub struct FingerFit {
     pub gripper: Gripper,
     /// What was fitted, with intervals.
     pub estimates: Vec<Estimate>,
-    /// Each recording against its twin.
+    /// Each recording against its fitted model.
     pub remainders: Vec<Remainder>,
     /// By which factor intervals are wider than noise alone would make them: what the model does not explain.
     pub widened: f64,
@@ -146,7 +148,7 @@ pub enum FitError {
     /// It was given up from outside.
     #[error("the fit was stopped; nothing was changed")]
     Stopped,
-    /// The twin cannot be computed.
+    /// The fitted model cannot be computed.
     #[error("the fit failed: {0}")]
     Failed(String),
 }
@@ -197,15 +199,15 @@ pub fn fit_finger_watched(
     let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
     let count = (peak / KNOT_BAR - 1e-6).ceil().clamp(KNOTS[0], KNOTS[1]);
     let knots: Vec<f64> = (1..=count as u32).map(|k| peak * f64::from(k) / count).collect();
-    let mut twin = Twin::new(observations, knots.clone());
+    let mut fitted = FittedModel::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
-    let minimum = minimise(&mut Watched::new(&mut twin, watch), &start, &priors)
+    let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)
         .map_err(|cause| if watch.is_over() { FitError::Stopped } else { FitError::Failed(cause) })?;
-    let gripper = twin.gripper(&first.scene.gripper, &minimum.x);
+    let gripper = fitted.gripper(&first.scene.gripper, &minimum.x);
     let estimates = estimates(&minimum, &knots);
-    let remainders = remainders(observations, &twin, &minimum);
-    let remarks = remarks(first, &twin, &minimum, &estimates, &remainders);
-    let courses = course::courses(observations, &twin, &minimum.residuals);
+    let remainders = remainders(observations, &fitted, &minimum);
+    let remarks = remarks(first, &fitted, &minimum, &estimates, &remainders);
+    let courses = course::courses(observations, &fitted, &minimum.residuals);
     let Minimum { widened, steps, .. } = minimum;
     Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks, courses })
 }
@@ -298,9 +300,9 @@ impl Known {
     }
 }
 
-fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) -> Vec<Remainder> {
+fn remainders(observations: &[Observation], fitted: &FittedModel<'_>, minimum: &Minimum) -> Vec<Remainder> {
     let mut sums = vec![[(0.0, 0u32); 2]; observations.len()];
-    for ((number, track, k), residual) in twin.places().zip(&minimum.residuals) {
+    for ((number, track, k), residual) in fitted.places().zip(&minimum.residuals) {
         let value = f64::from(observations[number].signals.row(k)[track.column]);
         let off = residual * track.deviation(value).unwrap_or(0.0);
         let off = if track.is_force { off / value } else { off };
@@ -308,7 +310,7 @@ fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) 
         (*sum, *count) = (*sum + off * off, *count + 1);
     }
     let mean = |(sum, count): (f64, u32)| (count > 0).then(|| (sum / f64::from(count)).sqrt());
-    let shift = |number: usize| minimum.x[twin.of_finger() + SHIFT + number];
+    let shift = |number: usize| minimum.x[fitted.of_finger() + SHIFT + number];
     let each = observations.iter().zip(sums).enumerate();
     each.map(|(number, (seen, [curvature, force]))| Remainder {
         name: seen.name.clone(),
@@ -321,7 +323,7 @@ fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) 
 
 fn remarks(
     first: &Observation,
-    twin: &Twin<'_>,
+    fitted: &FittedModel<'_>,
     minimum: &Minimum,
     estimates: &[Estimate],
     remainders: &[Remainder],
@@ -348,11 +350,11 @@ fn remarks(
             "torque over stiffness is known well, each of them is not: they may only be changed together".to_owned(),
         );
     }
-    remarks.extend(corrected_sensors(twin, minimum));
+    remarks.extend(corrected_sensors(fitted, minimum));
     if minimum.widened > 5.0 {
         let factor = minimum.widened;
         remarks.push(format!(
-            "the twin explains the recordings only in part: intervals are {factor:.0} times as wide as the noise would make \
+            "the fitted model explains the recordings only in part: intervals are {factor:.0} times as wide as the noise would make \
              them. Look at the residuals: contact in an empty close, a strip that creeps, another pressure than commanded?"
         ));
     }
@@ -360,8 +362,8 @@ fn remarks(
 }
 
 /// Sensors that the fit had to correct by more than their calibration allows.
-fn corrected_sensors(twin: &Twin<'_>, minimum: &Minimum) -> Vec<String> {
-    let sensor = |j: usize| minimum.x[twin.of_finger() + j];
+fn corrected_sensors(fitted: &FittedModel<'_>, minimum: &Minimum) -> Vec<String> {
+    let sensor = |j: usize| minimum.x[fitted.of_finger() + j];
     let mut words = Vec::new();
     for (side, name) in ["left", "right"].into_iter().enumerate() {
         let strip = sensor(STRIP_GAIN + side).exp_m1();

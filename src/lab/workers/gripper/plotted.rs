@@ -3,7 +3,7 @@
 use crate::workers::TraceRow;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Reading;
-use palpate_tactile::calibration::Felt;
+use palpate_tactile::calibration::SensorEstimate;
 
 /// Above this rate readings are gathered (1/s).
 const MOST_HZ: f64 = 110.0;
@@ -60,7 +60,7 @@ impl Plotted {
     }
 
     /// Takes in a reading; what it completes.
-    pub(super) fn push(&mut self, reading: &Reading, felt: &Felt, line_bar: Option<f64>) -> Vec<Row> {
+    pub(super) fn push(&mut self, reading: &Reading, felt: &SensorEstimate, line_bar: Option<f64>) -> Vec<Row> {
         let derived = self.channels.iter().map(|channel| felt.of(channel).map_or(f32::NAN, |value| value as f32));
         let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
         let values: Vec<f32> = derived.chain((0..self.counts).map(count)).collect();
@@ -123,7 +123,7 @@ mod tests {
     fn slow_boards_are_plotted_reading_by_reading() {
         let mut plotted = Plotted::new(Vec::new(), 2);
         for k in 0..10u8 {
-            let rows = plotted.push(&reading(0.02 * f64::from(k), f32::from(k)), &Felt::default(), Some(0.5));
+            let rows = plotted.push(&reading(0.02 * f64::from(k), f32::from(k)), &SensorEstimate::default(), Some(0.5));
             assert_eq!(rows.len(), 1);
             assert_eq!((rows[0].values[0], rows[0].line_bar), (f32::from(k), 0.5));
             assert!(rows[0].values[1].is_nan());
@@ -136,7 +136,7 @@ mod tests {
         let mut rows = Vec::new();
         for k in 0..10_000u32 {
             let spike = if k == 5003 { 4095.0 } else { 100.0 };
-            rows.extend(plotted.push(&reading(1e-3 * f64::from(k), spike), &Felt::default(), None));
+            rows.extend(plotted.push(&reading(1e-3 * f64::from(k), spike), &SensorEstimate::default(), None));
         }
         assert!((980..=1010).contains(&rows.len()), "{}", rows.len());
         assert!(rows.windows(2).all(|pair| pair[0].t_s < pair[1].t_s));

@@ -7,7 +7,7 @@
 //! sum over taxels  f_t(c_t + delta) = F
 //! ```
 //!
-//! with F rapier's force along the segment's inward axis, f_t the law of a strand and c_t the overlap of the undeformed
+//! with F rapier's force along the segment's inward axis, f_t the law of a contact spring and c_t the overlap of the undeformed
 //! skin with the object, negative where they are apart. Shear is shared out in proportion. The sum over a segment is
 //! rapier's force; where on the segment it acts is the pad's answer, not rapier's.
 
@@ -88,17 +88,17 @@ impl Skin {
         loads
     }
 
-    /// Forces of the strands (N) that add up to `total` (N).
+    /// Forces of the contact springs (N) that add up to `total` (N).
     fn spread(&self, taxels: &[usize], overlaps: &[f64], total: f64) -> Vec<f64> {
         let forces = |delta: f64| -> Vec<f64> {
-            let strand = |(taxel, overlap): (&usize, &f64)| {
+            let spring = |(taxel, overlap): (&usize, &f64)| {
                 self.law.force(self.grid.stiffness(*taxel), self.grid.height(*taxel), overlap + delta).0
             };
-            taxels.iter().zip(overlaps).map(strand).collect()
+            taxels.iter().zip(overlaps).map(spring).collect()
         };
         let sum = |delta: f64| forces(delta).iter().sum::<f64>();
         let mut low = -overlaps.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Every strand stiffens, so that doubling the depth at least doubles the force.
+        // Every contact spring stiffens, so that doubling the depth at least doubles the force.
         let mut reach = self.finger.length;
         while sum(low + reach) < total && reach.is_finite() {
             reach *= 2.0;

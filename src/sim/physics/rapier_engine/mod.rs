@@ -12,7 +12,7 @@
 //! | free bend | M / k | M / k to 1e-5 | nothing |
 //! | skin | compresses by millimetres, stiffening | rigid; overlap is pushed out | hold force 3 to 7 % higher, joints 0.05 to 0.15 degrees RMS apart |
 //! | friction | shear springs with a slip limit | sticks or slides | fixed objects: hold force 12 to 27 % lower, joints 0.2 to 0.3 degrees apart, since what touches first cannot yield along the skin |
-//! | tip | round strands | an edge with a chamfer | flat and small things are touched up to 50 ms later; lip balm, syringe and push button, thinner than 20 mm, end in another grasp or none |
+//! | tip | round contact springs | an edge with a chamfer | flat and small things are touched up to 50 ms later; lip balm, syringe and push button, thinner than 20 mm, end in another grasp or none |
 //! | contacts | some tens of taxels | one to four points on a segment | taxels: see `loads` |
 //! | cost | 10 to 20 ms | 160 to 250 ms | 4 s of a grasp |
 //!
@@ -112,7 +112,7 @@ impl RapierSimulation {
             Some(_) => Accuracy::Standard,
             None => scene.solver.accuracy,
         };
-        let parts = if refinement == Refinement::Companion { 2 } else { 1 };
+        let parts = if refinement == Refinement::Refined { 2 } else { 1 };
         let clock = scene.timing.clock(accuracy).refined(parts);
         let gripper = &scene.gripper;
         let plan = simulated(plan(scene, object, &placement));

@@ -37,7 +37,7 @@ const CONTACT_FREQUENCY: f32 = 200.0;
 const CONTACT_DAMPING: f32 = 5.0;
 /// The angle of a revolute joint among the six coordinates of a joint.
 const HINGE: usize = 3;
-/// What is cut off the front edge of the tip (m), about what the round ends of Palpate's strands leave out: a sharp edge
+/// What is cut off the front edge of the tip (m), about what the round ends of Palpate's contact springs leave out: a sharp edge
 /// catches on a pedestal that a soft one slides over.
 const TIP_CHAMFER: f64 = 0.00125;
 /// A mesh whose hull is larger by less than this share is taken to be convex: the holes of a button are too small for a

@@ -5,7 +5,7 @@ use crate::workers::Notice;
 use crate::workers::listener::Listener;
 use palpate_learn::Model;
 use palpate_tactile::Channel;
-use palpate_tactile::calibration::Felt;
+use palpate_tactile::calibration::SensorEstimate;
 use std::sync::Arc;
 
 impl Desk {
@@ -31,7 +31,7 @@ impl Desk {
     }
 
     /// Lets the model hear a reading of the grasp that goes on.
-    pub(super) fn recognise(&mut self, t_s: f64, felt: &Felt) {
+    pub(super) fn recognise(&mut self, t_s: f64, felt: &SensorEstimate) {
         let (Some(listener), Some(running)) = (&mut self.listener, &self.running) else { return };
         let Some(t) = running.closing_s.map(|closing_s| t_s - closing_s).filter(|t| *t >= 0.0) else { return };
         let names = listener.channels();
@@ -48,8 +48,8 @@ impl Desk {
     pub(super) fn catch_up(&mut self, closing_s: f64, until_s: f64) {
         let Some(connection) = &self.connection else { return };
         let heard = connection.recent.between(closing_s, until_s);
-        let felt: Vec<(f64, Felt)> =
-            heard.iter().map(|reading| (reading.t_s, connection.readout.felt(reading))).collect();
+        let felt: Vec<(f64, SensorEstimate)> =
+            heard.iter().map(|reading| (reading.t_s, connection.readout.estimate(reading))).collect();
         for (t_s, felt) in felt {
             self.recognise(t_s, &felt);
         }

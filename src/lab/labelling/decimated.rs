@@ -11,14 +11,14 @@ const MOST: usize = 8192;
 
 /// Readings of a trial, fewer of them the longer it is.
 #[derive(Clone, Debug, Default)]
-pub struct Thinned {
+pub struct Decimated {
     readings: Vec<Reading>,
     /// Every how many-th reading is taken, as a power of two.
     halvings: u32,
     heard: u64,
 }
 
-impl Thinned {
+impl Decimated {
     /// Takes the next reading, if it is one of those to be kept.
     pub fn push(&mut self, reading: &Reading) {
         let taken = self.heard.is_multiple_of(1 << self.halvings.min(63));
@@ -85,12 +85,12 @@ mod tests {
 
     #[test]
     fn memory_is_bounded_and_what_is_kept_is_evenly_spread() {
-        let mut thinned = Thinned::default();
+        let mut decimated = Decimated::default();
         let mut at_step = |to: u64| {
-            for k in thinned.heard..to {
-                thinned.push(&reading(k as f64, 0.0));
+            for k in decimated.heard..to {
+                decimated.push(&reading(k as f64, 0.0));
             }
-            let times: Vec<f64> = thinned.readings().iter().map(|reading| reading.t_s).collect();
+            let times: Vec<f64> = decimated.readings().iter().map(|reading| reading.t_s).collect();
             (times.len(), times.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>())
         };
         assert!(at_step(MOST as u64).1.iter().all(|step| *step == 1.0), "a grasp is kept whole");

@@ -1,4 +1,4 @@
-//! The twin: what a finger of given parameters would have shown, by simulating what the control box did.
+//! The fitted model: what a finger of given parameters would have shown, by simulating what the control box did.
 
 use super::least_squares::Problem;
 use super::observation::{Observation, Track};
@@ -7,7 +7,7 @@ use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::{Effect, Scene, Setting, Timing};
 use palpate_tactile::{Sensors, Signals};
 
-/// Rate at which the twin is commanded (Hz): commands of any control box fall on its ticks nearly enough. At 50 Hz they would be
+/// Rate at which the fitted model is commanded (Hz): commands of any control box fall on its ticks nearly enough. At 50 Hz they would be
 /// 10 ms late on average, some more than others, and the fit would make lag and damping of that.
 const COMMAND_HZ: u32 = 300;
 
@@ -30,7 +30,7 @@ pub(super) const PAD_BENDING: usize = 6;
 pub(super) const SHIFT: usize = 8;
 
 /// The fit as a problem of least squares.
-pub(super) struct Twin<'a> {
+pub(super) struct FittedModel<'a> {
     observations: &'a [Observation],
     tracks: Vec<Vec<Track>>,
     /// Pressures of the torque curve's points (bar).
@@ -39,7 +39,7 @@ pub(super) struct Twin<'a> {
     last: Option<(Vec<f64>, Vec<Signals>)>,
 }
 
-impl<'a> Twin<'a> {
+impl<'a> FittedModel<'a> {
     pub(super) fn new(observations: &'a [Observation], knots: Vec<f64>) -> Self {
         let tracks = observations.iter().map(Observation::tracks).collect();
         Self { observations, tracks, knots, last: None }
@@ -85,7 +85,7 @@ impl<'a> Twin<'a> {
     }
 }
 
-impl Problem for Twin<'_> {
+impl Problem for FittedModel<'_> {
     fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, String> {
         let of_finger = self.of_finger();
         self.simulate(&x[..of_finger])?;
@@ -140,7 +140,7 @@ fn at(signals: &Signals, column: usize, t: f64) -> f64 {
     }
 }
 
-/// What the twin shows of an observation: curvature, pressure and force, left and right.
+/// What the fitted model shows of an observation: curvature, pressure and force, left and right.
 fn shown(seen: &Observation, gripper: Gripper) -> Result<Signals, String> {
     let lag = gripper.actuation.filling_time > 0.0;
     let mut scene = Scene { gripper, ..seen.scene.clone() };

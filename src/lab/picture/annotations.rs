@@ -6,7 +6,7 @@ use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
 use palpate_geometry::units::three_digits;
 
-/// Distance of furniture from the edges (points).
+/// Distance of annotations from the edges (points).
 const MARGIN: f32 = 18.0;
 /// Height of its text (points).
 const TEXT: f32 = 14.0;
