@@ -13,7 +13,7 @@
 use super::store::Store;
 use super::store_error::{StoreError, fault};
 use palpate_tactile::board::Sensor;
-use palpate_tactile::calibration::{Calibration, Kind, Record};
+use palpate_tactile::calibration::{Calibration, Record, SensorKind};
 use palpate_tactile::trial::TrialId;
 use rusqlite::{OptionalExtension, Row, Transaction, params};
 use serde::{Deserialize, Serialize};
@@ -232,7 +232,7 @@ impl Store {
                 serving.warnings.push(text);
                 continue;
             };
-            let fits = |c: &&StoredCalibration| c.record.kind == Kind::of(sensor) && c.record.part == part;
+            let fits = |c: &&StoredCalibration| c.record.kind == SensorKind::of(sensor) && c.record.part == part;
             let wanted: Vec<StoredCalibration> = match asked.iter().find(fits) {
                 Some(one) => vec![one.clone()],
                 None => {
@@ -319,7 +319,7 @@ pub(super) mod tests {
             readings: 50,
         };
         let points = [0.0, 45.0, 90.0].map(point).to_vec();
-        Record { part: part.to_owned(), kind: Kind::Flex, input, points, bending: None, note: String::new() }
+        Record { part: part.to_owned(), kind: SensorKind::Flex, input, points, bending: None, note: String::new() }
     }
 
     fn store(folder: &tempfile::TempDir, name: &str) -> Store {

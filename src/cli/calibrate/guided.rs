@@ -9,7 +9,7 @@ use palpate_device::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_device::wire::Heard;
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
-use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
+use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Procedure, Record, SensorKind, Unsettled};
 use std::collections::VecDeque;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ pub(super) fn record(
         )
     })?;
     if !live.plan.is_empty() {
-        let plan: Vec<f64> = live.plan.iter().map(|shown| Kind::of(sensor).stimulus(*shown)).collect();
+        let plan: Vec<f64> = live.plan.iter().map(|shown| SensorKind::of(sensor).stimulus(*shown)).collect();
         procedure = procedure.with_plan(&plan);
     }
     note(&format!(

@@ -5,17 +5,17 @@
 //! the left and segment of the right finger, then from the tip of the right finger inward.
 
 use super::contact::{Acting, Against};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::workspace::{Spatial, Workspace};
 
 /// Gives the rows of the right finger room for the block, or takes it back.
-pub(super) fn prepare_coupling(model: &Model, ws: &mut Workspace) {
+pub(super) fn prepare_coupling(model: &PhysicsModel, ws: &mut Workspace) {
     let n = model.chain.joints;
     ws.hessian.begin_rows(n..2 * n, if ws.fingers_meet { 0 } else { n });
 }
 
 /// Fills the block.
-pub(super) fn fill_coupling(model: &Model, ws: &mut Workspace) {
+pub(super) fn fill_coupling(model: &PhysicsModel, ws: &mut Workspace) {
     if !ws.fingers_meet {
         return;
     }

@@ -17,7 +17,7 @@
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
 use super::effects::FingerContact;
 use super::finger_pair::{Fronts, OtherFinger, in_series};
-use super::model::{Body, Model};
+use super::model::{Body, PhysicsModel};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
 use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
@@ -55,7 +55,7 @@ enum Met {
 const LEAST_COSINE: f64 = 0.25;
 
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
-pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
+pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Workspace) {
     workspace.contacts.clear();
     let h = workspace.step.h;
     let object = model.body.as_ref().map(|body| Solid::new(body, state));
@@ -121,7 +121,7 @@ struct Place {
     segment: SegmentPose,
 }
 
-fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
+fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
     let plane = model.planes[place.finger];
     let local_axes = segment_axes(&plane, &place.segment);
     for k in model.springs.of_segment(place.segment_index) {
@@ -189,7 +189,7 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
 
 /// How far the fingers stand out towards each other, and the fastest segment of each (m/s); `None` where no segment of
 /// one can come near the other within the step, or where they pass through each other.
-fn fronts_of_near_fingers(model: &Model, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
+fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
     workspace.fingers_meet = false;
     if model.finger_contact == FingerContact::Never {
         return None;
@@ -276,7 +276,7 @@ impl Ray {
         })
     }
 
-    fn cast_environment(&self, model: &Model, margin: f64) -> Option<Hit> {
+    fn cast_environment(&self, model: &PhysicsModel, margin: f64) -> Option<Hit> {
         let environment = &model.environment;
         let (distance, normal) = (|p| environment.distance(p), |p| environment.normal(p));
         let met = self.trace(self.foot, self.axis, margin, distance, normal)?;
@@ -365,7 +365,7 @@ impl Ray {
 }
 
 /// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
-fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
+fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
     let h = workspace.step.h;
     let environment = &model.environment;
     if environment.distance(state.body.position) > body.radius + margin {

@@ -6,7 +6,7 @@ use super::detect::detect;
 use super::effects::{plan, plan_of};
 use super::integrator::{Integrator, Surroundings};
 use super::step::{Drive, lay_out};
-use super::{Model, Placement, Simulation};
+use super::{PhysicsModel, Placement, Simulation};
 use crate::frame::Plan;
 use crate::gripper::PadLaw;
 use crate::objects::ObjectModel;
@@ -30,7 +30,7 @@ fn everything() -> Scene {
 }
 
 /// A grasp with the pressure of the default programme, state by state.
-fn states(model: Model, placement: &Placement) -> Vec<super::State> {
+fn states(model: PhysicsModel, placement: &Placement) -> Vec<super::State> {
     let (mut run, actuation) = (Run::of(model, placement, H), Scene::default().gripper.actuation);
     (0..900)
         .map(|k| {
@@ -42,9 +42,9 @@ fn states(model: Model, placement: &Placement) -> Vec<super::State> {
         .collect()
 }
 
-fn model(scene: &Scene, ball: &ObjectModel, plan: Plan) -> (Model, Placement) {
+fn model(scene: &Scene, ball: &ObjectModel, plan: Plan) -> (PhysicsModel, Placement) {
     let placement = Placement::new(scene, Some(ball));
-    (Model::planned(scene, Some(ball), &placement, plan), placement)
+    (PhysicsModel::planned(scene, Some(ball), &placement, plan), placement)
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn a_finger_against_its_mirror_image_is_a_finger_against_a_wall() {
     let mut placement = Placement::new(&scene, None);
     let position = placement.world_from_gripper.position + DVec3::X * half.x;
     placement.world_from_object = Some(palpate_geometry::Pose::from_position(position));
-    let mut run = Run::of(Model::new(&scene, Some(&block), &placement), &placement, H);
+    let mut run = Run::of(PhysicsModel::new(&scene, Some(&block), &placement), &placement, H);
     for k in 0..900 {
         let (bar, _) = scene.programme.command(k / 30);
         super::step::step(&run.model, &mut run.state, &mut run.ws, &torque(0.06 * bar), H).expect("finite");
@@ -346,12 +346,12 @@ fn the_guard_lets_fingers_touch_that_should_not_have_met() {
         placement.world_from_object.map(|pose| palpate_geometry::Pose { position: pose.position + DVec3::Z, ..pose });
     let auto = plan(&scene, Some(&block), &placement);
     assert!(!auto.is_on("finger-contact"), "{auto:?}");
-    let guarded = states(Model::planned(&scene, Some(&block), &placement, auto), &placement);
+    let guarded = states(PhysicsModel::planned(&scene, Some(&block), &placement, auto), &placement);
     scene.effects.set(Effect::FingerContact, Setting::On);
-    let always = states(Model::new(&scene, Some(&block), &placement), &placement);
+    let always = states(PhysicsModel::new(&scene, Some(&block), &placement), &placement);
     assert!(guarded == always, "the guard is the same contact");
     scene.effects.set(Effect::FingerContact, Setting::Off);
-    let never = states(Model::new(&scene, Some(&block), &placement), &placement);
+    let never = states(PhysicsModel::new(&scene, Some(&block), &placement), &placement);
     assert!(guarded != never, "they have met");
     assert_eq!(never.last().map(|s| s.lag.iter().sum::<f64>()), Some(0.0), "off stays off");
 }

@@ -14,7 +14,7 @@
 //! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs. Both fingers bend in one plane, so that nothing
 //! moves across.
 
-use super::model::Model;
+use super::model::PhysicsModel;
 use crate::gripper::{FingerPlane, SegmentPose};
 use glam::{DVec2, DVec3};
 
@@ -29,7 +29,7 @@ pub(super) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
 pub(super) struct Fronts([f64; 2]);
 
 impl Fronts {
-    pub(super) fn new(model: &Model, segments: &[SegmentPose]) -> Self {
+    pub(super) fn new(model: &PhysicsModel, segments: &[SegmentPose]) -> Self {
         let n = model.chain.joints;
         Self([0, 1].map(|finger| {
             let own = &segments[finger * (n + 1)..(finger + 1) * (n + 1)];
@@ -38,18 +38,24 @@ impl Fronts {
     }
 
     /// True where this segment of a finger may come within `margin` (m) of any of the other finger.
-    pub(super) fn may_meet(&self, model: &Model, finger: usize, segment: (&SegmentPose, f64), margin: f64) -> bool {
+    pub(super) fn may_meet(
+        &self,
+        model: &PhysicsModel,
+        finger: usize,
+        segment: (&SegmentPose, f64),
+        margin: f64,
+    ) -> bool {
         front(model, segment.0, segment.1) + self.0[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
     }
 
     /// True where any of one finger may come within `margin` (m) of any of the other.
-    pub(super) fn are_near(&self, model: &Model, margin: f64) -> bool {
+    pub(super) fn are_near(&self, model: &PhysicsModel, margin: f64) -> bool {
         self.0[0] + self.0[1] + margin > 2.0 * model.planes[0].half_gap
     }
 }
 
 /// Most inward point of a segment, pad and bellows included (m).
-fn front(model: &Model, segment: &SegmentPose, length: f64) -> f64 {
+fn front(model: &PhysicsModel, segment: &SegmentPose, length: f64) -> f64 {
     let faces = model.skin.thickness * segment.inward().x;
     let back = -model.skin.back * segment.inward().x;
     segment.start.x + (length * segment.along.x).max(0.0) + faces.max(back)
@@ -57,7 +63,7 @@ fn front(model: &Model, segment: &SegmentPose, length: f64) -> f64 {
 
 /// A finger as the other one meets it.
 pub(super) struct OtherFinger<'a> {
-    model: &'a Model,
+    model: &'a PhysicsModel,
     plane: FingerPlane,
     segments: &'a [SegmentPose],
 }
@@ -76,7 +82,7 @@ struct Place {
 
 impl<'a> OtherFinger<'a> {
     /// The finger opposite to `finger`.
-    pub(super) fn opposite(model: &'a Model, segments: &'a [SegmentPose], finger: usize) -> Self {
+    pub(super) fn opposite(model: &'a PhysicsModel, segments: &'a [SegmentPose], finger: usize) -> Self {
         let (other, n) = (1 - finger, model.chain.joints);
         let segments = &segments[other * (n + 1)..(other + 1) * (n + 1)];
         Self { model, plane: model.planes[other], segments }

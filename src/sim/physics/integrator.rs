@@ -21,7 +21,7 @@
 //! same in force, first order still), BDF2 (no gain above 1/600 s), Richardson's extrapolation of Euler (half as good as
 //! SDIRK2 at equal cost).
 
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
 use super::workspace::Workspace;
@@ -32,7 +32,7 @@ const GAMMA: f64 = 1.0 - FRAC_1_SQRT_2;
 
 /// What a step needs besides a state and a length.
 pub(super) struct Surroundings<'a> {
-    pub(super) model: &'a Model,
+    pub(super) model: &'a PhysicsModel,
     pub(super) ws: &'a mut Workspace,
     pub(super) drive: &'a Drive,
 }

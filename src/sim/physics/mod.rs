@@ -52,7 +52,7 @@ mod stepper_tests;
 mod workspace;
 
 pub use engine::{Engine, SimulationError};
-pub use model::Model;
+pub use model::PhysicsModel;
 pub use placement::{Placement, random_rotation};
 #[cfg(feature = "rapier")]
 pub use rapier_engine::RapierSimulation;

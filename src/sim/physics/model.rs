@@ -15,7 +15,7 @@ use palpate_geometry::{DistanceField, Pose};
 
 /// Constants of a simulation. Built once, never changed; a step is a function of it and a [`super::State`].
 #[derive(Clone, Debug)]
-pub struct Model {
+pub struct PhysicsModel {
     /// What all contacts share; the length of a step is set as it is taken.
     pub(super) contact: ContactStep,
     pub(super) chain: ChainModel,
@@ -106,7 +106,7 @@ pub(super) struct Body {
 /// A resting object is carried by at least three points.
 const RESTING_POINTS: f64 = 3.0;
 
-impl Model {
+impl PhysicsModel {
     /// Resolves a scene.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>, placement: &Placement) -> Self {
         Self::planned(scene, object, placement, plan(scene, object, placement))

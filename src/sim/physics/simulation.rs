@@ -7,7 +7,7 @@ use super::effects::FingerContact;
 use super::engine::{Engine, SimulationError};
 use super::finger_pair::OtherFinger;
 use super::integrator::Surroundings;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::placement::Placement;
 use super::solve::{Unbalanced, segment_velocities};
 use super::state::State;
@@ -25,7 +25,7 @@ use palpate_geometry::Pose;
 /// it takes.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    model: Model,
+    model: PhysicsModel,
     state: State,
     workspace: Workspace,
     clock: Clock,
@@ -64,7 +64,7 @@ impl Simulation {
             Refinement::Refined => (2, scene.solver.refined()),
         };
         let clock = scene.timing.clock(solver.accuracy).refined(parts);
-        let model = Model::new(scene, object, &placement);
+        let model = PhysicsModel::new(scene, object, &placement);
         let state = State::new(&model, &placement);
         // No step can be longer than from sample to sample; a finer simulation takes more.
         let longest = f64::from(clock.ticks_per_sample) * clock.step() / f64::from(parts);
@@ -97,7 +97,7 @@ impl Simulation {
     }
 
     /// The constants it runs on.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &PhysicsModel {
         &self.model
     }
 

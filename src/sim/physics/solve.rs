@@ -12,7 +12,7 @@
 
 use super::contact::{Acting, Against, Contact};
 use super::coupling::{fill_coupling, prepare_coupling};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::workspace::{Block, PerLink, Spatial, Workspace};
 use glam::DVec3;
 
@@ -51,7 +51,7 @@ const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 
 /// Minimises over `velocity`, starting from it. Needs the workspace's dynamics and contacts; leaves each contact's
 /// relative velocity at the solution.
-pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
+pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
     let mut report = SolveReport::default();
     let mut passes = 0;
     prepare_coupling(model, ws);
@@ -112,7 +112,7 @@ pub(super) enum Product {
     OfDirection,
 }
 
-fn multiply_by_a(model: &Model, ws: &mut Workspace, x: &[f64], which: Product) {
+fn multiply_by_a(model: &PhysicsModel, ws: &mut Workspace, x: &[f64], which: Product) {
     let n = model.chain.joints;
     let out = match which {
         Product::OfVelocity => &mut ws.a_velocity,
@@ -145,7 +145,7 @@ fn write_object_part(out: &mut [f64], from: usize, value: &Spatial) {
 }
 
 /// Velocities of all segments, and from them the relative velocity of each contact.
-pub(super) fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, which: Product) {
+pub(super) fn relative_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Workspace, which: Product) {
     segment_velocities(model, x, ws);
     let object = object_part(x, model.joint_count());
     for contact in &mut ws.contacts {
@@ -166,7 +166,7 @@ pub(super) fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, 
 }
 
 /// Velocity of each segment for joint rates `x`, about the reference point.
-pub(super) fn segment_velocities(model: &Model, x: &[f64], ws: &mut Workspace) {
+pub(super) fn segment_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Workspace) {
     let n = model.chain.joints;
     for finger in 0..2 {
         let mut velocity = Spatial::default();
@@ -184,7 +184,7 @@ pub(super) struct Size {
     forces: f64,
 }
 
-pub(super) fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
+pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
     let n = model.chain.joints;
     let mut on_object = Spatial::default();
     for wrench in &mut ws.wrenches {
@@ -251,7 +251,7 @@ pub(super) fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut
 }
 
 /// The unknown with the largest share in the gradient, or the first whose share is no number at all.
-fn farthest_from_balance(model: &Model, ws: &Workspace, allowed: f64) -> Unbalanced {
+fn farthest_from_balance(model: &PhysicsModel, ws: &Workspace, allowed: f64) -> Unbalanced {
     let size = |k: usize| (ws.gradient[k] * ws.gradient[k] / diagonal(model, ws, k)).sqrt();
     let sizes = (0..ws.gradient.len()).map(|k| (k, if size(k).is_finite() { size(k) } else { f64::MAX }));
     let (unknown, largest) = sizes.fold((0, 0.0), |worst, next| if next.1 > worst.1 { next } else { worst });
@@ -261,7 +261,7 @@ fn farthest_from_balance(model: &Model, ws: &Workspace, allowed: f64) -> Unbalan
 
 /// Diagonal entry of A.
 #[inline]
-fn diagonal(model: &Model, ws: &Workspace, k: usize) -> f64 {
+fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
     let n = model.chain.joints;
     if k < 2 * n {
         let (finger, i) = (k / n, k % n);
@@ -277,7 +277,7 @@ fn diagonal(model: &Model, ws: &Workspace, k: usize) -> f64 {
     }
 }
 
-fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
+fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
     let on_object = sum_blocks(ws);
     let n = model.chain.joints;
     let couples = model.free_body().is_some();
@@ -361,7 +361,7 @@ const FLAT_ENOUGH: f64 = 0.05;
 const MOST_SEARCH_STEPS: u32 = 60;
 
 /// Share of the Newton direction to take, from the derivative along it: the whole, or where the slope vanishes.
-fn line_search(model: &Model, q: &[f64], velocity: &[f64], ws: &Workspace, steps: &mut u32) -> f64 {
+fn line_search(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &Workspace, steps: &mut u32) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let quadratic = dot(&ws.direction, &ws.a_direction);
     let linear = dot(&ws.direction, &ws.a_velocity) - dot(&ws.direction, &ws.rhs);

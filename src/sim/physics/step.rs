@@ -3,7 +3,7 @@
 use super::chain::turning;
 use super::contact::Acting;
 use super::detect::{detect, segment_axes};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::solve::{Unbalanced, minimise, segment_velocities};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
@@ -65,7 +65,7 @@ pub struct Drive {
 /// Advances the state by one step of `h` (s), which may differ from step to step. On failure the state is not to be used any
 /// more; whoever wants the last good one keeps the last frame.
 pub fn step(
-    model: &Model,
+    model: &PhysicsModel,
     state: &mut State,
     ws: &mut Workspace,
     drive: &Drive,
@@ -101,7 +101,7 @@ pub fn step(
 }
 
 /// The drive at the end of the step, where chambers take time to fill.
-fn fill_chamber(model: &Model, state: &mut State, drive: &Drive, h: f64) -> Drive {
+fn fill_chamber(model: &PhysicsModel, state: &mut State, drive: &Drive, h: f64) -> Drive {
     match &model.chamber {
         Some(chamber) => {
             state.filled_from_bar = drive.line_bar;
@@ -113,7 +113,7 @@ fn fill_chamber(model: &Model, state: &mut State, drive: &Drive, h: f64) -> Driv
 }
 
 /// Places of the segments, and the velocity of everything beyond each joint per unit of its rate.
-pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
+pub(super) fn lay_out(model: &PhysicsModel, state: &State, ws: &mut Workspace) {
     let n = model.chain.joints;
     ws.reference = if model.body.is_some() { state.body.position } else { DVec3::ZERO };
     for finger in 0..2 {
@@ -131,7 +131,7 @@ pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
 }
 
 /// Fills A and r.
-pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, drive: &Drive) {
+pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     let (n, h) = (model.chain.joints, ws.step.h);
     for finger in 0..2 {
         let joints = finger * n..(finger + 1) * n;
@@ -180,7 +180,7 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
 const FELT_FRICTION: f64 = 0.01;
 
 /// Keeps shear and normal impulse of each contact for the next step; returns the outer friction residual.
-pub(super) fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace) -> f64 {
+pub(super) fn remember_contacts(model: &PhysicsModel, state: &mut State, ws: &Workspace) -> f64 {
     state.shear.fill(DVec3::ZERO);
     state.lag.fill(0.0);
     state.lag_h = ws.step.h;
@@ -202,7 +202,7 @@ pub(super) fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace
 }
 
 /// Axes of a segment in the gripper frame, as columns: along, across, inward.
-pub(super) fn segment_axes_of(model: &Model, ws: &Workspace, link: u32) -> glam::DMat3 {
+pub(super) fn segment_axes_of(model: &PhysicsModel, ws: &Workspace, link: u32) -> glam::DMat3 {
     let plane = &model.planes[link as usize / (model.chain.joints + 1)];
     segment_axes(plane, &ws.segments[link as usize])
 }

@@ -5,7 +5,7 @@ use super::balance::static_residual;
 use super::contact::{Acting, Against};
 use super::explicit::explicit_step;
 use super::integrator::Surroundings;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::placement::Placement;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
@@ -29,7 +29,7 @@ pub enum Stepping {
 /// A scene at some moment, and what its steps came to.
 #[derive(Clone, Debug)]
 pub struct SteppedScene {
-    pub(super) model: Model,
+    pub(super) model: PhysicsModel,
     /// Joints, velocities, object; velocities may be set.
     pub state: State,
     pub(super) ws: Workspace,
@@ -63,11 +63,11 @@ impl SteppedScene {
     /// A scene at rest that is going to be stepped by `h` (s).
     pub fn new(scene: &Scene, object: Option<&ObjectModel>, h: f64) -> Self {
         let placement = Placement::new(scene, object);
-        Self::of(Model::new(scene, object, &placement), &placement, h)
+        Self::of(PhysicsModel::new(scene, object, &placement), &placement, h)
     }
 
     /// The same of a model that has been made before.
-    pub(super) fn of(model: Model, placement: &Placement, h: f64) -> Self {
+    pub(super) fn of(model: PhysicsModel, placement: &Placement, h: f64) -> Self {
         let state = State::new(&model, placement);
         let ws = Workspace::new(&model);
         let drive = Drive::default();
@@ -112,7 +112,7 @@ impl SteppedScene {
     }
 
     /// The constants it runs on.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &PhysicsModel {
         &self.model
     }
 

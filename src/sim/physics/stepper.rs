@@ -13,7 +13,7 @@
 
 use super::energy::{mechanical_energy, work_done};
 use super::integrator::{Integrator, Surroundings};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::solve::Unbalanced;
 use super::state::State;
 use super::step::{NotFinite, StepReport};
@@ -77,7 +77,13 @@ const FASTEST_SHRINKING: f64 = 0.2;
 
 impl Stepper {
     /// Under a tolerance no step is longer than `longest` (s), and the shortest is a share of it.
-    pub(super) fn new(model: &Model, state: &State, method: Method, tolerance: Option<f64>, longest: f64) -> Self {
+    pub(super) fn new(
+        model: &PhysicsModel,
+        state: &State,
+        method: Method,
+        tolerance: Option<f64>,
+        longest: f64,
+    ) -> Self {
         let control = tolerance.map(|tolerance| Control {
             tolerance,
             wanted: longest,

@@ -1,7 +1,7 @@
 //! Scratch memory of a step: allocated once, overwritten every step, never saved.
 
 use super::contact::{Contact, ContactStep};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::skyline::Skyline;
 use crate::gripper::SegmentPose;
 use glam::{DMat3, DVec2, DVec3};
@@ -128,7 +128,7 @@ pub struct Workspace {
 
 impl Workspace {
     /// Memory for a step of the model; its length is set as it is taken.
-    pub fn new(model: &Model) -> Self {
+    pub fn new(model: &PhysicsModel) -> Self {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
         let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {

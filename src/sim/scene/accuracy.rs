@@ -59,17 +59,23 @@ impl Display for Accuracy {
 }
 
 impl FromStr for Accuracy {
-    type Err = String;
+    type Err = UnknownAccuracy;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, UnknownAccuracy> {
         let named = Self::NAMED.into_iter().find(|accuracy| accuracy.to_string() == text);
         let tolerance = || text.parse().ok().filter(|t| Self::TOLERANCES.contains(t)).map(Self::Tolerance);
-        named.or_else(tolerance).ok_or_else(|| {
-            let (least, largest) = (Self::TOLERANCES.start(), Self::TOLERANCES.end());
-            format!("choose draft, standard, reference, or a tolerance between {least:e} and {largest}")
-        })
+        named.or_else(tolerance).ok_or(UnknownAccuracy)
     }
 }
+
+/// Error of a text that is neither the name of an accuracy nor a possible tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "choose draft, standard, reference, or a tolerance between {:e} and {}",
+    Accuracy::TOLERANCES.start(),
+    Accuracy::TOLERANCES.end()
+)]
+pub struct UnknownAccuracy;
 
 impl Serialize for Accuracy {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -158,7 +164,7 @@ mod tests {
             assert_eq!(Scene::from_toml(&scene.to_toml()), Ok(scene));
         }
         for wrong in ["perfect", "0", "-1e-3", "0.2", "nan", ""] {
-            let cause = wrong.parse::<Accuracy>().expect_err(wrong);
+            let cause = wrong.parse::<Accuracy>().expect_err(wrong).to_string();
             assert!(cause.contains("draft") && cause.contains("1e-9"), "{cause}");
         }
     }

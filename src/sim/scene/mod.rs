@@ -12,7 +12,7 @@ mod file;
 mod poses;
 mod timing;
 
-pub use accuracy::{Accuracy, Integrator, Method};
+pub use accuracy::{Accuracy, Integrator, Method, UnknownAccuracy};
 pub use auto::Auto;
 pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;

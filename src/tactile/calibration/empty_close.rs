@@ -3,7 +3,7 @@
 
 use super::Fault;
 use super::pad_curve::BendingZero;
-use super::point::Kind;
+use super::point::SensorKind;
 use super::readout::Readout;
 use super::record::Calibration;
 use crate::board::{Board, Reading, Sensor};
@@ -41,7 +41,7 @@ impl EmptyClose {
             Sensor::PadRight => Side::Right,
             Sensor::FlexLeft | Sensor::FlexRight => return Err(Fault::NoBending),
         };
-        let strip = Kind::Flex.on(side);
+        let strip = SensorKind::Flex.on(side);
         if board.channel_of(strip).is_none() || !serving.iter().any(|(own, _)| *own == strip) {
             return Err(Fault::NoStrip { strip: strip.label() });
         }
@@ -94,7 +94,7 @@ mod tests {
     use crate::electronics::StripPart;
 
     fn calibration(sensor: Sensor, points: &[(f64, f64)]) -> Calibration {
-        let (kind, input) = (Kind::of(sensor), Input::on(&Board::default(), sensor));
+        let (kind, input) = (SensorKind::of(sensor), Input::on(&Board::default(), sensor));
         let point = |&(shown, ohm): &(f64, f64)| Point {
             stimulus: kind.stimulus(shown),
             counts: input.counts(ohm),
@@ -108,7 +108,7 @@ mod tests {
     }
 
     fn parts() -> [(Sensor, Calibration); 2] {
-        let ohm = |kg: f64| 6e3 / Kind::Pad.stimulus(kg).powf(0.9);
+        let ohm = |kg: f64| 6e3 / SensorKind::Pad.stimulus(kg).powf(0.9);
         let loads = [0.03, 0.05, 0.1, 0.2, 0.35, 0.5].map(|kg| (kg, ohm(kg)));
         [
             (Sensor::FlexLeft, calibration(Sensor::FlexLeft, &[(0.0, 25e3), (45.0, 37.5e3), (90.0, 50e3)])),

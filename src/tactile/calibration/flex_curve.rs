@@ -11,7 +11,7 @@
 
 use super::Fault;
 use super::input::Input;
-use super::point::{Kind, Point, check, merged};
+use super::point::{Point, SensorKind, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
 use crate::electronics::StripPart;
 use palpate_geometry::units::three_digits;
@@ -57,7 +57,7 @@ pub struct FlexCurve {
 impl FlexCurve {
     /// Fits a strip; two points at least, a right angle apart if possible. Also says what is worth a word.
     pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
-        check(points, Kind::Flex, input, FRAC_PI_2)?;
+        check(points, SensorKind::Flex, input, FRAC_PI_2)?;
         let distinct = merged(points, APART);
         if distinct.len() < 2 {
             let more = "one with the finger straight and one bent by 90 degrees, better also 30 and 60";
@@ -65,9 +65,9 @@ impl FlexCurve {
         }
         let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
         if most - least < LEAST_SPAN {
-            let (from, to) = (Kind::Flex.told(least), Kind::Flex.told(most));
+            let (from, to) = (SensorKind::Flex.told(least), SensorKind::Flex.told(most));
             let wanted = "angles at least 45 degrees apart are needed, best 0 and 90";
-            return Err(Fault::TooClose { kind: Kind::Flex.label(), from, to, wanted });
+            return Err(Fault::TooClose { kind: SensorKind::Flex.label(), from, to, wanted });
         }
         rises(&distinct, input)?;
         let weighted = |p: &Point| WeightedPoint { x: p.stimulus, y: input.ohm(p.counts), weight: 1.0 };
@@ -136,7 +136,7 @@ impl FlexCurve {
         }
         let worst = points.iter().zip(&self.residuals).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((point, residual)) = worst else { return Ok(words) };
-        let (at, off) = (Kind::Flex.told(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
+        let (at, off) = (SensorKind::Flex.told(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
         if residual.abs() > TOO_FAR {
             return Err(Fault::Outlier { at, off });
         }
@@ -154,8 +154,8 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
         if after <= before {
             let kilo = |ohm: f64| format!("{} kOhm", three_digits(ohm * 1e-3));
             return Err(Fault::NotMonotone {
-                from: Kind::Flex.told(pair[0].stimulus),
-                to: Kind::Flex.told(pair[1].stimulus),
+                from: SensorKind::Flex.told(pair[0].stimulus),
+                to: SensorKind::Flex.told(pair[1].stimulus),
                 what: "resistance",
                 falls: format!("{} to {}", kilo(before), kilo(after)),
                 likely: "the strip bends towards its wrong side, its input is wired the other way round, or two angles \

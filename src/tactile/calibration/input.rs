@@ -76,12 +76,12 @@ impl Input {
 
     /// Why a reading says nothing of the resistance, where it is at an end of the converter's range. A pad that reads
     /// nothing is only unloaded.
-    pub fn rail(&self, counts: f64) -> Option<Rail> {
+    pub fn range_end(&self, counts: f64) -> Option<RangeEnd> {
         let high = counts >= f64::from(self.full_scale) - RAIL_COUNTS;
         let low = counts <= RAIL_COUNTS;
         match (self.divider.wiring, high, low) {
-            (Wiring::SensorToGround, true, _) | (Wiring::SensorToSupply, _, true) => Some(Rail::Open),
-            (Wiring::SensorToGround, _, true) | (Wiring::SensorToSupply, true, _) => Some(Rail::Short),
+            (Wiring::SensorToGround, true, _) | (Wiring::SensorToSupply, _, true) => Some(RangeEnd::Open),
+            (Wiring::SensorToGround, _, true) | (Wiring::SensorToSupply, true, _) => Some(RangeEnd::Short),
             _ => None,
         }
     }
@@ -103,7 +103,7 @@ pub(super) fn stated_resistor(board: &Board, sensor: Sensor) -> Option<f64> {
 
 /// An end of the converter's range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rail {
+pub enum RangeEnd {
     /// As if nothing were connected: no current flows through the sensor.
     Open,
     /// As if the sensor were a wire.
@@ -148,10 +148,13 @@ mod tests {
     fn an_end_of_the_range_is_named_by_what_it_means() {
         let [strip, pad] = inputs();
         assert_eq!(
-            (strip.rail(4095.0), strip.rail(0.0), strip.rail(1400.0)),
-            (Some(Rail::Open), Some(Rail::Short), None)
+            (strip.range_end(4095.0), strip.range_end(0.0), strip.range_end(1400.0)),
+            (Some(RangeEnd::Open), Some(RangeEnd::Short), None)
         );
-        assert_eq!((pad.rail(0.0), pad.rail(4095.0), pad.rail(900.0)), (Some(Rail::Open), Some(Rail::Short), None));
+        assert_eq!(
+            (pad.range_end(0.0), pad.range_end(4095.0), pad.range_end(900.0)),
+            (Some(RangeEnd::Open), Some(RangeEnd::Short), None)
+        );
         assert!(pad.siemens(0.0) == 0.0 && pad.siemens(4095.0).is_finite() && pad.siemens(1e9).is_finite());
         assert!(strip.ohm(0.0) == 0.0 && strip.ohm(4095.0).is_finite());
     }

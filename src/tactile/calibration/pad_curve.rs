@@ -9,7 +9,7 @@
 
 use super::Fault;
 use super::input::Input;
-use super::point::{Kind, Point, check, merged};
+use super::point::{Point, SensorKind, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
 use crate::electronics::PadPart;
 use palpate_geometry::units::{STANDARD_GRAVITY, three_digits};
@@ -68,7 +68,7 @@ pub struct PadCurve {
 impl PadCurve {
     /// Fits a pad; five weights at least that make it conduct. Also says what is worth a word.
     pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
-        check(points, Kind::Pad, input, MOST)?;
+        check(points, SensorKind::Pad, input, MOST)?;
         let idle = idle_counts(points);
         let conducts = |p: &&Point| p.stimulus > 0.0 && p.counts > idle + CONDUCTING_COUNTS.max(4.0 * p.spread);
         let felt: Vec<Point> = points.iter().filter(conducts).copied().collect();
@@ -143,13 +143,13 @@ impl PadCurve {
 
     fn remarks(&self, points: &[Point], silent: f64) -> Result<Vec<String>, Fault> {
         let mut words = Vec::new();
-        let told = |p: &Point| Kind::Pad.told(p.stimulus);
+        let told = |p: &Point| SensorKind::Pad.told(p.stimulus);
         let off = |p: &Point| p.stimulus > self.threshold * 1.5 && p.stimulus < silent;
         if let Some(point) = points.iter().find(|p| off(p)) {
             words.push(format!(
                 "{} was felt, but {} was not: was the weight on the pad?",
                 told(point),
-                Kind::Pad.told(silent)
+                SensorKind::Pad.told(silent)
             ));
         }
         let residuals = points.iter().zip(&self.residuals).filter_map(|(p, r)| Some((p, (*r)?)));
@@ -167,7 +167,7 @@ impl PadCurve {
             ));
         }
         if self.most < 0.45 * STANDARD_GRAVITY {
-            words.push(format!("forces above {} are read off beyond the last weight", Kind::Pad.told(self.most)));
+            words.push(format!("forces above {} are read off beyond the last weight", SensorKind::Pad.told(self.most)));
         }
         Ok(words)
     }
@@ -189,8 +189,8 @@ fn enough(distinct: &[Point]) -> Result<(), Fault> {
     let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
     if most < LEAST_SPAN * least {
         let wanted = "the heaviest weight must be at least four times the lightest, best 0.05 to 0.5 kg";
-        let (from, to) = (Kind::Pad.told(least), Kind::Pad.told(most));
-        return Err(Fault::TooClose { kind: Kind::Pad.label(), from, to, wanted });
+        let (from, to) = (SensorKind::Pad.told(least), SensorKind::Pad.told(most));
+        return Err(Fault::TooClose { kind: SensorKind::Pad.label(), from, to, wanted });
     }
     Ok(())
 }
@@ -202,8 +202,8 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
         if after <= before {
             let micro = |siemens: f64| format!("{} µS", three_digits(siemens * 1e6));
             return Err(Fault::NotMonotone {
-                from: Kind::Pad.told(pair[0].stimulus),
-                to: Kind::Pad.told(pair[1].stimulus),
+                from: SensorKind::Pad.told(pair[0].stimulus),
+                to: SensorKind::Pad.told(pair[1].stimulus),
                 what: "conductance",
                 falls: format!("{} to {}", micro(before), micro(after)),
                 likely: "two weights were mixed up, one stood partly beside the pad, or the input is wired the other \

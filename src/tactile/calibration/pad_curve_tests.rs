@@ -18,7 +18,7 @@ fn points(ohm_at_1_n: f64, exponent: f64, kilograms: &[f64], input: &Input) -> V
         false => input.counts(ohm_at_1_n / force.powf(exponent)),
     };
     let point = |&kg: &f64| {
-        let stimulus = Kind::Pad.stimulus(kg);
+        let stimulus = SensorKind::Pad.stimulus(kg);
         Point { stimulus, counts: counts(stimulus), spread: 2.0, readings: 50 }
     };
     kilograms.iter().map(point).collect()

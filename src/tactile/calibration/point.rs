@@ -1,7 +1,7 @@
 //! What a calibration is made from: a known angle or weight, and what the board read at it.
 
 use super::Fault;
-use super::input::{Input, Rail};
+use super::input::{Input, RangeEnd};
 use crate::board::Sensor;
 use palpate_geometry::units::{kg_of_load, three_digits};
 use serde::{Deserialize, Serialize};
@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 /// The two kinds of sensors, each calibrated against another quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum SensorKind {
     /// A strip that reads an angle.
     Flex,
     /// A pad that reads a force.
     Pad,
 }
 
-impl Kind {
+impl SensorKind {
     /// The kind of a sensor.
     pub fn of(sensor: Sensor) -> Self {
         if sensor.is_flex() { Self::Flex } else { Self::Pad }
@@ -46,7 +46,7 @@ impl Kind {
         }
     }
 
-    /// The unit of [`Kind::shown`].
+    /// The unit of [`SensorKind::shown`].
     pub fn unit(self) -> &'static str {
         match self {
             Self::Flex => "degrees",
@@ -89,7 +89,7 @@ impl Point {
 }
 
 /// What every point must fulfil, of whatever sensor.
-pub(super) fn check(points: &[Point], kind: Kind, input: &Input, most: f64) -> Result<(), Fault> {
+pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64) -> Result<(), Fault> {
     if !input.is_possible() {
         return Err(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt });
     }
@@ -103,12 +103,16 @@ pub(super) fn check(points: &[Point], kind: Kind, input: &Input, most: f64) -> R
         if !(point.counts >= 0.0 && point.counts <= f64::from(full_scale)) {
             return Err(Fault::NotCounts { at: at(), counts: point.counts, full_scale });
         }
-        match (kind, input.rail(point.counts)) {
+        match (kind, input.range_end(point.counts)) {
             // An unloaded pad does not conduct.
-            (Kind::Pad, Some(Rail::Open)) | (_, None) => {}
-            (Kind::Flex, Some(Rail::Open)) => return Err(Fault::OpenCircuit { at: at(), counts: point.counts }),
-            (Kind::Flex, Some(Rail::Short)) => return Err(Fault::ShortCircuit { at: at(), counts: point.counts }),
-            (Kind::Pad, Some(Rail::Short)) => {
+            (SensorKind::Pad, Some(RangeEnd::Open)) | (_, None) => {}
+            (SensorKind::Flex, Some(RangeEnd::Open)) => {
+                return Err(Fault::OpenCircuit { at: at(), counts: point.counts });
+            }
+            (SensorKind::Flex, Some(RangeEnd::Short)) => {
+                return Err(Fault::ShortCircuit { at: at(), counts: point.counts });
+            }
+            (SensorKind::Pad, Some(RangeEnd::Short)) => {
                 return Err(Fault::Saturated { at: at(), counts: point.counts, resistor_ohm: input.divider.fixed_ohm });
             }
         }

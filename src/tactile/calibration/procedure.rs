@@ -11,9 +11,9 @@
 
 use super::input::Input;
 use super::pad_curve::BendingZero;
-use super::point::{Kind, Point};
+use super::point::{Point, SensorKind};
 use super::record::{Calibration, Record};
-use super::{Fault, Rail};
+use super::{Fault, RangeEnd};
 use crate::board::{Board, Reading, Sensor};
 use crate::electronics::Divider;
 use std::collections::VecDeque;
@@ -59,17 +59,17 @@ pub enum Unsettled {
     },
     /// At the end of the converter's range.
     #[error("{counts:.0} counts is the end of the range: the circuit is open, shorted, or the pad saturated")]
-    Rail {
+    RangeEnd {
         /// What is read (counts).
         counts: f64,
     },
 }
 
 /// What is usually set, in rad or N: 0, 30, 60 and 90 degrees, or nothing and seven weights up to 0.5 kg.
-pub fn plan(kind: Kind) -> Vec<f64> {
+pub fn plan(kind: SensorKind) -> Vec<f64> {
     let shown: &[f64] = match kind {
-        Kind::Flex => &[0.0, 30.0, 60.0, 90.0],
-        Kind::Pad => &[0.0, 0.03, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
+        SensorKind::Flex => &[0.0, 30.0, 60.0, 90.0],
+        SensorKind::Pad => &[0.0, 0.03, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
     };
     shown.iter().map(|shown| kind.stimulus(*shown)).collect()
 }
@@ -101,7 +101,7 @@ impl Procedure {
         if let Some(ohm) = resistor_ohm {
             input.divider.fixed_ohm = ohm;
         }
-        let kind = Kind::of(sensor);
+        let kind = SensorKind::of(sensor);
         let part = part.trim().to_owned();
         Some(Self {
             sensor,
@@ -157,7 +157,7 @@ impl Procedure {
         let place = self.sensor.label();
         let Some(next) = self.next() else {
             return match (self.record.kind, &self.record.bending) {
-                (Kind::Pad, None) => {
+                (SensorKind::Pad, None) => {
                     "all points are taken; let the empty hand close once, so that its bending is not felt as \
                                       a force"
                         .to_owned()
@@ -166,10 +166,12 @@ impl Procedure {
             };
         };
         match self.record.kind {
-            Kind::Flex if next == 0.0 => format!("{place}: let the finger hang straight"),
-            Kind::Flex => format!("{place}: bend it by {:.0} degrees over its length and hold", next.to_degrees()),
-            Kind::Pad if next == 0.0 => format!("{place}: put nothing on it"),
-            Kind::Pad => format!("{place}: put {:.0} g on its middle", 1e3 * self.record.kind.shown(next)),
+            SensorKind::Flex if next == 0.0 => format!("{place}: let the finger hang straight"),
+            SensorKind::Flex => {
+                format!("{place}: bend it by {:.0} degrees over its length and hold", next.to_degrees())
+            }
+            SensorKind::Pad if next == 0.0 => format!("{place}: put nothing on it"),
+            SensorKind::Pad => format!("{place}: put {:.0} g on its middle", 1e3 * self.record.kind.shown(next)),
         }
     }
 
@@ -222,10 +224,10 @@ impl Procedure {
             return Err(Unsettled::Moving { by });
         }
         let counts = mean(&counts);
-        let unloaded = self.record.kind == Kind::Pad;
-        match self.record.input.rail(counts) {
-            Some(Rail::Open) if unloaded => {}
-            Some(_) => return Err(Unsettled::Rail { counts }),
+        let unloaded = self.record.kind == SensorKind::Pad;
+        match self.record.input.range_end(counts) {
+            Some(RangeEnd::Open) if unloaded => {}
+            Some(_) => return Err(Unsettled::RangeEnd { counts }),
             None => {}
         }
         Ok(Point { stimulus: f64::NAN, counts, spread, readings: self.window.len() as u32 })
@@ -384,7 +386,7 @@ mod tests {
         }
         assert_eq!(procedure.settled(), Err(Unsettled::Silent));
         feed(&mut procedure, 5.0, 2.0, |_| 4095.0);
-        assert!(matches!(procedure.settled(), Err(Unsettled::Rail { .. })));
+        assert!(matches!(procedure.settled(), Err(Unsettled::RangeEnd { .. })));
         let no_channel = Board { channels: vec!["flexL".into()], ..Board::default() };
         assert!(Procedure::new(&no_channel, Sensor::PadRight, "x", None).is_none());
     }

@@ -1,10 +1,10 @@
 //! Readings of a board through the calibrations of its parts, one by one or a whole trial.
 
-use super::input::{Input, Rail, stated_resistor};
+use super::input::{Input, RangeEnd, stated_resistor};
 use super::pad_curve::ACTIVE_AREA;
 use super::record::{Calibration, Curve};
 use super::zero::{Drift, DriftLevel, Unrest, Zero};
-use super::{Fault, Kind};
+use super::{Fault, SensorKind};
 use crate::board::{Board, Reading, Sensor};
 use crate::electronics::StripPart;
 use crate::{Channel, Quantity, Signals, whole_fingers};
@@ -290,7 +290,7 @@ impl Readout {
     fn saturated(&self, readings: &[Reading]) -> Vec<String> {
         let at_its_end = |wired: &Wired, reading: &Reading| {
             let counts = reading.counts.get(wired.column).copied().flatten();
-            counts.is_some_and(|counts| wired.input.rail(f64::from(counts)) == Some(Rail::Short))
+            counts.is_some_and(|counts| wired.input.range_end(f64::from(counts)) == Some(RangeEnd::Short))
         };
         let pads = Sensor::ALL.into_iter().zip(&self.wired).filter(|(sensor, _)| !sensor.is_flex());
         pads.filter_map(|(sensor, wired)| {
@@ -340,11 +340,11 @@ impl Wired {
         if !counts.is_finite() {
             return None;
         }
-        match (&self.calibration.curve, self.input.rail(counts)) {
+        match (&self.calibration.curve, self.input.range_end(counts)) {
             (Curve::Flex(curve), None) => Some(curve.angle(self.input.ohm(counts))),
             (Curve::Flex(_), Some(_)) => None,
             // A pad at its end is saturated: the number is what it takes to get there, and no less.
-            (Curve::Pad(curve), None | Some(Rail::Open | Rail::Short)) => {
+            (Curve::Pad(curve), None | Some(RangeEnd::Open | RangeEnd::Short)) => {
                 Some(self.input.siemens(counts) - curve.idle_siemens)
             }
         }
@@ -365,7 +365,7 @@ fn rest_window(readings: &[Reading], closing_s: Option<f64>) -> usize {
     readings.partition_point(|reading| reading.t_s < first.t_s + REST_WINDOW_S)
 }
 
-impl Kind {
+impl SensorKind {
     /// The sensor of this kind on a side.
     pub fn on(self, side: Side) -> Sensor {
         match (self, side) {

@@ -3,8 +3,8 @@
 use super::flex_curve::FlexCurve;
 use super::input::Input;
 use super::pad_curve::{BendingZero, PadCurve};
-use super::point::{Kind, Point};
-use super::{Fault, Rail};
+use super::point::{Point, SensorKind};
+use super::{Fault, RangeEnd};
 use crate::board::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Record {
     /// Name of the part, such as what is written on its tail.
     pub part: String,
     /// What it is.
-    pub kind: Kind,
+    pub kind: SensorKind,
     /// The input and converter it was measured with.
     pub input: Input,
     /// The known angles (rad) or forces (N), and what was read.
@@ -59,17 +59,17 @@ impl Calibration {
             return Err(Fault::NoName);
         }
         let (curve, warnings) = match record.kind {
-            Kind::Flex => {
+            SensorKind::Flex => {
                 let (curve, warnings) = FlexCurve::fit(&record.points, &record.input)?;
                 (Curve::Flex(curve), warnings)
             }
-            Kind::Pad => {
+            SensorKind::Pad => {
                 let (curve, warnings) = PadCurve::fit(&record.points, &record.input)?;
                 (Curve::Pad(curve), warnings)
             }
         };
         match &record.bending {
-            Some(_) if record.kind == Kind::Flex => Err(Fault::NoBending),
+            Some(_) if record.kind == SensorKind::Flex => Err(Fault::NoBending),
             Some(bending) if !bending.is_possible() => Err(Fault::BendingTooShort { have: 0, span: 0.0 }),
             _ => Ok(Self { record, curve, warnings }),
         }
@@ -77,7 +77,7 @@ impl Calibration {
 
     /// Refuses to be used for a sensor of the other kind.
     pub fn check_fits(&self, sensor: Sensor) -> Result<(), Fault> {
-        let wanted = Kind::of(sensor);
+        let wanted = SensorKind::of(sensor);
         if self.record.kind == wanted {
             return Ok(());
         }
@@ -88,12 +88,12 @@ impl Calibration {
     /// What a reading comes to through a input: an angle (rad) or a force (N), without any zero. None where the reading
     /// is at an end of the range; a pad that does not conduct is unloaded.
     pub fn stimulus(&self, input: &Input, counts: f64) -> Option<f64> {
-        match (&self.curve, input.rail(counts)) {
+        match (&self.curve, input.range_end(counts)) {
             (Curve::Flex(curve), None) => Some(curve.angle(input.ohm(counts))),
-            (Curve::Pad(curve), None | Some(Rail::Open)) => {
+            (Curve::Pad(curve), None | Some(RangeEnd::Open)) => {
                 Some(curve.force(input.siemens(counts) - curve.idle_siemens))
             }
-            (Curve::Flex(_), Some(_)) | (Curve::Pad(_), Some(Rail::Short)) => None,
+            (Curve::Flex(_), Some(_)) | (Curve::Pad(_), Some(RangeEnd::Short)) => None,
         }
     }
 

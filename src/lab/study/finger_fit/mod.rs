@@ -117,7 +117,7 @@ pub struct FingerFit {
 
 /// Why there is no fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
+pub enum FingerFitError {
     /// No recording.
     #[error("nothing to fit: name a few recorded empty closes, and presses against something held in place")]
     Nothing,
@@ -184,7 +184,7 @@ const HALF: f64 = 1.96;
 const LEAST_CURVATURE: f64 = 2.0;
 
 /// Fits the finger to recordings; it begins at the gripper of the first one's scene.
-pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FitError> {
+pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FingerFitError> {
     fit_finger_watched(observations, trust, &FitWatch { progress: &|_| (), stop: &AtomicBool::new(false) })
 }
 
@@ -193,8 +193,8 @@ pub fn fit_finger_watched(
     observations: &[Observation],
     trust: &Trust,
     watch: &FitWatch<'_>,
-) -> Result<FingerFit, FitError> {
-    let first = observations.first().ok_or(FitError::Nothing)?;
+) -> Result<FingerFit, FingerFitError> {
+    let first = observations.first().ok_or(FingerFitError::Nothing)?;
     observations.iter().try_for_each(usable)?;
     let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
     let count = (peak / KNOT_BAR - 1e-6).ceil().clamp(KNOTS[0], KNOTS[1]);
@@ -202,7 +202,7 @@ pub fn fit_finger_watched(
     let mut fitted = FittedModel::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
     let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)
-        .map_err(|cause| if watch.is_over() { FitError::Stopped } else { FitError::Failed(cause) })?;
+        .map_err(|cause| if watch.is_over() { FingerFitError::Stopped } else { FingerFitError::Failed(cause) })?;
     let gripper = fitted.gripper(&first.scene.gripper, &minimum.x);
     let estimates = estimates(&minimum, &knots);
     let remainders = remainders(observations, &fitted, &minimum);
@@ -212,21 +212,21 @@ pub fn fit_finger_watched(
     Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks, courses })
 }
 
-fn usable(seen: &Observation) -> Result<(), FitError> {
+fn usable(seen: &Observation) -> Result<(), FingerFitError> {
     let name = seen.name.clone();
     let tracks = seen.tracks();
     if !tracks.iter().any(|track| !track.is_force) {
-        return Err(FitError::NoCurvature { name });
+        return Err(FingerFitError::NoCurvature { name });
     }
     let duration_s = seen.duration();
     if !(0.5..=60.0).contains(&duration_s) {
-        return Err(FitError::Length { name, duration_s });
+        return Err(FingerFitError::Length { name, duration_s });
     }
     let bends = tracks.iter().filter(|track| !track.is_force);
     let all = bends.flat_map(|track| (0..seen.signals.len()).map(|k| f64::from(seen.signals.row(k)[track.column])));
     let (curvature, bar) = (all.fold(0.0, f64::max), seen.peak_bar());
     if curvature < LEAST_CURVATURE || bar <= 0.0 {
-        return Err(FitError::NoMotion { name, curvature, bar });
+        return Err(FingerFitError::NoMotion { name, curvature, bar });
     }
     Ok(())
 }

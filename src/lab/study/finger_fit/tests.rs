@@ -6,7 +6,7 @@ use palpate_sim::gripper::{Side, TorquePoint};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::board::{Board, Reading, Sensor};
-use palpate_tactile::calibration::{Calibration, Input, Kind, Point, Readout, Record, plan};
+use palpate_tactile::calibration::{Calibration, Input, Point, Readout, Record, SensorKind, plan};
 use palpate_tactile::electronics::{Converter, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::{PressureArea, SensorLayout, Sensors, Signals};
 use rand::{RngExt, SeedableRng};
@@ -96,7 +96,7 @@ impl Box4 {
     }
 
     fn calibrate(&mut self, sensor: Sensor) -> Calibration {
-        let kind = Kind::of(sensor);
+        let kind = SensorKind::of(sensor);
         let mut point = |stimulus: f64| {
             let (kappa, force) =
                 if sensor.is_flex() { (stimulus / StripPart::ACTIVE_LENGTH, 0.0) } else { (0.0, stimulus) };
@@ -135,7 +135,7 @@ fn truths() -> [f64; 7] {
 }
 
 #[test]
-fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FitError> {
+fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FingerFitError> {
     let truth = scene(&hidden());
     let close = observed("close", clean(&truth, None), &truth, None);
     let heard = Cell::new(0.0);
@@ -158,7 +158,7 @@ fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FitError> {
 }
 
 #[test]
-fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent() -> Result<(), FitError> {
+fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent() -> Result<(), FingerFitError> {
     let (free, pressed) = (scene(&hidden()), {
         let mut scene = scene(&hidden());
         scene.set_object_fixed(true);
@@ -192,7 +192,7 @@ fn a_fit_ends_when_it_is_told_to() {
     let close = observed("close", clean(&truth, None), &truth, None);
     let stop = AtomicBool::new(false);
     let watch = FitWatch { progress: &|steps| stop.store(steps > 0.5, Ordering::Relaxed), stop: &stop };
-    assert_eq!(fit_finger_watched(&[close], &Trust::default(), &watch), Err(FitError::Stopped));
+    assert_eq!(fit_finger_watched(&[close], &Trust::default(), &watch), Err(FingerFitError::Stopped));
 }
 
 #[test]

@@ -17,14 +17,14 @@ use serde::Serialize;
 
 /// How finely a case is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setting {
+pub enum CaseAccuracy {
     /// One of the settings a user has.
     Accuracy(Accuracy),
     /// A step of its own (s).
     Step(f64),
 }
 
-impl Setting {
+impl CaseAccuracy {
     /// Its name in tables.
     pub fn name(self) -> String {
         match self {
@@ -54,7 +54,7 @@ impl Setting {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
     /// How finely.
-    pub setting: Setting,
+    pub setting: CaseAccuracy,
     /// Every variant and the whole duration, rather than what a few seconds allow.
     pub thorough: bool,
 }
@@ -125,7 +125,7 @@ impl std::fmt::Display for Limit {
 
 /// One thing that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub struct Measurement {
     /// What, with its unit in brackets.
     pub what: String,
     /// How much.
@@ -134,7 +134,7 @@ pub struct Finding {
     pub limit: Limit,
 }
 
-impl Finding {
+impl Measurement {
     fn at_most(what: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { what: what.into(), measured, limit: Limit::AtMost(limit) }
     }
@@ -159,7 +159,7 @@ pub enum Settings {
 }
 
 /// What a case finds, or the number that left the range.
-pub type Findings = Result<Vec<Finding>, NotFinite>;
+pub type Findings = Result<Vec<Measurement>, NotFinite>;
 
 /// A hard case.
 #[derive(Clone, Copy, Debug)]
@@ -184,7 +184,7 @@ pub struct CaseRow {
     /// The setting.
     pub setting: String,
     /// All that was measured; the one that comes closest to its limit, or fails, is the first.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<Measurement>,
     /// What left the range of numbers, if anything did.
     pub not_finite: Option<String>,
     /// True when everything is as it must be.
@@ -193,21 +193,23 @@ pub struct CaseRow {
 
 impl Case {
     /// The settings it is run at, out of the accuracies asked for.
-    pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<Setting> {
+    pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<CaseAccuracy> {
         /// Steps below this are for thorough runs (s).
         const FINE: f64 = 1e-3;
         match self.settings {
             Settings::EveryAccuracyAnd(further) => {
                 let further = further.iter().filter(|h| thorough || **h >= FINE);
-                let accuracies = accuracies.iter().map(|accuracy| Setting::Accuracy(*accuracy));
-                accuracies.chain(further.map(|h| Setting::Step(*h))).collect()
+                let accuracies = accuracies.iter().map(|accuracy| CaseAccuracy::Accuracy(*accuracy));
+                accuracies.chain(further.map(|h| CaseAccuracy::Step(*h))).collect()
             }
-            Settings::Once => accuracies.first().map(|accuracy| Setting::Accuracy(*accuracy)).into_iter().collect(),
+            Settings::Once => {
+                accuracies.first().map(|accuracy| CaseAccuracy::Accuracy(*accuracy)).into_iter().collect()
+            }
         }
     }
 
     /// Runs it at one setting.
-    pub fn run(&self, setting: Setting, thorough: bool) -> CaseRow {
+    pub fn run(&self, setting: CaseAccuracy, thorough: bool) -> CaseRow {
         let name = if self.settings == Settings::Once { "any".to_owned() } else { setting.name() };
         let outcome = (self.measure)(&Conditions { setting, thorough });
         let (mut findings, not_finite) = match outcome {
@@ -215,7 +217,7 @@ impl Case {
             Err(NotFinite { body }) => (Vec::new(), Some(body)),
         };
         findings.sort_by(|a, b| b.limit.used(b.measured).total_cmp(&a.limit.used(a.measured)));
-        let holds = not_finite.is_none() && findings.iter().all(Finding::holds);
+        let holds = not_finite.is_none() && findings.iter().all(Measurement::holds);
         CaseRow { case: self.name, claim: self.claim, setting: name, findings, not_finite, holds }
     }
 }

@@ -5,7 +5,7 @@ mod fingers;
 mod motion;
 mod program;
 
-use super::{Case, Setting, Settings};
+use super::{Case, CaseAccuracy, Settings};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::{Drive, SteppedScene};
 use palpate_sim::scene::{Scene, SupportKind};
@@ -134,7 +134,7 @@ const FULL_TORQUE: f64 = 0.06;
 /// A scene about to be stepped under the conditions of a case.
 fn stepped(scene: &Scene, object: Option<&ObjectModel>, conditions: &super::Conditions) -> SteppedScene {
     match conditions.setting {
-        Setting::Accuracy(accuracy) => SteppedScene::at(scene, object, conditions.h(), accuracy),
-        Setting::Step(h) => SteppedScene::new(scene, object, h),
+        CaseAccuracy::Accuracy(accuracy) => SteppedScene::at(scene, object, conditions.h(), accuracy),
+        CaseAccuracy::Step(h) => SteppedScene::new(scene, object, h),
     }
 }
