@@ -21,7 +21,7 @@ pub struct ColouredPart {
     pub colour: Option<Rgb>,
 }
 
-/// Why a mesh file could not be read.
+/// Error of reading a mesh file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
     /// The file type is not one we read.
@@ -37,7 +37,7 @@ pub enum MeshFileError {
     Unreadable {
         /// File name.
         name: String,
-        /// What the system says.
+        /// Message of the operating system.
         cause: String,
     },
     /// The contents are not what the file type promises.
@@ -45,7 +45,7 @@ pub enum MeshFileError {
     Damaged {
         /// File name.
         name: String,
-        /// What is wrong.
+        /// Cause.
         cause: String,
     },
     /// Too big to be meant.
@@ -53,7 +53,7 @@ pub enum MeshFileError {
     TooLarge {
         /// File name.
         name: String,
-        /// How large it is and what the limit is.
+        /// Its size and the limit.
         what: String,
     },
 }

@@ -11,7 +11,7 @@ use super::TriMesh;
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 
-/// Why a mesh cannot serve as a solid.
+/// Reason why a mesh is no solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// No triangles at all, or none left after removing degenerate ones.
@@ -20,13 +20,13 @@ pub enum MeshError {
     /// A coordinate is NaN or infinite.
     #[error("corner {index} of the mesh is not a finite number")]
     NotFinite {
-        /// Which corner.
+        /// Index of the corner.
         index: usize,
     },
     /// A triangle names a corner that does not exist.
     #[error("triangle {index} of the mesh names a corner that does not exist")]
     BadIndex {
-        /// Which triangle.
+        /// Index of the triangle.
         index: usize,
     },
     /// All corners lie in a plane or on a line, or the volume is zero.
@@ -232,7 +232,7 @@ fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<(), MeshError> 
 
 /// A connected piece of a mesh.
 struct Piece {
-    /// Which triangles of the mesh.
+    /// Indices of its triangles in the mesh.
     places: Vec<usize>,
     /// The same, with one winding.
     triangles: Vec<[u32; 3]>,
@@ -257,7 +257,7 @@ fn is_cavity(mesh: &TriMesh, pieces: &[Piece], k: usize) -> bool {
     around.len() % 2 == 1 && around.iter().any(|outer| (outer.volume < 0.0) != (pieces[k].volume < 0.0))
 }
 
-/// How often a ray from a point crosses some triangles. Its direction runs along nothing that people model.
+/// Number of crossings of a ray from a point with some triangles. Its direction is oblique to usual edges.
 fn crossings(mesh: &TriMesh, triangles: &[[u32; 3]], from: DVec3) -> usize {
     let direction = DVec3::new(0.816_18, 0.463_07, 0.345_51);
     let crosses = |t: &&[u32; 3]| {

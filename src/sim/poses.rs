@@ -12,14 +12,14 @@ use glam::{DQuat, DVec2, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Draws before a scene that leaves no room is accepted as it is.
+/// Draws before a scene without room is accepted.
 const MOST_DRAWS: u32 = 100;
 
 /// Draws poses for one object in one scene, as the scene's `pose` says.
 #[derive(Clone, Debug)]
 pub struct PoseSampler {
     scene: Scene,
-    /// Where natural faces are wanted: orientations to draw from.
+    /// Resting orientations to draw from; empty unless the scene asks for them.
     natural: Vec<DQuat>,
 }
 

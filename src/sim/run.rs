@@ -103,17 +103,17 @@ impl SimRun {
         }
     }
 
-    /// The state before the first step, as a frame: what a picture of the start shows.
+    /// The state before the first step, as a frame.
     pub fn first_look(&self) -> Frame {
         self.engine.get().frame()
     }
 
-    /// How deep the open fingers stand inside the object or its support before the first step (m).
+    /// Overlap of the open fingers with the object or its support before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         self.engine.get_mut().starting_overlap()
     }
 
-    /// Which effects are simulated, and why.
+    /// Effects simulated, with the reason for each.
     pub fn plan(&self) -> &Plan {
         self.engine.get().plan()
     }
@@ -155,7 +155,7 @@ impl SimRun {
         self.engine.get_mut().command(bar, phase);
     }
 
-    /// How far the frames so far can be trusted.
+    /// Numerical quality of the frames so far.
     pub fn quality(&self) -> Quality {
         let mut quality = self.engine.get().quality();
         if let Some(at_hold) = self.static_residual {

@@ -1,9 +1,9 @@
-//! What a sensor board sends, as far as it was understood: counts of its converter, stamped. Angle, force and pressure
+//! Decoded data of a sensor board: counts of its converter, stamped. Angle, force and pressure
 //! are derived from them later by a calibration, so that a better one serves old trials too.
 
 use serde::{Deserialize, Serialize};
 
-/// What a channel of the board is wired to, by its place on the gripper (paper, section IV-B).
+/// Sensor of the gripper, which a channel of the board is wired to (paper, section IV-B).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensor {
@@ -42,7 +42,7 @@ impl Sensor {
         letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
     }
 
-    /// What it is called on screen.
+    /// Display name.
     pub fn label(self) -> &'static str {
         match self {
             Self::FlexLeft => "left flex strip",
@@ -58,7 +58,7 @@ impl Sensor {
     }
 }
 
-/// What a board says of itself in its hello line, or what was found out from its lines.
+/// Board description from its handshake line, or inferred from its data lines.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Board {
@@ -91,7 +91,7 @@ impl Default for Board {
 }
 
 impl Board {
-    /// Which of its channels a sensor is read on; see [`Sensor::is_called`].
+    /// Channel that a sensor is read on; see [`Sensor::is_called`].
     pub fn channel_of(&self, sensor: Sensor) -> Option<usize> {
         self.channels.iter().position(|name| sensor.is_called(name))
     }
@@ -107,10 +107,10 @@ pub const KNOWN_AFTER_S: f64 = 1.2;
 /// One line of a board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// When it was taken, in seconds since the stream began on this computer's clock (s): the board's own time mapped onto
+    /// Time of the sample since the stream began, on this computer's clock (s): the board's own time mapped onto
     /// it, where it sends one.
     pub t_s: f64,
-    /// When its bytes arrived, on the same clock (s).
+    /// Time of arrival of its bytes, on the same clock (s).
     pub arrived_s: f64,
     /// The board's counter, unwrapped.
     pub seq: Option<u64>,
@@ -127,13 +127,13 @@ pub struct Gap {
     pub from_s: f64,
     /// Time of the first one after it (s).
     pub to_s: f64,
-    /// How many readings are missing, where the board counts them.
+    /// Number of missing readings, where the board counts them.
     pub lost: Option<u64>,
-    /// Why, in words.
+    /// Reason.
     pub cause: String,
 }
 
-/// How a board writes its lines.
+/// Line format of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
@@ -148,7 +148,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// What it is called on screen.
+    /// Display name.
     pub fn label(self) -> &'static str {
         match self {
             Self::Plotter => "Arduino plotter lines",
@@ -158,7 +158,7 @@ impl Format {
         }
     }
 
-    /// The mark by which it was told from the others.
+    /// Feature that identifies the format.
     pub fn mark(self) -> &'static str {
         match self {
             Self::Plotter => "each number stands behind its name and a colon",
@@ -169,7 +169,7 @@ impl Format {
     }
 }
 
-/// What the times of readings rest on.
+/// Time base of the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TimeSource {
@@ -181,14 +181,14 @@ pub enum TimeSource {
     Arrival,
 }
 
-/// How a board's lines are read, and why.
+/// Line format of a board's stream, with the evidence for it.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Detected {
-    /// How it writes.
+    /// Line format.
     pub format: Format,
-    /// How that was found out, and what was taken for granted, in a sentence.
+    /// Evidence and assumptions, one sentence.
     pub why: String,
-    /// What the times of readings rest on.
+    /// Time base of the readings.
     pub time: TimeSource,
 }
 

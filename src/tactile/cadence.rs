@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How well a stream keeps time.
+/// Timing statistics of a stream.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Cadence {
@@ -21,7 +21,7 @@ pub struct Cadence {
     pub jitter_p95_ms: f64,
     /// 95th percentile of how much later than the quickest readings arrive (ms).
     pub delay_p95_ms: f64,
-    /// How fast the board's clock runs against this computer's (ppm); none where it sends no time.
+    /// Drift of the board's clock against this computer's (ppm); none where it sends no time.
     pub drift_ppm: Option<f64>,
     /// Share of the last second's lines that could not be read.
     pub bad_share: f64,

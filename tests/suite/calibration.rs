@@ -166,7 +166,7 @@ fn a_resistor_that_is_not_what_the_board_says_is_told() {
         }
     }
     let told = procedure.fit().expect_err("no such pad").to_string();
-    assert!(told.contains("is not the 47.0 kOhm it is said to be"), "{told}");
+    assert!(told.contains("is not the 47.0 kOhm entered"), "{told}");
 }
 
 /// The twin's scene, and the one with the hidden finger.

@@ -255,7 +255,7 @@ impl Bench {
                 if start.elapsed().as_secs_f64() > AUTO_PATIENCE_S {
                     let why =
                         procedure.settled().err().map_or_else(|| "nothing has changed".to_owned(), |e| e.to_string());
-                    return Err(format!("{} was not seen: {why}", kind.told(planned)).into());
+                    return Err(format!("{} was not seen: {why}", kind.with_unit(planned)).into());
                 }
                 continue;
             }
@@ -267,7 +267,7 @@ impl Bench {
                         Ok(()) => return Ok(()),
                         Err(why) => {
                             self.clear_line();
-                            warn(&format!("{} is not taken: {why}", kind.told(stimulus)));
+                            warn(&format!("{} is not taken: {why}", kind.with_unit(stimulus)));
                         }
                     }
                 }
@@ -276,7 +276,7 @@ impl Bench {
                     return Ok(());
                 }
                 Some(Wish::Undo) => {
-                    let undone = procedure.undo().map(|point| kind.told(point.stimulus));
+                    let undone = procedure.undo().map(|point| kind.with_unit(point.stimulus));
                     note(
                         &undone.map_or_else(
                             || "there is no point yet".to_owned(),
@@ -293,7 +293,7 @@ impl Bench {
     fn take(&self, procedure: &mut Procedure, stimulus: f64) -> Result<(), Unsettled> {
         let point = procedure.take(stimulus)?;
         self.clear_line();
-        let at = procedure.record().kind.told(stimulus);
+        let at = procedure.record().kind.with_unit(stimulus);
         note(&format!("  {at}: {:.1} counts, noise {:.1}, {} readings", point.counts, point.spread, point.readings));
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What helps to read a picture: axis gizmo, scale bar, legend of the pressure map, and a badge.
+//! Annotations of a picture: axis gizmo, scale bar, legend of the pressure map, and a badge.
 
 use super::{PictureView, ink};
 use glam::{Vec2, Vec3};

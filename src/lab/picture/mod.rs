@@ -20,12 +20,12 @@ use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Scene, SupportKind};
 use std::sync::Arc;
 
-/// How a picture is to look.
+/// View of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureView {
-    /// From where.
+    /// Camera.
     pub camera: Camera,
-    /// Dark or light.
+    /// Theme.
     pub theme: Theme,
     /// Size of the picture in points, for what is drawn on top.
     pub size: Vec2,
@@ -35,7 +35,7 @@ pub struct PictureView {
     pub annotations: bool,
     /// Pressure that has the brightest colour (Pa).
     pub full_scale: f32,
-    /// Words in the top left corner: where the data come from.
+    /// Badge in the top left corner: source of the data.
     pub badge: Option<String>,
 }
 
@@ -53,7 +53,7 @@ impl Default for PictureView {
     }
 }
 
-/// What does not change from frame to frame: meshes, and the gripper they belong to.
+/// Constant parts of a picture: meshes, and the gripper they belong to.
 #[derive(Clone, Debug)]
 pub struct Stage {
     gripper: Gripper,
@@ -114,7 +114,7 @@ impl Stage {
         }
     }
 
-    /// What a frame of another run of the same scene shows, to be laid over a picture as [`DrawList::ghosts`].
+    /// Outlines of another run of the same scene, for [`DrawList::ghosts`].
     pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
         let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, 1.0);
         let colour = theme.colours().accent;
@@ -127,7 +127,7 @@ impl Stage {
         ghosts
     }
 
-    /// The real fingers as their flex strips tell (1/m), left and right, to be laid over a picture as
+    /// The real fingers from the curvature of their flex strips (1/m), left and right, for
     /// [`DrawList::ghosts`]. A finger whose strip is not read is left out.
     pub fn reconstructed(&self, curvature: [Option<f64>; 2], theme: Theme) -> Vec<Solid> {
         let frame = reconstructed::evenly_bent(&self.gripper, curvature);

@@ -1,4 +1,4 @@
-//! Methods against each other on the same grasps: fitted to some, judged on others.
+//! Comparison of methods on the same grasps: fitted to some, evaluated on others.
 
 use palpate_learn::evaluation::{Answers, Evaluation, Round, answer, evaluate, product_of_experts, rounds};
 use palpate_learn::metrics::{Bootstrap, Confusion, Interval, McNemar, holm};
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub struct ComparisonRow {
     /// Key of the method, or path of a model.
     pub model: String,
-    /// What people call it.
+    /// Display name.
     pub title: String,
     /// The measures.
     #[serde(flatten)]
@@ -23,14 +23,14 @@ pub struct ComparisonRow {
     pub parameters: usize,
     /// Macro F1 after one grasp, two, and so on, where grasps count as independent: the product of experts.
     pub f1_by_grasps_independent: Vec<f64>,
-    /// How much feeding the PMF back gains over that after one grasp, two, and so on: macro F1 less macro F1 on the same
+    /// Gain of feeding the PMF back over that after one grasp, two, and so on: difference of macro F1 on the same
     /// grasps, with paired 95 % intervals.
     pub gain_over_independent: Vec<Interval>,
-    /// Where the grasps come from.
+    /// Origin of the grasps.
     pub data: DataCard,
-    /// Whether it was fitted in the quick form.
+    /// True for a quick fit.
     pub quick: bool,
-    /// Against the first row: is it better, and is that more than chance?
+    /// Comparison with the first row.
     pub against_first: Option<Difference>,
 }
 
@@ -45,17 +45,17 @@ pub struct Difference {
     pub mcnemar_p_holm: f64,
 }
 
-/// What is compared.
+/// Inputs of a comparison.
 pub struct Comparison<'a> {
-    /// What methods learn from.
+    /// Training set.
     pub train: &'a Dataset,
-    /// What they are judged by; no grasp of it is in `train`.
+    /// Test set; no grasp of it is in `train`.
     pub test: &'a Dataset,
     /// Seed of fits and draws.
     pub seed: u64,
     /// Quick fits, for tests and quick looks.
     pub quick: bool,
-    /// When to stop grasping.
+    /// Stop rule of grasping until sure.
     pub stop: StopRule,
     /// Set from outside to end the work.
     pub interrupted: &'a AtomicBool,
@@ -67,7 +67,7 @@ struct Judged {
     decided: Vec<Option<usize>>,
 }
 
-/// Why there is no comparison.
+/// Error of a comparison.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ComparisonError {
     /// A method could not be fitted.
@@ -75,10 +75,10 @@ pub enum ComparisonError {
     Fit {
         /// Its key.
         method: &'static str,
-        /// Why.
+        /// Cause.
         cause: FitError,
     },
-    /// Nothing to judge by.
+    /// No test grasps.
     #[error("no grasps are left to test with; collect more, or train on fewer with --train-trials")]
     NoTest,
 }
@@ -237,7 +237,7 @@ impl Comparison<'_> {
     }
 }
 
-/// What controls come to, as macro-accuracy with 95 % intervals.
+/// Macro-accuracy of the controls, with 95 % intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Controls {
     /// Key of the method.
@@ -246,9 +246,9 @@ pub struct Controls {
     pub chance: f64,
     /// Learned from labels that were exchanged at random.
     pub shuffled_labels: Interval,
-    /// As it is.
+    /// Learned from the true labels.
     pub plain: Interval,
-    /// Told the true size and shape.
+    /// Given the true size and shape.
     pub true_size_and_shape: Interval,
 }
 

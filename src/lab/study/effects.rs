@@ -1,4 +1,4 @@
-//! What each effect costs and what it changes: leave one out, or put one in, and compare whole trials.
+//! Cost and influence of each effect: switch it off, or on, and compare whole trials.
 //!
 //! Every effect is flipped alone, as if somebody had switched it by hand: what is left to `auto` is decided anew, so that
 //! an object let go has its weight. Cost comes from pairs of runs, with and without, one after the other in one thread,
@@ -17,7 +17,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Which effects a scene calls for, what they cost and what they change.
+/// Effects of a scene, with their cost and influence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Explanation {
     /// Name of the object.
@@ -26,25 +26,25 @@ pub struct Explanation {
     pub cpu_ms: f64,
     /// First contact (s); null when never.
     pub contact_onset_s: Option<f64>,
-    /// What should be known of the trial.
+    /// Remarks on the trial.
     pub warnings: Vec<String>,
-    /// All effects, in the order in which they are told.
+    /// All effects, in the order of [`Effect::ALL`].
     pub effects: Vec<ExplainedEffect>,
 }
 
 /// One effect, explained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExplainedEffect {
-    /// What the plan says of it.
+    /// Decision of the plan.
     #[serde(flatten)]
     pub planned: PlannedEffect,
-    /// What it is.
+    /// Description, one sentence.
     pub about: &'static str,
-    /// What its number is the ratio of.
+    /// Definition of its number.
     pub number_is: &'static str,
-    /// What it costs where it is on, and would cost where it is off, as a share of the trial's CPU time.
+    /// Cost where it is on, or cost of switching it on, as a share of the trial's CPU time.
     pub cost_share: f64,
-    /// What the trial would be with the effect left out where it is on, put in where it is off.
+    /// Change of the trial when the effect is switched the other way.
     pub change: EffectChange,
 }
 
@@ -56,12 +56,12 @@ pub struct EffectChange {
     pub norms: ErrorNorms,
     /// First contact in the other trial (s); null when never.
     pub contact_onset_s: Option<f64>,
-    /// How much later first contact is in the other trial (ms), in whole samples; null unless both touch.
+    /// Delay of first contact in the other trial (ms), in whole samples; null unless both touch.
     pub onset_ms: Option<f64>,
 }
 
 impl ExplainedEffect {
-    /// What it costs, in words.
+    /// Describes the cost.
     pub fn cost_in_words(&self) -> String {
         let (costs, saves) = if self.planned.on { ("costs", "saves") } else { ("would cost", "would save") };
         let percent = 100.0 * self.cost_share;
@@ -75,7 +75,7 @@ impl ExplainedEffect {
         }
     }
 
-    /// What the other trial is like, in words, given when this one has its first contact (s).
+    /// Describes the change, given the time of first contact in this trial (s).
     pub fn change_in_words(&self, onset_here: Option<f64>) -> String {
         let change = &self.change;
         let how = if self.planned.on { "without it" } else { "with it" };
@@ -102,16 +102,16 @@ impl ExplainedEffect {
 const PAIRS: usize = 5;
 /// Shares of CPU time below this differ from run to run on a busy machine.
 const NOISE: f64 = 0.03;
-/// What counts as long (s).
+/// Duration above which a trial is long (s).
 const LONG: f64 = 10.0;
 
-/// How to measure.
+/// Settings of the measurement.
 pub struct Measuring<'a> {
     /// Threads to work in.
     pub threads: usize,
     /// Set to give up.
     pub cancelled: &'a AtomicBool,
-    /// Hears how many of how many effects are done.
+    /// Receives the numbers of effects done and in all.
     pub progress: &'a (dyn Fn(usize, usize) + Sync),
 }
 
@@ -127,7 +127,7 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
         Some(explained)
     };
     let all = || Effect::ALL.par_iter().map(one).collect::<Option<Vec<ExplainedEffect>>>();
-    // Where the system has no threads to give, those that rayon has will do.
+    // Falls back to rayon's global pool where no threads can be started.
     let effects = match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
         Ok(pool) => pool.install(all),
         Err(_none) => all(),
@@ -257,7 +257,7 @@ mod tests {
         for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
             assert!(told.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
         }
-        // What was left out is not missed: no finger comes near the pedestal or the other finger.
+        // Effects left out change nothing: no finger comes near the pedestal or the other finger.
         for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
             assert_eq!(told.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
             assert_eq!(told.of(effect).change.norms.force_n, 0.0, "{effect:?}");

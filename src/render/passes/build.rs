@@ -4,7 +4,7 @@ use super::PassSetup;
 use crate::targets::{COLOUR, DEPTH, SAMPLES};
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPipeline, ShaderModule, VertexBufferLayout};
 
-/// How a pipeline treats depth.
+/// Depth test of a pipeline.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Depth {
     /// In front of what is there, and remembered.

@@ -13,14 +13,14 @@ use super::frame::FrameBindings;
 use palpate_geometry::drawing::DrawList;
 use wgpu::{Device, Queue, RenderPass};
 
-/// What a pass is made from.
+/// Inputs of creating a pass.
 pub(crate) struct PassSetup<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,
     pub(crate) frame: &'a FrameBindings,
 }
 
-/// What a pass reads before each picture.
+/// Inputs of preparing a pass for one picture.
 pub(crate) struct Prepare<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,

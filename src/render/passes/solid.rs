@@ -27,7 +27,7 @@ struct SolidPass {
     pipeline: RenderPipeline,
     /// Absent for ghosts.
     shadow: Option<RenderPipeline>,
-    /// What of a list is drawn.
+    /// Part of the draw list that is drawn.
     of: fn(&DrawList) -> &[Solid],
     meshes: Vec<Uploaded>,
     instances: StreamBuffer,

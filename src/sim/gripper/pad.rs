@@ -12,7 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How a contact spring resists compression.
+/// Force law of a contact spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PadLaw {

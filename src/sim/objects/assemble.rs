@@ -17,7 +17,7 @@ pub(super) enum ShapeSource {
     Mesh(Vec<ColouredPart>),
 }
 
-/// What the file says of one link's mass.
+/// Mass of one link as the file declares it.
 pub(super) struct Inertial {
     pub(super) link: String,
     /// In the object's frame; absent where the file says nothing usable.

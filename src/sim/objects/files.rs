@@ -1,4 +1,4 @@
-//! Where the files of an object come from, and what a reference inside one of them means.
+//! Files of an object, and references between them.
 
 use std::path::{Component, Path, PathBuf};
 

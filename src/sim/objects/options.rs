@@ -2,20 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which shape the physics sees.
+/// Shape used for contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CollisionShape {
-    /// What the file declares for collision; where it declares none, what it shows.
+    /// Collision shapes of the file; its visual shapes where it declares none.
     #[default]
     File,
-    /// What the file shows.
+    /// Visual shapes of the file.
     Visual,
     /// The convex hull, for meshes that cannot be repaired.
     Hull,
 }
 
-/// How a file is to be read. `None` leaves a choice to Palpate.
+/// Options of loading an object; `None` is chosen automatically.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadOptions {
     /// Factor on all lengths; guessed with a warning where the size is implausible.
@@ -24,7 +24,7 @@ pub struct LoadOptions {
     pub mass: Option<f64>,
     /// Density where the file gives no usable mass (kg/m³).
     pub density: f64,
-    /// Which shape the physics sees.
+    /// Shape used for contact.
     pub collision: CollisionShape,
     /// Lattice spacing of baked distances (m); chosen by size.
     pub cell: Option<f64>,

@@ -1,4 +1,4 @@
-//! Whether a gripper is at rest: the torque at each joint that neither springs, gravity nor contacts account for.
+//! Static residual: the torque at each joint that neither springs, gravity nor contacts balance.
 
 use super::contact::{Acting, Against, Contact};
 use super::model::PhysicsModel;

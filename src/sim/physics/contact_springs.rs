@@ -32,7 +32,7 @@ impl ContactSpring {
 #[derive(Clone, Debug)]
 pub(super) struct ContactSprings {
     pub(super) all: Vec<ContactSpring>,
-    /// How many belong to taxels.
+    /// Number of springs that belong to taxels.
     pub(super) on_pad: usize,
     /// Those carried by each of the N + 1 segments.
     by_segment: Vec<Range<usize>>,

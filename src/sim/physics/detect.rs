@@ -27,7 +27,7 @@ use glam::{DMat3, DVec3};
 const STILL_MARGIN: f64 = 2e-4;
 /// Speed gained within a step that a contact in waiting allows for (m/s).
 const SPEED_MARGIN: f64 = 0.1;
-/// How much faster than now a body may become within a step before contacts are found one step late.
+/// Factor on the speed within one step up to which contacts are found in time.
 const SPEED_FACTOR: f64 = 1.5;
 
 /// A surface that a contact spring has met.
@@ -36,13 +36,13 @@ struct Hit {
     compression: f64,
     /// Outward normal of the surface, unit length.
     normal: DVec3,
-    /// Where the surface is met.
+    /// Counterpart that is met.
     point: DVec3,
-    /// How squarely the contact spring meets the surface, c: from [`LEAST_COSINE`] to one.
+    /// Cosine between the spring's axis and the surface normal, c: from [`LEAST_COSINE`] to one.
     cosine: f64,
 }
 
-/// How a ray meets a surface.
+/// Encounter of a ray with a surface.
 enum Met {
     /// Coming from outside.
     InFront(Hit),
@@ -105,7 +105,7 @@ fn margin(h: f64, speed: f64) -> f64 {
     STILL_MARGIN + h * (SPEED_MARGIN + SPEED_FACTOR * speed)
 }
 
-/// What one segment may touch, and how far away it may still be.
+/// Counterparts within reach of one segment, and the reach.
 struct Near<'a> {
     object: Option<(&'a Solid<'a>, f64)>,
     world: Option<f64>,
@@ -143,7 +143,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
         if let Some(margin) = near.finger {
             let other = OtherFinger::opposite(model, &workspace.segments, place.finger);
             if let Some(met) = ray.cast_finger(&other, margin) {
-                // What merely waits to touch gives way to everything else.
+                // A contact in waiting gives way to all others.
                 let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));
                 if met.compression > deepest {
                     let first_link = (1 - place.finger) * (model.chain.joints + 1);
@@ -187,7 +187,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
     }
 }
 
-/// How far the fingers stand out towards each other, and the fastest segment of each (m/s); `None` where no segment of
+/// Protrusion of the fingers towards each other, and the fastest segment of each (m/s); `None` where no segment of
 /// one can come near the other within the step, or where they pass through each other.
 fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
     workspace.fingers_meet = false;
@@ -214,7 +214,7 @@ pub(super) fn segment_axes(plane: &FingerPlane, segment: &SegmentPose) -> DMat3 
     DMat3::from_cols(plane.direction(segment.along), DVec3::Y, plane.direction(segment.inward()))
 }
 
-/// The object where it is now.
+/// Object in its present pose.
 struct Solid<'a> {
     body: &'a Body,
     object_from_gripper: DMat3,
@@ -288,7 +288,7 @@ impl Ray {
         Some(self.in_front_or_pushed(met))
     }
 
-    /// What has no thickness to go back through, a table or the front of a finger, pushes along the contact spring.
+    /// A table or the front of a finger has no far side to go back through: it pushes along the contact spring.
     fn in_front_or_pushed(&self, met: Met) -> Hit {
         match met {
             Met::InFront(hit) => hit,

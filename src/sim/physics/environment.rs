@@ -1,4 +1,4 @@
-//! What stands still around the gripper: the table, and the pedestal on it. In the gripper frame.
+//! Fixed environment of the gripper: table and pedestal, in the gripper frame.
 
 use crate::scene::{Support, SupportKind};
 use glam::DVec3;
@@ -92,7 +92,7 @@ impl Environment {
         self.gripper_from_world.direction(DVec3::Z)
     }
 
-    /// How far a point lies above the highest surface (m); negative below it, where only part of the environment is.
+    /// Height of a point above the highest surface (m); negative below it, where only part of the environment is.
     pub(super) fn height_above_top(&self, p: DVec3) -> f64 {
         self.up().dot(p - self.gripper_from_world.position) - self.top
     }

@@ -24,7 +24,7 @@ pub(super) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
     (0.25 * stiffness, 2.0 * height)
 }
 
-/// How far each finger stands out inward from its own neutral axis when straight (m).
+/// Inward protrusion of each finger from its own straight neutral axis (m).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fronts([f64; 2]);
 
@@ -120,7 +120,7 @@ impl<'a> OtherFinger<'a> {
         Place { segment, beyond_tip: along - remaining, height: side * size, up }
     }
 
-    /// How far a point lies beyond the core of the rounded box, along the finger and away from its middle (m).
+    /// Distance of a point beyond the core of the rounded box, along the finger and away from its middle (m).
     fn excess(&self, place: &Place, across: f64) -> (f64, f64, bool) {
         let skin = &self.model.skin;
         let radius = self.model.springs.radius;

@@ -30,7 +30,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 const GAMMA: f64 = 1.0 - FRAC_1_SQRT_2;
 
-/// What a step needs besides a state and a length.
+/// Inputs of a step besides state and length.
 pub(super) struct Surroundings<'a> {
     pub(super) model: &'a PhysicsModel,
     pub(super) ws: &'a mut Workspace,

@@ -9,7 +9,7 @@
 //! v* carries torques, gravity and Coriolis forces. Springs, dampers and contacts are all taken at the *end* of the
 //! step, so that no stiffness, however large, makes a step unstable.
 //!
-//! What of all this a scene calls for is decided in [`effects`].
+//! [`effects`] decides which parts of this a scene needs.
 //!
 //! Read in this order: `chain` (what a finger resists), `contact springs` and `detect` (where it touches), `contact` (what
 //! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how

@@ -16,7 +16,7 @@ use palpate_geometry::{DistanceField, Pose};
 /// Constants of a simulation. Built once, never changed; a step is a function of it and a [`super::State`].
 #[derive(Clone, Debug)]
 pub struct PhysicsModel {
-    /// What all contacts share; the length of a step is set as it is taken.
+    /// Contact constants; the step length is set at each step.
     pub(super) contact: ContactStep,
     pub(super) chain: ChainModel,
     pub(super) planes: [FingerPlane; 2],
@@ -37,7 +37,7 @@ pub struct PhysicsModel {
     pub(super) chamber: Option<Chamber>,
     /// Joints that creep.
     pub(super) relaxation: Option<Relaxation>,
-    /// Which effects all of this came from.
+    /// Effects simulated.
     pub(super) plan: Plan,
     pub(super) tolerance: f64,
     pub(super) max_iterations: u32,
@@ -168,7 +168,7 @@ impl PhysicsModel {
         }
     }
 
-    /// Which effects are simulated, and why.
+    /// Effects simulated, with the reason for each.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }

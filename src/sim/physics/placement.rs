@@ -1,4 +1,4 @@
-//! Where things stand at the start: the object put down on its support, the gripper held above it.
+//! Initial placement: the object on its support, the gripper above it.
 
 use crate::objects::ObjectModel;
 use crate::scene::{Scene, SupportKind};
@@ -10,11 +10,11 @@ use rand_chacha::ChaCha8Rng;
 /// The start of a scene, in world coordinates. The world's origin is the middle of the table, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// Where the gripper is held.
+    /// Pose of the gripper in the world.
     pub world_from_gripper: Pose,
-    /// Where the object lies; its own frame, not its centre of mass. Absent for an empty hand.
+    /// Pose of the object's own frame (not its centre of mass) in the world; absent for an empty hand.
     pub world_from_object: Option<Pose>,
-    /// What was moved to make room.
+    /// Corrections made for clearance.
     pub warnings: Vec<String>,
 }
 

@@ -1,8 +1,8 @@
-//! How an object comes to rest by itself: it is dropped onto a plane many times, tumbling, and how it lies in the end is
-//! noted. rapier3d does the tumbling: what is wanted is a fair share of each face, not a fine trajectory.
+//! Resting poses: the object is dropped onto a plane many times, and its final orientations are collected. rapier3d
+//! simulates the drops: the result needs a fair share of each face, not an accurate trajectory.
 //!
-//! The object is scaled to unit size first: rapier's tolerances are made for bodies of about a metre, and a drop of a
-//! scaled body under the same gravity only takes another time.
+//! The object is scaled to unit size first: rapier's tolerances suit bodies of about a metre, and the drop of a scaled
+//! body under the same gravity differs only in its time scale.
 
 use super::placement::random_rotation;
 use crate::objects::ObjectModel;
@@ -25,7 +25,7 @@ const LINEAR_DAMPING: f32 = 0.5;
 const HEIGHT: f32 = 1.0;
 
 /// Orientations (world from object) in which an object comes to rest, one per drop, so that frequent ones are listed
-/// often. Never empty: an object that cannot be dropped is listed as it is. Equal objects give equal lists.
+/// often. Never empty: an object that cannot be dropped keeps its own orientation. Equal objects give equal lists.
 pub fn natural_rotations(object: &ObjectModel) -> Vec<DQuat> {
     let Some(body) = DroppedBody::new(object) else { return vec![DQuat::IDENTITY] };
     let mut random = ChaCha8Rng::seed_from_u64(0);
@@ -66,7 +66,7 @@ impl DroppedBody {
         Some(Self { shape: SharedShape::compound(parts), mass, radius })
     }
 
-    /// How it lies in the end; `None` where the engine has lost it.
+    /// Final orientation; `None` where the engine has lost the body.
     fn drop_from(&self, rotation: DQuat) -> Option<DQuat> {
         let mut world = PhysicsWorld { gravity: Vec3::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
         world.insert(
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use palpate_geometry::Primitive;
 
-    /// How often each axis of the object points up or down.
+    /// Counts of the rotations in which each axis of the object points up or down.
     fn axes_up(shape: Primitive) -> [usize; 3] {
         let object = ObjectModel::from_primitive("thing", shape, 500.0, 0.5);
         let rotations = natural_rotations(&object);

@@ -41,10 +41,10 @@ pub struct Simulation {
     imbalance: Option<Imbalance>,
 }
 
-/// How finely a simulation is computed.
+/// Refinement of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refinement {
-    /// As the scene says.
+    /// Steps as in the scene.
     None,
     /// More finely, to estimate an error from; see [`crate::scene::Solver::refined`].
     Refined,
@@ -166,7 +166,7 @@ impl Simulation {
         };
     }
 
-    /// Deepest compression of a contact spring in the state as it is, before any step (m).
+    /// Deepest compression of a contact spring before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         step::lay_out(&self.model, &self.state, &mut self.workspace);
         segment_velocities(&self.model, &self.state.velocity, &mut self.workspace);
@@ -178,14 +178,14 @@ impl Simulation {
         deepest
     }
 
-    /// When, if ever, the fingers came so near each other that their contact, which `auto` had left out, was turned
-    /// on (s).
+    /// Time at which finger contact left out by `auto` was turned on because the fingers came near each other (s);
+    /// `None` if never.
     pub fn finger_contact_turned_on(&self) -> Option<f64> {
         let guarded = self.model.finger_contact == FingerContact::Guarded;
         self.met_at.filter(|_| guarded).map(|tick| self.clock.seconds(tick))
     }
 
-    /// What a rig would sample now.
+    /// Sample of the present state.
     pub fn frame(&self) -> Frame {
         Frame {
             sample: (self.tick / u64::from(self.clock.ticks_per_sample)).saturating_sub(1) as u32,

@@ -16,23 +16,23 @@ use super::model::PhysicsModel;
 use super::workspace::{Block, PerLink, Spatial, Workspace};
 use glam::DVec3;
 
-/// How a minimisation went.
+/// Statistics of a minimisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SolveReport {
     pub(super) iterations: u32,
     pub(super) line_search_steps: u32,
     pub(super) converged: bool,
-    /// What was farthest from balance where it did not converge.
+    /// Largest imbalance; `None` where it converged.
     pub(super) unbalanced: Option<Unbalanced>,
 }
 
 /// Forces that did not balance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unbalanced {
-    /// Which unknown of the step: joint rates of both fingers, then the six velocities of a free object. See
+    /// Index of the unknown: joint rates of both fingers, then the six velocities of a free object. See
     /// [`super::State::place_of`].
     pub unknown: u32,
-    /// What was left over there, as a multiple of what the tolerance allows.
+    /// Residual there over the residual that the tolerance allows.
     pub excess: f64,
 }
 
@@ -105,7 +105,7 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
     }
 }
 
-/// Which of two vectors a product is taken of, and so where it goes.
+/// Vector of a matrix product, which selects the output.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Product {
     OfVelocity,

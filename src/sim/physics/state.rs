@@ -1,4 +1,4 @@
-//! What changes during a simulation. All of it can be saved and restored; scratch memory is elsewhere.
+//! State of a simulation. All of it can be saved and restored; scratch memory is elsewhere.
 
 use super::effects::went_on;
 use super::model::PhysicsModel;
@@ -104,7 +104,7 @@ impl State {
         }
     }
 
-    /// How far apart two states are: the largest difference of joint angles and of the object's orientation (rad), of
+    /// Distance between two states: the largest difference of joint angles and of the object's orientation (rad), of
     /// fingertips and of the object's position as shares of a finger's length. The segments are scratch memory.
     pub(super) fn distance(
         &self,
@@ -189,7 +189,7 @@ impl State {
         (!sound).then(|| Self::place_of(model, 2 * n))
     }
 
-    /// What an unknown of the step belongs to, named for people.
+    /// Display name of the joint or body that an unknown of the step belongs to.
     pub fn place_of(model: &PhysicsModel, unknown: usize) -> String {
         let n = model.chain.joints;
         match unknown / n {

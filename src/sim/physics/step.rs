@@ -9,7 +9,7 @@ use super::state::State;
 use super::workspace::{Spatial, Workspace};
 use glam::{DVec2, DVec3};
 
-/// How a step went.
+/// Statistics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepReport {
     /// Newton iterations taken.
@@ -23,7 +23,7 @@ pub struct StepReport {
     /// The outer friction residual: by how much the lagged slip limits missed the true ones where they mattered,
     /// as a share of the sum of the true ones. Zero without friction forces.
     pub friction_residual: f64,
-    /// What was farthest from balance; absent where the minimisation reached its tolerance.
+    /// Largest imbalance; absent where the minimisation reached its tolerance.
     pub unbalanced: Option<Unbalanced>,
 }
 
@@ -45,11 +45,11 @@ impl StepReport {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{body} left the range of numbers; the samples before it are kept. Try a smaller time step or softer contact")]
 pub struct NotFinite {
-    /// What became non-finite, in words.
+    /// Joint or body whose state is not finite.
     pub body: String,
 }
 
-/// What drives a step from outside.
+/// External inputs of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drive {
     /// Actuation torque on every joint (N m), where the chambers do not lag.

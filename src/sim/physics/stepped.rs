@@ -16,7 +16,7 @@ use crate::objects::ObjectModel;
 use crate::scene::{Accuracy, Scene};
 use glam::DVec3;
 
-/// How a step is taken.
+/// Method of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stepping {
     /// The convex step that grasps are made of.
@@ -35,7 +35,7 @@ pub struct SteppedScene {
     pub(super) ws: Workspace,
     /// Length of a step (s).
     pub h: f64,
-    /// How steps are taken.
+    /// Method of integration.
     pub stepping: Stepping,
     /// Steps taken.
     pub steps: u64,
@@ -124,7 +124,7 @@ impl SteppedScene {
         (tip.x, tip.y)
     }
 
-    /// How far the left finger is bent outward at its tip (m); zero where it is bent inward.
+    /// Outward deflection of the left fingertip (m); zero where it is bent inward.
     pub fn tip_sway(&self) -> f64 {
         (-self.tip().0).max(0.0)
     }

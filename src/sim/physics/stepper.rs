@@ -61,7 +61,7 @@ struct Control {
     /// The state at its beginning.
     origin: State,
     segments: [Vec<SegmentPose>; 2],
-    /// Where energies are worked out: the forces of the last step stay where they are.
+    /// Scratch for energies, so that the forces of the last step stay intact.
     aside: Workspace,
 }
 
@@ -225,7 +225,7 @@ impl Control {
         (gain - UNFELT_GAIN * share).max(0.0) / worth.max(f64::MIN_POSITIVE)
     }
 
-    /// How much longer the next step may be, from the error over the tolerance: errors grow with h^(p + 1).
+    /// Growth factor of the next step from the error over the tolerance: errors grow with h^(p + 1).
     fn factor(ratio: f64, order: i32) -> f64 {
         (SAFETY * ratio.powf(-1.0 / f64::from(order + 1))).clamp(FASTEST_SHRINKING, FASTEST_GROWTH)
     }

@@ -68,7 +68,7 @@ impl Block {
     }
 }
 
-/// What contacts ask of one segment: against the object, which couples to it, against the world or the other finger,
+/// Sums over the contacts of one segment: against the object, which couples to it, against the world or the other finger,
 /// and from the other finger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PerLink<T> {
@@ -121,7 +121,7 @@ pub struct Workspace {
     pub(super) a_velocity: Vec<f64>,
     pub(super) a_direction: Vec<f64>,
     pub(super) hessian: Skyline,
-    /// What the contacts between the fingers ask of each segment of the right finger per unit rate of each joint of
+    /// Forces of the contacts between the fingers on each segment of the right finger per unit rate of each joint of
     /// the left one, `N x (N + 1)`.
     pub(super) coupling: Vec<Spatial>,
 }

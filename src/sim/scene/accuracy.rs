@@ -1,4 +1,4 @@
-//! How accurately motion is computed: a named time step, or a tolerance; and by which method.
+//! Accuracy of the motion (a named time step or a tolerance) and method of integration.
 
 use serde::de::{Error as _, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -109,7 +109,7 @@ impl<'de> Deserialize<'de> for Accuracy {
     }
 }
 
-/// How steps are taken, as a scene says it.
+/// Integrator setting of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Integrator {
@@ -122,7 +122,7 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// What `auto` comes to at an accuracy.
+    /// Method of integration at an accuracy.
     pub fn method(self, accuracy: Accuracy) -> Method {
         match (self, accuracy.tolerance()) {
             (Self::Euler, _) | (Self::Auto, None) => Method::Euler,

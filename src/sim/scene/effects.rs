@@ -4,13 +4,13 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Whether an effect is simulated.
+/// Setting of an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Setting {
     /// Never.
     Off,
-    /// Where the scene calls for it.
+    /// On where the scene calls for it.
     #[default]
     Auto,
     /// Always.

@@ -5,7 +5,7 @@ use super::Scene;
 use crate::objects::anchored;
 use std::path::{Path, PathBuf};
 
-/// Why a scene was refused.
+/// Error of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// The file could not be read.
@@ -13,7 +13,7 @@ pub enum SceneError {
     Unreadable {
         /// The path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         cause: String,
     },
     /// Not TOML, or a value of the wrong kind.
@@ -40,7 +40,7 @@ pub enum SceneError {
         key: String,
         /// The value found.
         value: String,
-        /// What would be accepted.
+        /// Accepted range.
         wanted: String,
     },
 }
@@ -50,7 +50,7 @@ pub enum SceneError {
 pub struct SceneKey {
     /// Its name with its tables: `gripper.pad.modulus`.
     pub name: String,
-    /// What it is by default, as TOML writes it.
+    /// Default value, as TOML writes it.
     pub default: String,
 }
 
@@ -70,7 +70,7 @@ impl SceneKey {
         format!("{}={value}", self.name)
     }
 
-    /// Where its first number stands.
+    /// Range of its first number in the default.
     fn number(&self) -> Option<std::ops::Range<usize>> {
         let from = self.default.find(|c: char| c.is_ascii_digit() || c == '-')?;
         let end = self.default[from..].find(|c: char| !(c.is_ascii_alphanumeric() || "+-._".contains(c)));

@@ -24,7 +24,7 @@ pub struct EmptyClose {
 }
 
 impl EmptyClose {
-    /// How long it is watched where nobody says (s): enough to turn a regulator up and down again.
+    /// Default duration (s): enough to turn a regulator up and down again.
     pub const SECONDS: f64 = 15.0;
 
     /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts; the
@@ -65,12 +65,12 @@ impl EmptyClose {
         self.left_s() <= 0.0
     }
 
-    /// How long it still watches (s).
+    /// Time left (s).
     pub fn left_s(&self) -> f64 {
         (self.seconds - self.watched_s).max(0.0)
     }
 
-    /// What to do, in words.
+    /// Instruction to the user.
     pub fn instruction(&self) -> String {
         let left = self.left_s().ceil();
         format!(
@@ -79,7 +79,7 @@ impl EmptyClose {
         )
     }
 
-    /// What was seen.
+    /// Bending zero from the recorded readings.
     pub fn bending(&self) -> Result<BendingZero, Fault> {
         BendingZero::from_empty_close(&self.readout.bending(self.side, &self.readings))
     }

@@ -2,11 +2,11 @@
 //!
 //!   R = R0 + s theta,
 //!
-//! fitted by least squares of the resistance on the angle, all points alike: what is uncertain about a point is how well
-//! its angle was set, not the mean of its readings. The angle is spread evenly over the active length L of the strip, so
+//! fitted by least squares of the resistance on the angle, all points alike: the uncertainty of a point is that of
+//! the angle set, not of the mean of its readings. The angle is spread evenly over the active length L of the strip, so
 //! that the curvature is kappa = theta / L; a right angle is 28.4 1/m.
 //!
-//! What such a part can be is in the data sheet of the FS-L-0055-253-ST: 25 kOhm flat, off by 30 % at most; distributors
+//! Plausible parts follow the data sheet of the FS-L-0055-253-ST: 25 kOhm flat, off by 30 % at most; distributors
 //! measure 2 to 2.5 times that at 90 degrees.
 
 use super::Fault;
@@ -55,19 +55,24 @@ pub struct FlexCurve {
 }
 
 impl FlexCurve {
-    /// Fits a strip; two points at least, a right angle apart if possible. Also says what is worth a word.
+    /// Fits a strip; two points at least, a right angle apart if possible. Also returns remarks.
     pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
         check(points, SensorKind::Flex, input, FRAC_PI_2)?;
         let distinct = merged(points, APART);
         if distinct.len() < 2 {
-            let more = "one with the finger straight and one bent by 90 degrees, better also 30 and 60";
-            return Err(Fault::TooFew { have: distinct.len(), need: 2, what: "different angles", more });
+            return Err(Fault::TooFew(format!(
+                "{} of at least 2 different angles: take one with the finger straight and one bent by 90 degrees, better \
+                 also 30 and 60",
+                distinct.len()
+            )));
         }
         let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
         if most - least < LEAST_SPAN {
-            let (from, to) = (SensorKind::Flex.told(least), SensorKind::Flex.told(most));
-            let wanted = "angles at least 45 degrees apart are needed, best 0 and 90";
-            return Err(Fault::TooClose { kind: SensorKind::Flex.label(), from, to, wanted });
+            let [from, to] = [least, most].map(|angle| SensorKind::Flex.with_unit(angle));
+            return Err(Fault::TooFew(format!(
+                "the flex strip has points from {from} to {to} only: angles at least 45 degrees apart are needed, best 0 \
+                 and 90"
+            )));
         }
         rises(&distinct, input)?;
         let weighted = |p: &Point| WeightedPoint { x: p.stimulus, y: input.ohm(p.counts), weight: 1.0 };
@@ -112,10 +117,11 @@ impl FlexCurve {
             let resistor = input.divider.fixed_ohm;
             let [low, high] = FLAT_OHM.map(|flat| three_digits(1e-3 * resistor * flat / self.flat_ohm));
             let said = three_digits(1e-3 * resistor);
-            let hint = format!(
-                "the resistor beside it is not the {said} kOhm it is said to be but {low} to {high}, or it is another part"
-            );
-            return Err(Fault::FlatResistance { flat_ohm: self.flat_ohm, hint });
+            return Err(Fault::ImplausiblePart(format!(
+                "the flat strip comes out at {} kOhm, but such parts have 17.5 to 32.5: the resistor beside it is not the \
+                 {said} kOhm entered but {low} to {high}, or it is another part",
+                three_digits(self.flat_ohm * 1e-3)
+            )));
         }
         let ratio = self.bent_over_flat();
         if !within(BENT_OVER_FLAT, ratio) {
@@ -124,7 +130,11 @@ impl FlexCurve {
             } else {
                 "the angles are smaller than what was bent, or the part is damaged"
             };
-            return Err(Fault::BentResistance { ratio, hint: hint.to_owned() });
+            return Err(Fault::ImplausiblePart(format!(
+                "bent by 90 degrees the strip comes out at {} times its flat resistance, but such parts rise to 1.5 to 3.5 \
+                 times: {hint}",
+                three_digits(ratio)
+            )));
         }
         Ok(())
     }
@@ -132,13 +142,14 @@ impl FlexCurve {
     fn remarks(&self, points: &[Point]) -> Result<Vec<String>, Fault> {
         let mut words = Vec::new();
         if points.len() == 2 {
-            words.push("two points fit any line: only a third one tells how good it is".to_owned());
+            words.push("two points fit any line: take a third one to check the fit".to_owned());
         }
         let worst = points.iter().zip(&self.residuals).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((point, residual)) = worst else { return Ok(words) };
-        let (at, off) = (SensorKind::Flex.told(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
+        let (at, off) =
+            (SensorKind::Flex.with_unit(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
         if residual.abs() > TOO_FAR {
-            return Err(Fault::Outlier { at, off });
+            return Err(Fault::BadPoint(format!("{at} is {off} off the curve through the others: take it again")));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!("{at} is {off} off the line; take it again if the strip may have slipped"));
@@ -153,14 +164,13 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
         let (before, after) = (input.ohm(pair[0].counts), input.ohm(pair[1].counts));
         if after <= before {
             let kilo = |ohm: f64| format!("{} kOhm", three_digits(ohm * 1e-3));
-            return Err(Fault::NotMonotone {
-                from: SensorKind::Flex.told(pair[0].stimulus),
-                to: SensorKind::Flex.told(pair[1].stimulus),
-                what: "resistance",
-                falls: format!("{} to {}", kilo(before), kilo(after)),
-                likely: "the strip bends towards its wrong side, its input is wired the other way round, or two angles \
-                         were mixed up",
-            });
+            let [from, to] = [0, 1].map(|i| SensorKind::Flex.with_unit(pair[i].stimulus));
+            return Err(Fault::BadPoint(format!(
+                "between {from} and {to} the resistance falls from {} to {}, but it must rise: the strip bends towards its \
+                 wrong side, its input is wired the other way round, or two angles were mixed up",
+                kilo(before),
+                kilo(after)
+            )));
         }
     }
     Ok(())

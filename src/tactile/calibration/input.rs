@@ -18,7 +18,7 @@ pub struct Input {
     pub reference_volt: f64,
 }
 
-/// Counts within this distance of an end of the converter's range say only that it has ended.
+/// Counts within this distance of an end of the converter's range are saturated.
 const RAIL_COUNTS: f64 = 1.5;
 
 impl Input {
@@ -63,7 +63,7 @@ impl Input {
         self.divider.siemens(self.share(counts))
     }
 
-    /// What a resistance (ohm) is read as, before noise and rounding (counts).
+    /// Reading of a resistance (ohm) before noise and rounding (counts).
     pub fn counts(&self, ohm: f64) -> f64 {
         self.divider.share_of_ohm(ohm) * self.levels()
     }
@@ -74,8 +74,8 @@ impl Input {
         1.0 / (share * (1.0 - share) * self.divider.gain * self.levels())
     }
 
-    /// Why a reading says nothing of the resistance, where it is at an end of the converter's range. A pad that reads
-    /// nothing is only unloaded.
+    /// End of the converter's range that a reading is at, if any: it then does not determine the resistance. A pad that
+    /// reads zero is only unloaded.
     pub fn range_end(&self, counts: f64) -> Option<RangeEnd> {
         let high = counts >= f64::from(self.full_scale) - RAIL_COUNTS;
         let low = counts <= RAIL_COUNTS;

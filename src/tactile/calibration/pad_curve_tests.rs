@@ -1,4 +1,4 @@
-//! Tests of the pad's curve: closed forms, and every fault that it tells.
+//! Tests of the pad's curve: closed forms, and every fault.
 
 use super::pad_curve::*;
 use super::*;
@@ -70,7 +70,7 @@ fn too_few_too_close_and_too_light_weights_are_refused() {
 fn wrong_resistors_wiring_units_and_weights_are_told() {
     let behind =
         |resistor_ohm: f64| points(6e3, 0.9, &WEIGHTS, &Input { divider: Divider::of_pad(resistor_ohm), ..input() });
-    // 47 kOhm where 4.7 are said to be: the pad looks ten times too conductive.
+    // 47 kOhm where 4.7 is entered: the pad looks ten times too conductive.
     let text = fault(&behind(47e3));
     assert!(text.contains("0.600 kOhm") && text.contains("is not the 4.70 kOhm"), "{text}");
     assert!(fault(&behind(330.0)).contains("is not the 4.70 kOhm"));

@@ -18,7 +18,7 @@ use crate::board::{Board, Reading, Sensor};
 use crate::electronics::Divider;
 use std::collections::VecDeque;
 
-/// When a reading counts as settled.
+/// Criterion for a settled reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settling {
     /// Length of the window that is averaged (s).
@@ -37,15 +37,15 @@ impl Default for Settling {
     }
 }
 
-/// Why a point cannot be taken yet.
+/// Reason why no point can be taken yet.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsettled {
     /// Nothing, or not enough, has been read since the last point.
     #[error("reading: {have_s:.1} of {need_s:.1} s")]
     TooShort {
-        /// What there is (s).
+        /// Present length (s).
         have_s: f64,
-        /// What is needed (s).
+        /// Needed length (s).
         need_s: f64,
     },
     /// The channel says nothing.
@@ -60,12 +60,12 @@ pub enum Unsettled {
     /// At the end of the converter's range.
     #[error("{counts:.0} counts is the end of the range: the circuit is open, shorted, or the pad saturated")]
     RangeEnd {
-        /// What is read (counts).
+        /// Reading (counts).
         counts: f64,
     },
 }
 
-/// What is usually set, in rad or N: 0, 30, 60 and 90 degrees, or nothing and seven weights up to 0.5 kg.
+/// Default stimuli, in rad or N: 0, 30, 60 and 90 degrees, or no load and seven weights up to 0.5 kg.
 pub fn plan(kind: SensorKind) -> Vec<f64> {
     let shown: &[f64] = match kind {
         SensorKind::Flex => &[0.0, 30.0, 60.0, 90.0],
@@ -80,14 +80,14 @@ pub struct Procedure {
     sensor: Sensor,
     column: usize,
     record: Record,
-    /// What is left to set, next one first.
+    /// Remaining stimuli, next one first.
     left: VecDeque<f64>,
     settling: Settling,
     /// Time (s) and counts of the last readings.
     window: VecDeque<(f64, f64)>,
     /// Readings since the last point that had no number.
     silent: usize,
-    /// Why the last point that was asked for was not taken.
+    /// Reason why the last requested point was not taken.
     refusal: Option<Unsettled>,
     /// The user has said what resistor is beside the sensor.
     resistor_is_given: bool,
@@ -137,7 +137,7 @@ impl Procedure {
         self.sensor
     }
 
-    /// What has been measured so far.
+    /// Points measured so far.
     pub fn record(&self) -> &Record {
         &self.record
     }
@@ -147,12 +147,12 @@ impl Procedure {
         self.left.front().copied()
     }
 
-    /// How much of the plan is left.
+    /// Number of points left in the plan.
     pub fn left(&self) -> usize {
         self.left.len()
     }
 
-    /// What to do next, in words.
+    /// Instruction for the next step.
     pub fn instruction(&self) -> String {
         let place = self.sensor.label();
         let Some(next) = self.next() else {
@@ -255,7 +255,7 @@ impl Procedure {
         Ok(point)
     }
 
-    /// Why the point that was asked for last was not taken; none once another one was taken, left out or taken back.
+    /// Reason why the last requested point was not taken; none after a point was taken, skipped or undone.
     pub fn last_refusal(&self) -> Option<Unsettled> {
         self.refusal
     }
@@ -281,7 +281,7 @@ impl Procedure {
         self.record.bending = Some(bending);
     }
 
-    /// What the points so far come to.
+    /// Fits the points taken so far.
     pub fn fit(&self) -> Result<Calibration, Fault> {
         Calibration::fit(self.record.clone())
     }
@@ -371,7 +371,7 @@ mod tests {
         procedure.see(&Board { full_scale: 1023, divider_ohm: vec![3.3e3, 33e3], channels, ..Board::default() });
         assert!((procedure.record().input.ohm(600.0) - 3.3e3 * (1024.0 / 600.0 - 1.0)).abs() < 1e-6);
         assert_eq!(procedure.column, 0);
-        // What the user says of the resistor holds against the board's word.
+        // The user's resistor takes precedence over the board's.
         let mut told = Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
         told.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
         assert_eq!(told.record().input.divider.fixed_ohm, 1e3);

@@ -86,7 +86,7 @@ fn a_calibration_recovers_angle_within_a_degree_and_force_within_5_per_cent() {
         for step in 0..=60 {
             let share = f64::from(step) / 60.0;
             let (degrees, force) = (90.0 * share, 0.3 + 4.6 * share);
-            // What a finger at rest reads in half a second.
+            // Readings of a finger at rest during half a second.
             let mut mean = [0.0; 4];
             for _ in 0..25 {
                 let felt = readout.estimate(&parts.read(0.0, [degrees; 2], [force; 2]));
@@ -217,7 +217,7 @@ fn boards_without_a_channel_and_parts_without_a_calibration_are_told() {
     let readout = Readout::new(&board, &only).unwrap();
     let told = readout.warnings().join("\n");
     assert!(told.contains("no channel \"flexR\""), "{told}");
-    assert!(told.contains("calibrated beside 47.0 kOhm, but the board says 33.0"), "{told}");
+    assert!(told.contains("calibrated beside 47.0 kOhm, but the board reports 33.0"), "{told}");
     let wrong = [(Sensor::PadLeft, only[0].1.clone())];
     let text = Readout::new(&board, &wrong).expect_err("a strip is no pad").to_string();
     assert!(text.contains("flexL") && text.contains("left pad"), "{text}");

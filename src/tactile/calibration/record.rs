@@ -1,4 +1,4 @@
-//! What is known of a part: the points that were measured, and the curve through them.
+//! Calibration of a part: its measured points, and the curve through them.
 
 use super::flex_curve::FlexCurve;
 use super::input::Input;
@@ -11,18 +11,18 @@ use serde::{Deserialize, Serialize};
 /// Longest name of a part that is kept (characters).
 const LONGEST_NAME: usize = 80;
 
-/// What was measured of a part. This is what is stored and exchanged.
+/// Measured points of a part: the form in which calibrations are stored and exchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Name of the part, such as what is written on its tail.
     pub part: String,
-    /// What it is.
+    /// Kind of the sensor.
     pub kind: SensorKind,
     /// The input and converter it was measured with.
     pub input: Input,
     /// The known angles (rad) or forces (N), and what was read.
     pub points: Vec<Point>,
-    /// How the zero of a pad moves with the bending of its finger, where an empty close was recorded.
+    /// Bending zero of a pad, where an empty close was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bending: Option<BendingZero>,
     /// Whatever should be known besides.
@@ -43,12 +43,12 @@ pub enum Curve {
 /// A record with the curve fitted to it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Calibration {
-    /// What was measured.
+    /// Measured points.
     #[serde(flatten)]
     pub record: Record,
-    /// What came out.
+    /// Fitted curve.
     pub curve: Curve,
-    /// What should be known of it, in sentences.
+    /// Remarks, in sentences.
     pub warnings: Vec<String>,
 }
 
@@ -85,7 +85,7 @@ impl Calibration {
         Err(Fault::WrongKind { part, made, place: sensor.label(), wanted: wanted.label() })
     }
 
-    /// What a reading comes to through a input: an angle (rad) or a force (N), without any zero. None where the reading
+    /// Angle (rad) or force (N) of a reading, without any zero. None where the reading
     /// is at an end of the range; a pad that does not conduct is unloaded.
     pub fn stimulus(&self, input: &Input, counts: f64) -> Option<f64> {
         match (&self.curve, input.range_end(counts)) {
@@ -106,7 +106,7 @@ impl Calibration {
         }
     }
 
-    /// How uncertain its gain is: half the width of the 95 % interval as a share, at the middle of the usual range; none
+    /// Half-width of the 95 % interval of its gain as a share, at the middle of the usual range; none
     /// where the points do not tell.
     pub fn gain_interval(&self) -> Option<f64> {
         match &self.curve {
@@ -121,7 +121,7 @@ impl Calibration {
         [set.clone().fold(f64::INFINITY, f64::min), set.fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// What came out, in a line.
+    /// One-line summary of the fit.
     pub fn summary(&self) -> String {
         let often = |interval: Option<f64>, unit: &str| {
             interval.map_or_else(|| ", interval unknown".to_owned(), |half| format!(" ± {half:.2} {unit} (95 %)"))

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which side of the divider the sensor is on.
+/// Side of the divider that the sensor is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wiring {
@@ -20,7 +20,7 @@ pub enum Wiring {
 pub struct Divider {
     /// The fixed resistor (ohm).
     pub fixed_ohm: f64,
-    /// Where the sensor is.
+    /// Side of the sensor.
     pub wiring: Wiring,
     /// Factor on the voltage before it is read; 1 without an amplifier.
     pub gain: f64,

@@ -36,14 +36,14 @@ impl PadPart {
     /// The exponent of the nominal part.
     pub const NOMINAL_EXPONENT: f64 = 0.5 * (Self::EXPONENT[0] + Self::EXPONENT[1]);
 
-    /// How far a part's conductance is from nominal, at most, as a share of it (data sheet, parts of one batch).
+    /// Tolerance of a part's conductance, as a share of the nominal (data sheet, parts of one batch).
     pub const GAIN_TOLERANCE: f64 = 0.04;
 
     /// Resistor of its divider (ohm): the value recommended for the lowest tenth of the pad's range.
     pub const DIVIDER_OHM: f64 = 4.7e3;
 }
 
-/// How much more an unloading pad reads than a loading one, as a share of the load (data sheet).
+/// Hysteresis: reading of an unloading pad above that of a loading one, as a share of the load (data sheet).
 const HYSTERESIS: f64 = 0.05;
 
 /// Growth of the conductance for every tenfold time under load (data sheet, 1 % per log time).
@@ -55,7 +55,7 @@ const DRIFT_FROM_S: f64 = 0.1;
 /// A pad that is read at regular times.
 #[derive(Clone, Debug)]
 pub struct ForcePad {
-    /// What it is made of.
+    /// Part constants.
     pub part: PadPart,
     /// Unloading reads more than loading.
     pub hysteretic: bool,
@@ -67,7 +67,7 @@ pub struct ForcePad {
     pub rate_hz: f64,
     /// The load that shows, with hysteresis.
     shown: f64,
-    /// How long it has conducted (s).
+    /// Time since it began to conduct (s).
     loaded_s: f64,
 }
 

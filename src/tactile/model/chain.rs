@@ -9,7 +9,7 @@ use super::streams::Streams;
 use crate::Signals;
 
 impl PhysicalLike {
-    /// What such sensors report of a grasp whose clean signals are given, at 50 Hz and always finite. `seed` names the
+    /// Readings of a grasp from its clean signals, at 50 Hz and always finite. `seed` identifies the
     /// grasp. Channels are told apart by their names; one that is neither curvature, pressure nor force is read
     /// without a sensor.
     pub fn apply(&self, clean: &Signals, seed: u64) -> Signals {

@@ -71,7 +71,7 @@ impl ReadStrip {
         self.divider.ohm(share) / flat_ohm
     }
 
-    /// What the calibration makes of this part's rise: 1 is right.
+    /// Gain of this part under the nominal calibration: 1 is right.
     #[cfg(test)]
     pub(super) fn gain(&self) -> f64 {
         self.strip.part.reaching * self.strip.part.rise_per_rad / StripPart::nominal_rise()

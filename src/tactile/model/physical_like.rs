@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// 2 % of what the calibration believes, as what is known of the real gripper's readings asks.
 pub const GRIPPER: u64 = 127;
 
-/// Which faults the sensors have, and whose parts they are made of. Other numbers stand with the parts.
+/// Faults of the sensors and the gripper whose parts they are made of. Other constants stand with the parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PhysicalLike {

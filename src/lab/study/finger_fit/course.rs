@@ -1,4 +1,4 @@
-//! What was recorded and what the fit makes of it, to be drawn over each other.
+//! Recorded and fitted curvature over time, for a plot.
 
 use super::fitted_model::FittedModel;
 use super::observation::Observation;
@@ -9,7 +9,7 @@ use palpate_sim::gripper::Side;
 pub struct Course {
     /// The recording.
     pub name: String,
-    /// Which finger.
+    /// Finger.
     pub side: Side,
     /// Times since the first command (s).
     pub t_s: Vec<f64>,

@@ -1,15 +1,15 @@
 //! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so that the
 //! simulated finger lies on the real one.
 //!
-//! The fitted model is simulated with what the control box did, and its curvature and force laid over what was recorded; see
-//! `least_squares` for how the difference is made least. Fitted in logarithms: bending stiffness EI, damping time, the torques at
+//! The fitted model is simulated under the recorded line pressure; `least_squares` minimises the difference of its
+//! curvature and force from the recording. Fitted in logarithms: bending stiffness EI, damping time, the torques at
 //! points of the curve every 0.2 bar; and the time in which a chamber fills. Beside them, and only as far as their
 //! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and when
 //! each recording began.
 //!
-//! **What the data can tell.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
-//! stiffness bends alike. What gives a scale is the finger's weight and inertia, which resist with k/m and g/k: with
-//! closes alone, EI and torques are known as well as the mass is, and less well the stiffer the finger. A press on a
+//! **Identifiability.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
+//! stiffness bends alike. The scale comes from the finger's weight and inertia, which resist with k/m and g/k: with
+//! closes alone, EI and torques are as uncertain as the mass, and more uncertain the stiffer the finger. A press on a
 //! calibrated pad measures a force, and so the scale itself. The intervals say how much of this was in the data.
 
 mod course;
@@ -37,7 +37,7 @@ use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use watched::Watched;
 
-/// How well the sensors are known: one deviation each, left and right.
+/// Standard deviations of the sensors' gains and offsets, left and right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trust {
     /// Gain of the strips, as a share.
@@ -47,13 +47,13 @@ pub struct Trust {
 }
 
 impl Default for Trust {
-    /// What a careful calibration comes to: strips within one part in a hundred, pads within five.
+    /// A careful calibration: strips within 1 %, pads within 5 %.
     fn default() -> Self {
         Self { strip_gain: [0.01; 2], pad_gain: [0.05; 2] }
     }
 }
 
-/// How well a parameter is known.
+/// Identifiability of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Known {
@@ -68,7 +68,7 @@ pub enum Known {
 /// One parameter with its 95 % interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Estimate {
-    /// What it is: a key of the scene, or a ratio.
+    /// Name: a key of the scene, or a ratio.
     pub name: String,
     /// Its unit.
     pub unit: &'static str,
@@ -78,11 +78,11 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// How well it is known.
+    /// Identifiability.
     pub known: Known,
 }
 
-/// What is left between fitted and recording.
+/// Remaining difference between fitted model and recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remainder {
     /// The recording.
@@ -95,12 +95,12 @@ pub struct Remainder {
     pub shift_s: f64,
 }
 
-/// What a fit came to.
+/// Result of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FingerFit {
     /// The gripper of the first recording's scene, with the fitted finger.
     pub gripper: Gripper,
-    /// What was fitted, with intervals.
+    /// Estimates, with intervals.
     pub estimates: Vec<Estimate>,
     /// Each recording against its fitted model.
     pub remainders: Vec<Remainder>,
@@ -108,14 +108,14 @@ pub struct FingerFit {
     pub widened: f64,
     /// Steps that the fit took.
     pub steps: u32,
-    /// What should be known, in sentences.
+    /// Remarks, in sentences.
     pub remarks: Vec<String>,
     /// Curvature over time, recorded and fitted, of each finger of each recording.
     #[serde(skip)]
     pub courses: Vec<Course>,
 }
 
-/// Why there is no fit.
+/// Error of a fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FingerFitError {
     /// No recording.
@@ -160,11 +160,11 @@ const KNOT_BAR: f64 = 0.2;
 /// Points of the torque curve besides zero, fewest and most; each costs a simulation of every recording a step.
 const KNOTS: [f64; 2] = [2.0, 8.0];
 
-/// How far the finger's parameters are from where the fit begins, one deviation in logarithms: a factor of four and a
-/// half, so that it hardly counts.
+/// Prior deviation of the finger's parameters from their start, in logarithms: a factor of four and a half, so that it
+/// hardly counts.
 const OPEN: f64 = 1.5;
 
-/// What is usual of a filling time (s).
+/// Usual filling time (s).
 const USUAL_LAG: Prior = Prior { mean: 0.05, deviation: 0.3 };
 
 /// Deviation of a strip's zero after it was taken anew (1/m): 0.3 degrees.
@@ -231,7 +231,7 @@ fn usable(seen: &Observation) -> Result<(), FingerFitError> {
     Ok(())
 }
 
-/// Where the fit begins, and what is known of each parameter.
+/// Start values and priors of the parameters.
 fn beginning(gripper: &Gripper, knots: &[f64], recordings: usize, trust: &Trust) -> (Vec<f64>, Vec<Prior>) {
     let open = |value: f64| Prior { mean: value.max(1e-6).ln(), deviation: OPEN };
     let mut priors = vec![open(gripper.finger.bending_stiffness), open(gripper.finger.damping_time), USUAL_LAG];

@@ -50,7 +50,7 @@ fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
 }
 
 fn observed(name: &str, signals: Signals, scene: &Scene, object: Option<ObjectModel>) -> Observation {
-    // What the fit is told: everything but the finger.
+    // The fit knows everything but the finger.
     let scene = Scene { gripper: Gripper::default(), ..scene.clone() };
     Observation { name: name.to_owned(), signals, line: Observation::line_of(&scene), scene, object }
 }
@@ -109,7 +109,7 @@ impl Box4 {
         Calibration::fit(Record { part, kind, input, points, bending: None, note: String::new() }).expect("sound")
     }
 
-    /// What a board reports of clean signals, and what its calibrations make of that.
+    /// Clean signals through a board's converter and its calibrations.
     fn through(&mut self, clean: &Signals) -> Signals {
         let calibrations = Sensor::ALL.map(|sensor| (sensor, self.calibrate(sensor)));
         let readings: Vec<Reading> = (0..clean.len())

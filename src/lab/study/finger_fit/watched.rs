@@ -1,9 +1,9 @@
-//! A fit that tells how far it is and can be given up.
+//! Progress and cancellation of a fit.
 
 use super::least_squares::Problem;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Who follows a fit.
+/// Observer of a fit.
 pub struct FitWatch<'a> {
     /// Hears how many steps of [`super::MOST_STEPS`] at most are done, and parts of one; few fits need them all.
     pub progress: &'a dyn Fn(f64),

@@ -15,7 +15,7 @@ use palpate_sim::physics::NotFinite;
 use palpate_sim::scene::{Accuracy, Timing};
 use serde::Serialize;
 
-/// How finely a case is computed.
+/// Accuracy or step length of a case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CaseAccuracy {
     /// One of the settings a user has.
@@ -53,7 +53,7 @@ impl CaseAccuracy {
 /// Under what a case is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// How finely.
+    /// Accuracy or step length.
     pub setting: CaseAccuracy,
     /// Every variant and the whole duration, rather than what a few seconds allow.
     pub thorough: bool,
@@ -85,7 +85,7 @@ pub const ACCURACIES: [Accuracy; 5] =
 /// Of these, as many as a few seconds allow.
 pub const QUICK_ACCURACIES: &[Accuracy] = ACCURACIES.split_at(2).0;
 
-/// What a measured value must be.
+/// Limit of a measured value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
@@ -104,7 +104,7 @@ impl Limit {
         }
     }
 
-    /// How much of the limit a value uses up: one is all of it.
+    /// Share of the limit that a value uses; one is all of it.
     fn used(self, value: f64) -> f64 {
         match self {
             Self::AtMost(limit) if limit > 0.0 => value / limit,
@@ -126,11 +126,11 @@ impl std::fmt::Display for Limit {
 /// One thing that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measurement {
-    /// What, with its unit in brackets.
+    /// Name, with its unit in brackets.
     pub what: String,
-    /// How much.
+    /// Value.
     pub measured: f64,
-    /// What it must be.
+    /// Limit.
     pub limit: Limit,
 }
 
@@ -143,13 +143,13 @@ impl Measurement {
         Self { what: what.into(), measured, limit: Limit::AtLeast(limit) }
     }
 
-    /// True when it is as it must be.
+    /// True when the value keeps to its limit.
     pub fn holds(&self) -> bool {
         self.limit.holds(self.measured)
     }
 }
 
-/// Where a case is run.
+/// Accuracies and steps that a case is run at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settings {
     /// At every accuracy, and at further steps of its own (s).
@@ -158,7 +158,7 @@ pub enum Settings {
     Once,
 }
 
-/// What a case finds, or the number that left the range.
+/// Measurements of a case, or the number that is not finite.
 pub type Findings = Result<Vec<Measurement>, NotFinite>;
 
 /// A hard case.
@@ -166,9 +166,9 @@ pub type Findings = Result<Vec<Measurement>, NotFinite>;
 pub struct Case {
     /// Its name in tables.
     pub name: &'static str,
-    /// What must hold, in a sentence.
+    /// Claim, in a sentence.
     pub claim: &'static str,
-    /// Where it is run.
+    /// Accuracies and steps.
     pub settings: Settings,
     /// Measures.
     pub measure: fn(&Conditions) -> Findings,
@@ -179,15 +179,15 @@ pub struct Case {
 pub struct CaseRow {
     /// The case.
     pub case: &'static str,
-    /// What must hold.
+    /// Claim.
     pub claim: &'static str,
     /// The setting.
     pub setting: String,
     /// All that was measured; the one that comes closest to its limit, or fails, is the first.
     pub findings: Vec<Measurement>,
-    /// What left the range of numbers, if anything did.
+    /// Body whose state is not finite; none if all stayed finite.
     pub not_finite: Option<String>,
-    /// True when everything is as it must be.
+    /// True when all limits hold.
     pub holds: bool,
 }
 

@@ -23,7 +23,7 @@ const SAME_PLACE: f64 = 2e-3;
 /// An object this far from its start, or this far below it, has left the hand, and it does not matter where it is (m).
 const GONE: f64 = 0.15;
 const FALLEN: f64 = 0.03;
-/// How much more finely a scene is computed the second time.
+/// Refinement of the second computation.
 const FINER: f64 = 4.0;
 /// A push that must not matter (m).
 const PUSH: f64 = 1e-6;
@@ -33,7 +33,7 @@ const PUSH: f64 = 1e-6;
 pub struct RandomScene {
     /// Gripper, support and materials.
     pub scene: Scene,
-    /// What is grasped.
+    /// Grasped object.
     pub object: ObjectModel,
     /// Step (s).
     pub h: f64,
@@ -94,7 +94,7 @@ impl RandomScene {
         (DURATION / self.h).round() as u64
     }
 
-    /// What drives it at a time (s).
+    /// Drive at a time (s).
     pub fn drive(&self, t: f64) -> Drive {
         let rise = if self.closing > 0.0 { (t / self.closing).min(1.0) } else { 1.0 };
         let jump = if (0.6..0.7).contains(&t) { self.jump } else { 1.0 };
@@ -132,7 +132,7 @@ impl RandomScene {
     }
 }
 
-/// How far anything has gone in the last step: the object or a fingertip (m).
+/// Largest displacement in the last step, of the object or a fingertip (m).
 fn travel(run: &SteppedScene) -> f64 {
     let (joints, joint_count) = (&run.state.velocity, run.state.q.len());
     let n = joint_count / 2;
@@ -142,7 +142,7 @@ fn travel(run: &SteppedScene) -> f64 {
     tips.max(run.object_velocity().0.length()) * run.h
 }
 
-/// What a run came to.
+/// Result of a run.
 struct Ran {
     finite: bool,
     steps: u64,
@@ -157,7 +157,7 @@ struct Ran {
     /// Speed of the object at the end (m/s).
     speed: f64,
     q: Vec<f64>,
-    /// How far the object has moved; absent where it is gone.
+    /// Displacement of the object; absent where it is gone.
     place: Option<DVec3>,
 }
 
@@ -196,7 +196,7 @@ impl Ran {
     }
 }
 
-/// What is kept of a scene that has been computed twice.
+/// Summary of a scene computed twice.
 struct Judged {
     number: u64,
     /// Step (s).
@@ -236,7 +236,7 @@ pub struct Flags {
 impl Flags {
     /// Suspects much.
     pub const SHARP: Self = Self { friction_residual: 0.5, static_residual: 3e-3, travel: 8e-3 };
-    /// What counts as flagged. Tuned on seed 1; see [`RandomReport::flags`] for what it catches.
+    /// Criterion of a flag. Tuned on seed 1; see [`RandomReport::flags`] for its recall.
     pub const CHOSEN: Self = Self { friction_residual: 2.0, static_residual: 0.02, travel: 16e-3 };
     /// Suspects little.
     pub const BLUNT: Self = Self { friction_residual: 10.0, static_residual: 0.1, travel: 64e-3 };
@@ -261,7 +261,7 @@ fn step_rows(judged: &[Judged]) -> Vec<StepRow> {
         .collect()
 }
 
-/// How well a flag tells wrong answers from right ones.
+/// Detection performance of a flag.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FlagRow {
     /// The flag and its limit.
@@ -290,7 +290,7 @@ pub struct StepRow {
 /// The longest steps of the rows (s): standard, draft, and beyond what a trial can have.
 const STEP_ROWS: [f64; 4] = [1.0 / 300.0, 1.0 / 150.0, 0.02, 0.06];
 
-/// What random scenes came to.
+/// Results of random scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RandomReport {
     /// Seed of the scenes.

@@ -77,7 +77,7 @@ impl Relaxation {
         q + h * rate - (a * (q - crept) + b * rate)
     }
 
-    /// What is missing of the elastic energy k q² / 2 of a joint that has not crept (J).
+    /// Elastic energy k q² / 2 of a joint without creep, less that of the crept joint (J).
     pub(in crate::physics) fn energy_lost(&self, q: f64, crept: f64) -> f64 {
         0.5 * self.stiffness * (q * q - (q - crept) * (q - crept))
     }

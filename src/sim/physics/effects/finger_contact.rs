@@ -1,7 +1,7 @@
 //! Finger against finger: the contact springs of each pad meet the other finger's skin; see `physics/finger_pair.rs`.
 //!
-//! Where `auto` finds that the pads cannot meet, a guard still looks how far the pads stand out towards each other. That
-//! is cheap, and it is also what keeps apart fingers from being searched when the effect is on.
+//! Where `auto` finds that the pads cannot meet, a guard still computes how far they protrude towards each other. The
+//! guard is cheap; with the effect on, it also skips the search while the fingers are apart.
 
 use super::situation::Situation;
 use super::{Rule, Ruling, ratio};
@@ -39,7 +39,7 @@ fn ruling(situation: &Situation<'_>) -> Ruling {
     Ruling { possible: true, number: ratio(reach, room), facts }
 }
 
-/// How far the skin of a freely bending finger gets inward on its way to the programme's peak (m).
+/// Largest inward reach of a freely bending finger's skin up to the programme's peak (m).
 fn reach(situation: &Situation<'_>) -> f64 {
     let finger = situation.finger();
     let limit = finger.curvature_limit * finger.segment_length();
@@ -53,14 +53,14 @@ fn reach(situation: &Situation<'_>) -> f64 {
     (0..=STAGES).map(furthest).fold(0.0, f64::max)
 }
 
-/// Whether pads are looked at for contact with each other.
+/// Treatment of contact between the fingers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::physics) enum FingerContact {
-    /// They pass through each other, because the scene says so.
+    /// Fingers pass through each other, as set in the scene.
     Never,
-    /// They should not meet; when they come near all the same, they do touch, and the trial says so.
+    /// No contact expected; it is turned on if they come near each other, with a note in the trial.
     Guarded,
-    /// They touch.
+    /// Contact is computed.
     Always,
 }
 

@@ -1,4 +1,4 @@
-//! Which physical effects are simulated: one file per effect, one line each in [`rule_of`].
+//! Physical effects: one file per effect, one line each in [`rule_of`].
 //!
 //! An effect that is left to `auto` is decided once, when the scene is built: it is on where it is possible at all and
 //! one dimensionless number, which says how much the scene calls for it, lies above a threshold. What was decided and
@@ -29,23 +29,23 @@ use crate::frame::{Plan, PlannedEffect};
 use crate::objects::ObjectModel;
 use crate::scene::{Effect, Scene, Setting};
 
-/// What is fixed about an effect.
+/// Rule that decides whether an effect is simulated.
 pub struct Rule {
-    /// What it is, in a sentence.
+    /// Description, one sentence.
     pub about: &'static str,
-    /// What its number is the ratio of, in words.
+    /// Definition of its number as a ratio.
     pub number: &'static str,
     /// `auto` means on where the number is above this.
     pub threshold: f64,
-    /// What a scene makes of it.
+    /// Evaluation for a scene.
     ruling: fn(&Situation<'_>) -> Ruling,
 }
 
-/// What a scene makes of an effect.
+/// Evaluation of an effect for a scene.
 struct Ruling {
-    /// Whether it can occur at all.
+    /// True where the effect can occur at all.
     possible: bool,
-    /// How much the scene calls for it.
+    /// Dimensionless number that is compared with the threshold.
     number: f64,
     /// The facts, with numbers.
     facts: String,
@@ -96,7 +96,7 @@ fn planned(effect: Effect, situation: &Situation<'_>) -> PlannedEffect {
     PlannedEffect { name, setting, on, number, threshold: rule.threshold, reason }
 }
 
-/// Ratios beyond this are told as this: a stored number has to be finite.
+/// Upper bound of a ratio: a stored number has to be finite.
 const LARGEST_NUMBER: f64 = 1e9;
 
 /// a / b for two sizes that are not negative, finite whatever b is.

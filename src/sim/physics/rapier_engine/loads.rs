@@ -50,7 +50,7 @@ impl Skin {
         (0..self.grid.count()).map(|taxel| self.overlap(plane, segments, taxel, gap)).fold(0.0, f64::max)
     }
 
-    /// What the taxels of one finger feel of forces on its segments.
+    /// Loads on the taxels of one finger, from the forces on its segments.
     pub(super) fn loads(
         &self,
         plane: &FingerPlane,
@@ -63,7 +63,7 @@ impl Skin {
         let mut loads = Vec::new();
         for ((segment, touches), taxels) in segments.iter().zip(touches).zip(&self.by_segment) {
             let [along, inward] = [segment.along, segment.inward()].map(|axis| plane.direction(axis));
-            // What touches behind the neutral axis, as at the end of the tip, no taxel feels.
+            // Contacts behind the neutral axis, as at the end of the tip, load no taxel.
             let axis = plane.point(segment.start, 0.0);
             let on_pad = |touch: &&Touch| (touch.point - axis).dot(inward) > 0.0;
             let force: DVec3 = touches.iter().filter(on_pad).map(|touch| touch.force).sum();

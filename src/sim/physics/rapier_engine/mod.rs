@@ -341,7 +341,7 @@ mod tests {
         let weight = ball.mass.mass * scene.world.gravity;
         assert!((-felt.z / weight - 1.0).abs() < 0.01, "{felt} N carry {weight} N");
         assert!(felt.truncate().length() < 0.02 * weight, "{felt}");
-        // What taxels feel is what segments feel.
+        // Taxels carry the same force as segments.
         let frame = simulation.frame();
         let squeeze: f64 = Side::BOTH.iter().map(|side| frame.normal_force(*side, 160)).sum();
         assert!(squeeze > 5.0 * weight && squeeze < 1.5, "{squeeze} N");

@@ -37,8 +37,8 @@ const CONTACT_FREQUENCY: f32 = 200.0;
 const CONTACT_DAMPING: f32 = 5.0;
 /// The angle of a revolute joint among the six coordinates of a joint.
 const HINGE: usize = 3;
-/// What is cut off the front edge of the tip (m), about what the round ends of Palpate's contact springs leave out: a sharp edge
-/// catches on a pedestal that a soft one slides over.
+/// Chamfer of the front edge of the tip (m), like the round ends of Palpate's contact springs: a sharp edge catches on
+/// a pedestal that a soft one slides over.
 const TIP_CHAMFER: f64 = 0.00125;
 /// A mesh whose hull is larger by less than this share is taken to be convex: the holes of a button are too small for a
 /// segment to enter, and a hull is found 20 times as fast as a mesh.
@@ -63,11 +63,11 @@ pub(super) struct Hand {
 /// A force on a segment, at one point of contact, in the gripper frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
-    /// Which of the 2 (N + 1) segments.
+    /// Index among the 2 (N + 1) segments.
     pub(super) link: usize,
-    /// Where (m).
+    /// Position (m).
     pub(super) point: DVec3,
-    /// What the segment feels (N).
+    /// Force on the segment (N).
     pub(super) force: DVec3,
 }
 
@@ -129,7 +129,7 @@ impl Hand {
     }
 
     fn add_finger(&mut self, gripper: &Gripper, chain: &ChainModel, side: Side, plan: &Plan) {
-        // Where either surface has no friction there is none.
+        // No friction where either surface has none.
         let friction = if plan.is_on(Effect::Friction.name()) { gripper.pad.friction } else { 0.0 };
         let gravity_scale = if plan.is_on(Effect::FingerGravity.name()) { 1.0 } else { 0.0 };
         let plane = gripper.plane(side);
@@ -267,7 +267,7 @@ impl Hand {
         Some(palpate_geometry::Pose::new(position, rotation))
     }
 
-    /// What went beyond the range of numbers, for people: rapier takes such a body out of the world and goes on.
+    /// Display name of a body whose state is not finite: rapier disables such a body and continues.
     pub(super) fn not_finite(&self) -> Option<String> {
         for side in Side::BOTH {
             let lost = |handle: &RigidBodyHandle| !self.world.bodies[*handle].is_enabled();
@@ -322,7 +322,7 @@ impl Hand {
     }
 }
 
-/// How rapier is to solve, in steps of h (s).
+/// Solver settings of rapier for steps of h (s).
 fn parameters(h: f64) -> IntegrationParameters {
     let softness = SpringCoefficients::new(CONTACT_FREQUENCY, CONTACT_DAMPING);
     IntegrationParameters {
@@ -338,7 +338,7 @@ fn parameters(h: f64) -> IntegrationParameters {
     }
 }
 
-/// Which segment a collider belongs to, counted from 1 over both fingers; 0 is for everything else.
+/// Segment that a collider belongs to, counted from 1 over both fingers; 0 for all others.
 fn user_data(side: Side, links_per_finger: usize, j: usize) -> u128 {
     (side.index() * links_per_finger + j + 1) as u128
 }

@@ -47,7 +47,7 @@ pub(super) fn squeezed_masses(conditions: &Conditions) -> Findings {
     Ok(findings)
 }
 
-/// Where the object's centre of mass is on average over half a second (m).
+/// Mean position of the object's centre of mass over half a second (m).
 fn mean_centre(run: &mut SteppedScene, drive: Drive) -> Result<DVec3, NotFinite> {
     let steps = (0.5 / run.h).round().max(1.0) as u32;
     let mut sum = DVec3::ZERO;

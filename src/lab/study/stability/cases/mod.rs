@@ -12,7 +12,7 @@ use palpate_sim::scene::{Scene, SupportKind};
 
 /// At every accuracy and no step besides.
 const EVERY: Settings = Settings::EveryAccuracyAnd(&[]);
-/// What hard contact must bear beyond the accuracies (s).
+/// Further step lengths of the hard-contact cases (s).
 const WIDE: Settings = Settings::EveryAccuracyAnd(&[0.02, 2e-5]);
 
 /// All hard cases.
