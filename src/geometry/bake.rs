@@ -43,7 +43,7 @@ pub enum BakeError {
     /// The lattice would not fit into reasonable memory.
     #[error("a distance grid of {nodes} nodes is too fine; raise solver.distance_cell (the limit is 8 million nodes)")]
     TooFine {
-        /// Nodes asked for.
+        /// Nodes needed.
         nodes: usize,
     },
 }

@@ -137,7 +137,7 @@ fn parse_obj(
 }
 
 fn parse_stl(name: &str, mut bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
-    // A binary file announces its count; believe it only when the bytes are there. Its header may say "solid" too.
+    // A binary file announces its count; trust it only when the bytes are there. Its header may start with "solid" too.
     let announced = bytes.get(80..84).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
     let expected = announced.map(|n| 84 + 50 * n);
     let looks_like_text = bytes.trim_ascii_start().starts_with(b"solid") && expected != Some(bytes.len());
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn stl_comes_in_many_dresses() {
+    fn stl_is_read_in_all_its_forms() {
         let facet = |z: f32| {
             format!(
                 "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"

@@ -160,8 +160,8 @@ impl Theme {
     }
 }
 
-/// Quantity shown by a trace. Hue stands for the kind of sensor, shade for the place on the finger; the finger itself is
-/// shown by the dash of the line, never by colour alone.
+/// Quantity shown by a trace. Hue stands for the kind of sensor, shade for the place on the finger; the finger itself
+/// is shown by the dash of the line, never by colour alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trace {
     /// Curvature of the whole finger or of its proximal half.

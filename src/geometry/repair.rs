@@ -43,7 +43,7 @@ pub enum MeshError {
         /// Width of the widest (mm).
         widest_mm: f64,
     },
-    /// The surface crosses itself so that inside and outside cannot be told apart.
+    /// The surface crosses itself, so that inside and outside are not defined.
     #[error(
         "the mesh has no consistent inside (one-sided or tangled surface); repair it in a modelling tool, \
          or set object.collision = \"hull\""
@@ -75,7 +75,7 @@ const SMALL_HOLE: f64 = 0.2;
 /// has 5e-5, a 0.1 mm card of 85 x 54 mm has 5e-4.
 const FLAT: f64 = 1e-7;
 
-/// Checks and mends a mesh. See the module page for what is mended and what is refused.
+/// Checks and repairs a mesh. The module page lists repairs and refusals.
 pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
     check_numbers(mesh)?;
     let diagonal = mesh.bounds().size().length();
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_solid_is_refused() {
+    fn meshes_that_are_no_solid_are_refused() {
         assert_eq!(repair(&TriMesh::default()).err(), Some(MeshError::Empty));
         let mut broken = cube();
         broken.points[3].y = f64::NAN;

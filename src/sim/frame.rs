@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loads_are_told_apart_by_side() {
+    fn loads_are_separated_by_side() {
         let load = |taxel, normal| TaxelLoad { taxel, normal, along: 0.0, across: 0.0 };
         let frame = Frame {
             sample: 0,

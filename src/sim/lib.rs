@@ -2,10 +2,10 @@
 //!
 //! # Terms
 //!
-//! A **finger** is a chain of N joints, bent by **line pressure** in its chamber; its inner side is a soft **pad** tiled
-//! with **taxels**. Two fingers make a **gripper**. A **scene** describes object, gripper, support, pressure
-//! **programme**, physical **effects** and accuracy. A simulation of it gives **frames**: joint angles, object pose, line
-//! pressure and taxel loads at each sample.
+//! A **finger** is a chain of N joints, bent by **line pressure** in its chamber; its inner side is a soft **pad**
+//! tiled with **taxels**. Two fingers make a **gripper**. A **scene** describes object, gripper, support, pressure
+//! **programme**, physical **effects** and accuracy. A simulation of it gives **frames**: joint angles, object pose,
+//! line pressure and taxel loads at each sample.
 //!
 //! # Modules, lowest layer first
 //!
@@ -44,8 +44,8 @@
 //!
 //! # Features
 //!
-//! `rapier` (on by default) adds the second engine and the resting faces of objects. Without it, scenes that need either
-//! are refused with [`scene::SceneError::NeedsRapier`].
+//! `rapier` (on by default) adds the second engine and the resting faces of objects. Without it, scenes that need
+//! either are refused with [`scene::SceneError::NeedsRapier`].
 
 pub mod frame;
 pub mod gripper;

@@ -15,11 +15,11 @@ use rand_chacha::ChaCha8Rng;
 /// Draws before a scene without room is accepted.
 const MOST_DRAWS: u32 = 100;
 
-/// Draws poses for one object in one scene, as the scene's `pose` says.
+/// Sampler of poses for one object in one scene, by the scene's `pose`.
 #[derive(Clone, Debug)]
 pub struct PoseSampler {
     scene: Scene,
-    /// Resting orientations to draw from; empty unless the scene asks for them.
+    /// Resting orientations to draw from; empty where the scene does not use them.
     natural: Vec<DQuat>,
 }
 
@@ -44,8 +44,8 @@ impl PoseSampler {
         (drawn, MOST_DRAWS)
     }
 
-    /// The scene of a grasp that follows another of the same object, which the fingers have left as it is in
-    /// `released`. It stays there where the scene says so and it still lies on its support; in all other cases this is
+    /// The scene of a grasp that follows another of the same object, which the fingers have left as in
+    /// `released`. It stays there if the scene is set so and it still lies on its support; in all other cases this is
     /// [`PoseSampler::draw`].
     pub fn draw_after(&self, object: Option<&ObjectModel>, seed: u64, released: Option<&Frame>) -> (Scene, u32) {
         let left = released.and_then(|frame| self.left_behind(object?, frame));
@@ -103,13 +103,13 @@ fn natural_rotations(_object: &ObjectModel) -> Vec<DQuat> {
     Vec::new()
 }
 
-/// Lays the object as a rotation says.
+/// Sets the object's orientation.
 fn lay(scene: &mut Scene, rotation: DQuat) {
     let (yaw, pitch, roll) = rotation.to_euler(EulerRot::ZYX);
     scene.object.rotation_deg = [roll, pitch, yaw].map(f64::to_degrees);
 }
 
-/// One pose of an object in a scene; whoever wants many keeps a [`PoseSampler`].
+/// Draws one pose of an object in a scene; for many, keep a [`PoseSampler`].
 pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scene, u32) {
     PoseSampler::new(scene, object).draw(object, seed)
 }
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_stay_within_what_a_scene_file_may_say() {
+    fn poses_stay_within_the_range_of_scene_files() {
         let mut scene = Scene::default();
         scene.gripper.mount.yaw_deg = 179.0;
         for seed in 0..20 {

@@ -27,13 +27,13 @@ pub enum SimEvent {
 #[derive(Clone, Debug)]
 pub struct SimRun {
     engine: EngineRun,
-    /// The actuation tick that has been asked for, so that it is asked for once.
-    asked: Option<u32>,
+    /// The last actuation tick reported, so that each is reported once.
+    reported: Option<u32>,
     phase: Phase,
     static_residual: Option<f64>,
 }
 
-/// The engine that the scene asks for.
+/// The engine of the scene.
 #[derive(Clone, Debug)]
 enum EngineRun {
     Palpate(Box<Simulation>),
@@ -81,10 +81,10 @@ impl SimRun {
         Self::refined(scene, object, Refinement::None)
     }
 
-    /// The same, computed more finely than the scene asks for.
+    /// Sets up a scene with a refinement.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let (engine, placement) = EngineRun::new(scene, object, refinement);
-        let rig = Self { engine, asked: None, phase: Phase::Close, static_residual: None };
+        let rig = Self { engine, reported: None, phase: Phase::Close, static_residual: None };
         (rig, placement)
     }
 
@@ -132,8 +132,8 @@ impl SimRun {
                 return Ok(SimEvent::Finished);
             }
             let actuation_tick = (tick / u64::from(clock.ticks_per_actuation)) as u32;
-            if tick.is_multiple_of(u64::from(clock.ticks_per_actuation)) && self.asked != Some(actuation_tick) {
-                self.asked = Some(actuation_tick);
+            if tick.is_multiple_of(u64::from(clock.ticks_per_actuation)) && self.reported != Some(actuation_tick) {
+                self.reported = Some(actuation_tick);
                 return Ok(SimEvent::ActuationDue { tick: actuation_tick });
             }
             // Nothing happens before the nearer of the next sample and the next change of pressure.
@@ -164,7 +164,7 @@ impl SimRun {
         quality
     }
 
-    /// Remarks on the frames so far, in sentences.
+    /// Remarks on the frames so far.
     pub fn notes(&self) -> Vec<String> {
         let turned_on = self.engine.get().finger_contact_turned_on();
         let note = |t| format!("finger-contact was turned on at {t:.2} s: the fingers came near each other after all");

@@ -36,7 +36,7 @@ impl Sensor {
         Self::ALL.into_iter().find(|sensor| sensor.is_called(name))
     }
 
-    /// True for the names that boards may give its channel: case, blanks, hyphens and underscores say nothing.
+    /// True for the names that boards may give its channel: case, blanks, hyphens and underscores are ignored.
     pub fn is_called(self, name: &str) -> bool {
         let letters = name.chars().filter(|c| !" -_".contains(*c)).map(|c| c.to_ascii_lowercase());
         letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
@@ -68,11 +68,11 @@ pub struct Board {
     pub full_scale: u32,
     /// Voltage at which the converter reaches it, and which feeds the dividers (V).
     pub reference_volt: f64,
-    /// Samples per second that it says it takes (1/s).
+    /// Reported sampling rate (1/s).
     pub rate_hz: Option<f64>,
-    /// Fixed resistor of each channel's divider (ohm), where it says so; else empty.
+    /// Fixed resistor of each channel's divider (ohm), where reported; else empty.
     pub divider_ohm: Vec<f64>,
-    /// Version of its firmware, where it says so.
+    /// Version of its firmware, where reported.
     pub firmware: Option<String>,
 }
 
@@ -100,8 +100,8 @@ impl Board {
 /// Readings after which a board's channels are known.
 pub const KNOWN_AFTER: u32 = 5;
 
-/// Time of readings (s) after which it is known what a board is: it has answered who it is, or its counts have shown how
-/// far its converter goes.
+/// Time of readings (s) after which it is known what a board is: it has answered who it is, or its counts have shown
+/// how far its converter goes.
 pub const KNOWN_AFTER_S: f64 = 1.2;
 
 /// One line of a board.
@@ -177,7 +177,7 @@ pub enum TimeSource {
     Device,
     /// The board's sequence numbers, at an even pace.
     Sequence,
-    /// Lines counted on this side, at an even pace: lost ones are told from late ones only afterwards.
+    /// Lines counted on this side, at an even pace: lost and late ones cannot be distinguished at once.
     Arrival,
 }
 

@@ -16,8 +16,8 @@ pub struct Cadence {
     pub gaps: u64,
     /// Readings per second, lately (1/s).
     pub rate_hz: f64,
-    /// 95th percentile of how far the time between two readings is from the usual (ms); by the board's clock where it sends
-    /// one, else by arrival.
+    /// 95th percentile of how far the time between two readings is from the usual (ms); by the board's clock where it
+    /// sends one, else by arrival.
     pub jitter_p95_ms: f64,
     /// 95th percentile of how much later than the quickest readings arrive (ms).
     pub delay_p95_ms: f64,

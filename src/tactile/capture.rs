@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_captured_comes_back_with_its_times() -> io::Result<()> {
+    fn captured_bytes_come_back_with_their_times() -> io::Result<()> {
         let bytes = file(&records())?;
         let back: Vec<Captured> = read_all(&bytes)?;
         assert_eq!(back[..2], records()[..2]);

@@ -158,7 +158,7 @@ pub enum LayoutError {
     /// The name is not in the catalogue.
     #[error("there is no sensor layout \"{name}\"; there are C1 to C8, each also as C1+F and so on")]
     Unknown {
-        /// The name asked for.
+        /// The name given.
         name: String,
     },
     /// A pressure sensor would cover no taxel.

@@ -2,10 +2,10 @@
 //!
 //! # Terms
 //!
-//! A **layout** (C1 .. C8) places curvature and pressure sensors on the fingers; each gives a **channel**. Channels over
-//! time are [`Signals`]. A real **board** sends **readings**: counts of its converter. A **calibration** of each part
-//! turns counts into angle, curvature, force and pressure; a **zero** (tare) removes drift. Trials keep raw data, so
-//! that any layout and calibration can be applied later.
+//! A **layout** (C1 .. C8) places curvature and pressure sensors on the fingers; each gives a **channel**. Channels
+//! over time are [`Signals`]. A real **board** sends **readings**: counts of its converter. A **calibration** of each
+//! part turns counts into angle, curvature, force and pressure; a **zero** (tare) removes drift. Trials keep raw data,
+//! so that any layout and calibration can be applied later.
 //!
 //! # Modules, lowest layer first
 //!
@@ -71,7 +71,7 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Places a layout on a gripper. Pressure is force over the participation area unless said otherwise.
+    /// Places a layout on a gripper. `area` selects the area of pressure.
     pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
         Ok(Self { channels: layout.channels(gripper)?, finger: gripper.finger.clone(), grid: gripper.taxels(), area })
     }

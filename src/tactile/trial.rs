@@ -1,4 +1,5 @@
-//! Trials: recorded grasps. Raw quantities only; curvature, pressure and every sensor layout are derived from them later.
+//! Trials: recorded grasps. Raw quantities only; curvature, pressure and every sensor layout are derived from them
+//! later.
 
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};

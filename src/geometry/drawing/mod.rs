@@ -50,7 +50,7 @@ pub struct Ground {
     pub radius: f32,
 }
 
-/// A rigid thing somewhere in the world.
+/// Rigid mesh with its pose in the world.
 #[derive(Clone, Debug)]
 pub struct Solid {
     /// Its surface; the same `Arc` in the next picture means that nothing has to be uploaded again.

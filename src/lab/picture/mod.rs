@@ -27,7 +27,7 @@ pub struct PictureView {
     pub camera: Camera,
     /// Theme.
     pub theme: Theme,
-    /// Size of the picture in points, for what is drawn on top.
+    /// Size of the picture in points, for the overlay.
     pub size: Vec2,
     /// Draw force arrows.
     pub forces: bool,

@@ -50,7 +50,7 @@ mod tests {
     use palpate_sim::scene::Accuracy;
 
     #[test]
-    fn turning_the_dial_moves_the_error_and_cancelling_ends_it() {
+    fn accuracy_changes_the_error_and_cancelling_ends_the_run() {
         let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
         let mut scene = Scene::default();
         scene.object.fixed = true;

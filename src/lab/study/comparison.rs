@@ -84,7 +84,7 @@ pub enum ComparisonError {
 }
 
 impl Comparison<'_> {
-    /// Fits and judges methods side by side, each on one thread; rows come in the order of the methods. `tell` hears of
+    /// Fits and judges methods side by side, each on one thread; rows come in the order of the methods. `tell` receives
     /// every method that is done.
     pub fn of_methods(
         &self,
@@ -121,7 +121,7 @@ impl Comparison<'_> {
         Ok(self.compared(judged))
     }
 
-    /// The method's own settings; nobody follows the progress.
+    /// The method's own settings, without progress.
     fn fitting(&self) -> Fitting<'_> {
         Fitting {
             seed: self.seed,
@@ -198,7 +198,7 @@ impl Comparison<'_> {
     }
 
     /// The controls of a fair comparison: a method that learned from shuffled labels, which must not know more than
-    /// chance, and one that is told the true size and shape, which nothing that has to find them can pass.
+    /// chance, and one that is given the true size and shape, an upper bound for methods that must find them.
     pub fn controls(&self, method: &'static Method) -> Result<Controls, ComparisonError> {
         let fitting = self.fitting();
         let failed = |cause| ComparisonError::Fit { method: method.key, cause };
@@ -216,9 +216,9 @@ impl Comparison<'_> {
         let by_chance = answer(shuffled.recogniser.as_ref(), self.test);
         let model = method.train(self.train, &fitting).map_err(failed)?;
         let plain = answer(model.recogniser.as_ref(), self.test);
-        let mut told = plain.clone();
+        let mut oracle = plain.clone();
         let labels = &self.test.labels;
-        for (verdict, class) in told.verdicts.iter_mut().zip(&truth) {
+        for (verdict, class) in oracle.verdicts.iter_mut().zip(&truth) {
             let like = |other: usize| {
                 let (own, other) = (&labels.classes[*class], &labels.classes[other]);
                 (own.size, own.shape) == (other.size, other.shape)
@@ -232,7 +232,7 @@ impl Comparison<'_> {
             chance: 1.0 / self.test.by_class().iter().filter(|c| !c.is_empty()).count().max(1) as f64,
             shuffled_labels: of(&by_chance)?,
             plain: of(&plain)?,
-            true_size_and_shape: of(&told)?,
+            true_size_and_shape: of(&oracle)?,
         })
     }
 }

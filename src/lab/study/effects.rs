@@ -1,6 +1,6 @@
 //! Cost and influence of each effect: switch it off, or on, and compare whole trials.
 //!
-//! Every effect is flipped alone, as if somebody had switched it by hand: what is left to `auto` is decided anew, so that
+//! Every effect is flipped alone, as a user would: effects at `auto` are decided anew, so that
 //! an object let go has its weight. Cost comes from pairs of runs, with and without, one after the other in one thread,
 //! of which the quickest of each kind count, because whatever else a machine does only adds. Differences are taken over
 //! all samples and both fingers.
@@ -70,7 +70,7 @@ impl ExplainedEffect {
         } else if percent > 0.0 {
             format!("{costs} {percent:.0} % of the CPU time")
         } else {
-            // Without friction, say, an object rolls about and takes more steps of the solver.
+            // Without friction, for example, an object rolls about and takes more steps of the solver.
             format!("{saves} {:.0} % of the CPU time", -percent)
         }
     }
@@ -171,7 +171,7 @@ fn explain_one(
     })
 }
 
-/// The scene with one effect the other way round, as if somebody had switched it by hand.
+/// The scene with one effect switched the other way.
 fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
     let mut scene = scene.clone();
     scene.effects.set(effect, if plan.is_on(effect.name()) { Setting::Off } else { Setting::On });
@@ -251,31 +251,31 @@ mod tests {
     fn a_fixed_sphere_calls_for_fingers_and_friction_alone() {
         let mut scene = draft();
         scene.object.fixed = true;
-        let told = explained(&scene, Some(&ball(0.025, 400.0)));
-        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
-        assert!(told.of(Effect::FreeObject).planned.reason.contains("fixed"));
+        let report = explained(&scene, Some(&ball(0.025, 400.0)));
+        assert_eq!(report.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
+        assert!(report.of(Effect::FreeObject).planned.reason.contains("fixed"));
         for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
-            assert!(told.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
+            assert!(report.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", report.of(effect).change);
         }
         // Effects left out change nothing: no finger comes near the pedestal or the other finger.
         for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
-            assert_eq!(told.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
-            assert_eq!(told.of(effect).change.norms.force_n, 0.0, "{effect:?}");
+            assert_eq!(report.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
+            assert_eq!(report.of(effect).change.norms.force_n, 0.0, "{effect:?}");
         }
     }
 
     #[test]
-    fn a_light_free_ball_feels_support_and_friction_but_hardly_its_weight() {
-        let told = explained(&draft(), Some(&ball(0.020, 2.0)));
+    fn support_and_friction_matter_to_a_light_free_ball_but_hardly_its_weight() {
+        let report = explained(&draft(), Some(&ball(0.020, 2.0)));
         let on = ["free-object", "finger-gravity", "support", "friction", "finger-inertia"];
-        assert_eq!(told.names_on(), on, "{:#?}", told.effects);
-        let weight = told.of(Effect::ObjectGravity);
+        assert_eq!(report.names_on(), on, "{:#?}", report.effects);
+        let weight = report.of(Effect::ObjectGravity);
         assert!(
             weight.planned.number < weight.planned.threshold && weight.change.norms.curvature_share < 0.01,
             "{weight:?}"
         );
-        assert!(told.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
-        // A heavy one does feel it.
+        assert!(report.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
+        // Weight does matter for a heavy one.
         let heavy = explained(&draft(), Some(&ball(0.020, 4000.0)));
         assert!(
             heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.norms.force_n > 1e-3
@@ -284,16 +284,16 @@ mod tests {
 
     #[test]
     fn an_empty_hand_calls_for_its_fingers_to_meet() {
-        let told = explained(&draft(), None);
-        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
-        let contact = told.of(Effect::FingerContact);
+        let report = explained(&draft(), None);
+        assert_eq!(report.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
+        let contact = report.of(Effect::FingerContact);
         assert!(
             contact.change.norms.curvature_per_m > 1.0 && contact.change.norms.force_n > 0.05,
             "{:?}",
             contact.change
         );
-        assert!(told.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
-        assert_eq!(told.of(Effect::FreeObject).change.norms.curvature_per_m, 0.0);
+        assert!(report.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
+        assert_eq!(report.of(Effect::FreeObject).change.norms.curvature_per_m, 0.0);
     }
 
     #[test]
@@ -302,8 +302,8 @@ mod tests {
         scene.object.fixed = true;
         (scene.programme.hold_ticks, scene.timing.duration_s) = (200, 23.0);
         scene.gripper.finger.creep_time = 5.0;
-        let told = explained(&scene, Some(&ball(0.025, 400.0)));
-        let creep = told.of(Effect::Creep);
+        let report = explained(&scene, Some(&ball(0.025, 400.0)));
+        let creep = report.of(Effect::Creep);
         assert!(creep.planned.on && creep.planned.number == 4.0, "{:?}", creep.planned);
         assert!(
             creep.change.norms.force_share > 0.01 && creep.change.norms.curvature_share > 0.005,
@@ -318,20 +318,20 @@ mod tests {
     }
 
     #[test]
-    fn putting_an_effect_in_is_what_switching_it_does() {
+    fn the_reported_change_is_that_of_switching_the_effect() {
         let (mut scene, ball) = (draft(), ball(0.020, 400.0));
         scene.object.fixed = true;
-        let told = explained(&scene, Some(&ball));
+        let report = explained(&scene, Some(&ball));
         let free = GraspOutcome::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
         let held = GraspOutcome::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
         // An object let go has its weight, and rests.
         let expected = held.change_to(&free, &scene);
-        assert_eq!(told.of(Effect::FreeObject).change, expected);
+        assert_eq!(report.of(Effect::FreeObject).change, expected);
         assert!(expected.norms.force_n > 1e-3);
     }
 
     #[test]
-    fn whoever_cancels_gets_nothing() {
+    fn cancelling_gives_no_result() {
         let how = Measuring { threads: 1, cancelled: &AtomicBool::new(true), progress: &|_, _| {} };
         assert_eq!(explain_effects(&draft(), None, &how), None);
     }

@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Held-out share of each object's trials.
 pub const HELD_BACK: f64 = 0.2;
 
-/// Trials of an object from which on it is learned: four to learn from, of which the dual-stage networks take one half for
-/// each stage, and one to judge by.
+/// Trials of an object from which on it is learned: four to learn from, of which the dual-stage networks take one half
+/// for each stage, and one to judge by.
 pub const LEAST_TRIALS: usize = 5;
 
 /// Labelled trials of an object.

@@ -144,7 +144,7 @@ pub fn candle_step_cost(sizes: StepSizes, runs: usize) -> candle_core::Result<Ne
     })
 }
 
-/// Times one live step: a sample in, probabilities out. The row tells the mean over one sequence.
+/// Times one live step: a sample in, probabilities out. The row holds the mean over one sequence.
 pub fn live_step_cost(sizes: StepSizes, runs: usize) -> NetworkCost {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let layer = MacroLayer::new(shape(sizes), &mut random);

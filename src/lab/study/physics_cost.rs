@@ -49,8 +49,8 @@ pub struct CostRow {
     pub error: Option<ErrorNorms>,
 }
 
-/// A tolerance that is far below what is compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth of
-/// that of steps of 1/300 s.
+/// A tolerance far below the accuracies compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth
+/// of that of steps of 1/300 s.
 const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
 
 /// The grasp of a scene that errors are measured against.

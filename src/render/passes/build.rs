@@ -7,11 +7,11 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPipeline,
 /// Depth test of a pipeline.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Depth {
-    /// In front of what is there, and remembered.
+    /// Drawn in front of earlier items; depth is written.
     Solid,
-    /// In front of what is there, but transparent to what comes later.
+    /// Drawn in front of earlier items; depth is not written.
     Veil,
-    /// Behind what is there: what is hidden, shown faintly.
+    /// Drawn only where hidden by earlier items, faintly.
     Hidden,
     /// Regardless of depth.
     OnTop,

@@ -1,4 +1,4 @@
-//! One file for each kind of thing that is drawn, beside the shader of the same name. Adding one is adding a file, its
+//! Drawing passes: one file for each kind of item, beside the shader of the same name. Adding one is adding a file, its
 //! shader, and a line in [`ALL`].
 
 mod arrow;
@@ -28,7 +28,7 @@ pub(crate) struct Prepare<'a> {
     pub(crate) pixels_per_point: f32,
 }
 
-/// Draws one kind of thing. Bind group 0 is the frame's and is set already.
+/// Pass that draws one kind of item. Bind group 0 is the frame's and is set already.
 pub(crate) trait Pass: Send + Sync {
     /// Uploads what the list holds of this kind.
     fn prepare(&mut self, prepare: &Prepare<'_>);

@@ -73,8 +73,8 @@ impl Pad {
 const TANGENT_FROM: f64 = 0.95;
 
 impl PadLaw {
-    /// Force (N) and its slope (N/m) of a contact spring with small-strain stiffness `k` = E a / H (N/m) and rest length
-    /// `height` (m) under compression `x` (m). Zero without compression.
+    /// Force (N) and its slope (N/m) of a contact spring with small-strain stiffness `k` = E a / H (N/m) and rest
+    /// length `height` (m) under compression `x` (m). Zero without compression.
     #[inline]
     pub fn force(self, k: f64, height: f64, x: f64) -> (f64, f64) {
         if x <= 0.0 {

@@ -130,7 +130,7 @@ pub struct ObjectModel {
     pub surface: Arc<SurfaceMesh>,
     /// Solids for contact.
     pub field: DistanceField,
-    /// The same, solid by solid, for engines that want shapes instead of distances.
+    /// The same as single solids, for engines that need shapes instead of distances.
     pub parts: Arc<[SolidPart]>,
     /// With what it rests.
     pub resting: Resting,
@@ -138,7 +138,7 @@ pub struct ObjectModel {
     pub mass: MassProperties,
     /// Friction coefficient of its surface.
     pub friction: f64,
-    /// Bounding box of what is touched.
+    /// Bounding box of the contact solids.
     pub bounds: Bounds,
     /// Warnings: values guessed and meshes repaired while loading.
     pub warnings: Vec<String>,

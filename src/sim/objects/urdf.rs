@@ -1,9 +1,9 @@
 //! URDF files: every link's shapes and masses, gathered in the frame of the root link. Fixed joints weld; movable
 //! ones are welded at zero, with a warning, since a grasped object is one rigid body here.
 //!
-//! Files in the wild leave out names, colours and inertia terms, separate numbers by commas, and hold gazebo, sensor and
-//! transmission blocks: what is missing is filled in, what is not needed is skipped, and what matters and is missing or
-//! unknown becomes a warning or an error.
+//! Files in the wild leave out names, colours and inertia terms, separate numbers by commas, and hold gazebo, sensor
+//! and transmission blocks: missing items are filled in, unused ones are skipped, and essential ones that are missing
+//! or unknown becomes a warning or an error.
 
 use super::ObjectError;
 use super::assemble::{Blueprint, Inertial, ShapeSource};
@@ -69,7 +69,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
     Ok(blueprint)
 }
 
-/// The `<robot>` of a file. The error says in a sentence why there is none.
+/// The `<robot>` of a file. The error names the fault.
 fn robot_of(bytes: &[u8]) -> Result<Element, String> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}').trim_start();

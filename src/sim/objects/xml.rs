@@ -27,7 +27,7 @@ impl Element {
     }
 }
 
-/// Parses the bytes of an XML file. The error says in a sentence why it is not XML.
+/// Parses the bytes of an XML file. The error names the fault.
 pub(super) fn parse(text: &str) -> Result<Element, String> {
     let mut reader = Reader::from_str(text);
     let mut open = vec![Element::default()];

@@ -6,8 +6,8 @@ use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
 use super::workspace::{Spatial, Workspace};
 
-/// The static residual |tau - K q - g + J'f|: the largest joint torque not balanced by springs, gravity and the contacts
-/// of the last step, as a share of the actuation torque. Zero where nothing is driven.
+/// The static residual |tau - K q - g + J'f|: the largest joint torque not balanced by springs, gravity and the
+/// contacts of the last step, as a share of the actuation torque. Zero where nothing is driven.
 pub(super) fn static_residual(model: &PhysicsModel, state: &State, ws: &Workspace, drive: &Drive) -> f64 {
     if drive.torque == 0.0 {
         return 0.0;

@@ -1,8 +1,8 @@
 //! The block of the Hessian between the two fingers, which exists only while they touch each other.
 //!
-//! A contact between segment a of the left finger and segment b of the right one, with Hessian G at the arm r, subtracts
-//! S_i' J' G J S_j for every joint i before a and j before b, J = [1, -[r]x]. First everything is summed per joint of
-//! the left and segment of the right finger, then from the tip of the right finger inward.
+//! A contact between segment a of the left finger and segment b of the right one, with Hessian G at the arm r,
+//! subtracts S_i' J' G J S_j for every joint i before a and j before b, J = [1, -[r]x]. First everything is summed per
+//! joint of the left and segment of the right finger, then from the tip of the right finger inward.
 
 use super::contact::{Acting, Against};
 use super::model::PhysicsModel;

@@ -1,18 +1,19 @@
 //! Finding contacts: every contact spring of the pads casts a short ray from its foot along its axis.
 //!
-//! The ray is thick: a ball of the contact spring's radius moves from the foot outwards by sphere tracing until it touches
-//! something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels; rays
-//! that are as thick as the gaps between contact springs do not.
+//! The ray is thick: a ball of the contact spring's radius moves from the foot outwards by sphere tracing until it
+//! touches something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels;
+//! rays that are as thick as the gaps between contact springs do not.
 //!
-//! With the rest position of the ball's centre at s and the touch at t, the contact spring is compressed by x = s - t along its
-//! axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A relative motion v
-//! of the surfaces changes x by -n . v / c, whatever the shape of what is touched. The contact spring stores the energy U(x) of its
-//! law, so that it presses along n with U'(x) / c: the pressure in the contact spring on the slanted surface it meets, which is
-//! larger than its own section by 1 / c. The same force, as a function of the compression along n, is that of a contact spring of
-//! stiffness k / c² and length c H, since U depends on k H² and x / H alone. That is what a contact is given.
+//! With the rest position of the ball's centre at s and the touch at t, the contact spring is compressed by x = s - t
+//! along its axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A
+//! relative motion v of the surfaces changes x by -n . v / c, whatever the shape of the surface. The contact spring
+//! stores the energy U(x) of its law, so that it presses along n with U'(x) / c: the pressure in the contact spring on
+//! the slanted surface it meets, which is larger than its own section by 1 / c. The same force, as a function of the
+//! compression along n, is that of a contact spring of stiffness k / c² and length c H, since U depends on k H² and x /
+//! H alone. That is what a contact is given.
 //!
-//! It matters: a contact spring pressed along n by the force of its axial compression alone is the gradient of no energy. Fingers
-//! that swing then gain energy while they press, and what they hold rings and wanders.
+//! It matters: a contact spring pressed along n by the force of its axial compression alone is the gradient of no
+//! energy. Fingers that swing then gain energy while they press, and what they hold rings and wanders.
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
 use super::effects::FingerContact;
@@ -50,8 +51,8 @@ enum Met {
     Behind { gap: f64 },
 }
 
-/// A contact spring that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays finite, and
-/// its force vanishes with the compression along the normal.
+/// A contact spring that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays
+/// finite, and its force vanishes with the compression along the normal.
 const LEAST_COSINE: f64 = 0.25;
 
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
@@ -298,8 +299,8 @@ impl Ray {
         }
     }
 
-    /// The foot has come through a thin body: the contact spring is compressed down to where it went in, and pushes back the way it
-    /// came.
+    /// The foot has come through a thin body: the contact spring is compressed down to where it went in, and pushes
+    /// back the way it came.
     #[cold]
     fn trace_back(
         &self,

@@ -75,7 +75,7 @@ fn an_effect_that_is_off_leaves_no_trace() {
     }
 }
 
-/// A plan in which only the named effects differ from what the scene asks for.
+/// A plan in which only the named effects differ from the scene's.
 fn plan_with(scene: &Scene, ball: &ObjectModel, settings: &[(Effect, Setting)]) -> Plan {
     let mut scene = scene.clone();
     for (effect, setting) in settings {
@@ -215,8 +215,9 @@ fn steps_made_of_stages_keep_chambers_and_creep_on_their_course() {
 }
 
 #[test]
-fn two_flat_pads_share_what_they_overlap() {
-    // Straight fingers whose pads overlap by 2 d everywhere: each is pushed in by d, F = E L w d / H. Linear and stiffening.
+fn two_flat_pads_share_their_overlap() {
+    // Straight fingers whose pads overlap by 2 d everywhere: each is pushed in by d, F = E L w d / H. Linear and
+    // stiffening.
     let (length, width, height, modulus, d) = (0.1, 0.02, 0.008, 1e5, 0.002);
     for law in [PadLaw::Linear, PadLaw::NeoHookean] {
         let mut scene = bare(10);
@@ -236,14 +237,14 @@ fn two_flat_pads_share_what_they_overlap() {
         run.steps(1, &Drive::default());
         let mut simulation = Simulation::new(&scene, None).0;
         simulation.advance().expect("finite");
-        let felt: Vec<f64> = [0, 1]
+        let on_fingers: Vec<f64> = [0, 1]
             .map(|side| {
                 let count = scene.gripper.taxels().count();
                 let own = |load: &&crate::frame::TaxelLoad| usize::from(load.taxel) / count == side;
                 simulation.frame().taxels.iter().filter(own).map(|load| f64::from(load.normal)).sum()
             })
             .into();
-        assert!((felt[0] / felt[1] - 1.0).abs() < 1e-6 && felt[0] > 0.2 * want, "{felt:?}");
+        assert!((on_fingers[0] / on_fingers[1] - 1.0).abs() < 1e-6 && on_fingers[0] > 0.2 * want, "{on_fingers:?}");
     }
 }
 

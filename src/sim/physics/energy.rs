@@ -58,8 +58,8 @@ pub(super) fn mechanical_energy(model: &PhysicsModel, state: &State, ws: &mut Wo
     Energy { total, spin }
 }
 
-/// Work that a drive does on the way from one state to another (J). Where chambers lag it is what the pressure at the end
-/// would do; while they fill or empty, that is more than they did.
+/// Work that a drive does on the way from one state to another (J). Where chambers lag it is what the pressure at the
+/// end would do; while they fill or empty, that is more than they did.
 pub(super) fn work_done(model: &PhysicsModel, drive: &Drive, from: &State, to: &State, ws: &mut Workspace) -> f64 {
     let torque = model.chamber.as_ref().map_or(drive.torque, |chamber| chamber.torque(to.chamber_bar));
     let bent: f64 = to.q.iter().sum::<f64>() - from.q.iter().sum::<f64>();

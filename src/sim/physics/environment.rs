@@ -5,7 +5,7 @@ use glam::DVec3;
 use palpate_geometry::{Pose, Primitive};
 use std::f64::consts::TAU;
 
-/// Points on the rim of the pedestal that feel for overhanging objects. With 24, a cylinder lying across a 16 mm
+/// Contact points on the rim of the pedestal, for overhanging objects. With 24, a cylinder lying across a 16 mm
 /// pedestal sinks by at most 0.07 mm between two of them.
 const RIM_POINTS: usize = 24;
 

@@ -68,7 +68,7 @@ pub(super) fn explicit_step(
     }
 }
 
-/// Impulses of contacts and joint limits over an instant, from the state as it is. Leaves slip limits for that instant.
+/// Impulses of contacts and joint limits over an instant, from the present state. Leaves slip limits for that instant.
 fn contact_and_limit_impulses(model: &PhysicsModel, state: &State, ws: &mut Workspace) -> Vec<f64> {
     let instant = ContactStep { h: INSTANT, ..ws.step };
     ws.step = instant;

@@ -1,25 +1,26 @@
 //! Geometry and stiffness of two fingers in contact with each other.
 //!
-//! Two pads that press on each other are two contact springs in series, and every place of contact is found twice, once from
-//! either side. A contact spring that overlaps the other skin by x is therefore given half the force at half the compression:
+//! Two pads that press on each other are two contact springs in series, and every place of contact is found twice, once
+//! from either side. A contact spring that overlaps the other skin by x is therefore given half the force at half the
+//! compression:
 //!
 //! ```text
 //!   f(x) = 1/2 f_{k,H}(x / 2) = f_{k/4, 2H}(x)          exactly, for the linear and the neo-Hookean law
 //! ```
 //!
-//! so that both sides together press with f_{k,H}(x / 2), as one pad does that is pushed x / 2 into a rigid plane midway.
-//! Neither finger is preferred: a mirrored scene stays mirrored. Forces act on both fingers at the same point.
+//! so that both sides together press with f_{k,H}(x / 2), as one pad does that is pushed x / 2 into a rigid plane
+//! midway. Neither finger is preferred: a mirrored scene stays mirrored. Forces act on both fingers at the same point.
 //!
 //! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
-//! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs. Both fingers bend in one plane, so that nothing
-//! moves across.
+//! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs.
+//! Both fingers bend in one plane, so that nothing moves across.
 
 use super::model::PhysicsModel;
 use crate::gripper::{FingerPlane, SegmentPose};
 use glam::{DVec2, DVec3};
 
-/// Contact spring of a pad against another contact spring like it, as seen from one of them: small-strain stiffness (N/m) and rest
-/// length (m). See the top of this file.
+/// Contact spring of a pad against another contact spring like it, as seen from one of them: small-strain stiffness
+/// (N/m) and rest length (m). See the top of this file.
 pub(super) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
     (0.25 * stiffness, 2.0 * height)
 }
@@ -100,7 +101,7 @@ impl<'a> OtherFinger<'a> {
         for (j, segment) in self.segments.iter().enumerate() {
             let from_start = p - segment.start;
             let along = from_start.dot(segment.along);
-            // The first segment goes on into the palm, the last one beyond the tip.
+            // The first segment extends into the palm, the last one beyond the tip.
             let low = if j == 0 { f64::NEG_INFINITY } else { 0.0 };
             let high = if j == last { f64::INFINITY } else { lengths[j] };
             let within = along.clamp(low, high);

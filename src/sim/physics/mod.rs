@@ -11,10 +11,10 @@
 //!
 //! [`effects`] decides which parts of this a scene needs.
 //!
-//! Read in this order: `chain` (what a finger resists), `contact springs` and `detect` (where it touches), `contact` (what
-//! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
-//! long), [`Simulation`] (a grasp in time). A second engine, `RapierSimulation` (feature `rapier`), computes the same scenes
-//! independently; both are an [`Engine`].
+//! Read in this order: `chain` (what a finger resists), `contact springs` and `detect` (where it touches), `contact`
+//! (what a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which
+//! steps, and how long), [`Simulation`] (a grasp in time). A second engine, `RapierSimulation` (feature `rapier`),
+//! computes the same scenes independently; both are an [`Engine`].
 //! [`SteppedScene`] takes steps of any length, for tests and hard cases; `explicit` is there to be compared with.
 
 mod balance;

@@ -1,4 +1,4 @@
-//! The constant description that a step reads: everything the scene says, resolved to numbers, in the gripper frame.
+//! Constants that a step reads: the scene resolved to numbers, in the gripper frame.
 
 use super::chain::ChainModel;
 use super::contact::ContactStep;
@@ -26,7 +26,7 @@ pub struct PhysicsModel {
     pub(super) pad_friction: PadFriction,
     pub(super) body: Option<Body>,
     pub(super) environment: Environment,
-    /// Gravity as the fingers and as the object feel it (m/s²).
+    /// Gravity on the fingers and on the object (m/s²).
     pub(super) finger_gravity: DVec3,
     pub(super) object_gravity: DVec3,
     /// False where fingers move from balance to balance.
@@ -120,7 +120,7 @@ impl PhysicsModel {
         let surface_friction = |object: &ObjectModel| scene.object.friction.value().unwrap_or(object.friction);
         let gravity_world = DVec3::new(0.0, 0.0, -scene.world.gravity);
         let gravity = placement.world_from_gripper.inverse().direction(gravity_world);
-        let felt = |effect: Effect| if is_on(effect) { gravity } else { DVec3::ZERO };
+        let gravity_if = |effect: Effect| if is_on(effect) { gravity } else { DVec3::ZERO };
         let body = object.map(|object| Body {
             field: object.field.clone(),
             resting: object.resting.clone(),
@@ -153,8 +153,8 @@ impl PhysicsModel {
             },
             body,
             environment: Environment::new(support, &placement.world_from_gripper),
-            finger_gravity: felt(Effect::FingerGravity),
-            object_gravity: felt(Effect::ObjectGravity),
+            finger_gravity: gravity_if(Effect::FingerGravity),
+            object_gravity: gravity_if(Effect::ObjectGravity),
             finger_inertia: is_on(Effect::FingerInertia),
             finger_contact: FingerContact::planned(&plan),
             skin: Skin::new(gripper),

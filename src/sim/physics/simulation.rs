@@ -56,7 +56,7 @@ impl Simulation {
         Self::refined(scene, object, Refinement::None)
     }
 
-    /// The same, computed more finely than the scene asks for.
+    /// Sets up a scene with a refinement.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let placement = Placement::new(scene, object);
         let (parts, solver) = match refinement {
@@ -290,8 +290,8 @@ impl Simulation {
         (total.linear, total.angular)
     }
 
-    /// Deepest compression of any pad contact spring (m) and the largest ratio of friction to mu times normal force over
-    /// loaded contacts, in the last step.
+    /// Deepest compression of any pad contact spring (m) and the largest ratio of friction to mu times normal force
+    /// over loaded contacts, in the last step.
     pub fn contact_extremes(&self) -> (f64, f64) {
         let mut extremes = (0.0f64, 0.0f64);
         for contact in &self.workspace.contacts {

@@ -77,7 +77,8 @@ impl State {
 
     /// Goes on in a straight line, by `share` of the way from `start` to here. Normal impulses are no path and stay.
     ///
-    /// A turning object goes on in angular momentum rather than in angular velocity: what flies freely keeps it.
+    /// A turning object is advanced in angular momentum rather than in angular velocity, so that free flight conserves
+    /// it.
     pub(super) fn go_on_from(&mut self, start: &Self, share: f64, model: &PhysicsModel) {
         let momentum = self.angular_momentum(model);
         let momentum = momentum + (momentum - start.angular_momentum(model)) * share;
@@ -97,7 +98,7 @@ impl State {
             self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
         }
         for (site, (now, before)) in self.shear.iter_mut().zip(&start.shear).enumerate() {
-            // Skin that has just been touched has no shear to go on from.
+            // Newly touched skin has no shear yet.
             if self.lag[site] > 0.0 && start.lag[site] > 0.0 {
                 *now += (*now - *before) * share;
             }

@@ -1,4 +1,4 @@
-//! One step: lay out the fingers, gather what is known, find contacts, minimise, move.
+//! One step: lay out the fingers, assemble the dynamics, find contacts, minimise, move.
 
 use super::chain::turning;
 use super::contact::Acting;
@@ -62,8 +62,8 @@ pub struct Drive {
     pub object_force: DVec3,
 }
 
-/// Advances the state by one step of `h` (s), which may differ from step to step. On failure the state is not to be used any
-/// more; whoever wants the last good one keeps the last frame.
+/// Advances the state by one step of `h` (s), which may differ from step to step. On failure the state is not to be
+/// used any more; keep the last frame for the last good state.
 pub fn step(
     model: &PhysicsModel,
     state: &mut State,
@@ -176,7 +176,7 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
     }
 }
 
-/// Friction limits that add up to less than this (N) are too small for their mismatch to matter.
+/// Friction limits that add up to less than this (N) are too small for a meaningful mismatch.
 const FELT_FRICTION: f64 = 0.01;
 
 /// Keeps shear and normal impulse of each contact for the next step; returns the outer friction residual.

@@ -1,5 +1,5 @@
-//! A scene stepped by hand: steps of any length, any torque, any velocity to begin with. Closed-form tests and hard cases
-//! are made of it; grasps run on [`super::Simulation`].
+//! A scene stepped by hand: steps of any length, any torque, any velocity to begin with. Closed-form tests and hard
+//! cases are made of it; grasps run on [`super::Simulation`].
 
 use super::balance::static_residual;
 use super::contact::{Acting, Against};
@@ -103,7 +103,7 @@ impl SteppedScene {
         Ok(report)
     }
 
-    /// Covers a span of time (s), rounded to whole steps, under a drive that is asked for with the time passed (s).
+    /// Covers a span of time (s), rounded to whole steps, under a drive as a function of the time passed (s).
     pub fn cover(&mut self, span: f64, drive: impl Fn(f64) -> Drive) -> Result<(), NotFinite> {
         for k in 0..(span / self.h).round().max(1.0) as u64 {
             self.step(&drive(k as f64 * self.h))?;

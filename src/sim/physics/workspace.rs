@@ -68,13 +68,14 @@ impl Block {
     }
 }
 
-/// Sums over the contacts of one segment: against the object, which couples to it, against the world or the other finger,
-/// and from the other finger.
+/// Sums over the contacts of one segment: against the object, which couples to it, against the world or the other
+/// finger, and from the other finger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PerLink<T> {
     pub(super) object: T,
     pub(super) world: T,
-    /// Found by the other finger's contact springs. Kept apart, so that both fingers add up alike and mirrored scenes stay so.
+    /// Found by the other finger's contact springs. Kept apart, so that both fingers add up alike and mirrored scenes
+    /// stay so.
     pub(super) met: T,
 }
 

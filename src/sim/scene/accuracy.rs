@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tolerance_brings_the_second_order_method_unless_told_otherwise() {
+    fn a_tolerance_selects_the_second_order_method_by_default() {
         let tolerance = Accuracy::Tolerance(1e-4);
         assert_eq!(Integrator::Auto.method(Accuracy::Standard), Method::Euler);
         assert_eq!(Integrator::Auto.method(tolerance), Method::Sdirk2);

@@ -33,7 +33,7 @@ pub enum SceneError {
         /// The setting, as a scene file writes it.
         setting: &'static str,
     },
-    /// A number outside what is possible.
+    /// Number outside its range.
     #[error("{key} = {value} is not possible; it must be {wanted}")]
     OutOfRange {
         /// The key, with its tables.
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_can_be_set_to_what_it_is() {
+    fn every_key_can_be_set_to_its_own_value() {
         let keys = Scene::keys();
         assert!(keys.len() > 40 && keys.iter().filter(|key| key.holds_fractions()).count() > 30);
         for key in &keys {
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_kinds_and_broken_text_are_told_apart() {
+    fn wrong_kinds_and_broken_text_give_different_errors() {
         assert!(matches!(Scene::from_toml("[solver\n"), Err(SceneError::Syntax(_))));
         assert!(matches!(Scene::from_toml("[solver]\naccuracy = \"best\"\n"), Err(SceneError::Syntax(_))));
         assert!(matches!(Scene::from_toml("[object]\nmass = \"heavy\"\n"), Err(SceneError::Syntax(_))));

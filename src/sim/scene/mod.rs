@@ -80,7 +80,7 @@ impl Scene {
         }
     }
 
-    /// Holds the object in place, or lets it rest freely; takes back what `effects.free-object` may have said.
+    /// Holds the object in place, or lets it rest freely; resets `effects.free-object` to `auto`.
     pub fn set_object_fixed(&mut self, fixed: bool) {
         self.object.fixed = fixed;
         self.effects.set(Effect::FreeObject, Setting::Auto);
@@ -110,7 +110,7 @@ pub struct ObjectSetup {
     pub density: f64,
     /// Friction coefficient of the surface; `auto` takes the object's own, or 0.6.
     pub friction: Auto,
-    /// Factor on all lengths in the file; `auto` guesses millimetres or metres and says so.
+    /// Factor on all lengths in the file; `auto` guesses millimetres or metres, with a warning.
     pub scale: Auto,
     /// Shape used for contact.
     pub collision: CollisionShape,
@@ -209,8 +209,9 @@ impl Solver {
         self.integrator.method(self.accuracy)
     }
 
-    /// Settings of the refined run for the error estimate: a tenth of a tolerance. Named steps have a tolerance beside them, since Euler damps
-    /// the ringing of the fingers at one step and at half of it alike: these agree more closely than either with the truth.
+    /// Settings of the refined run for the error estimate: a tenth of a tolerance. Named steps have a tolerance beside
+    /// them, since Euler damps the ringing of the fingers at one step and at half of it alike: these agree more closely
+    /// than either with the truth.
     #[must_use]
     pub fn refined(&self) -> Self {
         let (accuracy, integrator) = match self.accuracy {

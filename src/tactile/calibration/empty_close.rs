@@ -1,5 +1,5 @@
-//! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending does to
-//! it, over the curvature that its finger's strip reads.
+//! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending
+//! does to it, over the curvature that its finger's strip reads.
 
 use super::Fault;
 use super::pad_curve::BendingZero;
@@ -27,8 +27,8 @@ impl EmptyClose {
     /// Default duration (s): enough to turn a regulator up and down again.
     pub const SECONDS: f64 = 15.0;
 
-    /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts; the
-    /// strip of the same finger must be among them.
+    /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts;
+    /// the strip of the same finger must be among them.
     pub fn begin(
         board: &Board,
         pad: (Sensor, Calibration),
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_load_that_bending_puts_on_a_pad_is_learned() -> Result<(), Fault> {
+    fn the_bending_zero_is_found_from_an_empty_close() -> Result<(), Fault> {
         let [strip, pad] = parts();
         let board = Board::default();
         let mut close = EmptyClose::begin(&board, pad.clone(), std::slice::from_ref(&strip), 4.0)?;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_learned_is_said() -> Result<(), Fault> {
+    fn an_unusable_empty_close_is_refused_with_the_reason() -> Result<(), Fault> {
         let [strip, pad] = parts();
         let board = Board::default();
         let begin = |sensor: &(Sensor, Calibration), serving: &[(Sensor, Calibration)]| {

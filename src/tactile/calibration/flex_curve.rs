@@ -24,8 +24,8 @@ const FLAT_OHM: [f64; 2] = [
     StripPart::NOMINAL_OHM * (1.0 + StripPart::FLAT_TOLERANCE),
 ];
 
-/// Resistance at 90 degrees over flat that is believed: wider than the 2 to 2.5 of distributors, for the strip may sit on
-/// a finger that bends only in part along it.
+/// Resistance at 90 degrees over flat that is believed: wider than the 2 to 2.5 of distributors, for the strip may sit
+/// on a finger that bends only in part along it.
 const BENT_OVER_FLAT: [f64; 2] = [1.5, 3.5];
 
 /// Two angles nearer to each other than this are one (rad): 5 degrees.
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_holds_the_truth_as_often_as_it_says() -> Result<(), Fault> {
+    fn an_interval_holds_the_truth_in_95_of_100_cases() -> Result<(), Fault> {
         // Angles set wrong by a degree or so: the interval at 45 degrees should hold the truth in 95 of 100.
         let mut held = 0;
         let mut drawn = 0x9e37_79b9_7f4a_7c15_u64;
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_resistor_is_told_with_what_it_may_be() {
+    fn a_wrong_resistor_is_reported_with_the_likely_range() {
         // Behind 10 kOhm instead of 47, a strip of 25 kOhm looks like one of 117.
         let actual = Input { divider: Divider::of_strip(10e3), ..input() };
         let text = fault(&points(25e3, 2.2, &[0.0, 45.0, 90.0], &actual));
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strip_the_wrong_way_round_is_told() {
+    fn a_strip_the_wrong_way_round_is_named() {
         let swapped = Input { divider: Divider::of_pad(47e3), ..input() };
         assert!(fault(&points(25e3, 2.2, &[0.0, 45.0, 90.0], &swapped)).contains("wired the other way round"));
         assert!(fault(&points(25e3, 1.2, &[0.0, 45.0, 90.0], &input())).contains("slips"));
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_wires_and_slipped_points_are_told() {
+    fn broken_wires_and_slipped_points_are_named() {
         let mut open = points(25e3, 2.2, &[0.0, 45.0, 90.0], &input());
         open[2].counts = 4095.0;
         assert!(fault(&open).contains("open"));

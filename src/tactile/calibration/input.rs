@@ -1,4 +1,4 @@
-//! An input of a board, read backwards: from counts to the resistance or conductance of what is connected.
+//! Input of a board: counts to the resistance or conductance of the sensor.
 //!
 //! Count c of a converter with full scale C stands for the share c / (C + 1) of the reference voltage; the rest is the
 //! [`Divider`]'s.
@@ -22,8 +22,8 @@ pub struct Input {
 const RAIL_COUNTS: f64 = 1.5;
 
 impl Input {
-    /// The divider of a sensor on a board: what the board says of itself, and else what our firmware's wiring plan asks
-    /// for: strips to ground beside 47 kOhm, pads to the supply beside 4.7 kOhm.
+    /// The divider of a sensor on a board: as the board reports it, else as in the wiring plan of our firmware:
+    /// strips to ground beside 47 kOhm, pads to the supply beside 4.7 kOhm.
     pub fn on(board: &Board, sensor: Sensor) -> Self {
         let usual = match sensor.is_flex() {
             true => Divider::of_strip(StripPart::DIVIDER_OHM),
@@ -95,7 +95,7 @@ impl Input {
     }
 }
 
-/// The resistor that a board says it has beside a sensor (ohm).
+/// Resistor beside a sensor that the board reports (ohm).
 pub(super) fn stated_resistor(board: &Board, sensor: Sensor) -> Option<f64> {
     let ohm = *board.divider_ohm.get(board.channel_of(sensor)?)?;
     (ohm.is_finite() && ohm > 0.0).then_some(ohm)
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_of_the_range_is_named_by_what_it_means() {
+    fn an_end_of_the_range_is_open_or_short() {
         let [strip, pad] = inputs();
         assert_eq!(
             (strip.range_end(4095.0), strip.range_end(0.0), strip.range_end(1400.0)),

@@ -10,8 +10,8 @@
 //! Only records are stored, so that a better fit serves old ones too, as a better calibration serves old trials:
 //! [`Readout`] derives [`super::Signals`] from stored readings with whatever calibrations it is given.
 //!
-//! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of these
-//! kinds from data sheets is used to refuse calibrations that cannot be; see [`Fault`].
+//! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of
+//! these kinds from data sheets is used to refuse calibrations that cannot be; see [`Fault`].
 
 mod empty_close;
 mod fault;

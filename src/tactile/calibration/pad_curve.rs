@@ -2,10 +2,10 @@
 //!
 //!   G = a F^b,
 //!
-//! a straight line in logarithms (data sheet of the FSR07CE; its threshold is below 15 g). The line is fitted with weights: a
-//! relative error of a pad is its repeatability, 2 %, and what the noise of the counts makes of it, which is much where
-//! a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is subtracted, and
-//! what bending does to it, the [`BendingZero`].
+//! a straight line in logarithms (data sheet of the FSR07CE; its threshold is below 15 g). The line is fitted with
+//! weights: a relative error of a pad is its repeatability, 2 %, and what the noise of the counts makes of it, which is
+//! much where a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is
+//! subtracted, and what bending does to it, the [`BendingZero`].
 
 use super::Fault;
 use super::input::Input;
@@ -53,7 +53,7 @@ pub struct PadCurve {
     pub gain: f64,
     /// Exponent, b.
     pub exponent: f64,
-    /// Force below which it does not conduct, F0 (N): what the data sheet says, within what the weights showed.
+    /// Force below which it does not conduct, F0 (N): that of the data sheet, within the bounds of the weights.
     pub threshold: f64,
     /// Conductance at rest, when it was calibrated (S).
     pub idle_siemens: f64,
@@ -66,13 +66,13 @@ pub struct PadCurve {
 }
 
 impl PadCurve {
-    /// Fits a pad; five weights at least that make it conduct. Also says what is worth a word.
+    /// Fits a pad; five weights at least that make it conduct. Also returns remarks.
     pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
         check(points, SensorKind::Pad, input, MOST)?;
         let idle = idle_counts(points);
         let conducts = |p: &&Point| p.stimulus > 0.0 && p.counts > idle + CONDUCTING_COUNTS.max(4.0 * p.spread);
-        let felt: Vec<Point> = points.iter().filter(conducts).copied().collect();
-        let distinct = merged(&felt, 0.005 * STANDARD_GRAVITY);
+        let loaded: Vec<Point> = points.iter().filter(conducts).copied().collect();
+        let distinct = merged(&loaded, 0.005 * STANDARD_GRAVITY);
         enough(&distinct)?;
         rises(&distinct, input)?;
         let idle_siemens = input.siemens(idle);
@@ -82,7 +82,7 @@ impl PadCurve {
             let weight = 1.0 / (REPEATABILITY * REPEATABILITY + noise * noise);
             WeightedPoint { x: p.stimulus.ln(), y: conductance(p).ln(), weight }
         };
-        let line = StraightLine::through(&felt.iter().map(weighted).collect::<Vec<_>>());
+        let line = StraightLine::through(&loaded.iter().map(weighted).collect::<Vec<_>>());
         // Five different weights are five different logarithms: its numbers left the range.
         let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
         let silent = points.iter().filter(|p| !conducts(p)).map(|p| p.stimulus).fold(0.0, f64::max);
@@ -221,8 +221,9 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Bending zero of a pad: its reading without a load as a function of its finger's curvature, found from an empty close.
-/// Bending presses the layers of such pads together (Interlink's guide, "false triggering"), which reads as a force.
+/// Bending zero of a pad: its reading without a load as a function of its finger's curvature, found from an empty
+/// close. Bending presses the layers of such pads together (Interlink's guide, "false triggering"), which reads as a
+/// force.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BendingZero {
     /// Curvature (1/m) and conductance (S), curvature rising.
@@ -232,15 +233,15 @@ pub struct BendingZero {
 /// Width of the bins that readings of an empty close are averaged in (1/m).
 const BIN: f64 = 1.5;
 
-/// Readings below which a bin says nothing.
+/// Readings that a bin must hold.
 const LEAST_READINGS: usize = 3;
 
 /// Curvature that an empty close must reach (1/m).
 const LEAST_CURVATURE: f64 = 5.0;
 
 impl BendingZero {
-    /// The zero from readings of an empty close, pairs of curvature (1/m) and conductance (S). The middle one of each bin
-    /// counts, so that a few readings in which something was touched do no harm.
+    /// The zero from readings of an empty close, pairs of curvature (1/m) and conductance (S). The middle one of each
+    /// bin counts, so that a few readings in which something was touched do no harm.
     pub fn from_empty_close(readings: &[(f64, f64)]) -> Result<Self, Fault> {
         let mut sorted: Vec<(f64, f64)> =
             readings.iter().copied().filter(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite()).collect();
@@ -259,17 +260,17 @@ impl BendingZero {
         Ok(Self { knots })
     }
 
-    /// Load that bending alone puts on a pad at a curvature (1/m), as if it were a force (N). It adds to what is touched as
-    /// a load and not as a conductance. Below the threshold nothing of it shows, but it cannot have jumped to where it
-    /// first does: up to there it is taken to rise straight from none.
+    /// Load that bending alone puts on a pad at a curvature (1/m), as if it were a force (N). It adds to the contact
+    /// force as a load and not as a conductance. Below the threshold nothing of it shows, but it cannot have jumped to
+    /// where it first does: up to there it is taken to rise straight from none.
     pub fn preload(&self, curve: &PadCurve, kappa: f64) -> f64 {
-        let felt = self.knots.iter().map(|(kappa, siemens)| (*kappa, curve.force(*siemens)));
-        let felt = felt.filter(|(kappa, force)| *kappa > 0.0 && *force > 0.0);
+        let loads = self.knots.iter().map(|(kappa, siemens)| (*kappa, curve.force(*siemens)));
+        let loads = loads.filter(|(kappa, force)| *kappa > 0.0 && *force > 0.0);
         let mut before = (0.0, 0.0);
         if kappa <= 0.0 {
             return 0.0;
         }
-        for knot in felt {
+        for knot in loads {
             if kappa <= knot.0 {
                 return before.1 + (knot.1 - before.1) * (kappa - before.0) / (knot.0 - before.0);
             }

@@ -1,5 +1,5 @@
-//! Calibrating step by step: what to set next, whether the reading has settled, what came out. Terminal and window drive
-//! the same procedure; it knows neither of them, nor the port that its readings come from.
+//! Calibrating step by step: what to set next, whether the reading has settled, what came out. Terminal and window
+//! drive the same procedure; it knows neither of them, nor the port that its readings come from.
 //!
 //! ```text
 //!   next() -> "bend to 30 degrees"
@@ -30,8 +30,8 @@ pub struct Settling {
 }
 
 impl Default for Settling {
-    /// A second: two and a half times the late part of a strip's bend lasts about 0.4 s, and 50 readings halve the noise
-    /// of 2 counts to a third of a count.
+    /// A second: two and a half times the late part of a strip's bend lasts about 0.4 s, and 50 readings halve the
+    /// noise of 2 counts to a third of a count.
     fn default() -> Self {
         Self { window_s: 1.0, least: 10, creep_counts: 1.0 }
     }
@@ -48,7 +48,7 @@ pub enum Unsettled {
         /// Needed length (s).
         need_s: f64,
     },
-    /// The channel says nothing.
+    /// No numbers on the channel.
     #[error("the board sends no number on this channel: check the wire, or which channel it is")]
     Silent,
     /// Still on its way.
@@ -89,13 +89,13 @@ pub struct Procedure {
     silent: usize,
     /// Reason why the last requested point was not taken.
     refusal: Option<Unsettled>,
-    /// The user has said what resistor is beside the sensor.
+    /// The user has entered the resistor beside the sensor.
     resistor_is_given: bool,
 }
 
 impl Procedure {
-    /// Begins with a part in its place. `resistor_ohm` is the resistor beside it where the board does not say, or says
-    /// wrong. Refuses a board that has no such channel.
+    /// Begins a calibration of a mounted part. `resistor_ohm` overrides the resistor that the board reports. Refuses a
+    /// board that has no such channel.
     pub fn new(board: &Board, sensor: Sensor, part: &str, resistor_ohm: Option<f64>) -> Option<Self> {
         let mut input = Input::on(board, sensor);
         if let Some(ohm) = resistor_ohm {
@@ -116,7 +116,7 @@ impl Procedure {
         })
     }
 
-    /// Learns more of the board: points are counts, and are read by what is known of it now.
+    /// Updates the board's properties, which apply to all points, as points are stored as counts.
     pub fn see(&mut self, board: &Board) {
         let input = &mut self.record.input;
         let seen = input.seen_by(board, self.sensor);
@@ -329,7 +329,7 @@ mod tests {
         }
         assert_eq!(
             (procedure.left(), procedure.instruction().as_str()),
-            (0, "all points are taken; let the empty hand close once, so that its bending is not felt as a force")
+            (0, "all points are taken; let the empty hand close once, so that its bending is not read as a force")
         );
         let calibration = procedure.fit()?;
         assert_eq!(calibration.record.part, "P7");
@@ -348,7 +348,7 @@ mod tests {
         let creeping = |t: f64| (500.0 - 100.0 * (-t / 0.4).exp()) as f32;
         feed(&mut procedure, 10.0, 1.2, creeping);
         assert!(matches!(procedure.settled(), Err(Unsettled::Moving { by }) if by > 5.0), "{:?}", procedure.settled());
-        // Asked for too early, it says so until something else is done.
+        // A refused point stays the last refusal until another action.
         let refused = procedure.take(1.0);
         assert!(refused.is_err() && procedure.last_refusal() == refused.err() && procedure.record().points.is_empty());
         feed(&mut procedure, 20.0, 3.5, creeping);
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_learned_of_the_board_later_serves_all_points() -> Result<(), Unsettled> {
+    fn later_facts_about_the_board_apply_to_all_points() -> Result<(), Unsettled> {
         let mut procedure = procedure();
         feed(&mut procedure, 0.0, 1.1, |_| 600.0);
         procedure.take(1.0)?;
@@ -372,14 +372,15 @@ mod tests {
         assert!((procedure.record().input.ohm(600.0) - 3.3e3 * (1024.0 / 600.0 - 1.0)).abs() < 1e-6);
         assert_eq!(procedure.column, 0);
         // The user's resistor takes precedence over the board's.
-        let mut told = Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
-        told.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
-        assert_eq!(told.record().input.divider.fixed_ohm, 1e3);
+        let mut procedure =
+            Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
+        procedure.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
+        assert_eq!(procedure.record().input.divider.fixed_ohm, 1e3);
         Ok(())
     }
 
     #[test]
-    fn silence_and_the_end_of_the_range_are_told() {
+    fn silence_and_the_end_of_the_range_are_reported() {
         let mut procedure = procedure();
         for k in 0..60 {
             procedure.feed(&reading(f64::from(k) * 0.02, None));

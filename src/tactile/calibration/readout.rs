@@ -1,17 +1,18 @@
 //! Readings of a board through the calibrations of its parts, one by one or a whole trial.
 
+use super::Fault;
 use super::input::{Input, RangeEnd, stated_resistor};
 use super::pad_curve::ACTIVE_AREA;
 use super::record::{Calibration, Curve};
 use super::zero::{Drift, DriftLevel, Unrest, Zero};
-use super::Fault;
 use crate::board::{Board, Reading, Sensor};
 use crate::electronics::StripPart;
 use crate::{Channel, Quantity, Signals, whole_fingers};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::Side;
 
-/// Sensor estimates from one reading, left and right. None where a sensor is missing, not calibrated, or at an end of its range.
+/// Sensor estimates from one reading, left and right. None where a sensor is missing, not calibrated, or at an end of
+/// its range.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorEstimate {
     /// Angle over the active length of each strip (rad).
@@ -82,8 +83,8 @@ const FORCE_BEYOND: f64 = 0.1;
 const LEAST_READINGS: usize = 5;
 
 impl Readout {
-    /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board does
-    /// not have is left out with a warning.
+    /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board
+    /// does not have is left out with a warning.
     pub fn new(board: &Board, calibrations: &[(Sensor, Calibration)]) -> Result<Self, Fault> {
         let mut wired = [const { None }; 4];
         let mut warnings = Vec::new();
@@ -147,8 +148,9 @@ impl Readout {
         zero
     }
 
-    /// The zero of readings taken while the hand is open and left alone: a tare. Sensors whose zero is so far away that it is
-    /// no drift are left out, as [`Readout::with_zero`] does; [`Readout::drift`] of [`Readout::zero_from`] lists them.
+    /// The zero of readings taken while the hand is open and left alone: a tare. Sensors whose zero is so far away that
+    /// it is no drift are left out, as [`Readout::with_zero`] does; [`Readout::drift`] of [`Readout::zero_from`] lists
+    /// them.
     pub fn tare(&self, readings: &[Reading]) -> Result<Zero, Unrest> {
         if readings.len() < 2 * LEAST_READINGS {
             return Err(Unrest::TooFew { have: readings.len() });
@@ -232,8 +234,8 @@ impl Readout {
         Sensor::ALL.into_iter().zip(&self.wired).zip(counts).filter_map(of).collect()
     }
 
-    /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`] is
-    /// made from.
+    /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`]
+    /// is made from.
     pub fn bending(&self, side: Side, readings: &[Reading]) -> Vec<(f64, f64)> {
         let pair = |reading: &Reading| {
             let angle = self.raw(reading, side.index())? - self.offset(side.index());

@@ -107,7 +107,7 @@ impl Calibration {
     }
 
     /// Half-width of the 95 % interval of its gain as a share, at the middle of the usual range; none
-    /// where the points do not tell.
+    /// where the points do not determine it.
     pub fn gain_interval(&self) -> Option<f64> {
         match &self.curve {
             Curve::Flex(curve) => curve.gain_interval(),

@@ -2,8 +2,8 @@
 //!
 //! Strips creep and pads are pinched, so that the reading of a finger at rest drifts. A [`Zero`] holds the reading of
 //! each sensor without contact and pressure: taken on request it is a tare; taken from the window before each trial's
-//! closing it is the dynamic calibration that the paper proposes in its outlook. It is subtracted, unless it is so large
-//! that it must have another cause.
+//! closing it is the dynamic calibration that the paper proposes in its outlook. It is subtracted, unless it is so
+//! large that it must have another cause.
 
 use crate::board::Sensor;
 use crate::electronics::PadPart;
@@ -67,7 +67,7 @@ pub struct Drift {
 const MOVED_RAD: f64 = std::f64::consts::PI / 180.0;
 /// Beyond this it is no drift but a bent finger (rad): 15 degrees.
 const TOO_FAR_RAD: f64 = 15.0 * MOVED_RAD;
-/// Beyond this a pad's zero has moved (N): what such a pad feels at all.
+/// Beyond this a pad's zero has moved (N): the pad's threshold.
 const MOVED_N: f64 = PadPart::LEAST_FORCE;
 /// Beyond this it is no drift but something on the pad (N).
 const TOO_FAR_N: f64 = 1.0;
@@ -84,7 +84,7 @@ impl Drift {
         Self { sensor, moved, level }
     }
 
-    /// The level in a word, as a badge.
+    /// Short name of the level, for a badge.
     pub fn badge(&self) -> &'static str {
         match self.level {
             DriftLevel::Steady => "steady",

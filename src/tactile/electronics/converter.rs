@@ -1,6 +1,6 @@
 //! The analogue input that reads a divider: an Arduino Due with 12 bits over 3.3 V, 0.806 mV a count.
 //!
-//! Voltages are given as shares of the 3.3 V. Count c stands for c / 4096, so that no reading says that the whole
+//! Voltages are given as shares of the 3.3 V. Count c stands for c / 4096, so that no reading means that the whole
 //! supply is across the divider, which no finite resistance explains.
 
 /// An analogue input.

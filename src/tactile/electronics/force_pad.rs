@@ -1,7 +1,7 @@
 //! A force-sensing pad, Ohmite FSR07CE (paper, section IV-B): from the load on it to its conductance.
 //!
-//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b. The load may be a force
-//! or a pressure, in any unit: a is the conductance at one [`PadPart::full`] of it.
+//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b. The load may be a
+//! force or a pressure, in any unit: a is the conductance at one [`PadPart::full`] of it.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +14,17 @@ pub struct PadPart {
     pub gain: f64,
     /// Exponent, b.
     pub exponent: f64,
-    /// Least load that it feels; none where it feels any.
+    /// Threshold load; none where it responds to any load.
     pub threshold: Option<f64>,
     /// Share of the load that reaches it.
     pub reaching: f64,
 }
 
 impl PadPart {
-    /// Least force that a pad feels (N). Data sheet: less than 15 g, 0.15 N, actuates.
+    /// Threshold force of a pad (N). Data sheet: less than 15 g, 0.15 N, actuates.
     pub const LEAST_FORCE: f64 = 0.15;
 
-    /// Least pressure that a pad feels (Pa): 15 g on the 170 mm² of the pad are 0.9 kPa.
+    /// Threshold pressure of a pad (Pa): 15 g on the 170 mm² of the pad are 0.9 kPa.
     pub const LEAST_PRESSURE: f64 = 0.9e3;
 
     /// Conductance at 1 N (S): 6 kOhm (Interlink 402, the table of Adafruit; there is none for the FSR07).

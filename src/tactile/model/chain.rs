@@ -10,7 +10,7 @@ use crate::Signals;
 
 impl PhysicalLike {
     /// Readings of a grasp from its clean signals, at 50 Hz and always finite. `seed` identifies the
-    /// grasp. Channels are told apart by their names; one that is neither curvature, pressure nor force is read
+    /// grasp. Channels are identified by their names; one that is neither curvature, pressure nor force is read
     /// without a sensor.
     pub fn apply(&self, clean: &Signals, seed: u64) -> Signals {
         let instants = instants(clean, self.jitter, seed);
@@ -37,7 +37,7 @@ enum Sensor {
 }
 
 impl Sensor {
-    /// The sensor that a channel's name asks for, as in `curvature_left_distal`.
+    /// The sensor for a channel's name, as in `curvature_left_distal`.
     fn new(settings: &PhysicalLike, streams: Streams<'_>) -> Self {
         let mut words = streams.channel.split('_');
         let quantity = words.next();

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The gripper whose parts are drawn unless another is asked for: the first whose two whole-finger strips rise within
-/// 2 % of what the calibration believes, as what is known of the real gripper's readings asks.
+/// Default gripper whose parts are drawn: the first whose two whole-finger strips rise within
+/// 2 % of the nominal calibration, which the published readings of the real gripper suggest.
 pub const GRIPPER: u64 = 127;
 
 /// Faults of the sensors and the gripper whose parts they are made of. Other constants stand with the parts.
@@ -26,18 +26,20 @@ pub struct PhysicalLike {
     pub hysteresis: bool,
     /// The rest angle of strips is another in every grasp; the conductance of pads grows under load.
     pub drift: bool,
-    /// Pads do not feel a light touch, strips do not feel being bent backwards.
+    /// Pads do not respond to a light touch, strips not to bending backwards.
     pub threshold: bool,
-    /// Pads meet the rail at full force or pressure, strips cannot be bent beyond a fold.
+    /// Pads saturate at full force or pressure, strips cannot be bent beyond a fold.
     pub saturation: bool,
     /// Voltages are noisy.
     pub noise: bool,
     /// Voltages are read in whole counts of 12 bits.
     pub counts: bool,
-    /// Force at which the nominal pad saturates (N). Assumed: 0.3 N. Real recordings have nearly three levels only, idle,
-    /// touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as well.
+    /// Force at which the nominal pad saturates (N). Assumed: 0.3 N. Real recordings have nearly three levels only,
+    /// idle, touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as
+    /// well.
     pub full_force: f64,
-    /// Pressure at which the nominal pad saturates (Pa). Assumed: 12 kPa, what 0.3 N makes on a usual contact of 25 mm².
+    /// Pressure at which the nominal pad saturates (Pa). Assumed: 12 kPa, what 0.3 N makes on a usual contact of 25
+    /// mm².
     pub full_pressure: f64,
 }
 

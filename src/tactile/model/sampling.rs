@@ -28,7 +28,7 @@ pub(super) struct Instant {
     pub(super) taken: f64,
 }
 
-/// The instants of a recording as long as the clean one. Without `jitter`, samples are taken when they are said to be.
+/// The instants of a recording as long as the clean one. Without `jitter`, samples are taken at the reported times.
 pub(super) fn instants(clean: &Signals, jitter: bool, seed: u64) -> Vec<Instant> {
     let (Some(&start), Some(&end)) = (clean.t_s.first(), clean.t_s.last()) else { return Vec::new() };
     // A hair more, so that the last of evenly divided time counts.

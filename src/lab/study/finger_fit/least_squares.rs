@@ -1,9 +1,9 @@
 //! Nonlinear least squares with prior knowledge (Levenberg 1944, Marquardt 1963), and what the data leave open.
 //!
-//! Minimises sum r_i(x)² + sum ((x_j - m_j) / s_j)², where the residuals r are in units of their deviation and a parameter may
-//! be known beforehand as m_j, give or take s_j. The covariance is the inverse of J'J + S⁻² at the minimum, the data's part
-//! of it widened by what the residuals show beyond their assumed noise, and by how far neighbouring residuals go
-//! together: n residuals with correlation rho count as n (1 - rho) / (1 + rho).
+//! Minimises sum r_i(x)² + sum ((x_j - m_j) / s_j)², where the residuals r are in units of their deviation and a
+//! parameter may be known beforehand as m_j, give or take s_j. The covariance is the inverse of J'J + S⁻² at the
+//! minimum, the data's part of it widened by what the residuals show beyond their assumed noise, and by how far
+//! neighbouring residuals go together: n residuals with correlation rho count as n (1 - rho) / (1 + rho).
 
 /// Least-squares problem.
 pub(super) trait Problem {
@@ -84,7 +84,7 @@ pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) 
     for (j, prior) in priors.iter().enumerate() {
         matrix[j][j] += 1.0 / (prior.deviation * prior.deviation);
     }
-    let covariance = inverse(&matrix).ok_or("the data do not tell the parameters apart at all")?;
+    let covariance = inverse(&matrix).ok_or("the parameters cannot be identified from these data")?;
     Ok(Minimum { x, covariance, residuals, widened, steps, settled })
 }
 
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_the_truth_as_often_as_they_say() -> Result<(), String> {
+    fn intervals_hold_the_truth_in_95_of_100_cases() -> Result<(), String> {
         let mut held = [0; 2];
         for seed in 0..200 {
             let found = minimise(&mut decay(seed, 0.05), &[2.0, 1.0], &[OPEN; 2])?;
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_beforehand_counts_and_bounds_hold() -> Result<(), String> {
+    fn priors_count_and_bounds_hold() -> Result<(), String> {
         let known = [Prior { mean: 2.0, deviation: 1e-6 }, OPEN];
         let found = minimise(&mut decay(1, 0.05), &[2.0, 1.0], &known)?;
         assert!((found.x[0] - 2.0).abs() < 1e-3 && found.covariance[0][0].sqrt() < 1.1e-6);

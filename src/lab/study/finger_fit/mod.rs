@@ -1,16 +1,16 @@
-//! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so that the
-//! simulated finger lies on the real one.
+//! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so
+//! that the simulated finger lies on the real one.
 //!
 //! The fitted model is simulated under the recorded line pressure; `least_squares` minimises the difference of its
 //! curvature and force from the recording. Fitted in logarithms: bending stiffness EI, damping time, the torques at
 //! points of the curve every 0.2 bar; and the time in which a chamber fills. Beside them, and only as far as their
-//! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and when
-//! each recording began.
+//! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and
+//! when each recording began.
 //!
 //! **Identifiability.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
 //! stiffness bends alike. The scale comes from the finger's weight and inertia, which resist with k/m and g/k: with
 //! closes alone, EI and torques are as uncertain as the mass, and more uncertain the stiffer the finger. A press on a
-//! calibrated pad measures a force, and so the scale itself. The intervals say how much of this was in the data.
+//! calibrated pad measures a force, and so the scale itself. The intervals show how much of this was in the data.
 
 mod course;
 mod fitted_model;
@@ -61,7 +61,7 @@ pub enum Known {
     Well,
     /// Within a half.
     Roughly,
-    /// The data do not tell.
+    /// Not identifiable from the data.
     Hardly,
 }
 
@@ -91,7 +91,7 @@ pub struct Remainder {
     pub curvature_per_m: f64,
     /// Root mean square over both pads as a share of the force; null where no force was usable.
     pub force_share: Option<f64>,
-    /// By how much it began later than it says (s).
+    /// Delay of its begin against its time stamps (s).
     pub shift_s: f64,
 }
 
@@ -153,8 +153,8 @@ pub enum FingerFitError {
     Failed(String),
 }
 
-/// Pressure between points of the torque curve (bar), at most. A curve that bends between them is not met: what is left
-/// over then shows in the widening of the intervals.
+/// Pressure between points of the torque curve (bar), at most. A curve that bends between them cannot be fitted: the
+/// rest over then shows in the widening of the intervals.
 const KNOT_BAR: f64 = 0.2;
 
 /// Points of the torque curve besides zero, fewest and most; each costs a simulation of every recording a step.
@@ -170,8 +170,8 @@ const USUAL_LAG: Prior = Prior { mean: 0.05, deviation: 0.3 };
 /// Deviation of a strip's zero after it was taken anew (1/m): 0.3 degrees.
 const OFFSET: f64 = 0.1;
 
-/// Deviation of what bending adds to a pad besides its known zero, per curvature (N m). Below its threshold an empty close
-/// shows nothing of it: 0.15 N at 15 1/m.
+/// Deviation of what bending adds to a pad besides its known zero, per curvature (N m). Below its threshold an empty
+/// close shows nothing of it: 0.15 N at 15 1/m.
 const PRELOAD: f64 = 0.01;
 
 /// Deviation of the instant at which a recording begins (s): half an actuation tick.
@@ -188,7 +188,7 @@ pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerF
     fit_finger_watched(observations, trust, &FitWatch { progress: &|_| (), stop: &AtomicBool::new(false) })
 }
 
-/// The same while somebody watches.
+/// The same with progress and cancellation.
 pub fn fit_finger_watched(
     observations: &[Observation],
     trust: &Trust,
@@ -342,8 +342,10 @@ fn remarks(
     }
     for estimate in estimates.iter().filter(|estimate| estimate.known == Known::Hardly) {
         let (name, low, high) = (&estimate.name, three_digits(estimate.low), three_digits(estimate.high));
-        remarks
-            .push(format!("the recordings do not tell {name}: anything from {low} to {high} {} fits", estimate.unit));
+        remarks.push(format!(
+            "{name} cannot be identified from the recordings: any value from {low} to {high} {} fits",
+            estimate.unit
+        ));
     }
     if estimates[STIFFNESS].known != Known::Well && estimates.last().is_some_and(|ratio| ratio.known == Known::Well) {
         remarks.push(

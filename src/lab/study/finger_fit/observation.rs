@@ -20,7 +20,7 @@ pub struct Observation {
     pub object: Option<ObjectModel>,
 }
 
-/// Force below which a real pad's word is not taken (N): its threshold, and a margin for where it begins to conduct.
+/// Force below which a real pad is ignored (N): its threshold, and a margin for where it begins to conduct.
 const LEAST_FORCE: f64 = 0.2;
 
 /// A force is known to this share of itself besides its noise: the repeatability of such pads (data sheet).

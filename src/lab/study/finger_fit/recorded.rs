@@ -1,5 +1,5 @@
-//! Stored trials as the fit takes them: what the board sent, through its calibrations, which also say how far their gains
-//! can be relied on.
+//! Stored trials as input of the fit: the board's readings through its calibrations, which also bound how far their
+//! gains can be relied on.
 
 use super::{Observation, Trust};
 use palpate_sim::gripper::Gripper;
@@ -51,8 +51,8 @@ pub enum RecordedGraspError {
 }
 
 impl RecordedGrasps {
-    /// Reads a trial. The fit begins at `gripper`, or else at the trial's own; `calibrations` are used instead of the newest of
-    /// each part.
+    /// Reads a trial. The fit begins at `gripper`, or else at the trial's own; `calibrations` are used instead of the
+    /// newest of each part.
     pub fn add(
         &mut self,
         store: &Store,
@@ -76,7 +76,7 @@ impl RecordedGrasps {
             if empty { None } else { own.load_object().map_err(|cause| RecordedGraspError::Object { id, cause })? };
         if object.is_some() && !own.holds_object() {
             self.warnings.push(format!(
-                "trial {id} grasps something that can move: presses against what is held in place tell more"
+                "trial {id} grasps an object that can move: presses against a fixed object are more informative"
             ));
         }
         let programme = Observation::line_of(&own);
@@ -105,8 +105,8 @@ impl Trust {
                 true => (&mut self.strip_gain, STRIP_REPEATS),
                 false => (&mut self.pad_gain, PAD_REPEATS),
             };
-            let told = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
-            gains[*sensor as usize % 2] = told.max(usual);
+            let deviation = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
+            gains[*sensor as usize % 2] = deviation.max(usual);
         }
     }
 }

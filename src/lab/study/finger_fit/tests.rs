@@ -138,11 +138,16 @@ fn truths() -> [f64; 7] {
 fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FingerFitError> {
     let truth = scene(&hidden());
     let close = observed("close", clean(&truth, None), &truth, None);
-    let heard = Cell::new(0.0);
-    let watch = FitWatch { progress: &|steps| heard.set(steps), stop: &AtomicBool::new(false) };
+    let steps_seen = Cell::new(0.0);
+    let watch = FitWatch { progress: &|steps| steps_seen.set(steps), stop: &AtomicBool::new(false) };
     let fit = fit_finger_watched(&[close], &Trust::default(), &watch)?;
-    assert!(heard.get() > 1.0 && heard.get() <= f64::from(fit.steps), "{} of {} steps", heard.get(), fit.steps);
-    // Both fingers over all of the recording, and as far off as is told.
+    assert!(
+        steps_seen.get() > 1.0 && steps_seen.get() <= f64::from(fit.steps),
+        "{} of {} steps",
+        steps_seen.get(),
+        fit.steps
+    );
+    // Both fingers over all of the recording, with the reported RMS error.
     assert_eq!(fit.courses.iter().map(|c| (c.side, c.t_s.len())).collect::<Vec<_>>(), Side::BOTH.map(|s| (s, 80)));
     let off = fit.courses.iter().flat_map(|c| c.recorded.iter().zip(&c.fitted).map(|(a, b)| (a - b) * (a - b)));
     let rms = (off.sum::<f64>() / 160.0).sqrt();
@@ -150,7 +155,7 @@ fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FingerFitEr
     for (estimate, truth) in fit.estimates.iter().zip(truths()) {
         assert!((estimate.value / truth - 1.0).abs() < 0.03, "{estimate:?} instead of {truth}");
     }
-    // But a close alone cannot know this well, and says so.
+    // A close alone cannot determine this well; the result shows it.
     assert!(fit.estimates[0].known == Known::Roughly && fit.estimates[6].known == Known::Well, "{:?}", fit.estimates);
     assert!(fit.remarks.iter().any(|r| r.contains("weight of the finger, 30.0 g")), "{:?}", fit.remarks);
     assert!(fit.remarks.iter().any(|r| r.contains("only be changed together")), "{:?}", fit.remarks);
@@ -187,7 +192,7 @@ fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent(
 }
 
 #[test]
-fn a_fit_ends_when_it_is_told_to() {
+fn a_fit_can_be_cancelled() {
     let truth = scene(&hidden());
     let close = observed("close", clean(&truth, None), &truth, None);
     let stop = AtomicBool::new(false);
@@ -196,7 +201,7 @@ fn a_fit_ends_when_it_is_told_to() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_told() {
+fn unusable_recordings_are_refused_with_the_reason() {
     let truth = scene(&hidden());
     let signals = clean(&truth, None);
     let fault = |signals: Signals| {

@@ -1,6 +1,6 @@
-//! Do hard cases stay numerically stable? A table of named cases, each with what must hold of it, run at every accuracy;
-//! and random scenes over wide ranges, each computed a second time with a quarter of the step, to count the answers that
-//! are wrong without a word.
+//! Do hard cases stay numerically stable? A table of named cases, each with what must hold of it, run at every
+//! accuracy; and random scenes over wide ranges, each computed a second time with a quarter of the step, to count the
+//! answers that are silently wrong.
 //!
 //! A case is one line in [`CASES`] and one function that measures. What it asserts is data: a measured value and its
 //! limit, so that the table can be printed, stored and tested alike.
@@ -123,7 +123,7 @@ impl std::fmt::Display for Limit {
     }
 }
 
-/// One thing that was measured.
+/// Measured value with its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measurement {
     /// Name, with its unit in brackets.
@@ -192,7 +192,7 @@ pub struct CaseRow {
 }
 
 impl Case {
-    /// The settings it is run at, out of the accuracies asked for.
+    /// The settings it is run at, out of the chosen accuracies.
     pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<CaseAccuracy> {
         /// Steps below this are for thorough runs (s).
         const FINE: f64 = 1e-3;
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_refuse_what_is_no_number() {
+    fn limits_refuse_nan() {
         assert!(Limit::AtMost(1.0).holds(1.0) && !Limit::AtMost(1.0).holds(1.1) && !Limit::AtMost(1.0).holds(f64::NAN));
         assert!(Limit::AtLeast(1.0).holds(2.0) && !Limit::AtLeast(1.0).holds(f64::NAN));
     }

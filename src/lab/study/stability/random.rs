@@ -1,8 +1,8 @@
-//! Random scenes over wide ranges: does every step converge, and is the answer right where nothing says otherwise?
+//! Random scenes over wide ranges: does every step converge, and is the answer right where it is not flagged?
 //!
-//! Each scene closes, holds and comes to an end; then it is computed again with a quarter of the step. Where the two end
-//! apart, the first was wrong. Where no flag had been raised, it was *silently* wrong. Some scenes have no right answer:
-//! their end depends on a push of a micrometre at the start, however fine the step; these are told apart.
+//! Each scene closes, holds and ends; then it is computed again with a quarter of the step. Where the two end apart,
+//! the first was wrong. Where no flag had been raised, it was *silently* wrong. Some scenes have no right answer: their
+//! end depends on a push of a micrometre at the start, however fine the step; these are counted apart.
 
 use glam::DVec3;
 use palpate_geometry::Primitive;
@@ -20,12 +20,12 @@ const DURATION: f64 = 1.5;
 const SAME_ANGLE: f64 = 0.02;
 /// Places farther apart than this are different answers (m).
 const SAME_PLACE: f64 = 2e-3;
-/// An object this far from its start, or this far below it, has left the hand, and it does not matter where it is (m).
+/// An object this far from its start, or this far below it, has left the hand; its position is ignored (m).
 const GONE: f64 = 0.15;
 const FALLEN: f64 = 0.03;
 /// Refinement of the second computation.
 const FINER: f64 = 4.0;
-/// A push that must not matter (m).
+/// Perturbation of the start that must not change the result (m).
 const PUSH: f64 = 1e-6;
 
 /// A random scene.
@@ -222,7 +222,7 @@ impl Judged {
     }
 }
 
-/// From where on what is measured beside an answer says that it should not be trusted.
+/// Thresholds above which an answer is flagged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Flags {
     /// Largest outer friction residual of any step.
@@ -275,7 +275,7 @@ pub struct FlagRow {
 /// Scenes up to a length of step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StepRow {
-    /// Longest step (s); the row before says the shortest.
+    /// Longest step (s); the row before holds the shortest.
     pub longest_s: f64,
     /// Scenes.
     pub scenes: usize,
@@ -360,7 +360,7 @@ impl RandomReport {
     }
 }
 
-/// True when anything says that an answer should not be trusted.
+/// True when any criterion flags an answer.
 fn raised(judged: &Judged, flags: &Flags) -> bool {
     let ran = &judged.coarse;
     !ran.finite
@@ -402,8 +402,8 @@ fn flag_rows(judged: &[Judged]) -> Vec<FlagRow> {
     rows
 }
 
-/// Computes random scenes, twice each, until they have taken `steps` steps together; `tell` hears how many of how many
-/// scenes are done. The result does not depend on the number of threads.
+/// Computes random scenes, twice each, until they have taken `steps` steps together; `tell` receives how many of how
+/// many scenes are done. The result does not depend on the number of threads.
 pub fn random_scenes(seed: u64, steps: u64, threads: usize, tell: &(dyn Fn(usize, usize) + Sync)) -> RandomReport {
     let (mut scenes, mut planned) = (0, 0);
     while planned < steps {
@@ -424,7 +424,7 @@ pub fn random_scenes(seed: u64, steps: u64, threads: usize, tell: &(dyn Fn(usize
     };
     let mut judged: Vec<Judged> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
-        // A fault in a thread is a fault of ours; it goes on as one.
+        // A panic in a thread is a bug: pass it on.
         let join = |thread: std::thread::ScopedJoinHandle<'_, _>| {
             thread.join().unwrap_or_else(|fault| std::panic::resume_unwind(fault))
         };

@@ -1,7 +1,7 @@
 //! Physical effects: one file per effect, one line each in [`rule_of`].
 //!
 //! An effect that is left to `auto` is decided once, when the scene is built: it is on where it is possible at all and
-//! one dimensionless number, which says how much the scene calls for it, lies above a threshold. What was decided and
+//! one dimensionless number, defined by the effect's rule, lies above a threshold. The decision and
 //! why is the [`Plan`], which is stored with the trial. A step reads only what the plan has made of the model; an
 //! effect that is off costs it nothing and leaves no trace.
 //!
@@ -90,7 +90,7 @@ fn planned(effect: Effect, situation: &Situation<'_>) -> PlannedEffect {
     let reason = if setting == Setting::Auto || on == called_for {
         facts
     } else {
-        format!("the scene wants it {}; {facts}", setting.name())
+        format!("set to {} in the scene; {facts}", setting.name())
     };
     let (name, setting) = (effect.name().to_owned(), setting.name().to_owned());
     PlannedEffect { name, setting, on, number, threshold: rule.threshold, reason }
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn the_setting_overrules_the_number_and_the_plan_says_so() {
+    fn the_setting_overrules_the_number_and_the_plan_gives_the_reason() {
         let mut scene = Scene::default();
         let made = |scene: &Scene| {
             let plan = plan(scene, None, &Placement::new(scene, None));
@@ -122,16 +122,16 @@ mod tests {
             plan.effects.into_iter().find(|e| e.name == "finger-gravity").expect("registered")
         };
         let auto = made(&scene);
-        assert!(auto.on && auto.number > auto.threshold && !auto.reason.contains("wants"), "{auto:?}");
+        assert!(auto.on && auto.number > auto.threshold && !auto.reason.contains("set to"), "{auto:?}");
         scene.effects.set(Effect::FingerGravity, Setting::Off);
         let off = made(&scene);
-        assert!(!off.on && off.number == auto.number && off.reason.contains("wants it off"), "{off:?}");
+        assert!(!off.on && off.number == auto.number && off.reason.contains("set to off"), "{off:?}");
         scene.effects.set(Effect::FingerGravity, Setting::On);
-        assert_eq!(made(&scene).reason, auto.reason, "what is on anyhow needs no word about who wanted it");
+        assert_eq!(made(&scene).reason, auto.reason, "a setting that changes nothing is not mentioned");
     }
 
     #[test]
-    fn every_effect_is_told_in_words_with_its_numbers() {
+    fn every_effect_is_described_with_its_numbers() {
         for effect in Effect::ALL {
             let rule = rule_of(*effect);
             assert!(rule.about.ends_with('.') && rule.number.contains('/'), "{}", effect.name());

@@ -1,5 +1,5 @@
 //! From points of contact to taxels. rapier's segments are rigid: they touch an object in a few points, wherever these
-//! happen to be found. What a skin would feel of such a force is spread as the pad's own law would spread it.
+//! happen to be found. Such a force is spread over the skin by the pad's own law.
 //!
 //! For every loaded segment the object is pushed on into the skin by a depth delta, the same for all its taxels, until
 //!
@@ -7,9 +7,9 @@
 //! sum over taxels  f_t(c_t + delta) = F
 //! ```
 //!
-//! with F rapier's force along the segment's inward axis, f_t the law of a contact spring and c_t the overlap of the undeformed
-//! skin with the object, negative where they are apart. Shear is shared out in proportion. The sum over a segment is
-//! rapier's force; where on the segment it acts is the pad's answer, not rapier's.
+//! with F rapier's force along the segment's inward axis, f_t the law of a contact spring and c_t the overlap of the
+//! undeformed skin with the object, negative where they are apart. Shear is shared out in proportion. The sum over a
+//! segment is rapier's force; where on the segment it acts is the pad's answer, not rapier's.
 
 use super::world::Touch;
 use crate::frame::TaxelLoad;
@@ -38,7 +38,7 @@ impl Skin {
         Self { grid, finger: finger.clone(), law, by_segment }
     }
 
-    /// Overlap of the undeformed skin over a taxel with what is `gap` away (m).
+    /// Overlap of the undeformed skin over a taxel with a surface at distance `gap` (m).
     fn overlap(&self, plane: &FingerPlane, segments: &[SegmentPose], taxel: usize, gap: &impl Fn(DVec3) -> f64) -> f64 {
         let (segment, along) = self.grid.place(taxel, &self.finger);
         let skin = segments[segment].point(along, self.grid.height(taxel));
@@ -72,12 +72,12 @@ impl Skin {
                 continue;
             }
             let overlaps: Vec<f64> = taxels.iter().map(|taxel| self.overlap(plane, segments, *taxel, gap)).collect();
-            for (taxel, felt) in taxels.iter().zip(self.spread(taxels, &overlaps, pressing)) {
-                if felt > 0.0 {
-                    let share = felt / pressing;
+            for (taxel, normal) in taxels.iter().zip(self.spread(taxels, &overlaps, pressing)) {
+                if normal > 0.0 {
+                    let share = normal / pressing;
                     loads.push(TaxelLoad {
                         taxel: (first + taxel) as u16,
-                        normal: felt as f32,
+                        normal: normal as f32,
                         along: (share * force.dot(along)) as f32,
                         across: (share * force.y) as f32,
                     });
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_the_tip_feels_nothing() {
+    fn the_end_of_the_tip_loads_no_taxel() {
         assert!(plate_loads(DVec3::new(-0.1, 0.0, 1.0), 0.0, -0.002).is_empty());
     }
 }

@@ -2,7 +2,7 @@
 //! detection with Palpate's own step, and writes the same frames on the same clock.
 //!
 //! Fingers are multibody chains of rigid segments with springs from `set_spring` (springs made of motors do not
-//! converge), joint damping as the scene says, and the actuation torque as the rest angle of the springs. Numbers are
+//! converge), joint damping from the scene, and the actuation torque as the rest angle of the springs. Numbers are
 //! single precision, in units of 50 mm. Of each tick rapier makes four small steps of four sweeps.
 //!
 //! # What differs, and why
@@ -32,10 +32,10 @@
 //! | 21 x 5 x 5 | -10.4 % | 7 ms | -14 % at Poisson's ratio 0.45, -19 % at 0.49, which is rubber's |
 //! | 41 x 5 x 5 | -6.1 % | 16 ms | |
 //!
-//! In metres the same beams from 21 x 3 x 3 on fly away at the speed limit, finite and without a word; solved by
-//! constraint rows instead, they come out 20 to 240 % too soft and keep swinging. Linear tetrahedra lock in bending and near
-//! incompressibility, so that a soft finger at 1 % would take some 10⁵ particles: they are no reference for a finger or
-//! for a soft object here, and Palpate does not use them.
+//! In metres the same beams from 21 x 3 x 3 on fly away at the speed limit, finite and without an error; solved by
+//! constraint rows instead, they come out 20 to 240 % too soft and keep swinging. Linear tetrahedra lock in bending and
+//! near incompressibility, so that a soft finger at 1 % would take some 10⁵ particles: they are no reference for a
+//! finger or for a soft object here, and Palpate does not use them.
 
 mod loads;
 mod world;
@@ -56,11 +56,11 @@ use loads::Skin;
 use palpate_geometry::{DistanceField, Pose};
 use world::{Hand, Touch};
 
-/// Effects that this engine has or lacks whatever the scene says.
+/// Effects that this engine always or never has.
 const SETTLED: [(Effect, bool, &str); 4] = [
     (Effect::FingerInertia, true, "rapier's chains always have inertia"),
     (Effect::FingerContact, false, "rapier's fingers do not meet each other here"),
-    (Effect::PneumaticLag, false, "rapier is given the line pressure as it is"),
+    (Effect::PneumaticLag, false, "rapier follows the line pressure without lag"),
     (Effect::Creep, false, "rapier's springs do not creep"),
 ];
 
@@ -337,10 +337,10 @@ mod tests {
         let start = placement.world_from_object.expect("a ball").position.z;
         let risen = frames[29].world_from_object.expect("a ball").position.z - start;
         assert!(risen > 1e-3, "the ball rose by {risen} m");
-        let felt: DVec3 = simulation.hand.touches().iter().map(|touch| touch.force).sum();
+        let on_fingers: DVec3 = simulation.hand.touches().iter().map(|touch| touch.force).sum();
         let weight = ball.mass.mass * scene.world.gravity;
-        assert!((-felt.z / weight - 1.0).abs() < 0.01, "{felt} N carry {weight} N");
-        assert!(felt.truncate().length() < 0.02 * weight, "{felt}");
+        assert!((-on_fingers.z / weight - 1.0).abs() < 0.01, "{on_fingers} N carry {weight} N");
+        assert!(on_fingers.truncate().length() < 0.02 * weight, "{on_fingers}");
         // Taxels carry the same force as segments.
         let frame = simulation.frame();
         let squeeze: f64 = Side::BOTH.iter().map(|side| frame.normal_force(*side, 160)).sum();
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_scene_gives_the_same_frames_and_a_copy_goes_on_alike() {
+    fn the_same_scene_gives_the_same_frames_and_a_copy_continues_alike() {
         let (scene, ball) = (Scene::default(), ball());
         let [mut a, mut b] = [(); 2].map(|()| RapierSimulation::new(&scene, Some(&ball)).0);
         assert_eq!(run_to(&mut a, &scene, 0.9), run_to(&mut b, &scene, 0.9));
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_the_range_of_numbers_is_named() {
+    fn a_body_that_is_not_finite_is_named() {
         let (mut simulation, _) = RapierSimulation::new(&Scene::default(), Some(&ball()));
         simulation.pull_object(DVec3::splat(1e300));
         let error = simulation.advance_by(1).expect_err("infinite");

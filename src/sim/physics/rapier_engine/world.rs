@@ -1,7 +1,7 @@
 //! The scene as rapier3d's bodies: two multibody chains, the object, what it stands on.
 //!
 //! Everything is in the gripper frame, in rapier's own units: rapier and parry hold absolute tolerances made for bodies
-//! of about a metre, so that 50 mm are one unit of length here (what `length_unit` = 0.05 says, but for parry too).
+//! of about a metre, so that 50 mm are one unit of length here (like `length_unit` = 0.05, but for parry too).
 
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, Gripper, Side};
@@ -44,7 +44,7 @@ const TIP_CHAMFER: f64 = 0.00125;
 /// segment to enter, and a hull is found 20 times as fast as a mesh.
 const NEARLY_CONVEX: f64 = 0.1;
 
-/// Groups: what is in which, so that fingers meet neither themselves nor each other, as in Palpate's own engine.
+/// Collision groups: fingers meet neither themselves nor each other, as in Palpate's own engine.
 const FINGERS: Group = Group::GROUP_1;
 const OBJECT: Group = Group::GROUP_2;
 const SUPPORT: Group = Group::GROUP_3;
@@ -230,8 +230,8 @@ impl Hand {
         self.object = Some(body);
     }
 
-    /// Sets the actuation torque on every joint of a finger (N m), as the rest angle tau / k of its springs: springs are
-    /// taken at the end of a step, torques would not be.
+    /// Sets the actuation torque on every joint of a finger (N m), as the rest angle tau / k of its springs: springs
+    /// are taken at the end of a step, torques would not be.
     pub(super) fn set_torque(&mut self, side: Side, torque: f64) {
         let (stiffness, rest) = ((self.stiffness * TORQUE) as f32, (torque / self.stiffness) as f32);
         for handle in &self.joints[side.index()] {
@@ -332,7 +332,7 @@ fn parameters(h: f64) -> IntegrationParameters {
         contact_softness: softness,
         static_contact_softness: softness,
         friction_model: FrictionModel::Coulomb,
-        // Contacts are found anew in every step: what is reused is up to 2.5 mm old.
+        // Contacts are found anew in every step: reused ones would be up to 2.5 mm old.
         contact_recycling: false,
         ..IntegrationParameters::default()
     }
@@ -371,7 +371,8 @@ fn segment_shape(gripper: &Gripper, plane: &FingerPlane, reach: f64, chamfer: f6
     SharedShape::convex_hull(&corners)
 }
 
-/// A solid of the object as rapier's shape, and its place in the object's frame. A mesh that is not convex stays a mesh.
+/// A solid of the object as rapier's shape, and its place in the object's frame. A mesh that is not convex stays a
+/// mesh.
 fn part_shape(part: &SolidPart) -> Option<(SharedShape, Pose)> {
     match part {
         SolidPart::Primitive(shape, object_from_shape) => {

@@ -33,7 +33,7 @@ pub(super) fn squeezed_masses(conditions: &Conditions) -> Findings {
             run.cover(1.5, ramp)?;
             let pulled = |t: f64| Drive { object_force: DVec3::Y * (pull * t.min(1.0)), ..torque(FULL_TORQUE) };
             run.cover(5.0, pulled)?;
-            // Of means over half a second, since what is held may still ring.
+            // Means over half a second, since a held object may still ring.
             let [early, late] = [mean_centre(&mut run, pulled(1.0))?, mean_centre(&mut run, pulled(1.0))?];
             let creep = (late - early).length() / 0.5;
             let moved = (run.object_centre() - start).length();
@@ -210,14 +210,14 @@ pub(super) fn thin_things(conditions: &Conditions) -> Findings {
         scene.gripper.mount.offset = [0.0, 0.0007, -0.012];
         let object = ObjectModel::from_primitive(name, shape, 400.0, 0.6);
         let mut run = stepped(&scene, Some(&object), conditions);
-        let mut felt = 0.0f64;
+        let mut force = 0.0f64;
         for k in 0..(3.0 / conditions.h()) as usize {
             let t = k as f64 * conditions.h();
             run.step(&torque(2.0 * FULL_TORQUE * (t / 1.5).min(1.0)))?;
-            felt = felt.max(run.skin_forces().map(|force| force.normal).fold(0.0, f64::max));
+            force = force.max(run.skin_forces().map(|force| force.normal).fold(0.0, f64::max));
         }
         let depth = run.deepest() / scene.gripper.pad.thickness;
-        findings.push(Measurement::at_least(format!("force felt on the {name} [N]"), felt, 0.01));
+        findings.push(Measurement::at_least(format!("force on the {name} [N]"), force, 0.01));
         findings.push(Measurement::at_most(format!("depth over the pad's thickness: {name}"), depth, 1.0));
         let across = run.tip().0 - run.half_gap();
         findings.push(Measurement::at_most(format!("tip beyond the {name} [m]"), across, 0.002));

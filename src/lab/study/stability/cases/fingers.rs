@@ -55,8 +55,8 @@ pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
     run.state.q[..10].fill(-0.06);
     run.state.q[10..].fill(-0.05);
     let start = run.energy();
-    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows what an error of it in every joint
-    // is worth when the springs are at their tightest.
+    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows what an error of it in every
+    // joint is worth when the springs are at their tightest.
     let tightest: f64 = run.state.q.iter().map(|q| q.abs()).sum();
     let allowed = 1e-6 + conditions.setting.tolerance() * scene.gripper.finger.joint_stiffness() * tightest;
     let (mut before, mut largest) = (start, 0.0f64);

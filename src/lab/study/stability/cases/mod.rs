@@ -73,7 +73,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "thin things",
-        claim: "a 1 mm plate, a card edge-on and needles are felt and not crossed",
+        claim: "a 1 mm plate, a card edge-on and needles are touched and not crossed",
         settings: Settings::EveryAccuracyAnd(&[0.02]),
         measure: contact::thin_things,
     },
@@ -85,7 +85,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "resting masses",
-        claim: "0.1 g .. 100 kg on the pedestal, pulled at as on a slope, sink as far as the scene says and do not creep",
+        claim: "0.1 g .. 100 kg on the pedestal, pulled at as on a slope, sink as far as set in the scene and do not creep",
         settings: EVERY,
         measure: motion::resting_masses,
     },
