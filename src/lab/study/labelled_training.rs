@@ -78,7 +78,7 @@ pub struct JudgedModel {
     pub evaluation: Evaluation,
     /// Trials to learn from, and to judge by.
     pub trials: [usize; 2],
-    /// Objects left out because there are too few trials of them.
+    /// Objects left out for too few trials.
     pub too_few: Vec<LabelledClass>,
     /// Trials that could not be used: without calibration, or not sound.
     pub left_out: usize,
@@ -96,7 +96,7 @@ pub enum TrainingError {
         /// Number of objects with enough trials.
         found: usize,
     },
-    /// After what could not be read was left out, too little is there.
+    /// Too few readable trials.
     #[error(
         "{usable} of {all} trials can be used, and only {found} of the objects have {LEAST_TRIALS} of them or more: see \
          which parts are calibrated by `palpate calibrate list`"

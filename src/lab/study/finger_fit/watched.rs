@@ -38,7 +38,7 @@ impl<P: Problem> Problem for Watched<'_, P> {
         }
         let residuals = self.problem.residuals(x);
         self.looks += 1;
-        // A step looks at its end, and beside that along each parameter; so does what comes before the first one.
+        // A step evaluates the residuals at its end and along each parameter; so does the preparation of the first one.
         let in_steps = f64::from(self.looks) / (x.len() + 1) as f64 - 1.0;
         (self.watch.progress)(in_steps.max(0.0));
         residuals

@@ -315,7 +315,7 @@ pub struct RandomReport {
     pub friction_residual_p99: f64,
     /// Answers that change with the step.
     pub wrong: usize,
-    /// Of these, answers that a push of a micrometre changes too: there is no right one.
+    /// Of these, answers that a push of a micrometre changes too: no answer is right.
     pub no_answer: usize,
     /// Wrong answers, other than those, that no flag was raised for.
     pub silently_wrong: usize,
@@ -323,7 +323,7 @@ pub struct RandomReport {
     pub examples: Vec<u64>,
     /// The same by length of step.
     pub by_step: Vec<StepRow>,
-    /// The flags, singly and together, over all answers but those to which there is no right one.
+    /// The flags, singly and together, over all answers except those without a right one.
     pub flags: Vec<FlagRow>,
 }
 

@@ -1,4 +1,4 @@
-//! The hard cases: one line each, and a function that measures in one of the files beside.
+//! The hard cases: one line each, with a measuring function in one of the submodules.
 
 mod contact;
 mod fingers;
