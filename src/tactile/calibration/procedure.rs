@@ -158,7 +158,7 @@ impl Procedure {
         let Some(next) = self.next() else {
             return match (self.record.kind, &self.record.bending) {
                 (SensorKind::Pad, None) => {
-                    "all points are taken; let the empty hand close once, so that its bending is not felt as \
+                    "all points are taken; let the empty hand close once, so that its bending is not read as \
                                       a force"
                         .to_owned()
                 }
