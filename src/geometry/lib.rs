@@ -27,7 +27,7 @@
 //! let cube = Primitive::Cuboid { half: DVec3::splat(0.02) }.tessellate();
 //! let sound = repair(&cube).expect("a closed mesh").mesh;
 //! let mass = mass_properties(&sound, 500.0);
-//! assert!((mass.mass - 0.032).abs() < 1e-9); // 64 cm³ at 500 kg/m³
+//! assert!((mass.mass - 0.032).abs() < 1e-6); // 64 cm³ at 500 kg/m³
 //! ```
 //!
 //! SI units; poses are named `outer_from_inner`.
