@@ -9,7 +9,7 @@ use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
 use palpate_store::{CalibrationId, Store, StoredCalibration, read_points_csv};
 use palpate_tactile::board::{Board, Sensor};
-use palpate_tactile::calibration::{Calibration, Input, Kind, Record};
+use palpate_tactile::calibration::{Calibration, Input, Record, SensorKind};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -131,7 +131,7 @@ fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: &Store) -> R
 }
 
 fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, file: &Path) -> Result<Record, Failure> {
-    let kind = Kind::of(sensor);
+    let kind = SensorKind::of(sensor);
     let board = Board { full_scale: arguments.full_scale, ..Board::default() };
     let mut input = Input::on(&board, sensor);
     input.divider.fixed_ohm = arguments.resistor.unwrap_or(input.divider.fixed_ohm);
@@ -153,12 +153,12 @@ fn print(calibration: &Calibration) -> Result<(), Failure> {
     let kind = calibration.record.kind;
     let residual = |residual: Option<f64>| match (kind, residual) {
         (_, None) => String::new(),
-        (Kind::Flex, Some(off)) => format!("{:+.2}", off.to_degrees()),
-        (Kind::Pad, Some(off)) => format!("{:+.1}", 100.0 * off),
+        (SensorKind::Flex, Some(off)) => format!("{:+.2}", off.to_degrees()),
+        (SensorKind::Pad, Some(off)) => format!("{:+.1}", 100.0 * off),
     };
     let worst = match kind {
-        Kind::Flex => 3f64.to_radians(),
-        Kind::Pad => 0.1,
+        SensorKind::Flex => 3f64.to_radians(),
+        SensorKind::Pad => 0.1,
     };
     let rows: Vec<Vec<String>> = calibration
         .record
@@ -173,8 +173,8 @@ fn print(calibration: &Calibration) -> Result<(), Failure> {
         })
         .collect();
     let (stimulus, off) = match kind {
-        Kind::Flex => ("angle [deg]", "residual [deg]"),
-        Kind::Pad => ("load [kg]", "residual [%]"),
+        SensorKind::Flex => ("angle [deg]", "residual [deg]"),
+        SensorKind::Pad => ("load [kg]", "residual [%]"),
     };
     table(&[stimulus, "counts", "kOhm", off, "     -  0  +"], &rows)?;
     say(calibration.summary())?;

@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result
         theme: arguments.theme,
         size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
         forces: !arguments.no_forces,
-        furniture: !arguments.bare,
+        annotations: !arguments.bare,
         badge: Some(badge).filter(|_| !arguments.bare),
         ..PictureView::default()
     };

@@ -34,7 +34,7 @@ impl SolidPart {
     }
 }
 
-/// Why a grid could not be baked.
+/// Error of baking a distance grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BakeError {
     /// Nothing to bake.
@@ -43,7 +43,7 @@ pub enum BakeError {
     /// The lattice would not fit into reasonable memory.
     #[error("a distance grid of {nodes} nodes is too fine; raise solver.distance_cell (the limit is 8 million nodes)")]
     TooFine {
-        /// Nodes asked for.
+        /// Nodes needed.
         nodes: usize,
     },
 }
@@ -170,7 +170,7 @@ impl CoarseLattice {
     }
 }
 
-/// Whether each node lies inside, by majority of the winding numbers along x, y and z.
+/// Marks the nodes that lie inside, by majority of the winding numbers along x, y and z.
 fn inside_by_winding(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<bool> {
     let votes: Vec<Vec<bool>> = [0, 1, 2].into_par_iter().map(|axis| inside_along(grid, mesh, axis)).collect();
     (0..grid.values.len()).map(|n| votes.iter().filter(|vote| vote[n]).count() >= 2).collect()

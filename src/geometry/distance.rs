@@ -4,7 +4,7 @@ use super::{Bounds, Pose, Primitive};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// What contact detection asks of a solid. Points are in the solid's own frame.
+/// Signed distance of a solid, as contact detection reads it. Points are in the solid's own frame.
 #[derive(Clone, Debug)]
 pub enum DistanceField {
     /// One primitive somewhere in the frame, exact.

@@ -1,5 +1,36 @@
-//! Shapes and what can be drawn: units, colours, meshes and their repair, hulls, distance grids, mass, the draw list
-//! and its camera. SI units; poses are named `outer_from_inner`.
+//! Shapes, and the draw list of pictures.
+//!
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers. Most are private; their items stand at the root of the crate.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | [`units`] | conversions to and from SI units |
+//! | 0 | [`palette`] | colours, themes and colour maps |
+//! | 0 | `circle`, `hull` | curvature of tracked points; area of a planar hull |
+//! | 0 | `pose` | position and orientation of a frame |
+//! | 1 | `mesh` | triangle meshes and bounds |
+//! | 2 | `mesh_files` | OBJ and STL in, OBJ out |
+//! | 2 | `modelling`, `repair`, `support_points`, `mass` | meshes made and repaired, extreme points, mass properties |
+//! | 3 | `primitive`, `convex`, `surface` | closed-form solids, convex hulls, meshes to draw |
+//! | 4 | `distance` | signed distance of solids |
+//! | 4 | [`drawing`] | draw list, camera, two-dimensional overlay |
+//! | 5 | `bake` | distance grids of meshes |
+//!
+//! # Example
+//!
+//! ```
+//! use glam::DVec3;
+//! use palpate_geometry::{Primitive, mass_properties, repair};
+//!
+//! let cube = Primitive::Cuboid { half: DVec3::splat(0.02) }.tessellate();
+//! let sound = repair(&cube).expect("a closed mesh").mesh;
+//! let mass = mass_properties(&sound, 500.0);
+//! assert!((mass.mass - 0.032).abs() < 1e-6); // 64 cm³ at 500 kg/m³
+//! ```
+//!
+//! SI units; poses are named `outer_from_inner`.
 
 mod bake;
 mod circle;

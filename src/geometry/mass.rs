@@ -3,7 +3,7 @@
 use super::{Pose, TriMesh};
 use glam::{DMat3, DVec3, Vec3};
 
-/// What a rigid body weighs and how it resists turning.
+/// Mass properties of a rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// Mass (kg).

@@ -21,7 +21,7 @@ pub struct ColouredPart {
     pub colour: Option<Rgb>,
 }
 
-/// Why a mesh file could not be read.
+/// Error of reading a mesh file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
     /// The file type is not one we read.
@@ -37,7 +37,7 @@ pub enum MeshFileError {
     Unreadable {
         /// File name.
         name: String,
-        /// What the system says.
+        /// Message of the operating system.
         cause: String,
     },
     /// The contents are not what the file type promises.
@@ -45,7 +45,7 @@ pub enum MeshFileError {
     Damaged {
         /// File name.
         name: String,
-        /// What is wrong.
+        /// Cause.
         cause: String,
     },
     /// Too big to be meant.
@@ -53,7 +53,7 @@ pub enum MeshFileError {
     TooLarge {
         /// File name.
         name: String,
-        /// How large it is and what the limit is.
+        /// Its size and the limit.
         what: String,
     },
 }
@@ -137,7 +137,7 @@ fn parse_obj(
 }
 
 fn parse_stl(name: &str, mut bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
-    // A binary file announces its count; believe it only when the bytes are there. Its header may say "solid" too.
+    // A binary file announces its count; trust it only when the bytes are there. Its header may start with "solid" too.
     let announced = bytes.get(80..84).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
     let expected = announced.map(|n| 84 + 50 * n);
     let looks_like_text = bytes.trim_ascii_start().starts_with(b"solid") && expected != Some(bytes.len());
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn stl_comes_in_many_dresses() {
+    fn stl_is_read_in_all_its_forms() {
         let facet = |z: f32| {
             format!(
                 "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"

@@ -73,7 +73,7 @@ pub fn pressure_colour(share: f32) -> Rgb {
     PRESSURE_MAP[low].mix(PRESSURE_MAP[low + 1], at - low as f32)
 }
 
-/// Dark or light.
+/// Theme.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Theme {
@@ -97,7 +97,7 @@ pub struct ThemeColours {
     pub text: Rgb,
     /// Text that matters less.
     pub quiet_text: Rgb,
-    /// What is active, chosen or to be pressed.
+    /// Active, selected and clickable elements.
     pub accent: Rgb,
     /// Something deserves a look.
     pub warning: Rgb,
@@ -160,8 +160,8 @@ impl Theme {
     }
 }
 
-/// What a trace shows. Hue stands for the kind of sensor, shade for the place on the finger; the finger itself is
-/// told by the dash of the line, never by colour alone.
+/// Quantity shown by a trace. Hue stands for the kind of sensor, shade for the place on the finger; the finger itself
+/// is shown by the dash of the line, never by colour alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trace {
     /// Curvature of the whole finger or of its proximal half.

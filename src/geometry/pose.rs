@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 /// A rigid transform: rotate, then translate (m).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Where the origin of the inner frame lies in the outer frame (m).
+    /// Origin of the inner frame in the outer frame (m).
     pub position: DVec3,
-    /// How the inner frame is turned in the outer frame (unit quaternion).
+    /// Orientation of the inner frame in the outer frame (unit quaternion).
     pub rotation: DQuat,
 }
 

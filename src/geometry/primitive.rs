@@ -248,7 +248,7 @@ mod tests {
     ];
 
     #[test]
-    fn distances_known_by_heart() {
+    fn distances_match_closed_forms() {
         assert_eq!(ALL[0].distance(DVec3::new(0.0, 0.0, 0.05)), 0.030000000000000002);
         assert!((ALL[1].distance(DVec3::new(0.043, 0.029, 0.0)) - 0.005).abs() < 1e-15);
         assert!((ALL[1].distance(DVec3::new(0.0, 0.0, 0.015)) + 0.005).abs() < 1e-15);

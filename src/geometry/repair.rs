@@ -11,7 +11,7 @@ use super::TriMesh;
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 
-/// Why a mesh cannot serve as a solid.
+/// Reason why a mesh is no solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// No triangles at all, or none left after removing degenerate ones.
@@ -20,13 +20,13 @@ pub enum MeshError {
     /// A coordinate is NaN or infinite.
     #[error("corner {index} of the mesh is not a finite number")]
     NotFinite {
-        /// Which corner.
+        /// Index of the corner.
         index: usize,
     },
     /// A triangle names a corner that does not exist.
     #[error("triangle {index} of the mesh names a corner that does not exist")]
     BadIndex {
-        /// Which triangle.
+        /// Index of the triangle.
         index: usize,
     },
     /// All corners lie in a plane or on a line, or the volume is zero.
@@ -43,7 +43,7 @@ pub enum MeshError {
         /// Width of the widest (mm).
         widest_mm: f64,
     },
-    /// The surface crosses itself so that inside and outside cannot be told apart.
+    /// The surface crosses itself, so that inside and outside are not defined.
     #[error(
         "the mesh has no consistent inside (one-sided or tangled surface); repair it in a modelling tool, \
          or set object.collision = \"hull\""
@@ -75,7 +75,7 @@ const SMALL_HOLE: f64 = 0.2;
 /// has 5e-5, a 0.1 mm card of 85 x 54 mm has 5e-4.
 const FLAT: f64 = 1e-7;
 
-/// Checks and mends a mesh. See the module page for what is mended and what is refused.
+/// Checks and repairs a mesh. The module page lists repairs and refusals.
 pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
     check_numbers(mesh)?;
     let diagonal = mesh.bounds().size().length();
@@ -232,7 +232,7 @@ fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<(), MeshError> 
 
 /// A connected piece of a mesh.
 struct Piece {
-    /// Which triangles of the mesh.
+    /// Indices of its triangles in the mesh.
     places: Vec<usize>,
     /// The same, with one winding.
     triangles: Vec<[u32; 3]>,
@@ -257,7 +257,7 @@ fn is_cavity(mesh: &TriMesh, pieces: &[Piece], k: usize) -> bool {
     around.len() % 2 == 1 && around.iter().any(|outer| (outer.volume < 0.0) != (pieces[k].volume < 0.0))
 }
 
-/// How often a ray from a point crosses some triangles. Its direction runs along nothing that people model.
+/// Number of crossings of a ray from a point with some triangles. Its direction is oblique to usual edges.
 fn crossings(mesh: &TriMesh, triangles: &[[u32; 3]], from: DVec3) -> usize {
     let direction = DVec3::new(0.816_18, 0.463_07, 0.345_51);
     let crosses = |t: &&[u32; 3]| {
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_solid_is_refused() {
+    fn meshes_that_are_no_solid_are_refused() {
         assert_eq!(repair(&TriMesh::default()).err(), Some(MeshError::Empty));
         let mut broken = cube();
         broken.points[3].y = f64::NAN;

@@ -1,4 +1,4 @@
-//! Meshes as they are drawn: single precision, a normal and a colour at every corner.
+//! Meshes to draw: single precision, a normal and a colour at every corner.
 
 use super::{ColouredPart, TriMesh};
 use crate::palette::Rgb;

@@ -12,7 +12,7 @@ pub fn mm(metres: f64) -> f64 {
     metres * 1e3
 }
 
-/// Newtons to the mass in kilograms whose weight they are ("kg of load", as sensor sheets say).
+/// Newtons to the mass in kilograms whose weight they are ("kg of load" in data sheets).
 pub fn kg_of_load(newtons: f64) -> f64 {
     newtons / STANDARD_GRAVITY
 }

@@ -1,4 +1,4 @@
-//! Puts a finished picture into somebody else's render pass.
+//! Draws a finished picture into a render pass of the caller.
 
 use super::shaders;
 use wgpu::{BindGroup, BindGroupLayout, Device, RenderPass, RenderPipeline, Sampler, TextureFormat, TextureView};

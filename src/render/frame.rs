@@ -1,4 +1,4 @@
-//! What all passes share: camera, light and shadow, as one uniform and its bindings.
+//! Uniforms shared by all passes: camera, light and shadow.
 
 use super::shadow::{ShadowMap, light_from_world};
 use bytemuck::{Pod, Zeroable};
@@ -87,9 +87,9 @@ impl FrameBindings {
     }
 }
 
-/// Where the key light stands: to the front left, well above.
+/// Direction of the key light: from the front left, well above.
 const TOWARDS_LIGHT: Vec3 = Vec3::new(-0.45, -0.60, 1.10);
-/// How dark shadows are, 0 to 1.
+/// Darkness of shadows, 0 to 1.
 const SHADOW_STRENGTH: f32 = 0.92;
 
 impl FrameUniform {

@@ -2,7 +2,7 @@
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Limits, Queue};
 
-/// Which drivers to look for.
+/// Choice of graphics drivers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DriverChoice {
     /// Whatever there is: Vulkan before OpenGL, hardware before software. `WGPU_BACKEND` overrides it.
@@ -12,7 +12,7 @@ pub enum DriverChoice {
     OpenGl,
 }
 
-/// Why there is no device.
+/// Error of opening a graphics device.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
     /// No driver at all.
@@ -27,7 +27,7 @@ pub enum GpuError {
     NoDevice {
         /// Its name.
         driver: String,
-        /// What it says.
+        /// Its message.
         cause: String,
     },
 }

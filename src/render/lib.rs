@@ -1,11 +1,35 @@
-//! Draws Palpate's soft fingers and objects: a [`DrawList`](palpate_geometry::drawing::DrawList) in, pixels out.
+//! Pictures of soft fingers and objects: a [`DrawList`](palpate_geometry::drawing::DrawList) in, pixels out.
 //!
 //! The same code draws into the window, into test pictures and off-screen. It keeps within WebGL2's limits: no compute,
 //! no storage buffers, four samples.
 //!
-//! - [`Renderer`] draws a list into a texture of its own; [`Blit`] puts that texture into a window.
-//! - [`Gpu`] finds a graphics device without a window; [`Picture`] is what comes out.
-//! - `passes` holds one file for each kind of thing that is drawn, beside the shader of the same name in `shaders/`.
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers. All are private; their items stand at the root of the crate.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | `gpu` | graphics device without a window ([`Gpu`]) |
+//! | 0 | `shaders`, `targets`, `text` | WGSL sources, render targets, glyph atlas |
+//! | 1 | `blit`, `shadow` | copy of a picture into another render pass ([`Blit`]), shadow map |
+//! | 2 | `frame` | uniforms shared by all passes |
+//! | 3 | `passes` | one file for each kind of item, beside its shader of the same name |
+//! | 4 | `renderer` | draws a list into its own texture ([`Renderer`]) |
+//! | 5 | `picture` | pixels in memory, PNG ([`Picture`]) |
+//!
+//! # Example
+//!
+//! ```no_run
+//! use palpate_geometry::drawing::DrawList;
+//! use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+//!
+//! fn save(list: &DrawList, choice: DriverChoice) -> Result<(), Box<dyn std::error::Error>> {
+//!     let gpu = Gpu::headless(choice)?;
+//!     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+//!     Picture::draw(&gpu, &mut renderer, list, [640, 480], 1.0)?.save("picture.png".as_ref())?;
+//!     Ok(())
+//! }
+//! ```
 
 mod blit;
 mod frame;

@@ -15,19 +15,19 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
-/// Why there is no picture.
+/// Error of making a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// The device failed while drawing.
     #[error("the picture could not be read back from the graphics driver: {cause}")]
     Device {
-        /// What the driver says.
+        /// Message of the driver.
         cause: String,
     },
     /// The bytes are no picture.
     #[error("these bytes are not a PNG picture: {cause}")]
     Decode {
-        /// What is wrong.
+        /// Cause.
         cause: String,
     },
     /// The file could not be written.
@@ -35,7 +35,7 @@ pub enum PictureError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         cause: String,
     },
 }

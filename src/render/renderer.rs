@@ -21,7 +21,7 @@ impl std::fmt::Debug for Renderer {
     }
 }
 
-/// Pictures are at least this large (pixels); a panel dragged shut asks for less.
+/// Pictures are at least this large (pixels); a panel dragged shut would need less.
 const SMALLEST: u32 = 1;
 
 impl Renderer {

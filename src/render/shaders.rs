@@ -66,7 +66,7 @@ mod tests {
         for file in std::fs::read_dir(folder).unwrap() {
             let path = file.unwrap().path();
             if let Some(stem) = path.file_stem().filter(|_| path.is_file()) {
-                assert!(names.contains(&stem.to_str().unwrap()), "{} is drawn by nobody", path.display());
+                assert!(names.contains(&stem.to_str().unwrap()), "{} has no pass", path.display());
             }
         }
     }

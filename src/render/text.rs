@@ -40,7 +40,7 @@ pub(crate) struct Glyphs {
     view: TextureView,
     texels: Vec<u8>,
     stored: HashMap<(GlyphId, u32), Option<Stored>>,
-    /// Where the next glyph goes: x, y, and the height of the row.
+    /// Position of the next glyph: x, y, and the height of the row.
     free: [u32; 3],
     changed: bool,
 }

@@ -1,10 +1,10 @@
-//! What a simulation samples, and how far it can be trusted: plain records, raw quantities only.
+//! Samples of a simulation and their numerical quality: plain records, raw quantities only.
 
 use crate::gripper::{Phase, Side};
 use palpate_geometry::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Load on one taxel at one sample, in the axes of its segment: what the finger feels.
+/// Load on one taxel at one sample, in the axes of its segment: the force on the finger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaxelLoad {
     /// Left pad's taxels first, then the right pad's; see [`crate::gripper::TaxelGrid`].
@@ -20,13 +20,13 @@ pub struct TaxelLoad {
 /// Everything sampled at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Which sample of the trial, from 0.
+    /// Index of the sample, from 0.
     pub sample: u32,
     /// Time since the start of the trial (s).
     pub t: f64,
     /// Commanded line pressure (bar).
     pub line_bar: f64,
-    /// What the programme was doing.
+    /// Phase of the programme.
     pub phase: Phase,
     /// Joint angles, left finger then right, from palm to tip (rad).
     pub q: Vec<f64>,
@@ -58,7 +58,7 @@ impl Frame {
     }
 }
 
-/// How far a simulated trial can be trusted.
+/// Numerical quality of a simulated trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Quality {
@@ -87,7 +87,7 @@ pub struct Quality {
     /// Largest torque at any joint that neither springs nor contacts account for at the end of the hold, as a share
     /// of the actuation torque. Far from zero means the grasp had not come to rest.
     pub static_residual: f64,
-    /// Where and when forces did not balance; absent where every step reached its tolerance.
+    /// Place and time of the imbalance; absent where every step reached its tolerance.
     pub imbalance: Option<Imbalance>,
 }
 
@@ -98,9 +98,9 @@ pub struct Imbalance {
     pub first_tick: u64,
     /// Its time (s).
     pub first_s: f64,
-    /// What was farthest from balance in the worst such step: `joint 4 of the left finger`, `the object`.
+    /// Place of the largest imbalance: `joint 4 of the left finger`, `the object`.
     pub worst_at: String,
-    /// What was left there, as a multiple of what the tolerance allows.
+    /// Residual there over the residual that the tolerance allows.
     pub worst_excess: f64,
 }
 
@@ -110,7 +110,7 @@ impl Quality {
         self.finite && self.converged
     }
 
-    /// What is wrong with a trial that did not converge, in a sentence.
+    /// Describes why a trial did not converge, in a sentence.
     pub fn misses(&self) -> Option<String> {
         let (missed, steps) = (self.unconverged_steps, self.steps);
         let place = |imbalance: &Imbalance| {
@@ -142,33 +142,33 @@ impl Default for Quality {
     }
 }
 
-/// One effect as a simulation took it.
+/// Decision about one effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedEffect {
     /// Its name in the scene's `[effects]`.
     pub name: String,
-    /// What the scene says: `off`, `auto` or `on`.
+    /// Setting in the scene: `off`, `auto` or `on`.
     pub setting: String,
-    /// Whether it was simulated.
+    /// True where it was simulated.
     pub on: bool,
-    /// How much the scene calls for it, without dimension; never infinite.
+    /// Dimensionless number that is compared with the threshold; never infinite.
     pub number: f64,
     /// `auto` means on where the number is above this.
     pub threshold: f64,
-    /// Why, in words.
+    /// Reason.
     pub reason: String,
 }
 
-/// Which effects a simulation takes into account and why; made once, when the scene is built.
+/// Effects of a simulation, with the reason for each; decided once, when the scene is built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Plan {
-    /// In the order in which effects are told; empty for trials from before there were effects.
+    /// In the order of [`Effect::ALL`](crate::scene::Effect::ALL); empty for trials of versions without effects.
     pub effects: Vec<PlannedEffect>,
 }
 
 impl Plan {
-    /// Whether an effect is simulated. One that the plan does not have is not.
+    /// True where an effect is simulated; false where the plan does not list it.
     pub fn is_on(&self, name: &str) -> bool {
         self.effects.iter().any(|effect| effect.name == name && effect.on)
     }
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loads_are_told_apart_by_side() {
+    fn loads_are_separated_by_side() {
         let load = |taxel, normal| TaxelLoad { taxel, normal, along: 0.0, across: 0.0 };
         let frame = Frame {
             sample: 0,

@@ -3,34 +3,30 @@
 
 use crate::frame::Frame;
 use crate::objects::ObjectModel;
-use crate::physics::{natural_rotations, random_rotation};
+#[cfg(feature = "rapier")]
+use crate::physics::natural_rotations;
+use crate::physics::random_rotation;
 use crate::run::SimRun;
 use crate::scene::{Between, Faces, ObjectSetup, Scene, SupportKind};
 use glam::{DQuat, DVec2, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Draws before a scene that leaves no room is accepted as it is.
+/// Draws before a scene without room is accepted.
 const MOST_DRAWS: u32 = 100;
 
-/// Draws poses for one object in one scene, as the scene's `pose` says.
+/// Sampler of poses for one object in one scene, by the scene's `pose`.
 #[derive(Clone, Debug)]
 pub struct PoseSampler {
     scene: Scene,
-    /// Where natural faces are wanted: orientations to draw from.
+    /// Resting orientations to draw from; empty where the scene does not use them.
     natural: Vec<DQuat>,
 }
 
 impl PoseSampler {
     /// Prepares to draw; finding the natural faces takes some tenths of a second.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> Self {
-        // A free object cannot lie anyhow: it would fall off its pedestal before the fingers come.
-        let lies_naturally = match scene.pose.faces {
-            Faces::Nominal => false,
-            Faces::Natural => true,
-            Faces::Any => !scene.holds_object(),
-        };
-        let natural = object.filter(|_| lies_naturally).map(natural_rotations).unwrap_or_default();
+        let natural = object.filter(|_| scene.uses_resting_faces()).map(natural_rotations).unwrap_or_default();
         Self { scene: scene.clone(), natural }
     }
 
@@ -48,8 +44,8 @@ impl PoseSampler {
         (drawn, MOST_DRAWS)
     }
 
-    /// The scene of a grasp that follows another of the same object, which the fingers have left as it is in
-    /// `released`. It stays there where the scene says so and it still lies on its support; in all other cases this is
+    /// The scene of a grasp that follows another of the same object, which the fingers have left as in
+    /// `released`. It stays there if the scene is set so and it still lies on its support; in all other cases this is
     /// [`PoseSampler::draw`].
     pub fn draw_after(&self, object: Option<&ObjectModel>, seed: u64, released: Option<&Frame>) -> (Scene, u32) {
         let left = released.and_then(|frame| self.left_behind(object?, frame));
@@ -101,13 +97,19 @@ impl PoseSampler {
     }
 }
 
-/// Lays the object as a rotation says.
+/// Without the feature no object can be dropped; [`Scene::check`] refuses scenes that need it.
+#[cfg(not(feature = "rapier"))]
+fn natural_rotations(_object: &ObjectModel) -> Vec<DQuat> {
+    Vec::new()
+}
+
+/// Sets the object's orientation.
 fn lay(scene: &mut Scene, rotation: DQuat) {
     let (yaw, pitch, roll) = rotation.to_euler(EulerRot::ZYX);
     scene.object.rotation_deg = [roll, pitch, yaw].map(f64::to_degrees);
 }
 
-/// One pose of an object in a scene; whoever wants many keeps a [`PoseSampler`].
+/// Draws one pose of an object in a scene; for many, keep a [`PoseSampler`].
 pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scene, u32) {
     PoseSampler::new(scene, object).draw(object, seed)
 }
@@ -115,6 +117,7 @@ pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scen
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "rapier")]
     use crate::scene::{PRESETS, PosePreset};
     use glam::DVec3;
     use palpate_geometry::Primitive;
@@ -123,6 +126,7 @@ mod tests {
         ObjectModel::from_primitive("brick", Primitive::Cuboid { half: DVec3::new(0.015, 0.03, 0.006) }, 500.0, 0.5)
     }
 
+    #[cfg(feature = "rapier")]
     #[test]
     fn a_seed_names_a_pose_within_its_range() {
         for preset in PRESETS {
@@ -139,6 +143,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "rapier")]
     #[test]
     fn natural_faces_are_flat_ones() {
         let poses = PosePreset::named("B").expect("in the list").poses();
@@ -153,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_stay_within_what_a_scene_file_may_say() {
+    fn poses_stay_within_the_range_of_scene_files() {
         let mut scene = Scene::default();
         scene.gripper.mount.yaw_deg = 179.0;
         for seed in 0..20 {

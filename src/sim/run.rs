@@ -3,7 +3,9 @@
 use crate::frame::{Frame, Plan, Quality};
 use crate::gripper::{Phase, Programme};
 use crate::objects::ObjectModel;
-use crate::physics::{Engine, Placement, RapierSimulation, Refinement, Simulation, SimulationError};
+#[cfg(feature = "rapier")]
+use crate::physics::RapierSimulation;
+use crate::physics::{Engine, Placement, Refinement, Simulation, SimulationError};
 use crate::scene::{EngineKind, Scene};
 use glam::DVec3;
 
@@ -25,16 +27,17 @@ pub enum SimEvent {
 #[derive(Clone, Debug)]
 pub struct SimRun {
     engine: EngineRun,
-    /// The actuation tick that has been asked for, so that it is asked for once.
-    asked: Option<u32>,
+    /// The last actuation tick reported, so that each is reported once.
+    reported: Option<u32>,
     phase: Phase,
     static_residual: Option<f64>,
 }
 
-/// The engine that the scene asks for.
+/// The engine of the scene.
 #[derive(Clone, Debug)]
 enum EngineRun {
     Palpate(Box<Simulation>),
+    #[cfg(feature = "rapier")]
     Rapier(Box<RapierSimulation>),
 }
 
@@ -45,16 +48,20 @@ impl EngineRun {
                 let (simulation, placement) = Simulation::refined(scene, object, refinement);
                 (Self::Palpate(Box::new(simulation)), placement)
             }
+            #[cfg(feature = "rapier")]
             EngineKind::Rapier => {
                 let (simulation, placement) = RapierSimulation::refined(scene, object, refinement);
                 (Self::Rapier(Box::new(simulation)), placement)
             }
+            #[cfg(not(feature = "rapier"))]
+            EngineKind::Rapier => panic!("Scene::check refuses the engine rapier in a build without it"),
         }
     }
 
     fn get(&self) -> &dyn Engine {
         match self {
             Self::Palpate(simulation) => simulation.as_ref(),
+            #[cfg(feature = "rapier")]
             Self::Rapier(simulation) => simulation.as_ref(),
         }
     }
@@ -62,6 +69,7 @@ impl EngineRun {
     fn get_mut(&mut self) -> &mut dyn Engine {
         match self {
             Self::Palpate(simulation) => simulation.as_mut(),
+            #[cfg(feature = "rapier")]
             Self::Rapier(simulation) => simulation.as_mut(),
         }
     }
@@ -73,10 +81,10 @@ impl SimRun {
         Self::refined(scene, object, Refinement::None)
     }
 
-    /// The same, computed more finely than the scene asks for.
+    /// Sets up a scene with a refinement.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let (engine, placement) = EngineRun::new(scene, object, refinement);
-        let rig = Self { engine, asked: None, phase: Phase::Close, static_residual: None };
+        let rig = Self { engine, reported: None, phase: Phase::Close, static_residual: None };
         (rig, placement)
     }
 
@@ -95,17 +103,17 @@ impl SimRun {
         }
     }
 
-    /// The state before the first step, as a frame: what a picture of the start shows.
+    /// The state before the first step, as a frame.
     pub fn first_look(&self) -> Frame {
         self.engine.get().frame()
     }
 
-    /// How deep the open fingers stand inside the object or its support before the first step (m).
+    /// Overlap of the open fingers with the object or its support before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         self.engine.get_mut().starting_overlap()
     }
 
-    /// Which effects are simulated, and why.
+    /// Effects simulated, with the reason for each.
     pub fn plan(&self) -> &Plan {
         self.engine.get().plan()
     }
@@ -124,8 +132,8 @@ impl SimRun {
                 return Ok(SimEvent::Finished);
             }
             let actuation_tick = (tick / u64::from(clock.ticks_per_actuation)) as u32;
-            if tick.is_multiple_of(u64::from(clock.ticks_per_actuation)) && self.asked != Some(actuation_tick) {
-                self.asked = Some(actuation_tick);
+            if tick.is_multiple_of(u64::from(clock.ticks_per_actuation)) && self.reported != Some(actuation_tick) {
+                self.reported = Some(actuation_tick);
                 return Ok(SimEvent::ActuationDue { tick: actuation_tick });
             }
             // Nothing happens before the nearer of the next sample and the next change of pressure.
@@ -147,7 +155,7 @@ impl SimRun {
         self.engine.get_mut().command(bar, phase);
     }
 
-    /// How far the frames so far can be trusted.
+    /// Numerical quality of the frames so far.
     pub fn quality(&self) -> Quality {
         let mut quality = self.engine.get().quality();
         if let Some(at_hold) = self.static_residual {
@@ -156,7 +164,7 @@ impl SimRun {
         quality
     }
 
-    /// Remarks on the frames so far, in sentences.
+    /// Remarks on the frames so far.
     pub fn notes(&self) -> Vec<String> {
         let turned_on = self.engine.get().finger_contact_turned_on();
         let note = |t| format!("finger-contact was turned on at {t:.2} s: the fingers came near each other after all");

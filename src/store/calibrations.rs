@@ -7,7 +7,7 @@
 use super::store::Store;
 use super::store_error::StoreError;
 use palpate_tactile::board::Sensor;
-use palpate_tactile::calibration::{Calibration, Kind, Record};
+use palpate_tactile::calibration::{Calibration, Record, SensorKind};
 use palpate_tactile::trial::TrialId;
 use rusqlite::{OptionalExtension, Row, Transaction, params};
 use serde::{Deserialize, Serialize};
@@ -211,7 +211,7 @@ impl CalibrationRepository<'_> {
                 serving.warnings.push(text);
                 continue;
             };
-            let fits = |c: &&StoredCalibration| c.record.kind == Kind::of(sensor) && c.record.part == part;
+            let fits = |c: &&StoredCalibration| c.record.kind == SensorKind::of(sensor) && c.record.part == part;
             let wanted: Vec<StoredCalibration> = match asked.iter().find(fits) {
                 Some(one) => vec![one.clone()],
                 None => {
@@ -297,7 +297,7 @@ pub(super) mod tests {
             readings: 50,
         };
         let points = [0.0, 45.0, 90.0].map(point).to_vec();
-        Record { part: part.to_owned(), kind: Kind::Flex, input, points, bending: None, note: String::new() }
+        Record { part: part.to_owned(), kind: SensorKind::Flex, input, points, bending: None, note: String::new() }
     }
 
     fn store(folder: &tempfile::TempDir, name: &str) -> Store {
@@ -369,7 +369,7 @@ pub(super) mod tests {
         };
         let degrees = |store: &Store, asked: &[CalibrationId]| -> Result<f64, Box<dyn std::error::Error>> {
             let serving = store.calibrations().serving(Some(trial), asked)?;
-            let felt = Readout::new(&Board::default(), &serving.calibrations)?.felt(&reading);
+            let felt = Readout::new(&Board::default(), &serving.calibrations)?.estimate(&reading);
             Ok(felt.angle[0].ok_or("calibrated")?.to_degrees())
         };
         // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.

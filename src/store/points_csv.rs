@@ -2,7 +2,7 @@
 //! `counts`. Columns `spread` (counts) and `readings` may stand beside them; several rows of one angle or weight are
 //! fine.
 
-use palpate_tactile::calibration::{Kind, Point};
+use palpate_tactile::calibration::{Point, SensorKind};
 use std::path::{Path, PathBuf};
 
 /// Error of reading points.
@@ -47,15 +47,15 @@ pub enum PointsError {
 const MOST_ROWS: usize = 10_000;
 
 /// Names of the stimulus column, and the factor to degrees or kilograms.
-fn stimulus_columns(kind: Kind) -> &'static [(&'static str, f64)] {
+fn stimulus_columns(kind: SensorKind) -> &'static [(&'static str, f64)] {
     match kind {
-        Kind::Flex => &[("angle_deg", 1.0)],
-        Kind::Pad => &[("load_kg", 1.0), ("load_g", 1e-3)],
+        SensorKind::Flex => &[("angle_deg", 1.0)],
+        SensorKind::Pad => &[("load_kg", 1.0), ("load_g", 1e-3)],
     }
 }
 
 /// Reads calibration points for a kind of sensor.
-pub fn read_points_csv(path: &Path, kind: Kind) -> Result<Vec<Point>, PointsError> {
+pub fn read_points_csv(path: &Path, kind: SensorKind) -> Result<Vec<Point>, PointsError> {
     let unreadable = |cause: String| PointsError::Unreadable { path: path.to_owned(), cause };
     let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
@@ -100,7 +100,7 @@ pub fn read_points_csv(path: &Path, kind: Kind) -> Result<Vec<Point>, PointsErro
 mod tests {
     use super::*;
 
-    fn read(text: &str, kind: Kind) -> Result<Vec<Point>, PointsError> {
+    fn read(text: &str, kind: SensorKind) -> Result<Vec<Point>, PointsError> {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("points.csv");
         std::fs::write(&path, text).expect("written");
@@ -109,26 +109,26 @@ mod tests {
 
     #[test]
     fn points_are_read_in_the_units_of_their_columns() -> Result<(), PointsError> {
-        let points = read("# strip A7\nangle_deg, counts\n0, 1422\n90 , 2230.5\n", Kind::Flex)?;
+        let points = read("# strip A7\nangle_deg, counts\n0, 1422\n90 , 2230.5\n", SensorKind::Flex)?;
         assert_eq!(points.len(), 2);
         assert!((points[1].stimulus - std::f64::consts::FRAC_PI_2).abs() < 1e-12 && points[1].counts == 2230.5);
-        let points = read("counts,load_g,spread,readings\n0,0,0,1\n1800,100,2.1,50\n", Kind::Pad)?;
+        let points = read("counts,load_g,spread,readings\n0,0,0,1\n1800,100,2.1,50\n", SensorKind::Pad)?;
         assert!((points[1].stimulus - 0.980665).abs() < 1e-12);
         assert_eq!((points[1].spread, points[1].readings), (2.1, 50));
-        assert!((read("load_kg,counts\n0.5,3000\n", Kind::Pad)?[0].stimulus - 4.903325).abs() < 1e-12);
+        assert!((read("load_kg,counts\n0.5,3000\n", SensorKind::Pad)?[0].stimulus - 4.903325).abs() < 1e-12);
         Ok(())
     }
 
     #[test]
     fn what_cannot_be_read_is_told_with_its_place() {
         let message = |text: &str, kind| read(text, kind).expect_err("refused").to_string();
-        assert!(message("load_kg,counts\n0.5,3000\n", Kind::Flex).contains("no column angle_deg"));
-        assert!(message("angle_deg,volts\n0,1\n", Kind::Flex).contains("it has: angle_deg, volts"));
-        let text = message("angle_deg,counts\n0,1422\n90,open\n", Kind::Flex);
+        assert!(message("load_kg,counts\n0.5,3000\n", SensorKind::Flex).contains("no column angle_deg"));
+        assert!(message("angle_deg,volts\n0,1\n", SensorKind::Flex).contains("it has: angle_deg, volts"));
+        let text = message("angle_deg,counts\n0,1422\n90,open\n", SensorKind::Flex);
         assert!(text.contains("line 3") && text.contains("\"open\""), "{text}");
-        assert!(message("angle_deg,counts\n0,nan\n", Kind::Flex).contains("not a number"));
-        assert!(message("angle_deg,counts\n0\n", Kind::Flex).contains("points.csv"));
-        let gone = read_points_csv(Path::new("/nowhere/p.csv"), Kind::Flex).expect_err("gone").to_string();
+        assert!(message("angle_deg,counts\n0,nan\n", SensorKind::Flex).contains("not a number"));
+        assert!(message("angle_deg,counts\n0\n", SensorKind::Flex).contains("points.csv"));
+        let gone = read_points_csv(Path::new("/nowhere/p.csv"), SensorKind::Flex).expect_err("gone").to_string();
         assert!(gone.contains("/nowhere/p.csv"));
     }
 }

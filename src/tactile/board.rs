@@ -1,9 +1,9 @@
-//! What a sensor board sends, as far as it was understood: counts of its converter, stamped. Angle, force and pressure
+//! Decoded data of a sensor board: counts of its converter, stamped. Angle, force and pressure
 //! are derived from them later by a calibration, so that a better one serves old trials too.
 
 use serde::{Deserialize, Serialize};
 
-/// What a channel of the board is wired to, by its place on the gripper (paper, section IV-B).
+/// Sensor of the gripper, which a channel of the board is wired to (paper, section IV-B).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensor {
@@ -36,13 +36,13 @@ impl Sensor {
         Self::ALL.into_iter().find(|sensor| sensor.is_called(name))
     }
 
-    /// True for the names that boards may give its channel: case, blanks, hyphens and underscores say nothing.
+    /// True for the names that boards may give its channel: case, blanks, hyphens and underscores are ignored.
     pub fn is_called(self, name: &str) -> bool {
         let letters = name.chars().filter(|c| !" -_".contains(*c)).map(|c| c.to_ascii_lowercase());
         letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
     }
 
-    /// Its name on screen.
+    /// Display name.
     pub fn label(self) -> &'static str {
         match self {
             Self::FlexLeft => "left flex strip",
@@ -58,7 +58,7 @@ impl Sensor {
     }
 }
 
-/// What a board says of itself in its hello line, or what was found out from its lines.
+/// Board description from its handshake line, or inferred from its data lines.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Board {
@@ -68,11 +68,11 @@ pub struct Board {
     pub full_scale: u32,
     /// Voltage at which the converter reaches it, and which feeds the dividers (V).
     pub reference_volt: f64,
-    /// Samples per second that it says it takes (1/s).
+    /// Reported sampling rate (1/s).
     pub rate_hz: Option<f64>,
-    /// Fixed resistor of each channel's divider (ohm), where it says so; else empty.
+    /// Fixed resistor of each channel's divider (ohm), where reported; else empty.
     pub divider_ohm: Vec<f64>,
-    /// Version of its firmware, where it says so.
+    /// Version of its firmware, where reported.
     pub firmware: Option<String>,
 }
 
@@ -91,7 +91,7 @@ impl Default for Board {
 }
 
 impl Board {
-    /// Which of its channels a sensor is read on; see [`Sensor::is_called`].
+    /// Channel that a sensor is read on; see [`Sensor::is_called`].
     pub fn channel_of(&self, sensor: Sensor) -> Option<usize> {
         self.channels.iter().position(|name| sensor.is_called(name))
     }
@@ -100,17 +100,17 @@ impl Board {
 /// Readings after which a board's channels are known.
 pub const KNOWN_AFTER: u32 = 5;
 
-/// Time of readings (s) after which it is known what a board is: it has answered who it is, or its counts have shown how
-/// far its converter goes.
+/// Time of readings (s) after which it is known what a board is: it has answered who it is, or its counts have shown
+/// how far its converter goes.
 pub const KNOWN_AFTER_S: f64 = 1.2;
 
 /// One line of a board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// When it was taken, in seconds since the stream began on this computer's clock (s): the board's own time mapped onto
+    /// Time of the sample since the stream began, on this computer's clock (s): the board's own time mapped onto
     /// it, where it sends one.
     pub t_s: f64,
-    /// When its bytes arrived, on the same clock (s).
+    /// Time of arrival of its bytes, on the same clock (s).
     pub arrived_s: f64,
     /// The board's counter, unwrapped.
     pub seq: Option<u64>,
@@ -127,9 +127,9 @@ pub struct Gap {
     pub from_s: f64,
     /// Time of the first one after it (s).
     pub to_s: f64,
-    /// How many readings are missing, where the board counts them.
+    /// Number of missing readings, where the board counts them.
     pub lost: Option<u64>,
-    /// Why, in words.
+    /// Reason.
     pub cause: String,
 }
 
@@ -147,7 +147,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its name on screen.
+    /// Display name.
     pub fn label(self) -> &'static str {
         match self {
             Self::Plotter => "Arduino plotter lines",
@@ -156,7 +156,7 @@ impl Format {
         }
     }
 
-    /// The mark that sets it apart from the others.
+    /// Feature that identifies the format.
     pub fn mark(self) -> &'static str {
         match self {
             Self::Plotter => "each number follows its name and a colon",
@@ -166,7 +166,7 @@ impl Format {
     }
 }
 
-/// Source of the times of readings.
+/// Time base of the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TimeSource {
@@ -174,18 +174,18 @@ pub enum TimeSource {
     Device,
     /// The board's sequence numbers, at an even pace.
     Sequence,
-    /// Lines counted on arrival, at an even pace: a loss shows only afterwards.
+    /// Lines counted on this side, at an even pace: lost and late ones cannot be distinguished at once.
     Arrival,
 }
 
-/// Detected line format of a board.
+/// Line format of a board's stream, with the evidence for it.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Detected {
-    /// The format.
+    /// Line format.
     pub format: Format,
-    /// Reason, and assumptions, in a sentence.
+    /// Evidence and assumptions, one sentence.
     pub why: String,
-    /// Source of the times of readings.
+    /// Time base of the readings.
     pub time: TimeSource,
 }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How well a stream keeps time.
+/// Timing statistics of a stream.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Cadence {
@@ -16,12 +16,12 @@ pub struct Cadence {
     pub gaps: u64,
     /// Readings per second, lately (1/s).
     pub rate_hz: f64,
-    /// 95th percentile of how far the time between two readings is from the usual (ms); by the board's clock where it sends
-    /// one, else by arrival.
+    /// 95th percentile of how far the time between two readings is from the usual (ms); by the board's clock where it
+    /// sends one, else by arrival.
     pub jitter_p95_ms: f64,
     /// 95th percentile of how much later than the quickest readings arrive (ms).
     pub delay_p95_ms: f64,
-    /// How fast the board's clock runs against this computer's (ppm); none where it sends no time.
+    /// Drift of the board's clock against this computer's (ppm); none where it sends no time.
     pub drift_ppm: Option<f64>,
     /// Share of the last second's lines that could not be read.
     pub bad_share: f64,

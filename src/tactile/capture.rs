@@ -23,22 +23,22 @@ pub const LONGEST_RECORD: usize = 65_536;
 pub enum Captured {
     /// Bytes that arrived together.
     Bytes {
-        /// When (s since the stream began).
+        /// Time (s since the stream began).
         arrived_s: f64,
-        /// What.
+        /// The bytes.
         bytes: Vec<u8>,
     },
     /// The stream was interrupted.
     Interrupted {
-        /// When (s since the stream began).
+        /// Time (s since the stream began).
         at_s: f64,
-        /// Why.
+        /// Cause.
         cause: String,
     },
 }
 
 impl Captured {
-    /// When it came (s since the stream began).
+    /// Time of arrival (s since the stream began).
     pub fn arrived_s(&self) -> f64 {
         match self {
             Self::Bytes { arrived_s, .. } => *arrived_s,
@@ -52,7 +52,7 @@ impl Captured {
             Self::Bytes { bytes, .. } => (0, bytes.as_slice()),
             Self::Interrupted { cause, .. } => (1, cause.as_bytes()),
         };
-        // What came together may be longer than a record; it is told in several.
+        // Bytes that arrived together may fill several records.
         let parts: Vec<&[u8]> =
             if payload.is_empty() { vec![payload] } else { payload.chunks(LONGEST_RECORD).collect() };
         for part in parts {
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_captured_comes_back_with_its_times() -> io::Result<()> {
+    fn captured_bytes_come_back_with_their_times() -> io::Result<()> {
         let bytes = file(&records())?;
         let back: Vec<Captured> = read_all(&bytes)?;
         assert_eq!(back[..2], records()[..2]);

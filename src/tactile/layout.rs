@@ -13,7 +13,7 @@ use std::borrow::Cow;
 pub struct Span {
     from: f64,
     to: f64,
-    /// What it is called; empty for the whole finger.
+    /// Name; empty for the whole finger.
     name: Cow<'static, str>,
 }
 
@@ -41,13 +41,13 @@ impl Span {
         self.to - self.from
     }
 
-    /// Where it begins and ends, as shares of the finger's length.
+    /// Start and end, as shares of the finger's length.
     pub fn ends(&self) -> (f64, f64) {
         (self.from, self.to)
     }
 }
 
-/// How curvature is read along a finger.
+/// Division of a finger into curvature sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CurvatureSplit {
     /// One sensor over the whole finger.
@@ -56,7 +56,7 @@ pub enum CurvatureSplit {
     Halves,
 }
 
-/// How pressure is read along a finger.
+/// Division of a finger into pressure sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PressureSplit {
     /// One sensor over the whole finger.
@@ -78,7 +78,7 @@ pub struct SensorLayout {
     pub curvature: CurvatureSplit,
     /// Pressure sensors on each finger.
     pub pressure: PressureSplit,
-    /// Whether force is a channel beside each pressure (`+F`).
+    /// True where force is a channel beside each pressure (`+F`).
     pub force: bool,
 }
 
@@ -98,7 +98,7 @@ pub const CATALOGUE: [SensorLayout; 8] = [
     row("C8", CurvatureSplit::Halves, PressureSplit::Joints),
 ];
 
-/// What a channel measures.
+/// Measured quantity of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Curvature (1/m).
@@ -132,7 +132,7 @@ impl Quantity {
 /// One sensor of a layout on one finger.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// What it measures.
+    /// Measured quantity.
     pub quantity: Quantity,
     /// On which finger.
     pub side: Side,
@@ -152,13 +152,13 @@ impl Channel {
     }
 }
 
-/// Why a layout cannot be used.
+/// Error of a sensor layout.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LayoutError {
     /// The name is not in the catalogue.
     #[error("there is no sensor layout \"{name}\"; there are C1 to C8, each also as C1+F and so on")]
     Unknown {
-        /// The name asked for.
+        /// The name given.
         name: String,
     },
     /// A pressure sensor would cover no taxel.

@@ -1,4 +1,42 @@
 //! Tactile signals: frames of a simulation or counts of a board in, channels of curvature, pressure and force out.
+//!
+//! # Terms
+//!
+//! A **layout** (C1 .. C8) places curvature and pressure sensors on the fingers; each gives a **channel**. Channels
+//! over time are [`Signals`]. A real **board** sends **readings**: counts of its converter. A **calibration** of each
+//! part turns counts into angle, curvature, force and pressure; a **zero** (tare) removes drift. Trials keep raw data,
+//! so that any layout and calibration can be applied later.
+//!
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | [`board`] | sensors, readings and gaps of a board |
+//! | 0 | [`cadence`], [`capture`] | timing statistics of a stream, file format of captured bytes |
+//! | 0 | [`electronics`] | strip, pad, divider and converter |
+//! | 0 | `layout` | sensor layouts and their channels |
+//! | 0 | `signals` | channels over time |
+//! | 0 | [`trial`] | recorded grasps |
+//! | 1 | `curvature`, `pressure` | circle fit along a finger, contact patch of a pad |
+//! | 1 | [`model`] | sensor models: clean signals to those of real sensors |
+//! | 1 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |
+//!
+//! # Example
+//!
+//! ```
+//! use palpate_sim::{run::SimRun, scene::Scene};
+//! use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+//!
+//! let scene = Scene::default();
+//! let frame = SimRun::new(&scene, None).0.first_look();
+//! let sensors = Sensors::new(&SensorLayout::named("C6+F")?, &scene.gripper, PressureArea::Participation)?;
+//! let values = sensors.read(&frame);
+//! assert_eq!(sensors.channels()[0].name(), "curvature_left_proximal");
+//! assert_eq!(values[0], Some(0.0)); // a straight finger
+//! # Ok::<(), palpate_tactile::LayoutError>(())
+//! ```
 
 pub mod board;
 pub mod cadence;
@@ -33,7 +71,7 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Places a layout on a gripper. Pressure is force over the participation area unless said otherwise.
+    /// Places a layout on a gripper. `area` selects the area of pressure.
     pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
         Ok(Self::of(layout.channels(gripper)?, gripper, area))
     }

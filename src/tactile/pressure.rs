@@ -15,7 +15,7 @@ use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, TaxelGrid};
 use serde::{Deserialize, Serialize};
 
-/// Which area force is divided by.
+/// Area that force is divided by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PressureArea {

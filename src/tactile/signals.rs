@@ -1,4 +1,4 @@
-//! What sensors report over a whole trial: named channels over time, the form in which recognisers and files know a
+//! Signals of a whole trial: named channels over time, the form in which recognisers and files know a
 //! grasp, whatever rig it came from.
 
 /// Readings of several channels at the same instants.
@@ -49,7 +49,7 @@ impl Signals {
         self
     }
 
-    /// What comes from a time on (s), which then counts as zero.
+    /// The part from a time on (s), which becomes time zero.
     pub fn since(mut self, t: f64) -> Self {
         let first = self.t_s.partition_point(|own| *own < t);
         self.t_s.drain(..first);

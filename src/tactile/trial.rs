@@ -1,4 +1,5 @@
-//! Trials: recorded grasps. Raw quantities only; curvature, pressure and every sensor layout are derived from them later.
+//! Trials: recorded grasps. Raw quantities only; curvature, pressure and every sensor layout are derived from them
+//! later.
 
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};
@@ -8,21 +9,21 @@ use serde::{Deserialize, Serialize};
 /// Names a trial within its store.
 pub type TrialId = i64;
 
-/// From when on the control box of a real gripper did something.
+/// Begin of a phase on a real gripper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhaseMark {
-    /// On the clock of the readings (s).
+    /// Begin, on the clock of the readings (s).
     pub from_s: f64,
-    /// What.
+    /// Phase.
     pub phase: Phase,
     /// Commanded line pressure (bar), where this program commands it.
     pub line_bar: Option<f64>,
 }
 
-/// What is known of a trial besides its frames.
+/// Facts of a trial besides its frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialInfo {
-    /// Where it came from: `sim` for a simulated gripper.
+    /// Source: `sim` for a simulated gripper.
     pub rig: String,
     /// Name of the object.
     pub object: String,
@@ -33,14 +34,14 @@ pub struct TrialInfo {
     pub collection: Option<String>,
     /// The whole scene as TOML, every key written out.
     pub scene: String,
-    /// Where the gripper was held.
+    /// Pose of the gripper in the world.
     pub world_from_gripper: Pose,
-    /// Which effects were simulated; empty for a trial that was not, and for old ones.
+    /// Effects simulated; empty for real grippers and old trials.
     #[serde(default)]
     pub plan: Plan,
-    /// How far it can be trusted.
+    /// Numerical quality.
     pub quality: Quality,
-    /// What was guessed, mended or cut short.
+    /// Warnings: values guessed, meshes repaired, recording cut short.
     pub warnings: Vec<String>,
     /// Version of the program that made it.
     pub version: String,
@@ -49,17 +50,17 @@ pub struct TrialInfo {
 /// One recorded grasp.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
-    /// What is known of it.
+    /// Facts.
     pub info: TrialInfo,
     /// Its samples, in order.
     pub frames: Vec<Frame>,
 }
 
-/// Who moves the fingers.
+/// Actuation of the fingers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Control {
-    /// Nobody, or nobody says: no phases are known.
+    /// Untimed: no phases are known.
     Free,
     /// A person at the control box, at the times of the programme.
     ByHand,

@@ -28,7 +28,7 @@ struct Shot {
     theme: Theme,
     size: [u32; 2],
     forces: bool,
-    furniture: bool,
+    annotations: bool,
     /// The other engine's run is laid over it.
     ghost: bool,
 }
@@ -40,7 +40,7 @@ const HELD: Shot = Shot {
     theme: Theme::Dark,
     size: [480, 320],
     forces: true,
-    furniture: true,
+    annotations: true,
     ghost: false,
 };
 
@@ -57,8 +57,8 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
         forces: shot.forces,
-        furniture: shot.furniture,
-        badge: shot.furniture.then(|| "SIMULATED".to_owned()),
+        annotations: shot.annotations,
+        badge: shot.annotations.then(|| "SIMULATED".to_owned()),
         ..PictureView::default()
     };
     let mut list = stage.draw(frame, &view);
@@ -93,7 +93,7 @@ fn held_objects_from_several_sides() {
     let mut table = Scene::default();
     table.support.kind = SupportKind::Table;
     table.gripper.finger.joints = 40;
-    check("view_metalbrick_bare", &Shot { object: "metalbrick", furniture: false, ..HELD }, &table);
+    check("view_metalbrick_bare", &Shot { object: "metalbrick", annotations: false, ..HELD }, &table);
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn the_sixteen_look_like_what_they_are() {
     let [width, height] = [240, 180];
     let mut sheet = RgbaImage::new(4 * width, 4 * height);
     for (k, built_in) in catalogue().iter().enumerate() {
-        let shot = Shot { object: &built_in.name, size: [width, height], forces: false, furniture: false, ..HELD };
+        let shot = Shot { object: &built_in.name, size: [width, height], forces: false, annotations: false, ..HELD };
         let picture = take(&gpu, &mut renderer, &Scene::default(), &shot);
         let (column, row) = (k as u32 % 4, k as u32 / 4);
         image::imageops::replace(&mut sheet, &picture, i64::from(column * width), i64::from(row * height));

@@ -14,7 +14,7 @@ use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Store};
 use palpate_tactile::board::{Board, Reading, Sensor};
-use palpate_tactile::calibration::{Input, Kind, Point, Record, plan};
+use palpate_tactile::calibration::{Input, Point, Record, SensorKind, plan};
 use palpate_tactile::trial::PhaseMark;
 use std::path::Path;
 use std::sync::Arc;
@@ -22,21 +22,21 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 /// Resistance of every part at an angle (rad) or force (N) (ohm).
-fn ohm(kind: Kind, stimulus: f64) -> f64 {
+fn ohm(kind: SensorKind, stimulus: f64) -> f64 {
     match kind {
-        Kind::Flex => 25e3 * (1.0 + stimulus.to_degrees() / 90.0),
-        Kind::Pad => 6.5e3 * stimulus.max(1e-4).powf(-0.9),
+        SensorKind::Flex => 25e3 * (1.0 + stimulus.to_degrees() / 90.0),
+        SensorKind::Pad => 6.5e3 * stimulus.max(1e-4).powf(-0.9),
     }
 }
 
 fn counts(sensor: Sensor, stimulus: f64) -> f64 {
-    Input::on(&Board::default(), sensor).counts(ohm(Kind::of(sensor), stimulus))
+    Input::on(&Board::default(), sensor).counts(ohm(SensorKind::of(sensor), stimulus))
 }
 
 /// All four parts, calibrated and in their places.
 fn calibrate(store: &mut Store) {
     for sensor in Sensor::ALL {
-        let kind = Kind::of(sensor);
+        let kind = SensorKind::of(sensor);
         let point = |stimulus| Point { stimulus, counts: counts(sensor, stimulus), spread: 1.0, readings: 50 };
         let points = plan(kind).into_iter().map(point).collect();
         let part = sensor.channel().to_owned();
@@ -63,9 +63,9 @@ fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32
     let reading = |k: u32| {
         let t_s = 0.02 * f64::from(k);
         let share = spread * t_s.min(1.0);
-        let felt = |sensor: Sensor| match Kind::of(sensor) {
-            Kind::Flex => (share * degrees).to_radians(),
-            Kind::Pad => share * newton,
+        let felt = |sensor: Sensor| match SensorKind::of(sensor) {
+            SensorKind::Flex => (share * degrees).to_radians(),
+            SensorKind::Pad => share * newton,
         };
         let counts = Sensor::ALL.map(|sensor| Some(counts(sensor, felt(sensor)) as f32)).to_vec();
         Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }

@@ -11,7 +11,7 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{CalibrationPlan, CalibrationView, CalibrationWish, GripperWish, RunningCalibration};
 use palpate_tactile::board::Sensor;
-use palpate_tactile::calibration::{Calibration, Curve, Kind, Point};
+use palpate_tactile::calibration::{Calibration, Curve, Point, SensorKind};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -98,7 +98,7 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
     if let Some(why) = &running.not_taken {
         wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
     }
-    let kind = Kind::of(running.plan.sensor);
+    let kind = SensorKind::of(running.plan.sensor);
     let fit = running.fit.as_deref().ok();
     match &running.fit {
         Ok(calibration) => {
@@ -134,7 +134,7 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) 
         "Measure the last point again",
         Some(CalibrationWish::Undo),
     );
-    if Kind::of(running.plan.sensor) == Kind::Pad {
+    if SensorKind::of(running.plan.sensor) == SensorKind::Pad {
         let about = "Watch the empty hand close for 15 s, to correct the pad's zero for bending";
         button(running.can_close, "Empty close", about, Some(CalibrationWish::EmptyClose));
     }
@@ -148,15 +148,15 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) 
 }
 
 /// Reading of a part in the unit of the plot: kilohms of a strip, microsiemens of a pad.
-fn shown(kind: Kind, ohm: f64) -> f64 {
+fn shown(kind: SensorKind, ohm: f64) -> f64 {
     match kind {
-        Kind::Flex => ohm * 1e-3,
-        Kind::Pad => 1e6 / ohm,
+        SensorKind::Flex => ohm * 1e-3,
+        SensorKind::Pad => 1e6 / ohm,
     }
 }
 
 /// Points and fitted curve.
-fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibration>, theme: Theme) {
+fn curve_plot(ui: &mut Ui, kind: SensorKind, points: &[Point], fit: Option<&Calibration>, theme: Theme) {
     let Some(calibration) = fit else { return };
     let accent = colour(theme.colours().accent);
     let input = &calibration.record.input;
@@ -173,7 +173,7 @@ fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibratio
             [kind.shown(along(k)), read]
         })
         .collect();
-    let axis = if kind == Kind::Flex { "kΩ" } else { "µS" };
+    let axis = if kind == SensorKind::Flex { "kΩ" } else { "µS" };
     plot(theme, "calibration curve", 140.0, axis, kind.unit()).show(ui, |plot| {
         plot.line(Line::new("fitted", line).color(accent).width(1.5));
         plot.points(Points::new("measured", measured).color(accent).radius(3.5));
@@ -181,13 +181,13 @@ fn curve_plot(ui: &mut Ui, kind: Kind, points: &[Point], fit: Option<&Calibratio
 }
 
 /// Residuals of the points.
-fn residual_plot(ui: &mut Ui, kind: Kind, calibration: &Calibration, theme: Theme) {
+fn residual_plot(ui: &mut Ui, kind: SensorKind, calibration: &Calibration, theme: Theme) {
     let accent = colour(theme.colours().accent);
-    let factor = if kind == Kind::Flex { 1f64.to_degrees() } else { 100.0 };
+    let factor = if kind == SensorKind::Flex { 1f64.to_degrees() } else { 100.0 };
     let residuals = calibration.record.points.iter().zip(calibration.residuals());
     let off: Vec<[f64; 2]> = residuals.filter_map(|(p, off)| Some([kind.shown(p.stimulus), factor * off?])).collect();
     let worst = off.iter().map(|[_, off]| off.abs()).fold(0.0, f64::max);
-    let unit = if kind == Kind::Flex { "degrees" } else { "%" };
+    let unit = if kind == SensorKind::Flex { "degrees" } else { "%" };
     ui.weak(format!("residuals, at most {} {unit}", three_digits(worst)));
     plot(theme, "calibration residuals", 90.0, unit, kind.unit()).include_y(-0.5).include_y(0.5).show(ui, |plot| {
         for [at, off] in &off {

@@ -193,7 +193,7 @@ fn drift_badge(ui: &mut Ui, theme: Theme, drift: &Drift) {
         DriftLevel::Moved => ("drifted", colours.warning),
         DriftLevel::TooFar => ("too large", colours.error),
     };
-    let text = format!("{word} {}", drift.told());
+    let text = format!("{word} {}", drift.with_unit());
     let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(5, 1));
     let about = drift.remark().unwrap_or_else(|| "Zero as calibrated".to_owned());
     frame.show(ui, |ui| ui.label(RichText::new(text).small().color(colour(ink)))).response.on_hover_text(about);

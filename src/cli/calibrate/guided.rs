@@ -9,7 +9,7 @@ use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
-use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Kind, Procedure, Record, Unsettled};
+use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Procedure, Record, SensorKind, Unsettled};
 use std::collections::VecDeque;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -89,7 +89,7 @@ pub(super) fn record(
         )
     })?;
     if !live.plan.is_empty() {
-        let plan: Vec<f64> = live.plan.iter().map(|shown| Kind::of(sensor).stimulus(*shown)).collect();
+        let plan: Vec<f64> = live.plan.iter().map(|shown| SensorKind::of(sensor).stimulus(*shown)).collect();
         procedure = procedure.with_plan(&plan);
     }
     note(&format!(
@@ -253,7 +253,7 @@ impl Bench {
                         .settled()
                         .err()
                         .map_or_else(|| "the reading did not change".to_owned(), |e| e.to_string());
-                    return Err(format!("no point at {}: {why}", kind.told(planned)).into());
+                    return Err(format!("no point at {}: {why}", kind.with_unit(planned)).into());
                 }
                 continue;
             }
@@ -265,7 +265,7 @@ impl Bench {
                         Ok(()) => return Ok(()),
                         Err(why) => {
                             self.clear_line();
-                            warn(&format!("{} not recorded: {why}", kind.told(stimulus)));
+                            warn(&format!("{} not recorded: {why}", kind.with_unit(stimulus)));
                         }
                     }
                 }
@@ -274,7 +274,7 @@ impl Bench {
                     return Ok(());
                 }
                 Some(Input::Undo) => {
-                    let undone = procedure.undo().map(|point| kind.told(point.stimulus));
+                    let undone = procedure.undo().map(|point| kind.with_unit(point.stimulus));
                     note(
                         &undone.map_or_else(
                             || "no point to undo".to_owned(),
@@ -291,7 +291,7 @@ impl Bench {
     fn take(&self, procedure: &mut Procedure, stimulus: f64) -> Result<(), Unsettled> {
         let point = procedure.take(stimulus)?;
         self.clear_line();
-        let at = procedure.record().kind.told(stimulus);
+        let at = procedure.record().kind.with_unit(stimulus);
         note(&format!("  {at}: {:.1} counts, noise {:.1}, {} readings", point.counts, point.spread, point.readings));
         Ok(())
     }

@@ -68,7 +68,7 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
     }
     let rows: Vec<Vec<String>> = drift
         .iter()
-        .map(|drift| vec![drift.sensor.label().to_owned(), drift.told(), drift.badge().to_owned(), to_do(drift)])
+        .map(|drift| vec![drift.sensor.label().to_owned(), drift.with_unit(), drift.badge().to_owned(), to_do(drift)])
         .collect();
     table(&["sensor", "drift", "", ""], &rows)?;
     warnings.iter().for_each(|warning| warn(warning));
@@ -126,7 +126,8 @@ pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Fai
         .iter()
         .map(|row| {
             let of = |sensor: Sensor| row.drift.iter().find(|drift| drift.sensor == sensor);
-            let cell = |sensor| of(sensor).map_or_else(|| "–".to_owned(), |d| format!("{} {}", d.told(), d.badge()));
+            let cell =
+                |sensor| of(sensor).map_or_else(|| "–".to_owned(), |d| format!("{} {}", d.with_unit(), d.badge()));
             let date = row.created.chars().take(19).collect::<String>().replace('T', " ");
             let start = [row.trial.to_string(), date, row.object.clone()];
             start.into_iter().chain(Sensor::ALL.map(cell)).collect()

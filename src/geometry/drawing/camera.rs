@@ -13,7 +13,7 @@ use glam::{Mat4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// Where the picture is seen from.
+/// Camera of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// The point in the middle of the picture (m).
@@ -141,7 +141,7 @@ impl Camera {
         [right, back.cross(right), back]
     }
 
-    /// Where the eye is (m).
+    /// Position of the eye (m).
     pub fn eye(&self) -> Vec3 {
         self.target + self.axes()[2] * self.distance
     }
@@ -160,7 +160,7 @@ impl Camera {
         projection * view
     }
 
-    /// Where a point of the world falls in a picture of `size` points, from its top left; `None` behind the eye.
+    /// Projects a point of the world into a picture of `size` points, from its top left; `None` behind the eye.
     pub fn project(&self, point: Vec3, size: Vec2) -> Option<Vec2> {
         let clip = self.clip_from_world(size.x / size.y) * point.extend(1.0);
         if clip.w <= 0.0 {
@@ -203,7 +203,7 @@ mod tests {
     fn panning_moves_the_target_with_the_mouse() {
         let camera = Camera::default();
         let moved = camera.panned(Vec2::new(0.1, 0.0));
-        // What was in the middle is now a tenth of the height to the right.
+        // The old middle is now a tenth of the height to the right.
         let at = moved.project(camera.target, SIZE).expect("in front");
         assert!((at.x - (200.0 + 30.0)).abs() < 0.5, "{at}");
     }

@@ -1,4 +1,4 @@
-//! What there is to draw, as plain data: shapes, camera, labels. Made without a graphics card, drawn by any renderer.
+//! The draw list: shapes, camera and labels as plain data. Made without a graphics card, drawn by any renderer.
 //!
 //! World coordinates in metres, z up. Overlay coordinates in points from the top left corner; a point is a pixel on an
 //! ordinary screen.
@@ -50,14 +50,14 @@ pub struct Ground {
     pub radius: f32,
 }
 
-/// A rigid thing somewhere in the world.
+/// Rigid mesh with its pose in the world.
 #[derive(Clone, Debug)]
 pub struct Solid {
     /// Its surface; the same `Arc` in the next picture means that nothing has to be uploaded again.
     pub mesh: Arc<SurfaceMesh>,
     /// Its place.
     pub world_from_mesh: Mat4,
-    /// How shiny it is, 0 matt to 1.
+    /// Gloss, 0 (matt) to 1.
     pub gloss: f32,
 }
 
@@ -66,7 +66,7 @@ pub struct Solid {
 pub struct SoftFinger {
     /// Frames along the neutral axis, from palm to tip.
     pub frames: Vec<FingerFrame>,
-    /// What its cross-section looks like.
+    /// Cross-section.
     pub section: Section,
     /// Loads on the pad.
     pub taxels: TaxelField,
@@ -114,9 +114,9 @@ pub struct TaxelField {
 /// An arrow, for a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrow {
-    /// Where it begins (m).
+    /// Start (m).
     pub from: Vec3,
-    /// Where its point is (m).
+    /// Tip (m).
     pub to: Vec3,
     /// Radius of the shaft (m).
     pub radius: f32,

@@ -3,14 +3,14 @@
 use crate::palette::Rgb;
 use glam::Vec2;
 
-/// What is drawn over the picture, in this order.
+/// Two-dimensional marks over the picture, drawn in this order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overlay {
     /// Shapes; later ones cover earlier ones.
     pub shapes: Vec<Shape2>,
 }
 
-/// Which part of a text lies at its position.
+/// Horizontal alignment of a text at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     /// Its left end.
@@ -59,9 +59,9 @@ pub enum Shape2 {
     },
     /// A line of text, centred vertically on its position.
     Text {
-        /// Where.
+        /// Position.
         at: Vec2,
-        /// Which part of the text lies there.
+        /// Alignment.
         align: Align,
         /// Height of the font in points.
         size: f32,

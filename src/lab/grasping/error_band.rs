@@ -1,7 +1,7 @@
 //! How far a simulated grasp may be from the exact solution of its own equations: a band about every channel, estimated
 //! from a companion that computes the same grasp more finely.
 //!
-//! A companion of named steps is close to the truth, see [`Solver::companion`](palpate_sim::scene::Solver::companion), so that
+//! A companion of named steps is close to the truth, see [`Solver::refined`](palpate_sim::scene::Solver::refined), so that
 //! the difference from it is the error. Where errors shrink by a factor r from a simulation to its companion, as under a
 //! tolerance, the simulation's error is the difference times 1 / (1 - r): r = 1/2 for Euler at half the step, 1/4 for
 //! SDIRK2 at a tenth of the tolerance. The difference passes through zero where the error need not, so that a band takes

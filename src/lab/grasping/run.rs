@@ -28,7 +28,7 @@ pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspR
 
 /// Sets up the same grasp computed more finely, sampled at the same times: the error of the other is estimated from it.
 pub fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimulatedGripper> {
-    prepare_with(scene, object, seed, Refinement::Companion)
+    prepare_with(scene, object, seed, Refinement::Refined)
 }
 
 fn prepare_with(

@@ -12,7 +12,7 @@ use palpate_sim::gripper::Phase;
 use palpate_store::labels::{Flag, FlagRemark};
 use palpate_tactile::board::{Board, Gap, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
-use palpate_tactile::calibration::{Calibration, Input, Rail, Readout};
+use palpate_tactile::calibration::{Calibration, Input, RangeEnd, Readout};
 use palpate_tactile::electronics::PadPart;
 use palpate_tactile::trial::PhaseMark;
 
@@ -109,7 +109,7 @@ impl Observed<'_> {
             let readout = Readout::new(self.board, self.calibrations).ok()?;
             let readout = readout.clone().with_zero(readout.zero_from(rest));
             let side = usize::from(pad == Sensor::PadRight);
-            let rise = lasting_peak(pressed.iter().map(|reading| readout.felt(reading).force[side]));
+            let rise = lasting_peak(pressed.iter().map(|reading| readout.estimate(reading).force[side]));
             let least = if calibration.record.bending.is_some() { PadPart::LEAST_FORCE } else { BENT_FORCE };
             return Some(PadRise { pad, rise: rise?, least, unit: "N" });
         }
@@ -129,10 +129,10 @@ impl Observed<'_> {
             let usual = Input::on(self.board, sensor);
             let input = made_with.map_or(usual, |input| input.seen_by(self.board, sensor));
             let counts = pressed.iter().filter_map(|reading| reading.counts.get(column).copied().flatten());
-            let at_its_end = |count: &f32| match input.rail(f64::from(*count)) {
+            let at_its_end = |count: &f32| match input.range_end(f64::from(*count)) {
                 // A pad that nothing presses conducts nothing.
-                Some(Rail::Open) => sensor.is_flex(),
-                Some(Rail::Short) => true,
+                Some(RangeEnd::Open) => sensor.is_flex(),
+                Some(RangeEnd::Short) => true,
                 None => false,
             };
             let (count, all) = (counts.filter(at_its_end).count(), pressed.len());

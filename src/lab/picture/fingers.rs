@@ -1,11 +1,11 @@
-//! Soft fingers of a frame: frames along the neutral axis, and what each taxel carries.
+//! Soft fingers of a frame: frames along the neutral axis, and taxel loads.
 
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, TaxelField};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, FingerPlane, Gripper, SegmentPose, Side, TaxelGrid};
 
-/// Both fingers as they are drawn.
+/// Both fingers as draw-list items.
 pub(super) fn soft_fingers(
     gripper: &Gripper,
     world_from_gripper: &Pose,

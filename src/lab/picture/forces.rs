@@ -1,4 +1,4 @@
-//! Contact forces as arrows: one for each loaded segment, the force that the finger feels.
+//! Contact forces as arrows: one for each loaded segment, the force on the finger.
 
 use glam::DVec3;
 use palpate_geometry::Pose;

@@ -1,4 +1,4 @@
-//! The outline of a bent finger as one mesh: how another run of the same scene is laid over a picture.
+//! Outline of a bent finger as one mesh, for the ghost of another run of the same scene.
 
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger};
 use palpate_geometry::palette::Rgb;

@@ -1,4 +1,4 @@
-//! Meshes of what does not move: the gripper's palm with its clamps and air fittings, and the pedestal.
+//! Meshes of the fixed parts: the gripper's palm with its clamps and air fittings, and the pedestal.
 
 use glam::DVec3;
 use palpate_geometry::palette::Rgb;

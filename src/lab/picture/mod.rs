@@ -1,14 +1,14 @@
 //! From a scene and a frame to a list of things to draw. No window and no graphics card: a live simulation, a stored
 //! trial and a test all make their pictures here.
 
+mod annotations;
 mod fingers;
 mod forces;
-mod furniture;
 mod ghost;
 mod gripper_model;
 mod reconstructed;
 
-pub use furniture::SCALE_STEPS;
+pub use annotations::SCALE_STEPS;
 
 use glam::{Mat4, Vec2, Vec3};
 use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid};
@@ -20,22 +20,22 @@ use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Scene, SupportKind};
 use std::sync::Arc;
 
-/// How a picture is to look.
+/// View of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureView {
-    /// From where.
+    /// Camera.
     pub camera: Camera,
-    /// Dark or light.
+    /// Theme.
     pub theme: Theme,
-    /// Size of the picture in points, for what is drawn on top.
+    /// Size of the picture in points, for the overlay.
     pub size: Vec2,
     /// Draw force arrows.
     pub forces: bool,
     /// Draw the axis gizmo, scale bar and legend.
-    pub furniture: bool,
+    pub annotations: bool,
     /// Pressure that has the brightest colour (Pa).
     pub full_scale: f32,
-    /// Words in the top left corner: where the data come from.
+    /// Badge in the top left corner: source of the data.
     pub badge: Option<String>,
 }
 
@@ -46,14 +46,14 @@ impl Default for PictureView {
             theme: Theme::Dark,
             size: Vec2::new(960.0, 600.0),
             forces: true,
-            furniture: true,
+            annotations: true,
             full_scale: 40e3, // taxel pressures of an ordinary hold reach some 30 kPa
             badge: None,
         }
     }
 }
 
-/// What does not change from frame to frame: meshes, and the gripper they belong to.
+/// Constant parts of a picture: meshes, and the gripper they belong to.
 #[derive(Clone, Debug)]
 pub struct Stage {
     gripper: Gripper,
@@ -88,8 +88,8 @@ impl Stage {
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
         let mut overlay = Overlay::default();
-        if view.furniture {
-            furniture::add(&mut overlay, view);
+        if view.annotations {
+            annotations::add(&mut overlay, view);
         }
         let palm = self.world_from_gripper.position.as_vec3();
         DrawList {
@@ -114,7 +114,7 @@ impl Stage {
         }
     }
 
-    /// What a frame of another run of the same scene shows, to be laid over a picture as [`DrawList::ghosts`].
+    /// Outlines of another run of the same scene, for [`DrawList::ghosts`].
     pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
         let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, 1.0);
         let colour = theme.colours().accent;
@@ -127,7 +127,7 @@ impl Stage {
         ghosts
     }
 
-    /// The real fingers as their flex strips tell (1/m), left and right, to be laid over a picture as
+    /// The real fingers from the curvature of their flex strips (1/m), left and right, for
     /// [`DrawList::ghosts`]. A finger whose strip is not read is left out.
     pub fn reconstructed(&self, curvature: [Option<f64>; 2], theme: Theme) -> Vec<Solid> {
         let frame = reconstructed::evenly_bent(&self.gripper, curvature);

@@ -1,4 +1,4 @@
-//! A real finger as far as its flex strip tells: bent evenly, because one strip reads one number.
+//! A real finger reconstructed from its flex strip: bent evenly, because one strip reads one number.
 
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Gripper, Phase, Side};
@@ -17,7 +17,7 @@ mod tests {
     use palpate_tactile::{PressureArea, SensorLayout, Sensors};
 
     #[test]
-    fn what_is_reconstructed_reads_what_the_strips_read() {
+    fn a_reconstructed_finger_has_the_curvature_of_its_strip() {
         let gripper = Gripper::default();
         let layout = SensorLayout::named("C1").expect("a layout");
         let sensors = Sensors::new(&layout, &gripper, PressureArea::Participation).expect("fits");

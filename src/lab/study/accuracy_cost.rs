@@ -1,4 +1,4 @@
-//! What accuracy costs, and what it is worth: CPU time of one grasp, and the error that is left in it.
+//! Cost and error of an accuracy: CPU time of one grasp, and its remaining error.
 
 use crate::grasping::{ErrorBand, ErrorNorms, prepare, prepare_refined};
 use palpate_sim::objects::ObjectModel;
@@ -6,7 +6,7 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::Sensors;
 use serde::Serialize;
 
-/// What a scene's accuracy costs and leaves.
+/// CPU time and remaining error of a scene's accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AccuracyCost {
     /// CPU time of one trial on one thread (ms).
@@ -17,7 +17,7 @@ pub struct AccuracyCost {
     pub error: ErrorNorms,
 }
 
-/// Runs a grasp and its companion; `None` where it was cancelled on the way, or the grasp ended before its time.
+/// Runs a grasp and its refined run; `None` where it was cancelled, or the grasp ended early.
 pub fn accuracy_cost(
     scene: &Scene,
     object: Option<&ObjectModel>,
@@ -50,7 +50,7 @@ mod tests {
     use palpate_sim::scene::Accuracy;
 
     #[test]
-    fn turning_the_dial_moves_the_error_and_cancelling_ends_it() {
+    fn accuracy_changes_the_error_and_cancelling_ends_the_run() {
         let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
         let mut scene = Scene::default();
         scene.object.fixed = true;

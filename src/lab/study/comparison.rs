@@ -1,4 +1,4 @@
-//! Methods against each other on the same grasps: fitted to some, judged on others.
+//! Comparison of methods on the same grasps: fitted to some, evaluated on others.
 
 use palpate_learn::evaluation::{Answers, Evaluation, Round, answer, evaluate, product_of_experts, rounds};
 use palpate_learn::metrics::{Bootstrap, Confusion, Interval, McNemar, holm};
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub struct ComparisonRow {
     /// Key of the method, or path of a model.
     pub model: String,
-    /// What people call it.
+    /// Display name.
     pub title: String,
     /// The measures.
     #[serde(flatten)]
@@ -23,14 +23,14 @@ pub struct ComparisonRow {
     pub parameters: usize,
     /// Macro F1 after one grasp, two, and so on, where grasps count as independent: the product of experts.
     pub f1_by_grasps_independent: Vec<f64>,
-    /// How much feeding the PMF back gains over that after one grasp, two, and so on: macro F1 less macro F1 on the same
+    /// Gain of feeding the PMF back over that after one grasp, two, and so on: difference of macro F1 on the same
     /// grasps, with paired 95 % intervals.
     pub gain_over_independent: Vec<Interval>,
-    /// Where the grasps come from.
+    /// Origin of the grasps.
     pub data: DataCard,
-    /// Whether it was fitted in the quick form.
+    /// True for a quick fit.
     pub quick: bool,
-    /// Against the first row: is it better, and is that more than chance?
+    /// Comparison with the first row.
     pub against_first: Option<Difference>,
 }
 
@@ -45,17 +45,17 @@ pub struct Difference {
     pub mcnemar_p_holm: f64,
 }
 
-/// What is compared.
+/// Inputs of a comparison.
 pub struct Comparison<'a> {
-    /// What methods learn from.
+    /// Training set.
     pub train: &'a Dataset,
-    /// What they are judged by; no grasp of it is in `train`.
+    /// Test set; no grasp of it is in `train`.
     pub test: &'a Dataset,
     /// Seed of fits and draws.
     pub seed: u64,
     /// Quick fits, for tests and quick looks.
     pub quick: bool,
-    /// When to stop grasping.
+    /// Stop rule of grasping until sure.
     pub stop: StopRule,
     /// Set from outside to end the work.
     pub interrupted: &'a AtomicBool,
@@ -67,7 +67,7 @@ struct Judged {
     decided: Vec<Option<usize>>,
 }
 
-/// Why there is no comparison.
+/// Error of a comparison.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ComparisonError {
     /// A method could not be fitted.
@@ -78,13 +78,13 @@ pub enum ComparisonError {
         /// Why.
         cause: LearnError,
     },
-    /// Nothing to judge by.
+    /// No test grasps.
     #[error("no grasps are left to test with; collect more, or train on fewer with --train-trials")]
     NoTest,
 }
 
 impl Comparison<'_> {
-    /// Fits and judges methods side by side, each on one thread; rows come in the order of the methods. `tell` hears of
+    /// Fits and judges methods side by side, each on one thread; rows come in the order of the methods. `tell` receives
     /// every method that is done.
     pub fn of_methods(
         &self,
@@ -121,7 +121,7 @@ impl Comparison<'_> {
         Ok(self.compared(judged))
     }
 
-    /// The method's own settings; nobody follows the progress.
+    /// The method's own settings, without progress.
     fn fitting(&self) -> Fitting<'_> {
         Fitting {
             seed: self.seed,
@@ -198,7 +198,7 @@ impl Comparison<'_> {
     }
 
     /// The controls of a fair comparison: a method that learned from shuffled labels, which must not know more than
-    /// chance, and one that is told the true size and shape, which nothing that has to find them can pass.
+    /// chance, and one that is given the true size and shape, an upper bound for methods that must find them.
     pub fn controls(&self, method: &'static Method) -> Result<Controls, ComparisonError> {
         let fitting = self.fitting();
         let failed = |cause| ComparisonError::Fit { method: method.key, cause };
@@ -216,9 +216,9 @@ impl Comparison<'_> {
         let by_chance = answer(shuffled.recogniser.as_ref(), self.test);
         let model = method.train(self.train, &fitting).map_err(failed)?;
         let plain = answer(model.recogniser.as_ref(), self.test);
-        let mut told = plain.clone();
+        let mut oracle = plain.clone();
         let labels = &self.test.labels;
-        for (verdict, class) in told.verdicts.iter_mut().zip(&truth) {
+        for (verdict, class) in oracle.verdicts.iter_mut().zip(&truth) {
             let like = |other: usize| {
                 let (own, other) = (&labels.classes[*class], &labels.classes[other]);
                 (own.size, own.shape) == (other.size, other.shape)
@@ -232,12 +232,12 @@ impl Comparison<'_> {
             chance: 1.0 / self.test.by_class().iter().filter(|c| !c.is_empty()).count().max(1) as f64,
             shuffled_labels: of(&by_chance)?,
             plain: of(&plain)?,
-            true_size_and_shape: of(&told)?,
+            true_size_and_shape: of(&oracle)?,
         })
     }
 }
 
-/// What controls come to, as macro-accuracy with 95 % intervals.
+/// Macro-accuracy of the controls, with 95 % intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Controls {
     /// Key of the method.
@@ -246,9 +246,9 @@ pub struct Controls {
     pub chance: f64,
     /// Learned from labels that were exchanged at random.
     pub shuffled_labels: Interval,
-    /// As it is.
+    /// Learned from the true labels.
     pub plain: Interval,
-    /// Told the true size and shape.
+    /// Given the true size and shape.
     pub true_size_and_shape: Interval,
 }
 

@@ -1,6 +1,6 @@
-//! What each effect costs and what it changes: leave one out, or put one in, and compare whole trials.
+//! Cost and influence of each effect: switch it off, or on, and compare whole trials.
 //!
-//! Every effect is flipped alone, as if somebody had switched it by hand: what is left to `auto` is decided anew, so that
+//! Every effect is flipped alone, as a user would: effects at `auto` are decided anew, so that
 //! an object let go has its weight. Cost comes from pairs of runs, with and without, one after the other in one thread,
 //! of which the quickest of each kind count, because whatever else a machine does only adds. Differences are taken over
 //! all samples and both fingers.
@@ -17,7 +17,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Which effects a scene calls for, what they cost and what they change.
+/// Effects of a scene, with their cost and influence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Explanation {
     /// Name of the object.
@@ -26,25 +26,25 @@ pub struct Explanation {
     pub cpu_ms: f64,
     /// First contact (s); null when never.
     pub contact_onset_s: Option<f64>,
-    /// What should be known of the trial.
+    /// Remarks on the trial.
     pub warnings: Vec<String>,
-    /// All effects, in the order in which they are told.
+    /// All effects, in the order of [`Effect::ALL`].
     pub effects: Vec<ExplainedEffect>,
 }
 
 /// One effect, explained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExplainedEffect {
-    /// What the plan says of it.
+    /// Decision of the plan.
     #[serde(flatten)]
     pub planned: PlannedEffect,
-    /// What it is.
+    /// Description, one sentence.
     pub about: &'static str,
-    /// What its number is the ratio of.
+    /// Definition of its number.
     pub number_is: &'static str,
-    /// What it costs where it is on, and would cost where it is off, as a share of the trial's CPU time.
+    /// Cost where it is on, or cost of switching it on, as a share of the trial's CPU time.
     pub cost_share: f64,
-    /// What the trial would be with the effect left out where it is on, put in where it is off.
+    /// Change of the trial when the effect is switched the other way.
     pub change: EffectChange,
 }
 
@@ -56,12 +56,12 @@ pub struct EffectChange {
     pub norms: ErrorNorms,
     /// First contact in the other trial (s); null when never.
     pub contact_onset_s: Option<f64>,
-    /// How much later first contact is in the other trial (ms), in whole samples; null unless both touch.
+    /// Delay of first contact in the other trial (ms), in whole samples; null unless both touch.
     pub onset_ms: Option<f64>,
 }
 
 impl ExplainedEffect {
-    /// What it costs, in words.
+    /// Describes the cost.
     pub fn cost_in_words(&self) -> String {
         let (costs, saves) = if self.planned.on { ("costs", "saves") } else { ("would cost", "would save") };
         let percent = 100.0 * self.cost_share;
@@ -70,12 +70,12 @@ impl ExplainedEffect {
         } else if percent > 0.0 {
             format!("{costs} {percent:.0} % of the CPU time")
         } else {
-            // Without friction, say, an object rolls about and takes more steps of the solver.
+            // Without friction, for example, an object rolls about and takes more steps of the solver.
             format!("{saves} {:.0} % of the CPU time", -percent)
         }
     }
 
-    /// What the other trial is like, in words, given when this one has its first contact (s).
+    /// Describes the change, given the time of first contact in this trial (s).
     pub fn change_in_words(&self, onset_here: Option<f64>) -> String {
         let change = &self.change;
         let how = if self.planned.on { "without it" } else { "with it" };
@@ -102,23 +102,23 @@ impl ExplainedEffect {
 const PAIRS: usize = 5;
 /// Shares of CPU time below this differ from run to run on a busy machine.
 const NOISE: f64 = 0.03;
-/// What counts as long (s).
+/// Duration above which a trial is long (s).
 const LONG: f64 = 10.0;
 
-/// How to measure.
+/// Settings of the measurement.
 pub struct Measuring<'a> {
     /// Threads to work in.
     pub threads: usize,
     /// Set to give up.
     pub cancelled: &'a AtomicBool,
-    /// Hears how many of how many effects are done.
+    /// Receives the numbers of effects done and in all.
     pub progress: &'a (dyn Fn(usize, usize) + Sync),
 }
 
 /// Explains every effect of a scene; `None` when cancelled.
 pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measuring<'_>) -> Option<Explanation> {
     let (base, cpu_s) = run(scene, object, how.cancelled)?;
-    let base = Felt::new(scene, base);
+    let base = GraspOutcome::new(scene, base);
     let done = AtomicUsize::new(0);
     (how.progress)(0, Effect::ALL.len());
     let one = |effect: &Effect| {
@@ -127,7 +127,7 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
         Some(explained)
     };
     let all = || Effect::ALL.par_iter().map(one).collect::<Option<Vec<ExplainedEffect>>>();
-    // Where the system has no threads to give, those that rayon has will do.
+    // Falls back to rayon's global pool where no threads can be started.
     let effects = match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
         Ok(pool) => pool.install(all),
         Err(_none) => all(),
@@ -144,7 +144,7 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
 fn explain_one(
     scene: &Scene,
     object: Option<&ObjectModel>,
-    base: &Felt,
+    base: &GraspOutcome,
     effect: Effect,
     cancelled: &AtomicBool,
 ) -> Option<ExplainedEffect> {
@@ -166,12 +166,12 @@ fn explain_one(
         about: rule.about,
         number_is: rule.number,
         cost_share: sign * (here - there) / here,
-        change: base.change_to(&Felt::new(&other_scene, other?), scene),
+        change: base.change_to(&GraspOutcome::new(&other_scene, other?), scene),
         planned,
     })
 }
 
-/// The scene with one effect the other way round, as if somebody had switched it by hand.
+/// The scene with one effect switched the other way.
 fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
     let mut scene = scene.clone();
     scene.effects.set(effect, if plan.is_on(effect.name()) { Setting::Off } else { Setting::On });
@@ -192,12 +192,12 @@ fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> O
 }
 
 /// A trial, and when its first contact was (s).
-struct Felt {
+struct GraspOutcome {
     trial: Trial,
     onset_s: Option<f64>,
 }
 
-impl Felt {
+impl GraspOutcome {
     fn new(scene: &Scene, trial: Trial) -> Self {
         Self { onset_s: GraspSummary::new(&trial, scene).contact_onset_s, trial }
     }
@@ -251,31 +251,31 @@ mod tests {
     fn a_fixed_sphere_calls_for_fingers_and_friction_alone() {
         let mut scene = draft();
         scene.object.fixed = true;
-        let told = explained(&scene, Some(&ball(0.025, 400.0)));
-        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
-        assert!(told.of(Effect::FreeObject).planned.reason.contains("fixed"));
+        let report = explained(&scene, Some(&ball(0.025, 400.0)));
+        assert_eq!(report.names_on(), ["finger-gravity", "friction", "finger-inertia"]);
+        assert!(report.of(Effect::FreeObject).planned.reason.contains("fixed"));
         for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
-            assert!(told.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", told.of(effect).change);
+            assert!(report.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", report.of(effect).change);
         }
-        // What was left out is not missed: no finger comes near the pedestal or the other finger.
+        // Effects left out change nothing: no finger comes near the pedestal or the other finger.
         for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
-            assert_eq!(told.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
-            assert_eq!(told.of(effect).change.norms.force_n, 0.0, "{effect:?}");
+            assert_eq!(report.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
+            assert_eq!(report.of(effect).change.norms.force_n, 0.0, "{effect:?}");
         }
     }
 
     #[test]
-    fn a_light_free_ball_feels_support_and_friction_but_hardly_its_weight() {
-        let told = explained(&draft(), Some(&ball(0.020, 2.0)));
+    fn support_and_friction_matter_to_a_light_free_ball_but_hardly_its_weight() {
+        let report = explained(&draft(), Some(&ball(0.020, 2.0)));
         let on = ["free-object", "finger-gravity", "support", "friction", "finger-inertia"];
-        assert_eq!(told.names_on(), on, "{:#?}", told.effects);
-        let weight = told.of(Effect::ObjectGravity);
+        assert_eq!(report.names_on(), on, "{:#?}", report.effects);
+        let weight = report.of(Effect::ObjectGravity);
         assert!(
             weight.planned.number < weight.planned.threshold && weight.change.norms.curvature_share < 0.01,
             "{weight:?}"
         );
-        assert!(told.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
-        // A heavy one does feel it.
+        assert!(report.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
+        // Weight does matter for a heavy one.
         let heavy = explained(&draft(), Some(&ball(0.020, 4000.0)));
         assert!(
             heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.norms.force_n > 1e-3
@@ -284,16 +284,16 @@ mod tests {
 
     #[test]
     fn an_empty_hand_calls_for_its_fingers_to_meet() {
-        let told = explained(&draft(), None);
-        assert_eq!(told.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
-        let contact = told.of(Effect::FingerContact);
+        let report = explained(&draft(), None);
+        assert_eq!(report.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
+        let contact = report.of(Effect::FingerContact);
         assert!(
             contact.change.norms.curvature_per_m > 1.0 && contact.change.norms.force_n > 0.05,
             "{:?}",
             contact.change
         );
-        assert!(told.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
-        assert_eq!(told.of(Effect::FreeObject).change.norms.curvature_per_m, 0.0);
+        assert!(report.contact_onset_s.is_some() && contact.change.contact_onset_s.is_none());
+        assert_eq!(report.of(Effect::FreeObject).change.norms.curvature_per_m, 0.0);
     }
 
     #[test]
@@ -302,8 +302,8 @@ mod tests {
         scene.object.fixed = true;
         (scene.programme.hold_ticks, scene.timing.duration_s) = (200, 23.0);
         scene.gripper.finger.creep_time = 5.0;
-        let told = explained(&scene, Some(&ball(0.025, 400.0)));
-        let creep = told.of(Effect::Creep);
+        let report = explained(&scene, Some(&ball(0.025, 400.0)));
+        let creep = report.of(Effect::Creep);
         assert!(creep.planned.on && creep.planned.number == 4.0, "{:?}", creep.planned);
         assert!(
             creep.change.norms.force_share > 0.01 && creep.change.norms.curvature_share > 0.005,
@@ -318,20 +318,20 @@ mod tests {
     }
 
     #[test]
-    fn putting_an_effect_in_is_what_switching_it_does() {
+    fn the_reported_change_is_that_of_switching_the_effect() {
         let (mut scene, ball) = (draft(), ball(0.020, 400.0));
         scene.object.fixed = true;
-        let told = explained(&scene, Some(&ball));
-        let free = Felt::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
-        let held = Felt::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
+        let report = explained(&scene, Some(&ball));
+        let free = GraspOutcome::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
+        let held = GraspOutcome::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
         // An object let go has its weight, and rests.
         let expected = held.change_to(&free, &scene);
-        assert_eq!(told.of(Effect::FreeObject).change, expected);
+        assert_eq!(report.of(Effect::FreeObject).change, expected);
         assert!(expected.norms.force_n > 1e-3);
     }
 
     #[test]
-    fn whoever_cancels_gets_nothing() {
+    fn cancelling_gives_no_result() {
         let how = Measuring { threads: 1, cancelled: &AtomicBool::new(true), progress: &|_, _| {} };
         assert_eq!(explain_effects(&draft(), None, &how), None);
     }

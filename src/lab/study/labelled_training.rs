@@ -1,5 +1,5 @@
-//! Training on what was labelled: a recogniser is fitted to some of the trials of the real gripper and judged by the others,
-//! and what was judged is what is kept.
+//! Training on labelled trials: a recogniser is fitted to some trials of the real gripper and evaluated on the others,
+//! and the evaluated model is kept.
 
 use super::comparison::{Comparison, ComparisonError};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
@@ -9,11 +9,11 @@ use palpate_store::{BOARD_RIG, Store, StoreError};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Share of each object's trials that is held back to judge by.
+/// Held-out share of each object's trials.
 pub const HELD_BACK: f64 = 0.2;
 
-/// Trials of an object from which on it is learned: four to learn from, of which the dual-stage networks take one half for
-/// each stage, and one to judge by.
+/// Trials of an object from which on it is learned: four to learn from, of which the dual-stage networks take one half
+/// for each stage, and one to judge by.
 pub const LEAST_TRIALS: usize = 5;
 
 /// Labelled trials of an object.
@@ -21,18 +21,18 @@ pub const LEAST_TRIALS: usize = 5;
 pub struct LabelledClass {
     /// Its label.
     pub name: String,
-    /// How many trials there are.
+    /// Number of trials.
     pub trials: usize,
 }
 
 impl LabelledClass {
-    /// Whether that is enough to learn it.
+    /// True where that is enough to learn it.
     pub fn is_enough(&self) -> bool {
         self.trials >= LEAST_TRIALS
     }
 }
 
-/// How many labelled trials of the real gripper there are of each object, by name.
+/// Numbers of labelled trials of the real gripper, by object name.
 pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError> {
     let mut counts = BTreeMap::<String, usize>::new();
     let labelled = |row: &palpate_store::TrialRow| {
@@ -44,18 +44,18 @@ pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError>
     Ok(counts.into_iter().map(|(name, trials)| LabelledClass { name, trials }).collect())
 }
 
-/// Where a training stands.
+/// Progress of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TrainingStage {
     /// Trials read, of so many.
     Reading(usize, usize),
     /// Share of the fit that is done.
     Fitting(f64),
-    /// It is judged by the trials that were held back.
+    /// Evaluation on the held-out trials.
     Judging,
 }
 
-/// How to train.
+/// Settings of a training.
 pub struct LabelledTraining<'a> {
     /// The method.
     pub method: &'static Method,
@@ -63,40 +63,40 @@ pub struct LabelledTraining<'a> {
     pub seed: u64,
     /// A quick fit with worse results.
     pub quick: bool,
-    /// Hears where it stands.
+    /// Receives the progress.
     pub tell: &'a (dyn Fn(TrainingStage) + Sync),
     /// Set from outside to end the work.
     pub stop: &'a AtomicBool,
 }
 
-/// What a training came to.
+/// Result of a training.
 #[derive(Clone, Debug)]
 pub struct JudgedModel {
-    /// The model; its card tells how it did.
+    /// The model; its card holds the evaluation.
     pub model: Model,
-    /// How it did on the trials that were held back.
+    /// Evaluation on the held-out trials.
     pub evaluation: Evaluation,
     /// Trials to learn from, and to judge by.
     pub trials: [usize; 2],
-    /// Objects left out because there are too few trials of them.
+    /// Objects left out for too few trials.
     pub too_few: Vec<LabelledClass>,
     /// Trials that could not be used: without calibration, or not sound.
     pub left_out: usize,
 }
 
-/// Why there is no model.
+/// Error of a training.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainingError {
-    /// Not two objects to tell apart.
+    /// Fewer than two objects with enough trials.
     #[error(
         "{found} of the objects have {LEAST_TRIALS} labelled trials or more, and two are needed: record and label more \
          trials of the real gripper"
     )]
     TooFew {
-        /// How many have enough.
+        /// Number of objects with enough trials.
         found: usize,
     },
-    /// After what could not be read was left out, too little is there.
+    /// Too few readable trials.
     #[error(
         "{usable} of {all} trials can be used, and only {found} of the objects have {LEAST_TRIALS} of them or more: see \
          which parts are calibrated by `palpate calibrate list`"
@@ -178,7 +178,7 @@ impl LabelledTraining<'_> {
     }
 }
 
-/// What could be read may be less than what is there: objects of which too little is left are no classes.
+/// Some trials may not be readable: objects with too few readable trials are no classes.
 fn without_small_classes(
     data: &Dataset,
     all: usize,

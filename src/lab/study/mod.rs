@@ -14,7 +14,7 @@ pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
 pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain_effects};
 pub use finger_fit::{
-    Course, Estimate, FingerFit, FitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
+    Course, Estimate, FingerFit, FingerFitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
     RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
 };
 pub use labelled_training::{

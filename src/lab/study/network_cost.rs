@@ -1,4 +1,4 @@
-//! What the macro-layer costs: a training step and a live step of our kernel, and the same training step in candle's own
+//! Cost of the macro-layer: a training step and a live step of our kernel, and the same training step in candle's own
 //! LSTM, on the same numbers in one run. `tests/peers/lstm_step.py` times PyTorch on the same sizes.
 
 use candle_core::{DType, Device, Tensor};
@@ -36,9 +36,9 @@ impl StepSizes {
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NetworkCost {
-    /// What was timed.
+    /// Timed operation.
     pub what: &'static str,
-    /// On which sizes.
+    /// Sizes.
     pub sizes: StepSizes,
     /// CPU time, the median over the runs (ms).
     pub cpu_ms_median: f64,
@@ -144,7 +144,7 @@ pub fn candle_step_cost(sizes: StepSizes, runs: usize) -> candle_core::Result<Ne
     })
 }
 
-/// Times one live step: a sample in, probabilities out. The row tells the mean over one sequence.
+/// Times one live step: a sample in, probabilities out. The row holds the mean over one sequence.
 pub fn live_step_cost(sizes: StepSizes, runs: usize) -> NetworkCost {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let layer = MacroLayer::new(shape(sizes), &mut random);

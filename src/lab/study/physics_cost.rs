@@ -1,4 +1,4 @@
-//! What a grasp costs: CPU time of one whole trial on one thread, and its error against a far finer one, for scenes from a
+//! Cost of a grasp: CPU time of one whole trial on one thread, and its error against a far finer one, for scenes from a
 //! fixed ball to a baked mesh.
 //!
 //! Times are those of the thread, not of the wall clock, and the median of several runs, so that a busy machine
@@ -18,7 +18,7 @@ use serde::Serialize;
 pub struct BenchScene {
     /// Its name in tables.
     pub name: &'static str,
-    /// What is grasped.
+    /// Grasped object.
     pub object: ObjectModel,
     /// Held in place, or free.
     pub fixed: bool,
@@ -27,9 +27,9 @@ pub struct BenchScene {
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CostRow {
-    /// Which scene.
+    /// Scene.
     pub scene: &'static str,
-    /// Which accuracy.
+    /// Accuracy.
     pub accuracy: String,
     /// Step length (s); under a tolerance the mean.
     pub step_s: f64,
@@ -45,12 +45,12 @@ pub struct CostRow {
     pub unconverged_steps: u64,
     /// Simulated time over CPU time.
     pub times_real_time: f64,
-    /// How far it is from the truth.
+    /// Error against the reference.
     pub error: Option<ErrorNorms>,
 }
 
-/// A tolerance that is far below what is compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth of
-/// that of steps of 1/300 s.
+/// A tolerance far below the accuracies compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth
+/// of that of steps of 1/300 s.
 const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
 
 /// The grasp of a scene that errors are measured against.

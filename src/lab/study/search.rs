@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 /// Settings that were tried, and how well they did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SearchRow {
-    /// What was changed.
+    /// Changed setting.
     pub settings: serde_json::Map<String, serde_json::Value>,
     /// Macro F1 on parts of the training data that were left out.
     pub f1_macro: f64,

@@ -4,14 +4,14 @@ use super::PassSetup;
 use crate::targets::{COLOUR, DEPTH, SAMPLES};
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPipeline, ShaderModule, VertexBufferLayout};
 
-/// How a pipeline treats depth.
+/// Depth test of a pipeline.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Depth {
-    /// In front of what is there, and remembered.
+    /// Drawn in front of earlier items; depth is written.
     Solid,
-    /// In front of what is there, but transparent to what comes later.
+    /// Drawn in front of earlier items; depth is not written.
     Veil,
-    /// Behind what is there: what is hidden, shown faintly.
+    /// Drawn only where hidden by earlier items, faintly.
     Hidden,
     /// Regardless of depth.
     OnTop,

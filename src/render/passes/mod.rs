@@ -1,4 +1,4 @@
-//! One file for each kind of thing that is drawn, beside the shader of the same name. Adding one is adding a file, its
+//! Drawing passes: one file for each kind of item, beside the shader of the same name. Adding one is adding a file, its
 //! shader, and a line in [`ALL`].
 
 mod arrow;
@@ -13,14 +13,14 @@ use super::frame::FrameBindings;
 use palpate_geometry::drawing::DrawList;
 use wgpu::{Device, Queue, RenderPass};
 
-/// What a pass is made from.
+/// Inputs of creating a pass.
 pub(crate) struct PassSetup<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,
     pub(crate) frame: &'a FrameBindings,
 }
 
-/// What a pass reads before each picture.
+/// Inputs of preparing a pass for one picture.
 pub(crate) struct Prepare<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,
@@ -28,7 +28,7 @@ pub(crate) struct Prepare<'a> {
     pub(crate) pixels_per_point: f32,
 }
 
-/// Draws one kind of thing. Bind group 0 is the frame's and is set already.
+/// Pass that draws one kind of item. Bind group 0 is the frame's and is set already.
 pub(crate) trait Pass: Send + Sync {
     /// Uploads what the list holds of this kind.
     fn prepare(&mut self, prepare: &Prepare<'_>);

@@ -68,7 +68,7 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
     Box::new(OverlayPass { pipeline, glyphs, group, vertices, count: 0 })
 }
 
-/// Triangles as they are gathered, in pixels.
+/// Triangles collected so far, in pixels.
 #[derive(Default)]
 struct Triangles(Vec<Vertex>);
 

@@ -68,7 +68,7 @@ struct SkinMesh {
     count: u32,
 }
 
-/// What one finger of the picture needs.
+/// Buffers of one finger.
 struct FingerOnDevice {
     uniform: Buffer,
     texels: Texture,
@@ -252,7 +252,7 @@ fn ring_at(frames: &[FingerFrame], arc: f32) -> Ring {
     }
 }
 
-/// How far the bellows stand out at an arc length, 0 in a fold to 1 on a rib.
+/// Profile of the bellows at an arc length, 0 in a fold to 1 on a rib.
 fn rib(arc: f32, length: f32) -> f32 {
     let share = (arc / length) * RIBS;
     let to_fold = (share - share.round()).abs();

@@ -1,5 +1,5 @@
-//! Rigid things, and ghosts of things, which are translucent and cast no shadow. A mesh is uploaded once and kept as long
-//! as pictures keep showing it.
+//! Rigid things, and ghosts of things, which are translucent and cast no shadow. A mesh is uploaded once and kept as
+//! long as pictures keep showing it.
 
 use super::build::{Depth, PictureShape, StreamBuffer, fixed_buffer, module, picture_pipeline, shadow_pipeline};
 use super::{Pass, PassSetup, Prepare};
@@ -27,7 +27,7 @@ struct SolidPass {
     pipeline: RenderPipeline,
     /// Absent for ghosts.
     shadow: Option<RenderPipeline>,
-    /// What of a list is drawn.
+    /// Part of the draw list that is drawn.
     of: fn(&DrawList) -> &[Solid],
     meshes: Vec<Uploaded>,
     instances: StreamBuffer,

@@ -1,4 +1,4 @@
-//! Where the rigid segments of a bent finger lie: forward kinematics of the planar chain.
+//! Forward kinematics of the planar chain: poses of the rigid segments of a bent finger.
 //!
 //! Finger plane: x points inward, to the other finger; y points from the palm to the tip; the origin is where the
 //! neutral axis leaves the palm. At absolute angle theta a segment runs along (sin theta, cos theta), and the pad
@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 /// One rigid segment in the finger plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SegmentPose {
-    /// Where it begins: the palm for segment 0, joint j for segment j (m).
+    /// Start: the palm for segment 0, joint j for segment j (m).
     pub start: DVec2,
     /// Unit vector from its start towards the tip.
     pub along: DVec2,

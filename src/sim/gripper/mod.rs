@@ -1,5 +1,5 @@
-//! What a gripper is: two fingers, their compliant pads, what line pressure does to them, and the programme that
-//! the control box runs. Descriptions only; physics reads them.
+//! Description of a gripper: two fingers, their compliant pads, the actuation from line pressure to joint torque, and
+//! the pressure programme. Plain data for the physics.
 
 mod actuation;
 mod bend;
@@ -17,7 +17,7 @@ pub use taxels::TaxelGrid;
 
 use serde::{Deserialize, Serialize};
 
-/// Which of the two fingers. Left stands at negative x in the gripper frame and closes towards positive x.
+/// Side of the gripper. The left finger stands at negative x in the gripper frame and closes towards positive x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
@@ -69,7 +69,7 @@ pub struct Gripper {
     pub finger: Finger,
     /// The compliant inner side of each finger.
     pub pad: Pad,
-    /// From line pressure to joint torque.
+    /// Line pressure to joint torque.
     pub actuation: Actuation,
 }
 
@@ -90,7 +90,7 @@ impl Gripper {
     }
 }
 
-/// How the fingers stand relative to each other and to what they grasp.
+/// Mounting of the fingers relative to each other and to the object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Mount {

@@ -1,7 +1,7 @@
-//! The compliant pad on the inner side of a finger: a field of elastic strands ("taxels"), each pushed in along
+//! The compliant pad on the inner side of a finger: a field of elastic contact springs ("taxels"), each pushed in along
 //! its own axis, with a law that gets stiffer the more it is compressed.
 //!
-//! A strand of cross-section a and rest length H under compression x, stretch lambda = 1 - x / H:
+//! A contact spring of cross-section a and rest length H under compression x, stretch lambda = 1 - x / H:
 //!
 //! - linear:       f = (E a / H) x
 //! - neo-Hookean:  f = (E a / 3) (1 / lambda² - lambda)   (uniaxial; Treloar, *The Physics of Rubber Elasticity*)
@@ -12,7 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How a strand resists compression.
+/// Force law of a contact spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PadLaw {
@@ -26,7 +26,7 @@ pub enum PadLaw {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Pad {
-    /// Height of the pad above the neutral axis, which is also the rest length of its strands, H (m).
+    /// Height of the pad above the neutral axis, which is also the rest length of its contact springs, H (m).
     pub thickness: f64,
     /// Young's modulus E (Pa).
     pub modulus: f64,
@@ -73,8 +73,8 @@ impl Pad {
 const TANGENT_FROM: f64 = 0.95;
 
 impl PadLaw {
-    /// Force (N) and its slope (N/m) of a strand with small-strain stiffness `k` = E a / H (N/m) and rest length
-    /// `height` (m) under compression `x` (m). Zero without compression.
+    /// Force (N) and its slope (N/m) of a contact spring with small-strain stiffness `k` = E a / H (N/m) and rest
+    /// length `height` (m) under compression `x` (m). Zero without compression.
     #[inline]
     pub fn force(self, k: f64, height: f64, x: f64) -> (f64, f64) {
         if x <= 0.0 {
@@ -93,7 +93,7 @@ impl PadLaw {
         }
     }
 
-    /// Elastic energy (J) of a strand under compression `x` (m): the integral of the force.
+    /// Elastic energy (J) of a contact spring under compression `x` (m): the integral of the force.
     pub fn energy(self, k: f64, height: f64, x: f64) -> f64 {
         if x <= 0.0 {
             return 0.0;

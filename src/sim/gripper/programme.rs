@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What the control box is doing.
+/// Phase of the pressure programme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Phase {

@@ -3,7 +3,7 @@
 
 use super::{Finger, Pad};
 
-/// Where the taxels of one pad lie and how stiff each is. Both fingers have the same grid.
+/// Taxel grid of one pad: positions and stiffness. Both fingers have the same grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaxelGrid {
     /// Rows along the finger.
@@ -61,7 +61,7 @@ impl TaxelGrid {
         self.pad.modulus * self.area() / self.height(taxel)
     }
 
-    /// How far a steady normal force (N) pushes a taxel in (m).
+    /// Compression of a taxel under a steady normal force (N), in m.
     pub fn compression(&self, taxel: usize, force: f64) -> f64 {
         self.pad.law.compression(self.stiffness(taxel), self.height(taxel), force)
     }

@@ -17,10 +17,10 @@ pub(super) enum ShapeSource {
     Mesh(Vec<ColouredPart>),
 }
 
-/// What the file says of one link's mass.
+/// Mass of one link as the file declares it.
 pub(super) struct Inertial {
     pub(super) link: String,
-    /// In the object's frame; absent where the file says nothing usable.
+    /// In the object's frame; absent where the file has no usable value.
     pub(super) declared: Option<MassProperties>,
 }
 
@@ -72,7 +72,7 @@ impl Blueprint {
         self.triangles <= MOST_TRIANGLES
     }
 
-    /// Adds what is seen. A colour given here overrides those of the mesh file, as in every URDF viewer.
+    /// Adds a visual shape. A colour given here overrides those of the mesh file, as in every URDF viewer.
     pub(super) fn add_visual(&mut self, shape: &ShapeSource, place: &Pose, colour: Option<Rgb>) {
         if !self.makes_room_for(shape) {
             return;
@@ -95,7 +95,7 @@ impl Blueprint {
         }
     }
 
-    /// Adds what is touched.
+    /// Adds a collision shape.
     pub(super) fn add_collision(&mut self, shape: &ShapeSource, place: &Pose) {
         if !self.makes_room_for(shape) {
             return;
@@ -106,7 +106,7 @@ impl Blueprint {
         });
     }
 
-    /// Builds the object as the scene wants it.
+    /// Builds the object with the options of a scene.
     pub(super) fn build(mut self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
         if self.triangles > MOST_TRIANGLES {
             let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
@@ -175,7 +175,7 @@ impl Blueprint {
         }
     }
 
-    /// The factor on lengths: what the scene says, or a guess with a warning.
+    /// Factor on lengths: that of the scene, or a guess with a warning.
     fn scale(&mut self, options: &LoadOptions, solids: &[SolidPart]) -> f64 {
         if let Some(scale) = options.scale {
             return scale;

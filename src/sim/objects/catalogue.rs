@@ -9,14 +9,14 @@ use std::sync::OnceLock;
 
 static FOLDERS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../assets/objects");
 
-/// What is known of a built-in object besides its URDF.
+/// Facts of a built-in object besides its URDF.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BuiltIn {
     /// The name of its folder.
     #[serde(skip)]
     pub name: String,
-    /// What people call it.
+    /// Display name.
     pub title: String,
     /// The paper's size class.
     pub size: SizeClass,

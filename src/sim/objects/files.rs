@@ -1,4 +1,4 @@
-//! Where the files of an object come from, and what a reference inside one of them means.
+//! Files of an object, and references between them.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -35,7 +35,7 @@ pub(super) fn read_referenced(path: &Path) -> std::io::Result<Vec<u8>> {
 ///
 /// - `package://NAME/rest`, `model://NAME/rest`: `rest` under any folder above that is called NAME or holds one called
 ///   NAME, under the entries of ROS_PACKAGE_PATH, then under the URDF's own folders
-/// - `file:///path`, absolute and relative paths: as they are, relative ones from the URDF's folder
+/// - `file:///path`, absolute and relative paths: unchanged, relative ones from the URDF's folder
 pub(super) fn candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
     let reference = reference.trim();
     if reference.is_empty() {

@@ -3,53 +3,13 @@
 use super::assemble::{Blueprint, ShapeSource};
 use super::catalogue::{catalogue, read_embedded};
 use super::files::{candidates, read_file, read_referenced};
+use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, urdf};
 use palpate_geometry::{MeshFileError, Pose, read_mesh};
-use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// The name that stands for an empty hand.
 pub const EMPTY: &str = "empty";
-
-/// Which shape the physics sees.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CollisionShape {
-    /// What the file declares for collision; where it declares none, what it shows.
-    #[default]
-    File,
-    /// What the file shows.
-    Visual,
-    /// The convex hull, for meshes that cannot be repaired.
-    Hull,
-}
-
-/// How a file is to be read. `None` leaves a choice to Palpate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LoadOptions {
-    /// Factor on all lengths; guessed with a warning where the size is implausible.
-    pub scale: Option<f64>,
-    /// Mass (kg); taken from the file, or from volume and density.
-    pub mass: Option<f64>,
-    /// Density where the file gives no usable mass (kg/m³).
-    pub density: f64,
-    /// Which shape the physics sees.
-    pub collision: CollisionShape,
-    /// Lattice spacing of baked distances (m); chosen by size.
-    pub cell: Option<f64>,
-}
-
-impl Default for LoadOptions {
-    fn default() -> Self {
-        Self {
-            scale: None,
-            mass: None,
-            density: 500.0, // wood and half-full containers; most graspable things float
-            collision: CollisionShape::File,
-            cell: None,
-        }
-    }
-}
 
 /// A source that names the same object from any folder: files that exist get their whole path, names stay names.
 pub fn anchored(source: &str) -> String {

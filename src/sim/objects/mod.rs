@@ -5,23 +5,25 @@ mod catalogue;
 mod files;
 mod load;
 mod model;
+mod options;
 mod urdf;
-mod urdf_text;
+mod xml;
 
 pub use catalogue::{BuiltIn, catalogue, thumbnail};
-pub use load::{CollisionShape, EMPTY, LoadOptions, anchored, load};
+pub use load::{EMPTY, anchored, load};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
+pub use options::{CollisionShape, LoadOptions};
 
 use palpate_geometry::{BakeError, MeshError, MeshFileError};
 use std::path::PathBuf;
 
-/// Why an object cannot be grasped.
+/// Error of loading an object.
 #[derive(Debug, thiserror::Error)]
 pub enum ObjectError {
     /// Neither a built-in name nor a file.
     #[error("there is no object \"{name}\": {hint}")]
     Unknown {
-        /// What was asked for.
+        /// Name given.
         name: String,
         /// The nearest name, or all of them.
         hint: String,
@@ -39,7 +41,7 @@ pub enum ObjectError {
     Unreadable {
         /// The path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         cause: String,
     },
     /// The file is not what it claims to be.
@@ -47,7 +49,7 @@ pub enum ObjectError {
     Malformed {
         /// The object.
         name: String,
-        /// What is wrong.
+        /// Cause.
         cause: String,
     },
     /// A shape of impossible size.
@@ -55,13 +57,13 @@ pub enum ObjectError {
     BadShape {
         /// The link.
         link: String,
-        /// What is wrong.
+        /// Cause.
         cause: String,
     },
     /// A mesh file that cannot be used.
     #[error("{cause}")]
     Mesh {
-        /// What is wrong with it.
+        /// Cause.
         cause: MeshFileError,
     },
     /// Nothing to touch.
@@ -75,7 +77,7 @@ pub enum ObjectError {
     Unsound {
         /// The object.
         name: String,
-        /// What is wrong with the mesh.
+        /// Fault of the mesh.
         cause: MeshError,
     },
     /// An absurd size.
@@ -91,7 +93,7 @@ pub enum ObjectError {
     Bake {
         /// The object.
         name: String,
-        /// Why.
+        /// Cause.
         cause: BakeError,
     },
 }

@@ -48,7 +48,7 @@ impl ShapeClass {
     }
 }
 
-/// What stage one says of an object.
+/// Size and shape class of an object, the answer of stage one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ObjectClass {
     /// Tiny or large.
@@ -107,7 +107,7 @@ impl Resting {
         }
     }
 
-    /// How far the object reaches along a unit direction of its own frame (m).
+    /// Support function: reach of the object along a unit direction of its own frame (m).
     pub fn reach(&self, direction: DVec3) -> f64 {
         self.0.iter().map(|ball| ball.centre.dot(direction) + ball.radius).fold(f64::NEG_INFINITY, f64::max)
     }
@@ -126,11 +126,11 @@ pub struct ObjectModel {
     pub name: String,
     /// Size and shape class, where known.
     pub class: Option<ObjectClass>,
-    /// What is drawn.
+    /// Mesh to draw.
     pub surface: Arc<SurfaceMesh>,
-    /// What is touched.
+    /// Solids for contact.
     pub field: DistanceField,
-    /// The same, solid by solid, for engines that want shapes instead of distances.
+    /// The same as single solids, for engines that need shapes instead of distances.
     pub parts: Arc<[SolidPart]>,
     /// With what it rests.
     pub resting: Resting,
@@ -138,9 +138,9 @@ pub struct ObjectModel {
     pub mass: MassProperties,
     /// Friction coefficient of its surface.
     pub friction: f64,
-    /// Bounding box of what is touched.
+    /// Bounding box of the contact solids.
     pub bounds: Bounds,
-    /// What had to be guessed or mended while loading.
+    /// Warnings: values guessed and meshes repaired while loading.
     pub warnings: Vec<String>,
 }
 

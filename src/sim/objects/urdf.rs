@@ -1,9 +1,13 @@
 //! URDF files: every link's shapes and masses, gathered in the frame of the root link. Fixed joints weld; movable
 //! ones are welded at zero, with a warning, since a grasped object is one rigid body here.
+//!
+//! Files in the wild leave out names, colours and inertia terms, separate numbers by commas, and hold gazebo, sensor
+//! and transmission blocks: missing items are filled in, unused ones are skipped, and essential ones that are missing
+//! or unknown becomes a warning or an error.
 
 use super::ObjectError;
 use super::assemble::{Blueprint, Inertial, ShapeSource};
-use super::urdf_text;
+use super::xml::{self, Element};
 use glam::{DMat3, DVec3};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::{ColouredPart, MassProperties, MeshFileError, Pose, Primitive};
@@ -12,138 +16,226 @@ use std::collections::HashMap;
 /// Reads meshes by the reference that the URDF makes to them.
 pub(super) type MeshReader<'a> = &'a dyn Fn(&str) -> Result<Vec<ColouredPart>, MeshFileError>;
 
+/// Link, joint or material with its name.
+type Named<'a> = (String, &'a Element);
+
+/// Connection of two links.
+struct Joint<'a> {
+    name: String,
+    parent: &'a str,
+    child: &'a str,
+    parent_from_child: Pose,
+}
+
 /// Parses the bytes of a URDF.
 pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Result<Blueprint, ObjectError> {
     let malformed = |cause: String| ObjectError::Malformed { name: name.to_owned(), cause };
-    let clean = urdf_text::clean(bytes).map_err(malformed)?;
-    let robot = urdf_rs::read_from_string(&clean.text)
-        .map_err(|e| malformed(e.to_string().trim_start_matches("custom: ").to_owned()))?;
+    let robot = robot_of(bytes).map_err(malformed)?;
     let mut blueprint = Blueprint::new(name);
-    blueprint.warnings = clean.warnings;
-    let poses = link_poses(&robot, &mut blueprint.warnings).map_err(malformed)?;
-    let colours: HashMap<&str, Rgb> =
-        robot.materials.iter().filter_map(|m| Some((m.name.as_str(), colour_of(m)?))).collect();
-    for link in &robot.links {
-        let Some(root_from_link) = poses.get(link.name.as_str()) else {
+    let links = named(&robot, "link");
+    let joints = joints_of(&robot, &mut blueprint.warnings).map_err(malformed)?;
+    let poses = link_poses(&links, &joints, &mut blueprint.warnings).map_err(malformed)?;
+    let materials = named(&robot, "material");
+    let colour_named =
+        |name: &str| materials.iter().rev().filter(|(own, _)| own == name).find_map(|(_, m)| colour_of(m));
+    for (link, element) in &links {
+        let Some(root_from_link) = poses.get(link.as_str()) else {
             continue;
         };
-        for visual in &link.visual {
-            let material = visual.material.as_ref();
-            let colour = material.and_then(|m| colour_of(m).or_else(|| colours.get(m.name.as_str()).copied()));
-            let place = *root_from_link * pose_of(&visual.origin, &link.name).map_err(malformed)?;
-            let shape = shape_of(&visual.geometry, &link.name, read_mesh);
-            match shape {
+        let visuals = shape_tags(link, element, "visual", &mut blueprint.warnings);
+        let collisions = shape_tags(link, element, "collision", &mut blueprint.warnings);
+        for (visual, shape) in &visuals {
+            let material = visual.child("material");
+            let colour = material.and_then(|m| colour_of(m).or_else(|| colour_named(m.attribute("name")?)));
+            let place = *root_from_link * origin_of(visual, link).map_err(malformed)?;
+            match shape_of(shape, link, read_mesh) {
                 Ok(shape) => blueprint.add_visual(&shape, &place, colour),
-                // A visual that is missing is drawn as what is touched instead.
-                Err(error) if !link.collision.is_empty() => blueprint.warnings.push(error.to_string()),
+                // The collision shape is drawn in place of a missing visual.
+                Err(error) if !collisions.is_empty() => blueprint.warnings.push(error.to_string()),
                 Err(error) => return Err(error),
             }
         }
-        for collision in &link.collision {
-            let place = *root_from_link * pose_of(&collision.origin, &link.name).map_err(malformed)?;
-            let shape = shape_of(&collision.geometry, &link.name, read_mesh)?;
-            blueprint.add_collision(&shape, &place);
+        for (collision, shape) in &collisions {
+            let place = *root_from_link * origin_of(collision, link).map_err(malformed)?;
+            blueprint.add_collision(&shape_of(shape, link, read_mesh)?, &place);
         }
-        let has_shape = !(link.visual.is_empty() && link.collision.is_empty());
-        if has_shape || link.inertial.mass.value != 0.0 {
-            let declared = inertial_of(link, root_from_link).map_err(malformed)?;
-            blueprint.inertials.push(Inertial { link: link.name.clone(), declared });
+        let own = inertial_of(link, element).map_err(malformed)?;
+        if !(visuals.is_empty() && collisions.is_empty()) || own.is_some_and(|(mass, _)| mass.mass != 0.0) {
+            let possible = own.filter(|(own, _)| own.mass.is_finite() && own.mass > 0.0 && own.mass < 1e4);
+            let declared = possible.map(|(own, place)| own.seen_from(&(*root_from_link * place)));
+            blueprint.inertials.push(Inertial { link: link.clone(), declared });
         }
     }
     Ok(blueprint)
 }
 
-/// Where each link lies in the frame of the root. Loops and second parents are refused.
-fn link_poses<'a>(robot: &'a urdf_rs::Robot, warnings: &mut Vec<String>) -> Result<HashMap<&'a str, Pose>, String> {
-    let mut parent_of: HashMap<&str, &urdf_rs::Joint> = HashMap::new();
-    let known = |name: &str| robot.links.iter().any(|link| link.name == name);
-    for joint in &robot.joints {
-        for end in [&joint.parent.link, &joint.child.link] {
-            if !known(end) {
+/// The `<robot>` of a file. The error names the fault.
+fn robot_of(bytes: &[u8]) -> Result<Element, String> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    if text.contains("${") || text.contains("$(") || text.contains("<xacro:") {
+        return Err("it is a xacro template, not a URDF; run `xacro FILE > object.urdf` first".to_owned());
+    }
+    let robot = xml::parse(text)?;
+    match robot.name.as_str() {
+        "robot" => Ok(robot),
+        "sdf" => Err("it is an SDF file; Palpate reads URDF, OBJ and STL".to_owned()),
+        other => Err(format!("its outermost element is <{other}>, not <robot>; it is not a URDF")),
+    }
+}
+
+/// Parts of a robot of one kind. A nameless one is named by its place in the file.
+fn named<'a>(robot: &'a Element, kind: &str) -> Vec<Named<'a>> {
+    let parts = robot.children.iter().filter(|part| ["link", "joint", "material"].contains(&part.name.as_str()));
+    let with_name = |(k, part): (usize, &'a Element)| {
+        let name = part.attribute("name").map_or_else(|| format!("{kind}_{k}"), str::to_owned);
+        (part.name == kind).then_some((name, part))
+    };
+    parts.enumerate().filter_map(with_name).collect()
+}
+
+fn joints_of<'a>(robot: &'a Element, warnings: &mut Vec<String>) -> Result<Vec<Joint<'a>>, String> {
+    let mut joints = Vec::new();
+    for (name, element) in named(robot, "joint") {
+        let kind = element.attribute("type").unwrap_or("fixed");
+        if kind != "fixed" {
+            warnings.push(format!("joint \"{name}\" is {kind}; it was welded at its zero position"));
+        }
+        let [parent, child] = ["parent", "child"].map(|end| element.child(end).and_then(|e| e.attribute("link")));
+        let (Some(parent), Some(child)) = (parent, child) else {
+            warnings.push(format!("joint \"{name}\" names no parent or no child and was left out"));
+            continue;
+        };
+        let parent_from_child = origin_of(element, &name)?;
+        joints.push(Joint { name, parent, child, parent_from_child });
+    }
+    Ok(joints)
+}
+
+/// Pose of each link in the frame of the root. Loops and second parents are refused.
+fn link_poses<'a>(
+    links: &'a [Named<'_>],
+    joints: &'a [Joint<'_>],
+    warnings: &mut Vec<String>,
+) -> Result<HashMap<&'a str, Pose>, String> {
+    let mut parent_of: HashMap<&str, &Joint<'_>> = HashMap::new();
+    for joint in joints {
+        for end in [joint.parent, joint.child] {
+            if !links.iter().any(|(name, _)| name == end) {
                 return Err(format!("joint \"{}\" refers to a link \"{end}\" that does not exist", joint.name));
             }
         }
-        if let Some(other) = parent_of.insert(&joint.child.link, joint) {
-            let child = &joint.child.link;
+        if let Some(other) = parent_of.insert(joint.child, joint) {
+            let child = joint.child;
             return Err(format!("link \"{child}\" hangs from two joints, \"{}\" and \"{}\"", other.name, joint.name));
         }
     }
     let roots: Vec<&str> =
-        robot.links.iter().map(|l| l.name.as_str()).filter(|name| !parent_of.contains_key(name)).collect();
+        links.iter().map(|(name, _)| name.as_str()).filter(|name| !parent_of.contains_key(name)).collect();
     let Some(root) = roots.first() else {
-        return Err(if robot.links.is_empty() {
+        return Err(if links.is_empty() {
             "it has no links".to_owned()
         } else {
             "its joints form a loop: no link is the root".to_owned()
         });
     };
     for other in &roots[1..] {
-        warnings.push(format!("link \"{other}\" is not joined to \"{root}\"; it is kept where it is"));
+        warnings.push(format!("link \"{other}\" is not joined to \"{root}\"; it stays at its own origin"));
     }
     let mut poses: HashMap<&str, Pose> = roots.iter().map(|name| (*name, Pose::IDENTITY)).collect();
-    for link in &robot.links {
+    for (link, _) in links {
         // Up to the nearest link already placed, then back down.
-        let mut chain: Vec<&urdf_rs::Joint> = Vec::new();
-        let mut at = link.name.as_str();
+        let mut chain: Vec<&Joint<'_>> = Vec::new();
+        let mut at = link.as_str();
         while !poses.contains_key(at) {
             let Some(joint) = parent_of.get(at) else { break };
-            if chain.len() > robot.links.len() {
+            if chain.len() > links.len() {
                 return Err(format!("the joints around link \"{at}\" form a loop"));
             }
             chain.push(joint);
-            at = &joint.parent.link;
+            at = joint.parent;
         }
         for joint in chain.into_iter().rev() {
-            let parent = poses[joint.parent.link.as_str()];
-            let place = parent * pose_of(&joint.origin, &joint.name)?;
-            poses.insert(&joint.child.link, place);
+            let place = poses[joint.parent] * joint.parent_from_child;
+            poses.insert(joint.child, place);
         }
     }
     Ok(poses)
 }
 
-fn pose_of(origin: &urdf_rs::Pose, owner: &str) -> Result<Pose, String> {
-    let (xyz, rpy) = (DVec3::from_array(*origin.xyz), DVec3::from_array(*origin.rpy));
-    if xyz.is_finite() && rpy.is_finite() {
-        Ok(Pose::from_xyz_rpy(xyz, rpy))
-    } else {
-        Err(format!("an origin of \"{owner}\" is not a finite number"))
+/// Numbers separated by blanks, commas or semicolons, where there are exactly N of them.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let words = text.split([',', ';', ' ', '\t', '\n', '\r']);
+    words.filter_map(|word| word.parse().ok()).collect::<Vec<f64>>().try_into().ok()
+}
+
+/// The first `<origin>` of an element; no origin is the identity.
+fn origin_of(element: &Element, owner: &str) -> Result<Pose, String> {
+    let Some(origin) = element.child("origin") else { return Ok(Pose::IDENTITY) };
+    let vector = |key: &str| origin.attribute(key).map_or(Some([0.0; 3]), numbers).map(DVec3::from_array);
+    match (vector("xyz"), vector("rpy")) {
+        (Some(xyz), Some(rpy)) if xyz.is_finite() && rpy.is_finite() => Ok(Pose::from_xyz_rpy(xyz, rpy)),
+        _ => Err(format!("an origin of \"{owner}\" is not three finite numbers")),
     }
 }
 
-fn colour_of(material: &urdf_rs::Material) -> Option<Rgb> {
-    material.color.as_ref().map(|c| Rgb::from_unit([c.rgba[0], c.rgba[1], c.rgba[2]].map(|x| x as f32)))
+/// Colour of a material; grey where its `<color>` has no usable numbers.
+fn colour_of(material: &Element) -> Option<Rgb> {
+    let rgba = material.child("color")?.attribute("rgba").unwrap_or_default();
+    let channels: Vec<f32> = rgba.split([',', ';', ' ', '\t', '\n', '\r']).filter_map(|c| c.parse().ok()).collect();
+    Some(Rgb::from_unit(channels.first_chunk::<3>().copied().unwrap_or([0.7; 3])))
 }
 
-fn shape_of(geometry: &urdf_rs::Geometry, link: &str, read_mesh: MeshReader<'_>) -> Result<ShapeSource, ObjectError> {
-    let positive = |value: f64, what: &str| {
-        if value.is_finite() && value > 0.0 {
-            Ok(value)
-        } else {
-            let cause = format!("{what} = {value} is not a positive length");
-            Err(ObjectError::BadShape { link: link.to_owned(), cause })
-        }
-    };
-    let primitive = match geometry {
-        urdf_rs::Geometry::Box { size } => {
-            let half = DVec3::new(positive(size[0], "size")?, positive(size[1], "size")?, positive(size[2], "size")?);
-            Primitive::Cuboid { half: 0.5 * half }
-        }
-        urdf_rs::Geometry::Cylinder { radius, length } => Primitive::Cylinder {
-            radius: positive(*radius, "radius")?,
-            half_length: 0.5 * positive(*length, "length")?,
-        },
-        urdf_rs::Geometry::Capsule { radius, length } => {
-            Primitive::Capsule { radius: positive(*radius, "radius")?, half_length: 0.5 * positive(*length, "length")? }
-        }
-        urdf_rs::Geometry::Sphere { radius } => Primitive::Sphere { radius: positive(*radius, "radius")? },
-        urdf_rs::Geometry::Mesh { filename, scale } => {
-            let factors = scale.map_or(DVec3::ONE, |s| DVec3::from_array(*s));
-            if !factors.is_finite() || factors.min_element() == 0.0 || factors.abs().max_element() > 1e9 {
-                let cause = format!("the mesh scale {factors} is not usable");
-                return Err(ObjectError::BadShape { link: link.to_owned(), cause });
+/// Visual or collision elements of a link, each with its shape.
+fn shape_tags<'a>(
+    link: &str,
+    element: &'a Element,
+    kind: &str,
+    warnings: &mut Vec<String>,
+) -> Vec<(&'a Element, &'a Element)> {
+    let known = |shape: &&Element| ["box", "cylinder", "sphere", "capsule", "mesh"].contains(&shape.name.as_str());
+    let declared = element.children.iter().filter(|child| child.name == kind);
+    declared
+        .filter_map(|declared| {
+            let shapes = &declared.child("geometry")?.children;
+            if let Some(unknown) = shapes.iter().find(|shape| !known(shape)) {
+                warnings.push(format!("link \"{link}\": the shape <{}> is not known and was left out", unknown.name));
             }
-            let mut parts = read_mesh(filename).map_err(|cause| ObjectError::Mesh { cause })?;
+            Some((declared, shapes.iter().find(known)?))
+        })
+        .collect()
+}
+
+fn shape_of(shape: &Element, link: &str, read_mesh: MeshReader<'_>) -> Result<ShapeSource, ObjectError> {
+    let bad = |cause: String| ObjectError::BadShape { link: link.to_owned(), cause };
+    let positive = |value: f64, what: &str| {
+        let possible = value.is_finite() && value > 0.0;
+        if possible { Ok(value) } else { Err(bad(format!("{what} = {value} is not a positive length"))) }
+    };
+    let length = |key: &str| match shape.attribute(key).and_then(|text| text.trim().parse().ok()) {
+        Some(value) => positive(value, key),
+        None => Err(bad(format!("the {key} of its {} is not a number", shape.name))),
+    };
+    let primitive = match shape.name.as_str() {
+        "box" => {
+            let size = shape.attribute("size").and_then(numbers);
+            let [x, y, z] = size.ok_or_else(|| bad("the size of its box is not three numbers".to_owned()))?;
+            let size = DVec3::new(positive(x, "size")?, positive(y, "size")?, positive(z, "size")?);
+            Primitive::Cuboid { half: 0.5 * size }
+        }
+        "cylinder" => Primitive::Cylinder { radius: length("radius")?, half_length: 0.5 * length("length")? },
+        "capsule" => Primitive::Capsule { radius: length("radius")?, half_length: 0.5 * length("length")? },
+        "sphere" => Primitive::Sphere { radius: length("radius")? },
+        _ => {
+            let scale = shape
+                .attribute("scale")
+                .map_or(Some([1.0; 3]), |text| numbers(text).or_else(|| numbers(text).map(|[factor]| [factor; 3])));
+            let factors = scale.map_or(DVec3::NAN, DVec3::from_array);
+            if !factors.is_finite() || factors.min_element() == 0.0 || factors.abs().max_element() > 1e9 {
+                return Err(bad(format!("the mesh scale {factors} is not usable")));
+            }
+            let file = shape.attribute("filename").ok_or_else(|| bad("its mesh names no file".to_owned()))?;
+            let mut parts = read_mesh(file).map_err(|cause| ObjectError::Mesh { cause })?;
             for part in &mut parts {
                 part.mesh.scale(factors);
             }
@@ -153,20 +245,69 @@ fn shape_of(geometry: &urdf_rs::Geometry, link: &str, read_mesh: MeshReader<'_>)
     Ok(ShapeSource::Primitive(primitive))
 }
 
-/// What the file says a link weighs, in the root frame, where that is possible for a real body.
-fn inertial_of(link: &urdf_rs::Link, root_from_link: &Pose) -> Result<Option<MassProperties>, String> {
-    let inertial = &link.inertial;
-    let i = &inertial.inertia;
-    let place = *root_from_link * pose_of(&inertial.origin, &link.name)?;
-    let own = MassProperties {
-        mass: inertial.mass.value,
-        centre: DVec3::ZERO,
-        inertia: DMat3::from_cols(
-            DVec3::new(i.ixx, i.ixy, i.ixz),
-            DVec3::new(i.ixy, i.iyy, i.iyz),
-            DVec3::new(i.ixz, i.iyz, i.izz),
-        ),
+/// Mass properties as a link declares them, about their own origin, and the pose of that origin in the link. Terms that
+/// are missing or no numbers count as zero.
+fn inertial_of(link: &str, element: &Element) -> Result<Option<(MassProperties, Pose)>, String> {
+    let Some(inertial) = element.child("inertial") else { return Ok(None) };
+    let term = |part: &str, key: &str| {
+        let text = inertial.child(part).and_then(|part| part.attribute(key));
+        text.and_then(|text| text.trim().parse().ok()).unwrap_or(0.0)
     };
-    let sound_mass = own.mass.is_finite() && own.mass > 0.0 && own.mass < 1e4;
-    Ok(sound_mass.then(|| own.seen_from(&place)))
+    let [ixx, ixy, ixz, iyy, iyz, izz] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|key| term("inertia", key));
+    let inertia = DMat3::from_cols(DVec3::new(ixx, ixy, ixz), DVec3::new(ixy, iyy, iyz), DVec3::new(ixz, iyz, izz));
+    let own = MassProperties { mass: term("mass", "value"), centre: DVec3::ZERO, inertia };
+    Ok(Some((own, origin_of(inertial, link)?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blueprint(text: &str) -> Result<Blueprint, ObjectError> {
+        parse("thing", text.as_bytes(), &|name| {
+            Err(MeshFileError::Unreadable { name: name.to_owned(), cause: "no meshes here".to_owned() })
+        })
+    }
+
+    #[test]
+    fn hand_written_files_are_read_with_warnings() {
+        let sloppy = "\u{feff}\n\n<?xml version='1.0' encoding='latin1'?>\n<!-- a mug -->\n\
+            <robot xmlns:x='http://x' name='mug'><gazebo><deep><deeper/></deep></gazebo>\n\
+            <link name='body' type='odd'><visual name='v'><geometry><box size='1,2,3'/></geometry>\
+            <material><color rgba='1 0 0'/></material></visual>\
+            <collision><geometry><heightmap/></geometry></collision>\
+            <inertial><mass value='0.2'/></inertial></link>\
+            <link/><joint name='j' type='revolute'><axis xyz='0 0 1'/><parent link='body'/><child link='link_1'/>\
+            <limit/></joint><joint name='lost'/></robot>";
+        let read = blueprint(sloppy).expect("tolerated");
+        assert_eq!((read.visual.len(), read.collision.len(), read.inertials.len()), (1, 0, 1));
+        assert_eq!(read.visual[0].colour, Some(Rgb(255, 0, 0)));
+        let mass = read.inertials[0].declared.expect("declared").mass;
+        assert!((mass - 0.2).abs() < 1e-12);
+        assert_eq!(read.warnings.len(), 3, "{:?}", read.warnings);
+    }
+
+    #[test]
+    fn files_that_are_no_urdf_are_refused_with_the_reason() {
+        let message = |text: &str| blueprint(text).map(|_| ()).expect_err("refused").to_string();
+        assert!(message("").contains("no XML"));
+        assert!(message("<sdf/>").contains("SDF"));
+        assert!(message("<robot><link name='${x}'/></robot>").contains("xacro"));
+        assert!(message("<robot><link></robot>").contains("well-formed"));
+        assert!(message("<robot><link>").contains("cut short"));
+        assert!(message(&"<robot>".repeat(10_000)).contains("nested"));
+        assert!(message("<html></html>").contains("<html>"));
+    }
+
+    #[test]
+    fn shapes_without_their_numbers_are_refused_by_name() {
+        let message = |shape: &str| {
+            let text =
+                format!("<robot><link name='a'><collision><geometry>{shape}</geometry></collision></link></robot>");
+            blueprint(&text).map(|_| ()).expect_err("refused").to_string()
+        };
+        assert!(message("<box/>").contains("size") && message("<box size='1 2'/>").contains("size"));
+        assert!(message("<cylinder radius='0.01'/>").contains("length"));
+        assert!(message("<mesh/>").contains("mesh") && message("<mesh filename='a.obj' scale='x'/>").contains("scale"));
+    }
 }

@@ -1,14 +1,14 @@
-//! Whether a gripper is at rest: the torque at each joint that neither springs, gravity nor contacts account for.
+//! Static residual: the torque at each joint that neither springs, gravity nor contacts balance.
 
 use super::contact::{Acting, Against, Contact};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
 use super::workspace::{Spatial, Workspace};
 
-/// The static residual |tau - K q - g + J'f|: the largest joint torque not balanced by springs, gravity and the contacts
-/// of the last step, as a share of the actuation torque. Zero where nothing is driven.
-pub(super) fn static_residual(model: &Model, state: &State, ws: &Workspace, drive: &Drive) -> f64 {
+/// The static residual |tau - K q - g + J'f|: the largest joint torque not balanced by springs, gravity and the
+/// contacts of the last step, as a share of the actuation torque. Zero where nothing is driven.
+pub(super) fn static_residual(model: &PhysicsModel, state: &State, ws: &Workspace, drive: &Drive) -> f64 {
     if drive.torque == 0.0 {
         return 0.0;
     }

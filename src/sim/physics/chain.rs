@@ -86,9 +86,9 @@ impl ChainModel {
         }
     }
 
-    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane (m/s²)), for a step of h
-    /// (s). Forces that grow with the square of the rates are explicit; to be no source of energy where a segment turns by a
-    /// radian within a step, they are divided by 1 + (h w)², w the fastest turn of a segment.
+    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane (m/s²)), for a step of
+    /// h (s). Forces that grow with the square of the rates are explicit; to be no source of energy where a segment
+    /// turns by a radian within a step, they are divided by 1 + (h w)², w the fastest turn of a segment.
     pub(super) fn bias(
         &self,
         segments: &[SegmentPose],
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_hanging_finger_feels_no_gravity_torque() {
+    fn a_straight_hanging_finger_has_no_gravity_torque() {
         let model = chain(10);
         let mut segments = vec![SegmentPose::default(); 11];
         model.bend(&[0.0; 10], &mut segments);

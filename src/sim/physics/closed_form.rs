@@ -3,7 +3,7 @@
 
 use super::detect::detect;
 use super::step::{Drive, lay_out, step};
-use super::{Model, Placement, SteppedScene};
+use super::{PhysicsModel, Placement, SteppedScene};
 use crate::gripper::{Finger, PadLaw};
 use crate::objects::ObjectModel;
 use crate::scene::{Effect, Scene, Setting, SupportKind};
@@ -86,7 +86,7 @@ fn a_cantilever_rings_at_its_modes() {
             let mut scene = bare(joints);
             scene.gripper.finger.back = 0.0;
             scene.gripper.pad.thickness = 1e-4; // a thin beam: no rotary inertia beyond that of its segments
-            let model = Model::new(&scene, None, &Placement::new(&scene, None));
+            let model = PhysicsModel::new(&scene, None, &Placement::new(&scene, None));
             let modes = lowest_modes(&model);
             [(modes[0], 1.8751), (modes[1], 4.6941)].map(|(got, beta)| got / want(beta, &scene.gripper.finger) - 1.0)
         })
@@ -100,7 +100,7 @@ fn a_cantilever_rings_at_its_modes() {
 }
 
 /// The two lowest natural frequencies of the straight chain (rad/s), by inverse iteration with deflation.
-fn lowest_modes(model: &Model) -> [f64; 2] {
+fn lowest_modes(model: &PhysicsModel) -> [f64; 2] {
     let n = model.chain.joints;
     let mut segments = vec![crate::gripper::SegmentPose::default(); n + 1];
     model.chain.bend(&vec![0.0; n], &mut segments);

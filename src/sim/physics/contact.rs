@@ -18,7 +18,7 @@
 use crate::gripper::PadLaw;
 use glam::{DMat3, DVec3};
 
-/// What a contact pushes against.
+/// Counterpart of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Against {
     /// A finger segment against the object.
@@ -29,7 +29,7 @@ pub(super) enum Against {
     Finger(u32),
 }
 
-/// Which body the contact acts on.
+/// Body that the contact acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Acting {
     /// Segment `link` = finger (N + 1) + segment.
@@ -41,7 +41,7 @@ pub(super) enum Acting {
 /// A contact and its state within the solve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
-    /// Where its shear and lag are remembered between steps.
+    /// Index under which shear and lag are kept between steps.
     pub(super) site: u32,
     /// Body A.
     pub(super) acting: Acting,
@@ -57,7 +57,7 @@ pub(super) struct Contact {
     pub(super) law: PadLaw,
     /// Small-strain stiffness along the normal (N/m).
     pub(super) stiffness: f64,
-    /// Rest length of the strand along the normal (m).
+    /// Rest length of the contact spring along the normal (m).
     pub(super) height: f64,
     /// Stiffness of the skin in shear, k_t (N/m).
     pub(super) shear_stiffness: f64,
@@ -73,7 +73,7 @@ pub(super) struct Contact {
     pub(super) change: DVec3,
 }
 
-/// What all contacts of a step share.
+/// Constants shared by all contacts of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactStep {
     /// Step length, h (s).
@@ -85,7 +85,7 @@ pub(super) struct ContactStep {
 }
 
 impl ContactStep {
-    /// What a velocity counts for in the friction impulse, beside the shear there is: h + tau (s).
+    /// Factor of the velocity in the friction impulse, h + tau (s).
     fn shear_reach(self) -> f64 {
         self.h + self.shear_damping_time
     }

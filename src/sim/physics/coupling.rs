@@ -1,21 +1,21 @@
 //! The block of the Hessian between the two fingers, which exists only while they touch each other.
 //!
-//! A contact between segment a of the left finger and segment b of the right one, with Hessian G at the arm r, subtracts
-//! S_i' J' G J S_j for every joint i before a and j before b, J = [1, -[r]x]. First everything is summed per joint of
-//! the left and segment of the right finger, then from the tip of the right finger inward.
+//! A contact between segment a of the left finger and segment b of the right one, with Hessian G at the arm r,
+//! subtracts S_i' J' G J S_j for every joint i before a and j before b, J = [1, -[r]x]. First everything is summed per
+//! joint of the left and segment of the right finger, then from the tip of the right finger inward.
 
 use super::contact::{Acting, Against};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::workspace::{Spatial, Workspace};
 
 /// Gives the rows of the right finger room for the block, or takes it back.
-pub(super) fn prepare_coupling(model: &Model, ws: &mut Workspace) {
+pub(super) fn prepare_coupling(model: &PhysicsModel, ws: &mut Workspace) {
     let n = model.chain.joints;
     ws.hessian.begin_rows(n..2 * n, if ws.fingers_meet { 0 } else { n });
 }
 
 /// Fills the block.
-pub(super) fn fill_coupling(model: &Model, ws: &mut Workspace) {
+pub(super) fn fill_coupling(model: &PhysicsModel, ws: &mut Workspace) {
     if !ws.fingers_meet {
         return;
     }

@@ -1,22 +1,24 @@
-//! Finding contacts: every strand of the pads casts a short ray from its foot along its axis.
+//! Finding contacts: every contact spring of the pads casts a short ray from its foot along its axis.
 //!
-//! The ray is thick: a ball of the strand's radius moves from the foot outwards by sphere tracing until it touches
-//! something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels; rays
-//! that are as thick as the gaps between strands do not.
+//! The ray is thick: a ball of the contact spring's radius moves from the foot outwards by sphere tracing until it
+//! touches something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels;
+//! rays that are as thick as the gaps between contact springs do not.
 //!
-//! With the rest position of the ball's centre at s and the touch at t, the strand is compressed by x = s - t along its
-//! axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A relative motion v
-//! of the surfaces changes x by -n . v / c, whatever the shape of what is touched. The strand stores the energy U(x) of its
-//! law, so that it presses along n with U'(x) / c: the pressure in the strand on the slanted surface it meets, which is
-//! larger than its own section by 1 / c. The same force, as a function of the compression along n, is that of a strand of
-//! stiffness k / c² and length c H, since U depends on k H² and x / H alone. That is what a contact is given.
+//! With the rest position of the ball's centre at s and the touch at t, the contact spring is compressed by x = s - t
+//! along its axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A
+//! relative motion v of the surfaces changes x by -n . v / c, whatever the shape of the surface. The contact spring
+//! stores the energy U(x) of its law, so that it presses along n with U'(x) / c: the pressure in the contact spring on
+//! the slanted surface it meets, which is larger than its own section by 1 / c. The same force, as a function of the
+//! compression along n, is that of a contact spring of stiffness k / c² and length c H, since U depends on k H² and x /
+//! H alone. That is what a contact is given.
 //!
-//! It matters: a strand pressed along n by the force of its axial compression alone is the gradient of no energy. Fingers
-//! that swing then gain energy while they press, and what they hold rings and wanders.
+//! It matters: a contact spring pressed along n by the force of its axial compression alone is the gradient of no
+//! energy. Fingers that swing then gain energy while they press, and what they hold rings and wanders.
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
-use super::effects::{FingerContact, Fronts, OtherFinger, in_series};
-use super::model::{Body, Model};
+use super::effects::FingerContact;
+use super::finger_pair::{Fronts, OtherFinger, in_series};
+use super::model::{Body, PhysicsModel};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
 use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
@@ -26,22 +28,22 @@ use glam::{DMat3, DVec3};
 const STILL_MARGIN: f64 = 2e-4;
 /// Speed gained within a step that a contact in waiting allows for (m/s).
 const SPEED_MARGIN: f64 = 0.1;
-/// How much faster than now a body may become within a step before contacts are found one step late.
+/// Factor on the speed within one step up to which contacts are found in time.
 const SPEED_FACTOR: f64 = 1.5;
 
-/// A surface that a strand has met.
+/// A surface that a contact spring has met.
 struct Hit {
     /// Compression along the surface normal (m), negative while apart.
     compression: f64,
     /// Outward normal of the surface, unit length.
     normal: DVec3,
-    /// Where the surface is met.
+    /// Counterpart that is met.
     point: DVec3,
-    /// How squarely the strand meets the surface, c: from [`LEAST_COSINE`] to one.
+    /// Cosine between the spring's axis and the surface normal, c: from [`LEAST_COSINE`] to one.
     cosine: f64,
 }
 
-/// How a ray meets a surface.
+/// Encounter of a ray with a surface.
 enum Met {
     /// Coming from outside.
     InFront(Hit),
@@ -49,12 +51,12 @@ enum Met {
     Behind { gap: f64 },
 }
 
-/// A strand that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays finite, and
-/// its force vanishes with the compression along the normal.
+/// A contact spring that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays
+/// finite, and its force vanishes with the compression along the normal.
 const LEAST_COSINE: f64 = 0.25;
 
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
-pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
+pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Workspace) {
     workspace.contacts.clear();
     let h = workspace.step.h;
     let object = model.body.as_ref().map(|body| Solid::new(body, state));
@@ -66,7 +68,7 @@ pub(super) fn detect(model: &Model, state: &State, workspace: &mut Workspace) {
             let link = first_link + j;
             let segment = workspace.segments[link];
             let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
-            let reach = model.strands.reach[j] + model.strands.radius;
+            let reach = model.springs.reach[j] + model.springs.radius;
             let link_velocity = workspace.spatial[link];
             let speed =
                 link_velocity.linear_at(middle - workspace.reference).length() + link_velocity.angular.length() * reach;
@@ -104,7 +106,7 @@ fn margin(h: f64, speed: f64) -> f64 {
     STILL_MARGIN + h * (SPEED_MARGIN + SPEED_FACTOR * speed)
 }
 
-/// What one segment may touch, and how far away it may still be.
+/// Counterparts within reach of one segment, and the reach.
 struct Near<'a> {
     object: Option<(&'a Solid<'a>, f64)>,
     world: Option<f64>,
@@ -120,17 +122,17 @@ struct Place {
     segment: SegmentPose,
 }
 
-fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
+fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
     let plane = model.planes[place.finger];
     let local_axes = segment_axes(&plane, &place.segment);
-    for k in model.strands.of_segment(place.segment_index) {
-        let strand = &model.strands.all[k];
-        let (foot, axis) = strand.ray(&place.segment);
+    for k in model.springs.of_segment(place.segment_index) {
+        let spring = &model.springs.all[k];
+        let (foot, axis) = spring.ray(&place.segment);
         let ray = Ray {
-            foot: plane.point(foot, strand.across),
+            foot: plane.point(foot, spring.across),
             axis: plane.direction(axis),
-            radius: model.strands.radius,
-            rest: strand.height - model.strands.radius,
+            radius: model.springs.radius,
+            rest: spring.height - model.springs.radius,
         };
         let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, margin));
         let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
@@ -142,7 +144,7 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
         if let Some(margin) = near.finger {
             let other = OtherFinger::opposite(model, &workspace.segments, place.finger);
             if let Some(met) = ray.cast_finger(&other, margin) {
-                // What merely waits to touch gives way to everything else.
+                // A contact in waiting gives way to all others.
                 let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));
                 if met.compression > deepest {
                     let first_link = (1 - place.finger) * (model.chain.joints + 1);
@@ -153,15 +155,15 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
         }
         let Some(hit) = hit else { continue };
         workspace.fingers_meet |= matches!(against, Against::Finger(_));
-        let site = place.finger * model.strands.all.len() + k;
+        let site = place.finger * model.springs.all.len() + k;
         let mu = match against {
             Against::Object => model.pad_friction.on_object,
             Against::World => model.pad_friction.on_world,
             Against::Finger(_) => model.pad_friction.on_pad,
         };
         let (stiffness, height) = match against {
-            Against::Finger(_) => in_series(strand.stiffness, strand.height),
-            _ => (strand.stiffness, strand.height),
+            Against::Finger(_) => in_series(spring.stiffness, spring.height),
+            _ => (spring.stiffness, spring.height),
         };
         let shear = local_axes * state.shear[site];
         let shear_stiffness = SHEAR_SHARE * stiffness;
@@ -186,9 +188,9 @@ fn detect_segment(model: &Model, state: &State, workspace: &mut Workspace, near:
     }
 }
 
-/// How far the fingers stand out towards each other, and the fastest segment of each (m/s); `None` where no segment of
+/// Protrusion of the fingers towards each other, and the fastest segment of each (m/s); `None` where no segment of
 /// one can come near the other within the step, or where they pass through each other.
-fn fronts_of_near_fingers(model: &Model, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
+fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
     workspace.fingers_meet = false;
     if model.finger_contact == FingerContact::Never {
         return None;
@@ -200,7 +202,7 @@ fn fronts_of_near_fingers(model: &Model, workspace: &mut Workspace) -> Option<(F
             let middle = workspace.segments[link].point(0.5 * model.chain.lengths[j], 0.0);
             let arm = model.planes[finger].point(middle, 0.0) - workspace.reference;
             let velocity = &workspace.spatial[link];
-            velocity.linear_at(arm).length() + velocity.angular.length() * model.strands.reach[j]
+            velocity.linear_at(arm).length() + velocity.angular.length() * model.springs.reach[j]
         };
         (0..links).map(speed).fold(0.0, f64::max)
     });
@@ -213,7 +215,7 @@ pub(super) fn segment_axes(plane: &FingerPlane, segment: &SegmentPose) -> DMat3 
     DMat3::from_cols(plane.direction(segment.along), DVec3::Y, plane.direction(segment.inward()))
 }
 
-/// The object where it is now.
+/// Object in its present pose.
 struct Solid<'a> {
     body: &'a Body,
     object_from_gripper: DMat3,
@@ -238,7 +240,7 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// The path of a strand's round end.
+/// The path of a contact spring's round end.
 struct Ray {
     foot: DVec3,
     axis: DVec3,
@@ -252,7 +254,7 @@ struct Ray {
 const CLOSE: f64 = 1e-5;
 /// Steps of sphere tracing before a ray that grazes along a surface is taken to touch where it is.
 const MOST_STEPS: usize = 32;
-/// A surface whose normal points ahead along the strand by more than this was passed, not met sideways: things
+/// A surface whose normal points ahead along the contact spring by more than this was passed, not met sideways: things
 /// beside a finger have a normal across it.
 const FROM_BEHIND: f64 = -0.7;
 
@@ -275,7 +277,7 @@ impl Ray {
         })
     }
 
-    fn cast_environment(&self, model: &Model, margin: f64) -> Option<Hit> {
+    fn cast_environment(&self, model: &PhysicsModel, margin: f64) -> Option<Hit> {
         let environment = &model.environment;
         let (distance, normal) = (|p| environment.distance(p), |p| environment.normal(p));
         let met = self.trace(self.foot, self.axis, margin, distance, normal)?;
@@ -287,7 +289,7 @@ impl Ray {
         Some(self.in_front_or_pushed(met))
     }
 
-    /// What has no thickness to go back through, a table or the front of a finger, pushes along the strand.
+    /// A table or the front of a finger has no far side to go back through: it pushes along the contact spring.
     fn in_front_or_pushed(&self, met: Met) -> Hit {
         match met {
             Met::InFront(hit) => hit,
@@ -297,8 +299,8 @@ impl Ray {
         }
     }
 
-    /// The foot has come through a thin body: the strand is compressed down to where it went in, and pushes back the way it
-    /// came.
+    /// The foot has come through a thin body: the contact spring is compressed down to where it went in, and pushes
+    /// back the way it came.
     #[cold]
     fn trace_back(
         &self,
@@ -364,7 +366,7 @@ impl Ray {
 }
 
 /// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
-fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
+fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
     let h = workspace.step.h;
     let environment = &model.environment;
     if environment.distance(state.body.position) > body.radius + margin {
@@ -372,7 +374,7 @@ fn detect_resting(model: &Model, state: &State, workspace: &mut Workspace, body:
     }
     let gripper_from_object = state.body.matrix();
     let place = |p: DVec3| gripper_from_object * (p - body.centre) + state.body.position;
-    let first_site = 2 * model.strands.all.len();
+    let first_site = 2 * model.springs.all.len();
     let mut touch = |site: usize, compression: f64, normal: DVec3, point: DVec3| {
         let shear = state.shear[site];
         workspace.contacts.push(Contact {

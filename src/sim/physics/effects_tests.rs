@@ -6,7 +6,7 @@ use super::detect::detect;
 use super::effects::{plan, plan_of};
 use super::integrator::{Integrator, Surroundings};
 use super::step::{Drive, lay_out};
-use super::{Model, Placement, Simulation};
+use super::{PhysicsModel, Placement, Simulation};
 use crate::frame::Plan;
 use crate::gripper::PadLaw;
 use crate::objects::ObjectModel;
@@ -30,7 +30,7 @@ fn everything() -> Scene {
 }
 
 /// A grasp with the pressure of the default programme, state by state.
-fn states(model: Model, placement: &Placement) -> Vec<super::State> {
+fn states(model: PhysicsModel, placement: &Placement) -> Vec<super::State> {
     let (mut run, actuation) = (Run::of(model, placement, H), Scene::default().gripper.actuation);
     (0..900)
         .map(|k| {
@@ -42,9 +42,9 @@ fn states(model: Model, placement: &Placement) -> Vec<super::State> {
         .collect()
 }
 
-fn model(scene: &Scene, ball: &ObjectModel, plan: Plan) -> (Model, Placement) {
+fn model(scene: &Scene, ball: &ObjectModel, plan: Plan) -> (PhysicsModel, Placement) {
     let placement = Placement::new(scene, Some(ball));
-    (Model::planned(scene, Some(ball), &placement, plan), placement)
+    (PhysicsModel::planned(scene, Some(ball), &placement, plan), placement)
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn an_effect_that_is_off_leaves_no_trace() {
     }
 }
 
-/// A plan in which only the named effects differ from what the scene asks for.
+/// A plan in which only the named effects differ from the scene's.
 fn plan_with(scene: &Scene, ball: &ObjectModel, settings: &[(Effect, Setting)]) -> Plan {
     let mut scene = scene.clone();
     for (effect, setting) in settings {
@@ -215,8 +215,9 @@ fn steps_made_of_stages_keep_chambers_and_creep_on_their_course() {
 }
 
 #[test]
-fn two_flat_pads_share_what_they_overlap() {
-    // Straight fingers whose pads overlap by 2 d everywhere: each is pushed in by d, F = E L w d / H. Linear and stiffening.
+fn two_flat_pads_share_their_overlap() {
+    // Straight fingers whose pads overlap by 2 d everywhere: each is pushed in by d, F = E L w d / H. Linear and
+    // stiffening.
     let (length, width, height, modulus, d) = (0.1, 0.02, 0.008, 1e5, 0.002);
     for law in [PadLaw::Linear, PadLaw::NeoHookean] {
         let mut scene = bare(10);
@@ -232,18 +233,18 @@ fn two_flat_pads_share_what_they_overlap() {
         let force: f64 = run.ws.contacts.iter().map(|c| c.force(run.ws.step).0).sum();
         let want = law.force(modulus * length * width / height, height, d).0;
         assert!((force / want - 1.0).abs() < 0.01, "{law:?}: {force} N instead of {want}");
-        // Each finger feels all of it: its own strands, and those of the other.
+        // Each finger feels all of it: its own contact springs, and those of the other.
         run.steps(1, &Drive::default());
         let mut simulation = Simulation::new(&scene, None).0;
         simulation.advance().expect("finite");
-        let felt: Vec<f64> = [0, 1]
+        let on_fingers: Vec<f64> = [0, 1]
             .map(|side| {
                 let count = scene.gripper.taxels().count();
                 let own = |load: &&crate::frame::TaxelLoad| usize::from(load.taxel) / count == side;
                 simulation.frame().taxels.iter().filter(own).map(|load| f64::from(load.normal)).sum()
             })
             .into();
-        assert!((felt[0] / felt[1] - 1.0).abs() < 1e-6 && felt[0] > 0.2 * want, "{felt:?}");
+        assert!((on_fingers[0] / on_fingers[1] - 1.0).abs() < 1e-6 && on_fingers[0] > 0.2 * want, "{on_fingers:?}");
     }
 }
 
@@ -273,7 +274,7 @@ fn a_finger_against_its_mirror_image_is_a_finger_against_a_wall() {
     let mut placement = Placement::new(&scene, None);
     let position = placement.world_from_gripper.position + DVec3::X * half.x;
     placement.world_from_object = Some(palpate_geometry::Pose::from_position(position));
-    let mut run = Run::of(Model::new(&scene, Some(&block), &placement), &placement, H);
+    let mut run = Run::of(PhysicsModel::new(&scene, Some(&block), &placement), &placement, H);
     for k in 0..900 {
         let (bar, _) = scene.programme.command(k / 30);
         super::step::step(&run.model, &mut run.state, &mut run.ws, &torque(0.06 * bar), H).expect("finite");
@@ -319,7 +320,7 @@ fn a_push_from_one_side_is_passed_on() {
         let contacts = run.ws.contacts.iter().map(|c| {
             let (normal, tangential) = c.force(run.ws.step);
             let force = c.normal * normal + tangential;
-            let left_acts = c.site < run.model.strands.all.len() as u32;
+            let left_acts = c.site < run.model.springs.all.len() as u32;
             let force = if left_acts == (finger == 0) { force } else { -force };
             let arm =
                 run.ws.reference + c.arm - run.model.planes[finger].point(run.ws.segments[finger * 11 + 1].start, 0.0);
@@ -346,12 +347,12 @@ fn the_guard_lets_fingers_touch_that_should_not_have_met() {
         placement.world_from_object.map(|pose| palpate_geometry::Pose { position: pose.position + DVec3::Z, ..pose });
     let auto = plan(&scene, Some(&block), &placement);
     assert!(!auto.is_on("finger-contact"), "{auto:?}");
-    let guarded = states(Model::planned(&scene, Some(&block), &placement, auto), &placement);
+    let guarded = states(PhysicsModel::planned(&scene, Some(&block), &placement, auto), &placement);
     scene.effects.set(Effect::FingerContact, Setting::On);
-    let always = states(Model::new(&scene, Some(&block), &placement), &placement);
+    let always = states(PhysicsModel::new(&scene, Some(&block), &placement), &placement);
     assert!(guarded == always, "the guard is the same contact");
     scene.effects.set(Effect::FingerContact, Setting::Off);
-    let never = states(Model::new(&scene, Some(&block), &placement), &placement);
+    let never = states(PhysicsModel::new(&scene, Some(&block), &placement), &placement);
     assert!(guarded != never, "they have met");
     assert_eq!(never.last().map(|s| s.lag.iter().sum::<f64>()), Some(0.0), "off stays off");
 }

@@ -1,7 +1,7 @@
 //! Mechanical energy of a state, and the work that a drive does: what a step must never gain beyond.
 
 use super::detect::detect;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::solve::segment_velocities;
 use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
@@ -17,7 +17,7 @@ pub(super) struct Energy {
 }
 
 /// Mechanical energy of a state. What was in the workspace is lost.
-pub(super) fn mechanical_energy(model: &Model, state: &State, ws: &mut Workspace) -> Energy {
+pub(super) fn mechanical_energy(model: &PhysicsModel, state: &State, ws: &mut Workspace) -> Energy {
     // At h = 0, A is the inertia alone.
     ws.step.h = 0.0;
     lay_out(model, state, ws);
@@ -58,9 +58,9 @@ pub(super) fn mechanical_energy(model: &Model, state: &State, ws: &mut Workspace
     Energy { total, spin }
 }
 
-/// Work that a drive does on the way from one state to another (J). Where chambers lag it is what the pressure at the end
-/// would do; while they fill or empty, that is more than they did.
-pub(super) fn work_done(model: &Model, drive: &Drive, from: &State, to: &State, ws: &mut Workspace) -> f64 {
+/// Work that a drive does on the way from one state to another (J). Where chambers lag it is what the pressure at the
+/// end would do; while they fill or empty, that is more than they did.
+pub(super) fn work_done(model: &PhysicsModel, drive: &Drive, from: &State, to: &State, ws: &mut Workspace) -> f64 {
     let torque = model.chamber.as_ref().map_or(drive.torque, |chamber| chamber.torque(to.chamber_bar));
     let bent: f64 = to.q.iter().sum::<f64>() - from.q.iter().sum::<f64>();
     let pulled = drive.object_force.dot(to.body.position - from.body.position);

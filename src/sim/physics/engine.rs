@@ -1,11 +1,23 @@
-//! What a simulated gripper asks of whatever computes its motion. Two engines answer: [`super::Simulation`], which is
-//! Palpate's own convex step, and [`super::RapierSimulation`], which is rapier3d.
+//! Interface of a physics engine. Implemented by [`super::Simulation`], Palpate's own convex step, and by
+//! `RapierSimulation`, which is rapier3d (feature `rapier`).
 
-use super::simulation::SimulationError;
+use super::step::NotFinite;
 use crate::frame::{Frame, Plan, Quality};
 use crate::gripper::Phase;
 use crate::scene::Clock;
 use glam::DVec3;
+
+/// A simulation that had to stop.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the simulation stopped after {seconds:.3} s (step {tick}): {cause}")]
+pub struct SimulationError {
+    /// The step that failed.
+    pub tick: u64,
+    /// Its time (s).
+    pub seconds: f64,
+    /// Cause.
+    pub cause: NotFinite,
+}
 
 /// A gripper and an object in motion, on a clock of whole ticks.
 pub trait Engine {
@@ -15,7 +27,7 @@ pub trait Engine {
     /// Ticks passed.
     fn tick(&self) -> u64;
 
-    /// Which effects are simulated, and why.
+    /// Effects simulated, with the reason for each.
     fn plan(&self) -> &Plan;
 
     /// Sets the line pressure (bar) from now on.
@@ -27,17 +39,17 @@ pub trait Engine {
     /// Lets some ticks pass, within which nothing is sampled or commanded.
     fn advance_by(&mut self, ticks: u64) -> Result<(), SimulationError>;
 
-    /// When, if ever, finger contact that the plan had left out was turned on (s).
+    /// Time at which finger contact left out by the plan was turned on (s); `None` if never.
     fn finger_contact_turned_on(&self) -> Option<f64> {
         None
     }
 
-    /// What a rig would sample now.
+    /// Sample of the present state.
     fn frame(&self) -> Frame;
 
-    /// Deepest compression of the pads in the state as it is, before any step (m).
+    /// Deepest compression of the pads before the first step (m).
     fn starting_overlap(&mut self) -> f64;
 
-    /// How far the steps so far can be trusted; the static residual is that of this moment.
+    /// Numerical quality of the steps so far; the static residual is that of the present state.
     fn quality(&self) -> Quality;
 }

@@ -1,11 +1,11 @@
-//! What stands still around the gripper: the table, and the pedestal on it. In the gripper frame.
+//! Fixed environment of the gripper: table and pedestal, in the gripper frame.
 
 use crate::scene::{Support, SupportKind};
 use glam::DVec3;
 use palpate_geometry::{Pose, Primitive};
 use std::f64::consts::TAU;
 
-/// Points on the rim of the pedestal that feel for overhanging objects. With 24, a cylinder lying across a 16 mm
+/// Contact points on the rim of the pedestal, for overhanging objects. With 24, a cylinder lying across a 16 mm
 /// pedestal sinks by at most 0.07 mm between two of them.
 const RIM_POINTS: usize = 24;
 
@@ -92,7 +92,7 @@ impl Environment {
         self.gripper_from_world.direction(DVec3::Z)
     }
 
-    /// How far a point lies above the highest surface (m); negative below it, where only part of the environment is.
+    /// Height of a point above the highest surface (m); negative below it, where only part of the environment is.
     pub(super) fn height_above_top(&self, p: DVec3) -> f64 {
         self.up().dot(p - self.gripper_from_world.position) - self.top
     }

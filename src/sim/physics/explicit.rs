@@ -10,7 +10,7 @@
 
 use super::contact::ContactStep;
 use super::detect::detect;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::solve::{Product, fill_gradient, relative_velocities, segment_velocities};
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, gather_dynamics, lay_out, remember_contacts};
@@ -21,7 +21,7 @@ const INSTANT: f64 = 1e-9;
 
 /// Advances the state by an explicit step of `h` (s).
 pub(super) fn explicit_step(
-    model: &Model,
+    model: &PhysicsModel,
     state: &mut State,
     ws: &mut Workspace,
     drive: &Drive,
@@ -68,8 +68,8 @@ pub(super) fn explicit_step(
     }
 }
 
-/// Impulses of contacts and joint limits over an instant, from the state as it is. Leaves slip limits for that instant.
-fn contact_and_limit_impulses(model: &Model, state: &State, ws: &mut Workspace) -> Vec<f64> {
+/// Impulses of contacts and joint limits over an instant, from the present state. Leaves slip limits for that instant.
+fn contact_and_limit_impulses(model: &PhysicsModel, state: &State, ws: &mut Workspace) -> Vec<f64> {
     let instant = ContactStep { h: INSTANT, ..ws.step };
     ws.step = instant;
     for contact in &mut ws.contacts {
@@ -84,7 +84,7 @@ fn contact_and_limit_impulses(model: &Model, state: &State, ws: &mut Workspace) 
 }
 
 /// M in the place of the Hessian.
-fn fill_inertia(model: &Model, ws: &mut Workspace) {
+fn fill_inertia(model: &PhysicsModel, ws: &mut Workspace) {
     let n = model.chain.joints;
     for k in 0..2 * n {
         let matrix = &ws.finger_matrix[(k / n) * n * n + (k % n) * n..];

@@ -13,15 +13,15 @@
 //!   Coriolis forces, slip limits) leaves a first-order part, which is small: over eight objects, at the cost of Euler
 //!   with twice as many steps, errors in curvature are 4 to 14 times lower while the object is fixed and 1.5 to 4 times
 //!   while it is free, errors in force 2 to 6 times.
-//!   At fixed steps a hard impact can lead it astray, since the second stage goes on along the slope of the first: with a
+//!   At fixed steps a hard impact can lead it astray, since the second stage continues along the slope of the first: with a
 //!   pad a thousand times stiffer, a cube of 1 g and all pressure at once, steps of 1/150 s end with a hold force 24 % low
-//!   where Euler's are right, and so is a tolerance of 1e-4. So Euler takes named steps unless a scene says otherwise.
+//!   where Euler's are right, and so is a tolerance of 1e-4. So Euler takes named steps by default.
 //!
 //! Also tried, and not kept: subtracting h k or h k / 2 from the damping (half the error in curvature at 1/150 s, the
-//! same in force, first order still), BDF2 (no gain above 1/600 s), Richardson's extrapolation of Euler (half as good as
-//! SDIRK2 at equal cost).
+//! same in force, first order still), BDF2 (no gain above 1/600 s), Richardson's extrapolation of Euler (half as good
+//! as SDIRK2 at equal cost).
 
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
 use super::workspace::Workspace;
@@ -30,9 +30,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 const GAMMA: f64 = 1.0 - FRAC_1_SQRT_2;
 
-/// What a step needs besides a state and a length.
+/// Inputs of a step besides state and length.
 pub(super) struct Surroundings<'a> {
-    pub(super) model: &'a Model,
+    pub(super) model: &'a PhysicsModel,
     pub(super) ws: &'a mut Workspace,
     pub(super) drive: &'a Drive,
 }

@@ -9,12 +9,12 @@
 //! v* carries torques, gravity and Coriolis forces. Springs, dampers and contacts are all taken at the *end* of the
 //! step, so that no stiffness, however large, makes a step unstable.
 //!
-//! What of all this a scene calls for is decided in [`effects`].
+//! [`effects`] decides which parts of this a scene needs.
 //!
-//! Read in this order: `chain` (what a finger resists), `strands` and `detect` (where it touches), `contact` (what
-//! a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which steps, and how
-//! long), [`Simulation`] (a grasp in time). A second engine, [`RapierSimulation`], computes the same scenes independently;
-//! both are an [`Engine`].
+//! Read in this order: `chain` (what a finger resists), `contact springs` and `detect` (where it touches), `contact`
+//! (what a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which
+//! steps, and how long), [`Simulation`] (a grasp in time). A second engine, `RapierSimulation` (feature `rapier`),
+//! computes the same scenes independently; both are an [`Engine`].
 //! [`SteppedScene`] takes steps of any length, for tests and hard cases; `explicit` is there to be compared with.
 
 mod balance;
@@ -22,6 +22,7 @@ mod chain;
 #[cfg(test)]
 mod closed_form;
 mod contact;
+mod contact_springs;
 mod coupling;
 mod detect;
 pub mod effects;
@@ -31,10 +32,13 @@ mod energy;
 mod engine;
 mod environment;
 mod explicit;
+mod finger_pair;
 mod integrator;
 mod model;
 mod placement;
+#[cfg(feature = "rapier")]
 mod rapier_engine;
+#[cfg(feature = "rapier")]
 mod resting;
 mod simulation;
 mod skyline;
@@ -45,16 +49,18 @@ mod stepped;
 mod stepper;
 #[cfg(test)]
 mod stepper_tests;
-mod strands;
 mod workspace;
 
-pub use engine::Engine;
-pub use model::Model;
-pub use placement::Placement;
+pub use engine::{Engine, SimulationError};
+pub use model::PhysicsModel;
+pub use placement::{Placement, random_rotation};
+#[cfg(feature = "rapier")]
 pub use rapier_engine::RapierSimulation;
-pub use resting::{natural_rotations, random_rotation};
-pub use simulation::{Refinement, Simulation, SimulationError};
+#[cfg(feature = "rapier")]
+pub use resting::natural_rotations;
+pub use simulation::{Refinement, Simulation};
+pub use solve::Unbalanced;
 pub use state::State;
-pub use step::{Drive, NotFinite, StepReport, Unbalanced, step};
+pub use step::{Drive, NotFinite, StepReport, step};
 pub use stepped::{SkinForce, SteppedScene, Stepping};
 pub use workspace::Workspace;

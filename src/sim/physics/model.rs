@@ -1,11 +1,11 @@
-//! The constant description that a step reads: everything the scene says, resolved to numbers, in the gripper frame.
+//! Constants that a step reads: the scene resolved to numbers, in the gripper frame.
 
 use super::chain::ChainModel;
 use super::contact::ContactStep;
+use super::contact_springs::ContactSprings;
 use super::effects::{Chamber, FingerContact, Relaxation, plan};
 use super::environment::Environment;
 use super::placement::Placement;
-use super::strands::Strands;
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, Gripper, PadLaw, Side};
 use crate::objects::{ObjectModel, Resting};
@@ -15,18 +15,18 @@ use palpate_geometry::{DistanceField, Pose};
 
 /// Constants of a simulation. Built once, never changed; a step is a function of it and a [`super::State`].
 #[derive(Clone, Debug)]
-pub struct Model {
-    /// What all contacts share; the length of a step is set as it is taken.
+pub struct PhysicsModel {
+    /// Contact constants; the step length is set at each step.
     pub(super) contact: ContactStep,
     pub(super) chain: ChainModel,
     pub(super) planes: [FingerPlane; 2],
-    pub(super) strands: Strands,
+    pub(super) springs: ContactSprings,
     pub(super) pad_law: PadLaw,
     /// Friction of the pads against the object and against the environment.
     pub(super) pad_friction: PadFriction,
     pub(super) body: Option<Body>,
     pub(super) environment: Environment,
-    /// Gravity as the fingers and as the object feel it (m/s²).
+    /// Gravity on the fingers and on the object (m/s²).
     pub(super) finger_gravity: DVec3,
     pub(super) object_gravity: DVec3,
     /// False where fingers move from balance to balance.
@@ -37,7 +37,7 @@ pub struct Model {
     pub(super) chamber: Option<Chamber>,
     /// Joints that creep.
     pub(super) relaxation: Option<Relaxation>,
-    /// Which effects all of this came from.
+    /// Effects simulated.
     pub(super) plan: Plan,
     pub(super) tolerance: f64,
     pub(super) max_iterations: u32,
@@ -64,7 +64,7 @@ pub(super) struct Skin {
     pub(super) width: f64,
     pub(super) rows: usize,
     pub(super) columns: usize,
-    /// Distance of the last row of strands from the tip (m).
+    /// Distance of the last row of contact springs from the tip (m).
     pub(super) last_row: f64,
 }
 
@@ -106,7 +106,7 @@ pub(super) struct Body {
 /// A resting object is carried by at least three points.
 const RESTING_POINTS: f64 = 3.0;
 
-impl Model {
+impl PhysicsModel {
     /// Resolves a scene.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>, placement: &Placement) -> Self {
         Self::planned(scene, object, placement, plan(scene, object, placement))
@@ -120,7 +120,7 @@ impl Model {
         let surface_friction = |object: &ObjectModel| scene.object.friction.value().unwrap_or(object.friction);
         let gravity_world = DVec3::new(0.0, 0.0, -scene.world.gravity);
         let gravity = placement.world_from_gripper.inverse().direction(gravity_world);
-        let felt = |effect: Effect| if is_on(effect) { gravity } else { DVec3::ZERO };
+        let gravity_if = |effect: Effect| if is_on(effect) { gravity } else { DVec3::ZERO };
         let body = object.map(|object| Body {
             field: object.field.clone(),
             resting: object.resting.clone(),
@@ -144,7 +144,7 @@ impl Model {
             },
             chain: ChainModel::new(&gripper.finger, &gripper.pad),
             planes: Side::BOTH.map(|side| gripper.plane(side)),
-            strands: Strands::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
+            springs: ContactSprings::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
             pad_law: gripper.pad.law,
             pad_friction: PadFriction {
                 on_object: object.map_or(0.0, |o| mu(gripper.pad.friction, surface_friction(o))),
@@ -153,8 +153,8 @@ impl Model {
             },
             body,
             environment: Environment::new(support, &placement.world_from_gripper),
-            finger_gravity: felt(Effect::FingerGravity),
-            object_gravity: felt(Effect::ObjectGravity),
+            finger_gravity: gravity_if(Effect::FingerGravity),
+            object_gravity: gravity_if(Effect::ObjectGravity),
             finger_inertia: is_on(Effect::FingerInertia),
             finger_contact: FingerContact::planned(&plan),
             skin: Skin::new(gripper),
@@ -168,7 +168,7 @@ impl Model {
         }
     }
 
-    /// Which effects are simulated, and why.
+    /// Effects simulated, with the reason for each.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -193,9 +193,9 @@ impl Model {
         self.body.as_ref().filter(|body| body.free)
     }
 
-    /// Places where contact can be remembered: strands of both fingers, resting points, rim of the pedestal.
+    /// Places where contact can be remembered: contact springs of both fingers, resting points, rim of the pedestal.
     pub(super) fn sites(&self) -> usize {
-        2 * self.strands.all.len() + self.resting_points() + self.environment.rim().len()
+        2 * self.springs.all.len() + self.resting_points() + self.environment.rim().len()
     }
 
     pub(super) fn resting_points(&self) -> usize {

@@ -1,18 +1,20 @@
-//! Where things stand at the start: the object put down on its support, the gripper held above it.
+//! Initial placement: the object on its support, the gripper above it.
 
 use crate::objects::ObjectModel;
 use crate::scene::{Scene, SupportKind};
 use glam::{DQuat, DVec3};
 use palpate_geometry::Pose;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 
 /// The start of a scene, in world coordinates. The world's origin is the middle of the table, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// Where the gripper is held.
+    /// Pose of the gripper in the world.
     pub world_from_gripper: Pose,
-    /// Where the object lies; its own frame, not its centre of mass. Absent for an empty hand.
+    /// Pose of the object's own frame (not its centre of mass) in the world; absent for an empty hand.
     pub world_from_object: Option<Pose>,
-    /// What was moved to make room.
+    /// Corrections made for clearance.
     pub warnings: Vec<String>,
 }
 
@@ -67,6 +69,14 @@ fn put_down(scene: &Scene, object: &ObjectModel, surface: f64) -> (Pose, f64) {
     let [x, y] = scene.object.shift;
     let position = DVec3::new(x - centre.x, y - centre.y, surface + below);
     (Pose { position, rotation: turned.rotation }, below + above)
+}
+
+/// A rotation, all equally likely (Shoemake 1992).
+pub fn random_rotation(random: &mut ChaCha8Rng) -> DQuat {
+    let [u, v, w] = [(); 3].map(|()| random.random::<f64>());
+    let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
+    let (v, w) = (v * std::f64::consts::TAU, w * std::f64::consts::TAU);
+    DQuat::from_xyzw(a * v.sin(), a * v.cos(), b * w.sin(), b * w.cos())
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
-//! How an object comes to rest by itself: it is dropped onto a plane many times, tumbling, and how it lies in the end is
-//! noted. rapier3d does the tumbling: what is wanted is a fair share of each face, not a fine trajectory.
+//! Resting poses: the object is dropped onto a plane many times, and its final orientations are collected. rapier3d
+//! simulates the drops: the result needs a fair share of each face, not an accurate trajectory.
 //!
-//! The object is scaled to unit size first: rapier's tolerances are made for bodies of about a metre, and a drop of a
-//! scaled body under the same gravity only takes another time.
+//! The object is scaled to unit size first: rapier's tolerances suit bodies of about a metre, and the drop of a scaled
+//! body under the same gravity differs only in its time scale.
 
+use super::placement::random_rotation;
 use crate::objects::ObjectModel;
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rapier3d::prelude::{ColliderBuilder, MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, SharedShape};
 
@@ -24,20 +25,12 @@ const LINEAR_DAMPING: f32 = 0.5;
 const HEIGHT: f32 = 1.0;
 
 /// Orientations (world from object) in which an object comes to rest, one per drop, so that frequent ones are listed
-/// often. Never empty: an object that cannot be dropped is listed as it is. Equal objects give equal lists.
+/// often. Never empty: an object that cannot be dropped keeps its own orientation. Equal objects give equal lists.
 pub fn natural_rotations(object: &ObjectModel) -> Vec<DQuat> {
     let Some(body) = DroppedBody::new(object) else { return vec![DQuat::IDENTITY] };
     let mut random = ChaCha8Rng::seed_from_u64(0);
     let found: Vec<DQuat> = (0..DROPS).filter_map(|_| body.drop_from(random_rotation(&mut random))).collect();
     if found.is_empty() { vec![DQuat::IDENTITY] } else { found }
-}
-
-/// A rotation, all equally likely (Shoemake 1992).
-pub fn random_rotation(random: &mut ChaCha8Rng) -> DQuat {
-    let [u, v, w] = [(); 3].map(|()| random.random::<f64>());
-    let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
-    let (v, w) = (v * std::f64::consts::TAU, w * std::f64::consts::TAU);
-    DQuat::from_xyzw(a * v.sin(), a * v.cos(), b * w.sin(), b * w.cos())
 }
 
 /// An object of unit size, ready to be dropped again and again.
@@ -73,7 +66,7 @@ impl DroppedBody {
         Some(Self { shape: SharedShape::compound(parts), mass, radius })
     }
 
-    /// How it lies in the end; `None` where the engine has lost it.
+    /// Final orientation; `None` where the engine has lost the body.
     fn drop_from(&self, rotation: DQuat) -> Option<DQuat> {
         let mut world = PhysicsWorld { gravity: Vec3::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
         world.insert(
@@ -113,7 +106,7 @@ mod tests {
     use super::*;
     use palpate_geometry::Primitive;
 
-    /// How often each axis of the object points up or down.
+    /// Counts of the rotations in which each axis of the object points up or down.
     fn axes_up(shape: Primitive) -> [usize; 3] {
         let object = ObjectModel::from_primitive("thing", shape, 500.0, 0.5);
         let rotations = natural_rotations(&object);

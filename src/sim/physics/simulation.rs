@@ -3,14 +3,15 @@
 use super::balance::static_residual;
 use super::contact::{Acting, Against, Contact};
 use super::detect::detect;
-use super::effects::{FingerContact, OtherFinger};
-use super::engine::Engine;
+use super::effects::FingerContact;
+use super::engine::{Engine, SimulationError};
+use super::finger_pair::OtherFinger;
 use super::integrator::Surroundings;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::placement::Placement;
-use super::solve::segment_velocities;
+use super::solve::{Unbalanced, segment_velocities};
 use super::state::State;
-use super::step::{self, Drive, StepReport, Unbalanced, segment_axes_of};
+use super::step::{self, Drive, StepReport, segment_axes_of};
 use super::stepper::Stepper;
 use super::workspace::{Spatial, Workspace};
 use crate::frame::{Frame, Imbalance, Plan, Quality, TaxelLoad};
@@ -24,7 +25,7 @@ use palpate_geometry::Pose;
 /// it takes.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    model: Model,
+    model: PhysicsModel,
     state: State,
     workspace: Workspace,
     clock: Clock,
@@ -40,25 +41,13 @@ pub struct Simulation {
     imbalance: Option<Imbalance>,
 }
 
-/// How finely a simulation is computed.
+/// Refinement of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refinement {
-    /// As the scene says.
+    /// Steps as in the scene.
     None,
-    /// More finely, to estimate an error from; see [`crate::scene::Solver::companion`].
-    Companion,
-}
-
-/// A simulation that had to stop.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the simulation stopped after {seconds:.3} s (step {tick}): {cause}")]
-pub struct SimulationError {
-    /// The step that failed.
-    pub tick: u64,
-    /// Its time (s).
-    pub seconds: f64,
-    /// What went wrong.
-    pub cause: step::NotFinite,
+    /// More finely, to estimate an error from; see [`crate::scene::Solver::refined`].
+    Refined,
 }
 
 impl Simulation {
@@ -67,15 +56,15 @@ impl Simulation {
         Self::refined(scene, object, Refinement::None)
     }
 
-    /// The same, computed more finely than the scene asks for.
+    /// Sets up a scene with a refinement.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let placement = Placement::new(scene, object);
         let (parts, solver) = match refinement {
             Refinement::None => (1, scene.solver.clone()),
-            Refinement::Companion => (2, scene.solver.companion()),
+            Refinement::Refined => (2, scene.solver.refined()),
         };
         let clock = scene.timing.clock(solver.accuracy).refined(parts);
-        let model = Model::new(scene, object, &placement);
+        let model = PhysicsModel::new(scene, object, &placement);
         let state = State::new(&model, &placement);
         // No step can be longer than from sample to sample; a finer simulation takes more.
         let longest = f64::from(clock.ticks_per_sample) * clock.step() / f64::from(parts);
@@ -108,7 +97,7 @@ impl Simulation {
     }
 
     /// The constants it runs on.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &PhysicsModel {
         &self.model
     }
 
@@ -177,7 +166,7 @@ impl Simulation {
         };
     }
 
-    /// Deepest compression of a strand in the state as it is, before any step (m).
+    /// Deepest compression of a contact spring before the first step (m).
     pub fn starting_overlap(&mut self) -> f64 {
         step::lay_out(&self.model, &self.state, &mut self.workspace);
         segment_velocities(&self.model, &self.state.velocity, &mut self.workspace);
@@ -189,14 +178,14 @@ impl Simulation {
         deepest
     }
 
-    /// When, if ever, the fingers came so near each other that their contact, which `auto` had left out, was turned
-    /// on (s).
+    /// Time at which finger contact left out by `auto` was turned on because the fingers came near each other (s);
+    /// `None` if never.
     pub fn finger_contact_turned_on(&self) -> Option<f64> {
         let guarded = self.model.finger_contact == FingerContact::Guarded;
         self.met_at.filter(|_| guarded).map(|tick| self.clock.seconds(tick))
     }
 
-    /// What a rig would sample now.
+    /// Sample of the present state.
     pub fn frame(&self) -> Frame {
         Frame {
             sample: (self.tick / u64::from(self.clock.ticks_per_sample)).saturating_sub(1) as u32,
@@ -236,20 +225,20 @@ impl Simulation {
 
     /// Forces on the loaded taxels in the last step.
     fn taxel_loads(&self) -> Vec<TaxelLoad> {
-        let strands = &self.model.strands;
+        let springs = &self.model.springs;
         let mut loads: Vec<TaxelLoad> = Vec::new();
         for contact in &self.workspace.contacts {
             let Acting::Segment(link) = contact.acting else {
                 continue;
             };
-            let (side, strand) = (contact.site as usize / strands.all.len(), contact.site as usize % strands.all.len());
+            let (side, spring) = (contact.site as usize / springs.all.len(), contact.site as usize % springs.all.len());
             let (normal, tangential) = contact.force(self.workspace.step);
             if normal <= 0.0 {
                 continue;
             }
             let force = contact.normal * normal + tangential;
-            if strand < strands.on_pad {
-                loads.push(self.taxel_load(side, strand, link, force));
+            if spring < springs.on_pad {
+                loads.push(self.taxel_load(side, spring, link, force));
             }
             if let Against::Finger(other) = contact.against {
                 let met = OtherFinger::opposite(&self.model, &self.workspace.segments, side);
@@ -277,7 +266,7 @@ impl Simulation {
         let [along, across, inward] =
             (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
         TaxelLoad {
-            taxel: (side * self.model.strands.on_pad + taxel) as u16,
+            taxel: (side * self.model.springs.on_pad + taxel) as u16,
             normal: -inward as f32,
             along: along as f32,
             across: across as f32,
@@ -301,8 +290,8 @@ impl Simulation {
         (total.linear, total.angular)
     }
 
-    /// Deepest compression of any pad strand (m) and the largest ratio of friction to mu times normal force over
-    /// loaded contacts, in the last step.
+    /// Deepest compression of any pad contact spring (m) and the largest ratio of friction to mu times normal force
+    /// over loaded contacts, in the last step.
     pub fn contact_extremes(&self) -> (f64, f64) {
         let mut extremes = (0.0f64, 0.0f64);
         for contact in &self.workspace.contacts {

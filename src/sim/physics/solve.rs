@@ -12,19 +12,38 @@
 
 use super::contact::{Acting, Against, Contact};
 use super::coupling::{fill_coupling, prepare_coupling};
-use super::model::Model;
-use super::step::Unbalanced;
+use super::model::PhysicsModel;
 use super::workspace::{Block, PerLink, Spatial, Workspace};
 use glam::DVec3;
 
-/// How a minimisation went.
+/// Statistics of a minimisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SolveReport {
     pub(super) iterations: u32,
     pub(super) line_search_steps: u32,
     pub(super) converged: bool,
-    /// What was farthest from balance where it did not converge.
+    /// Largest imbalance; `None` where it converged.
     pub(super) unbalanced: Option<Unbalanced>,
+}
+
+/// Forces that did not balance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unbalanced {
+    /// Index of the unknown: joint rates of both fingers, then the six velocities of a free object. See
+    /// [`super::State::place_of`].
+    pub unknown: u32,
+    /// Residual there over the residual that the tolerance allows.
+    pub excess: f64,
+}
+
+impl Unbalanced {
+    /// The one that is farther from balance, if any is.
+    pub(super) fn worse(one: Option<Self>, other: Option<Self>) -> Option<Self> {
+        match (one, other) {
+            (Some(a), Some(b)) => Some(if b.excess > a.excess { b } else { a }),
+            (a, b) => a.or(b),
+        }
+    }
 }
 
 /// A gradient this small compared with nothing at all counts as zero.
@@ -32,7 +51,7 @@ const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 
 /// Minimises over `velocity`, starting from it. Needs the workspace's dynamics and contacts; leaves each contact's
 /// relative velocity at the solution.
-pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
+pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
     let mut report = SolveReport::default();
     let mut passes = 0;
     prepare_coupling(model, ws);
@@ -86,14 +105,14 @@ pub(super) fn minimise(model: &Model, q: &[f64], velocity: &mut [f64], ws: &mut 
     }
 }
 
-/// Which of two vectors a product is taken of, and so where it goes.
+/// Vector of a matrix product, which selects the output.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Product {
     OfVelocity,
     OfDirection,
 }
 
-fn multiply_by_a(model: &Model, ws: &mut Workspace, x: &[f64], which: Product) {
+fn multiply_by_a(model: &PhysicsModel, ws: &mut Workspace, x: &[f64], which: Product) {
     let n = model.chain.joints;
     let out = match which {
         Product::OfVelocity => &mut ws.a_velocity,
@@ -126,7 +145,7 @@ fn write_object_part(out: &mut [f64], from: usize, value: &Spatial) {
 }
 
 /// Velocities of all segments, and from them the relative velocity of each contact.
-pub(super) fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, which: Product) {
+pub(super) fn relative_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Workspace, which: Product) {
     segment_velocities(model, x, ws);
     let object = object_part(x, model.joint_count());
     for contact in &mut ws.contacts {
@@ -147,7 +166,7 @@ pub(super) fn relative_velocities(model: &Model, x: &[f64], ws: &mut Workspace, 
 }
 
 /// Velocity of each segment for joint rates `x`, about the reference point.
-pub(super) fn segment_velocities(model: &Model, x: &[f64], ws: &mut Workspace) {
+pub(super) fn segment_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Workspace) {
     let n = model.chain.joints;
     for finger in 0..2 {
         let mut velocity = Spatial::default();
@@ -165,7 +184,7 @@ pub(super) struct Size {
     forces: f64,
 }
 
-pub(super) fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
+pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
     let n = model.chain.joints;
     let mut on_object = Spatial::default();
     for wrench in &mut ws.wrenches {
@@ -232,7 +251,7 @@ pub(super) fn fill_gradient(model: &Model, q: &[f64], velocity: &[f64], ws: &mut
 }
 
 /// The unknown with the largest share in the gradient, or the first whose share is no number at all.
-fn farthest_from_balance(model: &Model, ws: &Workspace, allowed: f64) -> Unbalanced {
+fn farthest_from_balance(model: &PhysicsModel, ws: &Workspace, allowed: f64) -> Unbalanced {
     let size = |k: usize| (ws.gradient[k] * ws.gradient[k] / diagonal(model, ws, k)).sqrt();
     let sizes = (0..ws.gradient.len()).map(|k| (k, if size(k).is_finite() { size(k) } else { f64::MAX }));
     let (unknown, largest) = sizes.fold((0, 0.0), |worst, next| if next.1 > worst.1 { next } else { worst });
@@ -242,7 +261,7 @@ fn farthest_from_balance(model: &Model, ws: &Workspace, allowed: f64) -> Unbalan
 
 /// Diagonal entry of A.
 #[inline]
-fn diagonal(model: &Model, ws: &Workspace, k: usize) -> f64 {
+fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
     let n = model.chain.joints;
     if k < 2 * n {
         let (finger, i) = (k / n, k % n);
@@ -258,7 +277,7 @@ fn diagonal(model: &Model, ws: &Workspace, k: usize) -> f64 {
     }
 }
 
-fn fill_hessian(model: &Model, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
+fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
     let on_object = sum_blocks(ws);
     let n = model.chain.joints;
     let couples = model.free_body().is_some();
@@ -342,7 +361,7 @@ const FLAT_ENOUGH: f64 = 0.05;
 const MOST_SEARCH_STEPS: u32 = 60;
 
 /// Share of the Newton direction to take, from the derivative along it: the whole, or where the slope vanishes.
-fn line_search(model: &Model, q: &[f64], velocity: &[f64], ws: &Workspace, steps: &mut u32) -> f64 {
+fn line_search(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &Workspace, steps: &mut u32) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let quadratic = dot(&ws.direction, &ws.a_direction);
     let linear = dot(&ws.direction, &ws.a_velocity) - dot(&ws.direction, &ws.rhs);

@@ -1,7 +1,7 @@
-//! What changes during a simulation. All of it can be saved and restored; scratch memory is elsewhere.
+//! State of a simulation. All of it can be saved and restored; scratch memory is elsewhere.
 
 use super::effects::went_on;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::placement::Placement;
 use crate::gripper::SegmentPose;
 use glam::{DQuat, DVec3};
@@ -32,7 +32,7 @@ pub struct State {
 
 impl State {
     /// Fingers straight, everything at rest.
-    pub fn new(model: &Model, placement: &Placement) -> Self {
+    pub fn new(model: &PhysicsModel, placement: &Placement) -> Self {
         let body = match (&model.body, placement.world_from_object) {
             (Some(body), Some(world_from_object)) => {
                 let gripper_from_object = model.world_from_gripper.inverse() * world_from_object;
@@ -54,7 +54,7 @@ impl State {
     }
 
     /// The object's frame in the world; absent for an empty hand.
-    pub fn world_from_object(&self, model: &Model) -> Option<Pose> {
+    pub fn world_from_object(&self, model: &PhysicsModel) -> Option<Pose> {
         let body = model.body.as_ref()?;
         let gripper_from_object =
             Pose { position: self.body.position - self.body.rotation * body.centre, rotation: self.body.rotation };
@@ -77,8 +77,9 @@ impl State {
 
     /// Goes on in a straight line, by `share` of the way from `start` to here. Normal impulses are no path and stay.
     ///
-    /// A turning object goes on in angular momentum rather than in angular velocity: what flies freely keeps it.
-    pub(super) fn go_on_from(&mut self, start: &Self, share: f64, model: &Model) {
+    /// A turning object is advanced in angular momentum rather than in angular velocity, so that free flight conserves
+    /// it.
+    pub(super) fn go_on_from(&mut self, start: &Self, share: f64, model: &PhysicsModel) {
         let momentum = self.angular_momentum(model);
         let momentum = momentum + (momentum - start.angular_momentum(model)) * share;
         for (now, before) in self.q.iter_mut().zip(&start.q).chain(self.velocity.iter_mut().zip(&start.velocity)) {
@@ -97,19 +98,19 @@ impl State {
             self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
         }
         for (site, (now, before)) in self.shear.iter_mut().zip(&start.shear).enumerate() {
-            // Skin that has just been touched has no shear to go on from.
+            // Newly touched skin has no shear yet.
             if self.lag[site] > 0.0 && start.lag[site] > 0.0 {
                 *now += (*now - *before) * share;
             }
         }
     }
 
-    /// How far apart two states are: the largest difference of joint angles and of the object's orientation (rad), of
+    /// Distance between two states: the largest difference of joint angles and of the object's orientation (rad), of
     /// fingertips and of the object's position as shares of a finger's length. The segments are scratch memory.
     pub(super) fn distance(
         &self,
         other: &Self,
-        model: &Model,
+        model: &PhysicsModel,
         own_segments: &mut [SegmentPose],
         other_segments: &mut [SegmentPose],
     ) -> f64 {
@@ -137,7 +138,7 @@ impl State {
     }
 
     /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.
-    pub(super) fn body_velocity(&self, model: &Model) -> (DVec3, DVec3) {
+    pub(super) fn body_velocity(&self, model: &PhysicsModel) -> (DVec3, DVec3) {
         match self.velocity.get(model.joint_count()..) {
             Some([x, y, z, a, b, c]) => (DVec3::new(*x, *y, *z), DVec3::new(*a, *b, *c)),
             _ => (DVec3::ZERO, DVec3::ZERO),
@@ -145,7 +146,7 @@ impl State {
     }
 
     /// Angular momentum of a free object about its centre of mass, in the gripper frame (kg m²/s); zero otherwise.
-    pub(super) fn angular_momentum(&self, model: &Model) -> DVec3 {
+    pub(super) fn angular_momentum(&self, model: &PhysicsModel) -> DVec3 {
         let Some(body) = model.free_body() else { return DVec3::ZERO };
         let axes = self.body.matrix();
         axes * (body.inertia * (axes.transpose() * self.body_velocity(model).1))
@@ -156,7 +157,7 @@ impl State {
     /// A turning object keeps its angular momentum L = I w while I turns with it: w+ = I+^-1 I w. To first order in h
     /// that is the gyroscopic torque, but the spin can never exceed |L| over the least moment of inertia, however
     /// long the step: an explicit torque flung light splinters out of the range of numbers.
-    pub(super) fn integrate(&mut self, model: &Model, h: f64) {
+    pub(super) fn integrate(&mut self, model: &PhysicsModel, h: f64) {
         if let Some(relaxation) = &model.relaxation {
             for ((crept, q), rate) in self.crept.iter_mut().zip(&self.q).zip(&self.velocity) {
                 *crept = relaxation.crept(h, *q, *rate, *crept);
@@ -178,7 +179,7 @@ impl State {
     }
 
     /// The first number that is not finite, named for people; `None` when all is well.
-    pub(super) fn not_finite(&self, model: &Model) -> Option<String> {
+    pub(super) fn not_finite(&self, model: &PhysicsModel) -> Option<String> {
         let n = model.chain.joints;
         let bad = |values: &[f64]| values.iter().position(|x| !x.is_finite());
         if let Some(i) = bad(&self.q).or_else(|| bad(&self.velocity[..2 * n])) {
@@ -189,8 +190,8 @@ impl State {
         (!sound).then(|| Self::place_of(model, 2 * n))
     }
 
-    /// What an unknown of the step belongs to, named for people.
-    pub fn place_of(model: &Model, unknown: usize) -> String {
+    /// Display name of the joint or body that an unknown of the step belongs to.
+    pub fn place_of(model: &PhysicsModel, unknown: usize) -> String {
         let n = model.chain.joints;
         match unknown / n {
             0 => format!("joint {} of the left finger", unknown + 1),

@@ -1,15 +1,15 @@
-//! One step: lay out the fingers, gather what is known, find contacts, minimise, move.
+//! One step: lay out the fingers, assemble the dynamics, find contacts, minimise, move.
 
 use super::chain::turning;
 use super::contact::Acting;
 use super::detect::{detect, segment_axes};
-use super::model::Model;
-use super::solve::{minimise, segment_velocities};
+use super::model::PhysicsModel;
+use super::solve::{Unbalanced, minimise, segment_velocities};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
 use glam::{DVec2, DVec3};
 
-/// How a step went.
+/// Statistics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepReport {
     /// Newton iterations taken.
@@ -23,18 +23,8 @@ pub struct StepReport {
     /// The outer friction residual: by how much the lagged slip limits missed the true ones where they mattered,
     /// as a share of the sum of the true ones. Zero without friction forces.
     pub friction_residual: f64,
-    /// What was farthest from balance; absent where the minimisation reached its tolerance.
+    /// Largest imbalance; absent where the minimisation reached its tolerance.
     pub unbalanced: Option<Unbalanced>,
-}
-
-/// Forces that did not balance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unbalanced {
-    /// Which unknown of the step: joint rates of both fingers, then the six velocities of a free object. See
-    /// [`State::place_of`].
-    pub unknown: u32,
-    /// What was left over there, as a multiple of what the tolerance allows.
-    pub excess: f64,
 }
 
 impl StepReport {
@@ -51,25 +41,15 @@ impl StepReport {
     }
 }
 
-impl Unbalanced {
-    /// The one that is farther from balance, if any is.
-    pub(super) fn worse(one: Option<Self>, other: Option<Self>) -> Option<Self> {
-        match (one, other) {
-            (Some(a), Some(b)) => Some(if b.excess > a.excess { b } else { a }),
-            (a, b) => a.or(b),
-        }
-    }
-}
-
 /// A step that must not be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{body} left the range of numbers; the samples before it are kept. Try a smaller time step or softer contact")]
 pub struct NotFinite {
-    /// What became non-finite, in words.
+    /// Joint or body whose state is not finite.
     pub body: String,
 }
 
-/// What drives a step from outside.
+/// External inputs of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drive {
     /// Actuation torque on every joint (N m), where the chambers do not lag.
@@ -82,10 +62,10 @@ pub struct Drive {
     pub object_force: DVec3,
 }
 
-/// Advances the state by one step of `h` (s), which may differ from step to step. On failure the state is not to be used any
-/// more; whoever wants the last good one keeps the last frame.
+/// Advances the state by one step of `h` (s), which may differ from step to step. On failure the state is not to be
+/// used any more; keep the last frame for the last good state.
 pub fn step(
-    model: &Model,
+    model: &PhysicsModel,
     state: &mut State,
     ws: &mut Workspace,
     drive: &Drive,
@@ -121,7 +101,7 @@ pub fn step(
 }
 
 /// The drive at the end of the step, where chambers take time to fill.
-fn fill_chamber(model: &Model, state: &mut State, drive: &Drive, h: f64) -> Drive {
+fn fill_chamber(model: &PhysicsModel, state: &mut State, drive: &Drive, h: f64) -> Drive {
     match &model.chamber {
         Some(chamber) => {
             state.filled_from_bar = drive.line_bar;
@@ -133,7 +113,7 @@ fn fill_chamber(model: &Model, state: &mut State, drive: &Drive, h: f64) -> Driv
 }
 
 /// Places of the segments, and the velocity of everything beyond each joint per unit of its rate.
-pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
+pub(super) fn lay_out(model: &PhysicsModel, state: &State, ws: &mut Workspace) {
     let n = model.chain.joints;
     ws.reference = if model.body.is_some() { state.body.position } else { DVec3::ZERO };
     for finger in 0..2 {
@@ -151,7 +131,7 @@ pub(super) fn lay_out(model: &Model, state: &State, ws: &mut Workspace) {
 }
 
 /// Fills A and r.
-pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, drive: &Drive) {
+pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     let (n, h) = (model.chain.joints, ws.step.h);
     for finger in 0..2 {
         let joints = finger * n..(finger + 1) * n;
@@ -196,11 +176,11 @@ pub(super) fn gather_dynamics(model: &Model, state: &State, ws: &mut Workspace, 
     }
 }
 
-/// Friction limits that add up to less than this (N) are too small for their mismatch to matter.
+/// Friction limits that add up to less than this (N) are too small for a meaningful mismatch.
 const FELT_FRICTION: f64 = 0.01;
 
 /// Keeps shear and normal impulse of each contact for the next step; returns the outer friction residual.
-pub(super) fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace) -> f64 {
+pub(super) fn remember_contacts(model: &PhysicsModel, state: &mut State, ws: &Workspace) -> f64 {
     state.shear.fill(DVec3::ZERO);
     state.lag.fill(0.0);
     state.lag_h = ws.step.h;
@@ -222,7 +202,7 @@ pub(super) fn remember_contacts(model: &Model, state: &mut State, ws: &Workspace
 }
 
 /// Axes of a segment in the gripper frame, as columns: along, across, inward.
-pub(super) fn segment_axes_of(model: &Model, ws: &Workspace, link: u32) -> glam::DMat3 {
+pub(super) fn segment_axes_of(model: &PhysicsModel, ws: &Workspace, link: u32) -> glam::DMat3 {
     let plane = &model.planes[link as usize / (model.chain.joints + 1)];
     segment_axes(plane, &ws.segments[link as usize])
 }

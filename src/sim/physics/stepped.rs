@@ -1,11 +1,11 @@
-//! A scene stepped by hand: steps of any length, any torque, any velocity to begin with. Closed-form tests and hard cases
-//! are made of it; grasps run on [`super::Simulation`].
+//! A scene stepped by hand: steps of any length, any torque, any velocity to begin with. Closed-form tests and hard
+//! cases are made of it; grasps run on [`super::Simulation`].
 
 use super::balance::static_residual;
 use super::contact::{Acting, Against};
 use super::explicit::explicit_step;
 use super::integrator::Surroundings;
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::placement::Placement;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
@@ -16,7 +16,7 @@ use crate::objects::ObjectModel;
 use crate::scene::{Accuracy, Scene};
 use glam::DVec3;
 
-/// How a step is taken.
+/// Method of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stepping {
     /// The convex step that grasps are made of.
@@ -29,13 +29,13 @@ pub enum Stepping {
 /// A scene at some moment, and what its steps came to.
 #[derive(Clone, Debug)]
 pub struct SteppedScene {
-    pub(super) model: Model,
+    pub(super) model: PhysicsModel,
     /// Joints, velocities, object; velocities may be set.
     pub state: State,
     pub(super) ws: Workspace,
     /// Length of a step (s).
     pub h: f64,
-    /// How steps are taken.
+    /// Method of integration.
     pub stepping: Stepping,
     /// Steps taken.
     pub steps: u64,
@@ -63,11 +63,11 @@ impl SteppedScene {
     /// A scene at rest that is going to be stepped by `h` (s).
     pub fn new(scene: &Scene, object: Option<&ObjectModel>, h: f64) -> Self {
         let placement = Placement::new(scene, object);
-        Self::of(Model::new(scene, object, &placement), &placement, h)
+        Self::of(PhysicsModel::new(scene, object, &placement), &placement, h)
     }
 
     /// The same of a model that has been made before.
-    pub(super) fn of(model: Model, placement: &Placement, h: f64) -> Self {
+    pub(super) fn of(model: PhysicsModel, placement: &Placement, h: f64) -> Self {
         let state = State::new(&model, placement);
         let ws = Workspace::new(&model);
         let drive = Drive::default();
@@ -103,7 +103,7 @@ impl SteppedScene {
         Ok(report)
     }
 
-    /// Covers a span of time (s), rounded to whole steps, under a drive that is asked for with the time passed (s).
+    /// Covers a span of time (s), rounded to whole steps, under a drive as a function of the time passed (s).
     pub fn cover(&mut self, span: f64, drive: impl Fn(f64) -> Drive) -> Result<(), NotFinite> {
         for k in 0..(span / self.h).round().max(1.0) as u64 {
             self.step(&drive(k as f64 * self.h))?;
@@ -112,7 +112,7 @@ impl SteppedScene {
     }
 
     /// The constants it runs on.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &PhysicsModel {
         &self.model
     }
 
@@ -124,7 +124,7 @@ impl SteppedScene {
         (tip.x, tip.y)
     }
 
-    /// How far the left finger is bent outward at its tip (m); zero where it is bent inward.
+    /// Outward deflection of the left fingertip (m); zero where it is bent inward.
     pub fn tip_sway(&self) -> f64 {
         (-self.tip().0).max(0.0)
     }
@@ -183,7 +183,7 @@ impl SteppedScene {
         super::energy::mechanical_energy(&self.model, &self.state, &mut Workspace::new(&self.model)).total
     }
 
-    /// Deepest compression of any strand of a finger in the last step (m).
+    /// Deepest compression of any contact spring of a finger in the last step (m).
     pub fn deepest(&self) -> f64 {
         let on_finger = self.ws.contacts.iter().filter(|c| c.acting != Acting::Object);
         on_finger.map(|c| c.compression).fold(0.0, f64::max)

@@ -1,21 +1,22 @@
 //! From one tick to the next: one step, or as many as a tolerance takes.
 //!
 //! Under a tolerance every step is taken twice, whole and as two halves, after CENIC (Kurtz and Castro 2025, arXiv
-//! 2511.08771): their distance, over 2^p - 1 for a method of order p, estimates the error of the halves, which are kept.
-//! A step whose error is too large is taken again, shorter. The wanted length is carried on to the next step and over
-//! ticks; no step crosses a tick that is waited for, so that samples and actuation stay where they are.
+//! 2511.08771): their distance, over 2^p - 1 for a method of order p, estimates the error of the halves, which are
+//! kept. A step whose error is too large is taken again, shorter. The wanted length is carried on to the next step and
+//! over ticks; no step crosses a tick that is waited for, so that samples and actuation stay where they are.
 //!
 //! The error is the largest of: joint angles and turn of the object (rad), fingertips and position of the object as
 //! shares of the finger's length. Velocities and forces do not enter: at an impact they jump, and no step is short
-//! enough for a jump. Energy does: a second stage that goes on along the slope of the first can be thrown into the skin
-//! and come out of it faster than it went in, with angles that agree. So what a step gains beyond the work done on it
-//! counts as error too, as the angle by which joints as bent as these would have to be off for it.
+//! enough for a jump. Energy does: a second stage that continues along the slope of the first can be thrown into the
+//! skin and come out of it faster than it went in, with angles that agree. So what a step gains beyond the work done on
+//! it counts as error too, as the angle by which joints as bent as these would have to be off for it.
 
 use super::energy::{mechanical_energy, work_done};
 use super::integrator::{Integrator, Surroundings};
-use super::model::Model;
+use super::model::PhysicsModel;
+use super::solve::Unbalanced;
 use super::state::State;
-use super::step::{NotFinite, StepReport, Unbalanced};
+use super::step::{NotFinite, StepReport};
 use super::workspace::Workspace;
 use crate::gripper::SegmentPose;
 use crate::scene::Method;
@@ -41,7 +42,7 @@ pub(super) struct Totals {
     /// Shortest step taken (s); infinite before the first.
     pub(super) shortest: Option<f64>,
     pub(super) friction_residual: f64,
-    /// The worst imbalance of steps that missed the solver's tolerance, until somebody takes it.
+    /// The worst imbalance of steps that missed the solver's tolerance, until it is read.
     pub(super) unbalanced: Option<Unbalanced>,
 }
 
@@ -60,7 +61,7 @@ struct Control {
     /// The state at its beginning.
     origin: State,
     segments: [Vec<SegmentPose>; 2],
-    /// Where energies are worked out: the forces of the last step stay where they are.
+    /// Scratch for energies, so that the forces of the last step stay intact.
     aside: Workspace,
 }
 
@@ -76,7 +77,13 @@ const FASTEST_SHRINKING: f64 = 0.2;
 
 impl Stepper {
     /// Under a tolerance no step is longer than `longest` (s), and the shortest is a share of it.
-    pub(super) fn new(model: &Model, state: &State, method: Method, tolerance: Option<f64>, longest: f64) -> Self {
+    pub(super) fn new(
+        model: &PhysicsModel,
+        state: &State,
+        method: Method,
+        tolerance: Option<f64>,
+        longest: f64,
+    ) -> Self {
         let control = tolerance.map(|tolerance| Control {
             tolerance,
             wanted: longest,
@@ -113,7 +120,7 @@ impl Stepper {
             let h = control.next_length(left);
             if let Some(report) = control.attempt(integrator, within, state, h, totals)? {
                 left -= h;
-                // The last step is what is left, so that this becomes zero exactly.
+                // The last step is the remainder, so that this becomes zero exactly.
                 if left <= 0.0 {
                     return Ok(report);
                 }
@@ -136,7 +143,7 @@ impl Totals {
 }
 
 impl Control {
-    /// The wanted length, made so that what is `left` (s) is not cut into a long step and a tiny one.
+    /// Step length, adjusted so that the rest `left` (s) is not cut into a long step and a tiny one.
     fn next_length(&self, left: f64) -> f64 {
         let wanted = self.wanted.min(self.longest);
         if wanted >= left {
@@ -179,7 +186,7 @@ impl Control {
         totals.missed += u64::from(ratio > 1.0);
         totals.add(&report, h, 3 * stages);
         let planned = h * Self::factor(ratio, integrator.order());
-        // A step that a tick cut short says little about how long it might have been.
+        // A step cut short by a tick is no measure of the possible length.
         let cut = h < self.wanted;
         self.wanted = if cut { planned.max(self.wanted) } else { planned }.max(self.least);
         Ok(Some(report))
@@ -204,9 +211,10 @@ impl Control {
         Ok((StepReport { newton_iterations, ..halves }, distance / (2f64.powi(integrator.order()) - 1.0)))
     }
 
-    /// Energy from nowhere in a step of `h` (s), as the error (rad) by which joints as bent as these would have to be off
-    /// for it, or by which a free object would have to be turned. Joints may gain in a step its share of what they may in
-    /// the longest, for their gains add up; the energy of a turning object swings about what its momentum allows.
+    /// Energy from nowhere in a step of `h` (s), as the error (rad) by which joints as bent as these would have to be
+    /// off for it, or by which a free object would have to be turned. Joints may gain in a step its share of what they
+    /// may in the longest, for their gains add up; the energy of a turning object swings about what its momentum
+    /// allows.
     fn gain(&mut self, within: &Surroundings<'_>, state: &State, h: f64) -> f64 {
         let model = within.model;
         let before = mechanical_energy(model, &self.origin, &mut self.aside);
@@ -218,7 +226,7 @@ impl Control {
         (gain - UNFELT_GAIN * share).max(0.0) / worth.max(f64::MIN_POSITIVE)
     }
 
-    /// How much longer the next step may be, from the error over the tolerance: errors grow with h^(p + 1).
+    /// Growth factor of the next step from the error over the tolerance: errors grow with h^(p + 1).
     fn factor(ratio: f64, order: i32) -> f64 {
         (SAFETY * ratio.powf(-1.0 / f64::from(order + 1))).clamp(FASTEST_SHRINKING, FASTEST_GROWTH)
     }

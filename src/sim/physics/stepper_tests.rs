@@ -3,7 +3,7 @@
 use super::integrator::{Integrator, Surroundings};
 use super::step::Drive;
 use super::stepper::Stepper;
-use super::{Model, Placement, Simulation, State, Workspace};
+use super::{PhysicsModel, Placement, Simulation, State, Workspace};
 use crate::gripper::Phase;
 use crate::objects::ObjectModel;
 use crate::scene::{Accuracy, Method, Scene, SupportKind};
@@ -22,10 +22,10 @@ fn ball() -> ObjectModel {
     ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6)
 }
 
-/// Model, state and scratch memory of a scene without an object.
-fn set_up(scene: &Scene) -> (Model, State, Workspace) {
+/// PhysicsModel, state and scratch memory of a scene without an object.
+fn set_up(scene: &Scene) -> (PhysicsModel, State, Workspace) {
     let placement = Placement::new(scene, None);
-    let model = Model::new(scene, None, &placement);
+    let model = PhysicsModel::new(scene, None, &placement);
     let state = State::new(&model, &placement);
     let ws = Workspace::new(&model);
     (model, state, ws)

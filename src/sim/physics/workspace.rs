@@ -1,7 +1,7 @@
 //! Scratch memory of a step: allocated once, overwritten every step, never saved.
 
 use super::contact::{Contact, ContactStep};
-use super::model::Model;
+use super::model::PhysicsModel;
 use super::skyline::Skyline;
 use crate::gripper::SegmentPose;
 use glam::{DMat3, DVec2, DVec3};
@@ -68,13 +68,14 @@ impl Block {
     }
 }
 
-/// What contacts ask of one segment: against the object, which couples to it, against the world or the other finger,
-/// and from the other finger.
+/// Sums over the contacts of one segment: against the object, which couples to it, against the world or the other
+/// finger, and from the other finger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PerLink<T> {
     pub(super) object: T,
     pub(super) world: T,
-    /// Found by the other finger's strands. Kept apart, so that both fingers add up alike and mirrored scenes stay so.
+    /// Found by the other finger's contact springs. Kept apart, so that both fingers add up alike and mirrored scenes
+    /// stay so.
     pub(super) met: T,
 }
 
@@ -121,14 +122,14 @@ pub struct Workspace {
     pub(super) a_velocity: Vec<f64>,
     pub(super) a_direction: Vec<f64>,
     pub(super) hessian: Skyline,
-    /// What the contacts between the fingers ask of each segment of the right finger per unit rate of each joint of
+    /// Forces of the contacts between the fingers on each segment of the right finger per unit rate of each joint of
     /// the left one, `N x (N + 1)`.
     pub(super) coupling: Vec<Spatial>,
 }
 
 impl Workspace {
     /// Memory for a step of the model; its length is set as it is taken.
-    pub fn new(model: &Model) -> Self {
+    pub fn new(model: &PhysicsModel) -> Self {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
         let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {

@@ -1,4 +1,4 @@
-//! How accurately motion is computed: a named time step, or a tolerance; and by which method.
+//! Accuracy of the motion (a named time step or a tolerance) and method of integration.
 
 use serde::de::{Error as _, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -59,17 +59,23 @@ impl Display for Accuracy {
 }
 
 impl FromStr for Accuracy {
-    type Err = String;
+    type Err = UnknownAccuracy;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, UnknownAccuracy> {
         let named = Self::NAMED.into_iter().find(|accuracy| accuracy.to_string() == text);
         let tolerance = || text.parse().ok().filter(|t| Self::TOLERANCES.contains(t)).map(Self::Tolerance);
-        named.or_else(tolerance).ok_or_else(|| {
-            let (least, largest) = (Self::TOLERANCES.start(), Self::TOLERANCES.end());
-            format!("choose draft, standard, reference, or a tolerance between {least:e} and {largest}")
-        })
+        named.or_else(tolerance).ok_or(UnknownAccuracy)
     }
 }
+
+/// Error of a text that is neither the name of an accuracy nor a possible tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "choose draft, standard, reference, or a tolerance between {:e} and {}",
+    Accuracy::TOLERANCES.start(),
+    Accuracy::TOLERANCES.end()
+)]
+pub struct UnknownAccuracy;
 
 impl Serialize for Accuracy {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -103,7 +109,7 @@ impl<'de> Deserialize<'de> for Accuracy {
     }
 }
 
-/// How steps are taken, as a scene says it.
+/// Integrator setting of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Integrator {
@@ -116,7 +122,7 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// What `auto` comes to at an accuracy.
+    /// Method of integration at an accuracy.
     pub fn method(self, accuracy: Accuracy) -> Method {
         match (self, accuracy.tolerance()) {
             (Self::Euler, _) | (Self::Auto, None) => Method::Euler,
@@ -158,7 +164,7 @@ mod tests {
             assert_eq!(Scene::from_toml(&scene.to_toml()), Ok(scene));
         }
         for wrong in ["perfect", "0", "-1e-3", "0.2", "nan", ""] {
-            let cause = wrong.parse::<Accuracy>().expect_err(wrong);
+            let cause = wrong.parse::<Accuracy>().expect_err(wrong).to_string();
             assert!(cause.contains("draft") && cause.contains("1e-9"), "{cause}");
         }
     }
@@ -175,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tolerance_brings_the_second_order_method_unless_told_otherwise() {
+    fn a_tolerance_selects_the_second_order_method_by_default() {
         let tolerance = Accuracy::Tolerance(1e-4);
         assert_eq!(Integrator::Auto.method(Accuracy::Standard), Method::Euler);
         assert_eq!(Integrator::Auto.method(tolerance), Method::Sdirk2);

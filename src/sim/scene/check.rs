@@ -43,6 +43,8 @@ impl Ranges {
 impl Scene {
     /// Refuses values that no gripper, object or computer can have, naming the key.
     pub fn check(&self) -> Result<(), SceneError> {
+        #[cfg(not(feature = "rapier"))]
+        self.check_engine()?;
         let mut ranges = Ranges { fault: None };
         self.check_object_and_support(&mut ranges);
         self.check_gripper(&mut ranges);
@@ -52,6 +54,19 @@ impl Scene {
             Some(fault) => Err(fault),
             None => Ok(()),
         }
+    }
+
+    #[cfg(not(feature = "rapier"))]
+    fn check_engine(&self) -> Result<(), SceneError> {
+        if self.solver.engine == super::EngineKind::Rapier {
+            return Err(SceneError::NeedsRapier { setting: "solver.engine = \"rapier\"" });
+        }
+        if self.uses_resting_faces() {
+            return Err(SceneError::NeedsRapier {
+                setting: "pose.faces = \"natural\" (and \"any\" for a free object)",
+            });
+        }
+        Ok(())
     }
 
     fn check_object_and_support(&self, ranges: &mut Ranges) {
@@ -168,6 +183,13 @@ mod tests {
     #[test]
     fn the_default_scene_is_in_range() {
         assert_eq!(Scene::default().check(), Ok(()));
+    }
+
+    #[cfg(not(feature = "rapier"))]
+    #[test]
+    fn scenes_that_need_rapier_are_refused_by_name() {
+        assert!(refused(|s| s.solver.engine = crate::scene::EngineKind::Rapier).contains("solver.engine"));
+        assert!(refused(|s| s.pose.faces = crate::scene::Faces::Natural).contains("pose.faces"));
     }
 
     #[test]

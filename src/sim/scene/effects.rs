@@ -1,16 +1,16 @@
-//! `[effects]`: which physical effects are simulated. Each is `off`, `auto` or `on`; what `auto` comes to is decided in
+//! `[effects]`: settings of the physical effects. Each is `off`, `auto` or `on`; `auto` is decided in
 //! [`crate::physics::effects`], from the rest of the scene.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Whether an effect is simulated.
+/// Setting of an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Setting {
     /// Never.
     Off,
-    /// Where the scene calls for it.
+    /// On where the scene calls for it.
     #[default]
     Auto,
     /// Always.
@@ -31,10 +31,10 @@ impl Setting {
     }
 }
 
-/// Makes the list below into an enum, its names and the order in which effects are told.
+/// Makes the list below into an enum, its names and their order.
 macro_rules! effects {
     ($($(#[$doc:meta])* $effect:ident = $name:literal,)*) => {
-        /// An effect that can be left out. In the order in which they are told.
+        /// An effect that can be left out.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         pub enum Effect {
             $($(#[$doc])* #[serde(rename = $name)] $effect,)*
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_an_effect_or_not_a_setting_is_refused() {
+    fn unknown_effects_and_settings_are_refused() {
         let message = |text: &str| Scene::from_toml(text).expect_err("refused").to_string();
         let text = message("[effects]\ncrep = \"on\"\n");
         assert!(text.contains("effects.crep") && text.contains("\"effects.creep\""), "{text}");

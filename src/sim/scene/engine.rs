@@ -1,8 +1,8 @@
-//! Which engine computes a scene.
+//! Choice of the physics engine.
 
 use serde::{Deserialize, Serialize};
 
-/// What computes the motion of a scene.
+/// Physics engine of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EngineKind {

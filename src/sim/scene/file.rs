@@ -5,7 +5,7 @@ use super::Scene;
 use crate::objects::anchored;
 use std::path::{Path, PathBuf};
 
-/// Why a scene was refused.
+/// Error of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// The file could not be read.
@@ -13,7 +13,7 @@ pub enum SceneError {
     Unreadable {
         /// The path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         cause: String,
     },
     /// Not TOML, or a value of the wrong kind.
@@ -27,14 +27,20 @@ pub enum SceneError {
         /// The known key that looks most like it.
         nearest: Option<String>,
     },
-    /// A number outside what is possible.
+    /// A scene that needs an optional part of this program.
+    #[error("{setting} needs rapier, which this build leaves out; build with the feature `rapier`")]
+    NeedsRapier {
+        /// The setting, as a scene file writes it.
+        setting: &'static str,
+    },
+    /// Number outside its range.
     #[error("{key} = {value} is not possible; it must be {wanted}")]
     OutOfRange {
         /// The key, with its tables.
         key: String,
         /// The value found.
         value: String,
-        /// What would be accepted.
+        /// Accepted range.
         wanted: String,
     },
 }
@@ -44,7 +50,7 @@ pub enum SceneError {
 pub struct SceneKey {
     /// Its name with its tables: `gripper.pad.modulus`.
     pub name: String,
-    /// What it is by default, as TOML writes it.
+    /// Default value, as TOML writes it.
     pub default: String,
 }
 
@@ -64,7 +70,7 @@ impl SceneKey {
         format!("{}={value}", self.name)
     }
 
-    /// Where its first number stands.
+    /// Range of its first number in the default.
     fn number(&self) -> Option<std::ops::Range<usize>> {
         let from = self.default.find(|c: char| c.is_ascii_digit() || c == '-')?;
         let end = self.default[from..].find(|c: char| !(c.is_ascii_alphanumeric() || "+-._".contains(c)));
@@ -268,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_can_be_set_to_what_it_is() {
+    fn every_key_can_be_set_to_its_own_value() {
         let keys = Scene::keys();
         assert!(keys.len() > 40 && keys.iter().filter(|key| key.holds_fractions()).count() > 30);
         for key in &keys {
@@ -299,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_kinds_and_broken_text_are_told_apart() {
+    fn wrong_kinds_and_broken_text_give_different_errors() {
         assert!(matches!(Scene::from_toml("[solver\n"), Err(SceneError::Syntax(_))));
         assert!(matches!(Scene::from_toml("[solver]\naccuracy = \"best\"\n"), Err(SceneError::Syntax(_))));
         assert!(matches!(Scene::from_toml("[object]\nmass = \"heavy\"\n"), Err(SceneError::Syntax(_))));

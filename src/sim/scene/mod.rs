@@ -12,7 +12,7 @@ mod file;
 mod poses;
 mod timing;
 
-pub use accuracy::{Accuracy, Integrator, Method};
+pub use accuracy::{Accuracy, Integrator, Method, UnknownAccuracy};
 pub use auto::Auto;
 pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
@@ -29,28 +29,28 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Scene {
-    /// What is grasped and how it lies.
+    /// Object and its pose.
     pub object: ObjectSetup,
-    /// What the object rests on.
+    /// Support of the object.
     pub support: Support,
     /// The gripper and where it is held.
     pub gripper: Gripper,
-    /// How poses vary from grasp to grasp.
+    /// Variation of poses from grasp to grasp.
     pub pose: PoseSpread,
     /// Line pressure over time.
     pub programme: Programme,
     /// Rates and duration.
     pub timing: Timing,
-    /// How accurately motion is computed.
+    /// Solver settings.
     pub solver: Solver,
     /// The world around.
     pub world: World,
-    /// Which physical effects are simulated.
+    /// Settings of the physical effects.
     pub effects: EffectSettings,
 }
 
 impl Scene {
-    /// How the object's file is to be read.
+    /// Options for loading its object.
     pub fn load_options(&self) -> LoadOptions {
         LoadOptions {
             scale: self.object.scale.value(),
@@ -61,8 +61,7 @@ impl Scene {
         }
     }
 
-    /// Whether the object is held in place. `effects.free-object` has the last word; left to `auto`, it is
-    /// `object.fixed` that counts.
+    /// True where the object is held in place: by `effects.free-object`, or by `object.fixed` where that is `auto`.
     pub fn holds_object(&self) -> bool {
         match self.effects.get(Effect::FreeObject) {
             Setting::Off => true,
@@ -71,7 +70,17 @@ impl Scene {
         }
     }
 
-    /// Holds the object in place, or lets it rest freely; takes back what `effects.free-object` may have said.
+    /// True where random poses put the object on the faces that it comes to rest on. A free object cannot lie on any
+    /// other: it would fall off its pedestal before the fingers come.
+    pub fn uses_resting_faces(&self) -> bool {
+        match self.pose.faces {
+            Faces::Nominal => false,
+            Faces::Natural => true,
+            Faces::Any => !self.holds_object(),
+        }
+    }
+
+    /// Holds the object in place, or lets it rest freely; resets `effects.free-object` to `auto`.
     pub fn set_object_fixed(&mut self, fixed: bool) {
         self.object.fixed = fixed;
         self.effects.set(Effect::FreeObject, Setting::Auto);
@@ -83,7 +92,7 @@ impl Scene {
     }
 }
 
-/// What is grasped.
+/// Settings of the grasped object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ObjectSetup {
@@ -101,9 +110,9 @@ pub struct ObjectSetup {
     pub density: f64,
     /// Friction coefficient of the surface; `auto` takes the object's own, or 0.6.
     pub friction: Auto,
-    /// Factor on all lengths in the file; `auto` guesses millimetres or metres and says so.
+    /// Factor on all lengths in the file; `auto` guesses millimetres or metres, with a warning.
     pub scale: Auto,
-    /// Which shape the physics sees.
+    /// Shape used for contact.
     pub collision: CollisionShape,
 }
 
@@ -119,7 +128,7 @@ pub enum SupportKind {
     None,
 }
 
-/// What the object rests on. The table is the plane z = 0 of the world; fingers touch both.
+/// Support of the object. The table is the plane z = 0 of the world; fingers touch both.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Support {
@@ -131,21 +140,21 @@ pub struct Support {
     pub radius: f64,
     /// Friction coefficient; combined with the object's as a geometric mean.
     pub friction: f64,
-    /// How far a resting object may sink into the support under its own weight (m).
+    /// Largest depth that a resting object sinks into the support under its own weight (m).
     pub sink: f64,
     /// Least stiffness of a contact point (N/m), for light objects that are pressed down.
     pub stiffness: f64,
 }
 
-/// How accurately motion is computed.
+/// Solver settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Solver {
-    /// What computes the motion.
+    /// Physics engine.
     pub engine: EngineKind,
     /// A named time step, or a tolerance to which steps are chosen.
     pub accuracy: Accuracy,
-    /// How steps are taken.
+    /// Method of integration.
     pub integrator: Integrator,
     /// Newton stops when the scaled gradient falls below this share of the forces at play.
     pub tolerance: f64,
@@ -200,10 +209,11 @@ impl Solver {
         self.integrator.method(self.accuracy)
     }
 
-    /// What errors are estimated from: a tenth of a tolerance. Named steps have a tolerance beside them, since Euler damps
-    /// the ringing of the fingers at one step and at half of it alike: these agree more closely than either with the truth.
+    /// Settings of the refined run for the error estimate: a tenth of a tolerance. Named steps have a tolerance beside
+    /// them, since Euler damps the ringing of the fingers at one step and at half of it alike: these agree more closely
+    /// than either with the truth.
     #[must_use]
-    pub fn companion(&self) -> Self {
+    pub fn refined(&self) -> Self {
         let (accuracy, integrator) = match self.accuracy {
             Accuracy::Draft | Accuracy::Standard => (Accuracy::Tolerance(1e-4), Integrator::Auto),
             Accuracy::Reference => (Accuracy::Tolerance(1e-6), Integrator::Auto),

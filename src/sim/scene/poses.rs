@@ -1,9 +1,9 @@
-//! How poses vary from grasp to grasp, and the presets A, M, B and C.
+//! Variation of poses from grasp to grasp, and the presets A, M, B and C.
 
 use super::Scene;
 use serde::{Deserialize, Serialize};
 
-/// How far random poses stray from the scene's own. Shifts and turns move the gripper, not the resting object.
+/// Range of random poses about the scene's own. Shifts and turns move the gripper, not the resting object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PoseSpread {
@@ -13,7 +13,7 @@ pub struct PoseSpread {
     pub yaw_deg: f64,
     /// On which of its faces the object lies.
     pub faces: Faces,
-    /// Where the object lies in the next of several grasps.
+    /// Pose of the object in the next of several grasps.
     pub between: Between,
 }
 
@@ -24,7 +24,7 @@ impl Default for PoseSpread {
     }
 }
 
-/// What happens to the object between two grasps.
+/// Treatment of the object between two grasps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Between {
@@ -39,7 +39,7 @@ pub enum Between {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Faces {
-    /// As the scene says.
+    /// The orientation set in the scene.
     #[default]
     Nominal,
     /// On any face it comes to rest on when it is dropped, as often as it does.

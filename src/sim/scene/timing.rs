@@ -1,5 +1,6 @@
-//! Time is counted in whole ticks. One tick is one solver step, or a span that a tolerance divides; every sample and every actuation step falls on a
-//! tick, so the rate is a multiple of lcm(sample_hz, actuation_hz): 150 Hz for the paper's 75 and 10 Hz.
+//! Time is counted in whole ticks. One tick is one solver step, or a span that a tolerance divides; every sample and
+//! every actuation step falls on a tick, so the rate is a multiple of lcm(sample_hz, actuation_hz): 150 Hz for the
+//! paper's 75 and 10 Hz.
 
 use super::Accuracy;
 use serde::{Deserialize, Serialize};

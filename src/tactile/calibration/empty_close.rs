@@ -1,9 +1,9 @@
-//! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending does to
-//! it, over the curvature that its finger's strip reads.
+//! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending
+//! does to it, over the curvature that its finger's strip reads.
 
 use super::Fault;
 use super::pad_curve::BendingZero;
-use super::point::Kind;
+use super::point::SensorKind;
 use super::readout::Readout;
 use super::record::Calibration;
 use crate::board::{Board, Reading, Sensor};
@@ -24,11 +24,11 @@ pub struct EmptyClose {
 }
 
 impl EmptyClose {
-    /// How long it is watched where nobody says (s): enough to turn a regulator up and down again.
+    /// Default duration (s): enough to turn a regulator up and down again.
     pub const SECONDS: f64 = 15.0;
 
-    /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts; the
-    /// strip of the same finger must be among them.
+    /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts;
+    /// the strip of the same finger must be among them.
     pub fn begin(
         board: &Board,
         pad: (Sensor, Calibration),
@@ -41,7 +41,7 @@ impl EmptyClose {
             Sensor::PadRight => Side::Right,
             Sensor::FlexLeft | Sensor::FlexRight => return Err(Fault::NoBending),
         };
-        let strip = Kind::Flex.on(side);
+        let strip = SensorKind::Flex.on(side);
         if board.channel_of(strip).is_none() || !serving.iter().any(|(own, _)| *own == strip) {
             return Err(Fault::NoStrip { strip: strip.label() });
         }
@@ -65,12 +65,12 @@ impl EmptyClose {
         self.left_s() <= 0.0
     }
 
-    /// How long it still watches (s).
+    /// Time left (s).
     pub fn left_s(&self) -> f64 {
         (self.seconds - self.watched_s).max(0.0)
     }
 
-    /// What to do, in words.
+    /// Instruction to the user.
     pub fn instruction(&self) -> String {
         let left = self.left_s().ceil();
         format!(
@@ -79,7 +79,7 @@ impl EmptyClose {
         )
     }
 
-    /// What was seen.
+    /// Bending zero from the recorded readings.
     pub fn bending(&self) -> Result<BendingZero, Fault> {
         BendingZero::from_empty_close(&self.readout.bending(self.side, &self.readings))
     }
@@ -94,7 +94,7 @@ mod tests {
     use crate::electronics::StripPart;
 
     fn calibration(sensor: Sensor, points: &[(f64, f64)]) -> Calibration {
-        let (kind, input) = (Kind::of(sensor), Input::on(&Board::default(), sensor));
+        let (kind, input) = (SensorKind::of(sensor), Input::on(&Board::default(), sensor));
         let point = |&(shown, ohm): &(f64, f64)| Point {
             stimulus: kind.stimulus(shown),
             counts: input.counts(ohm),
@@ -108,7 +108,7 @@ mod tests {
     }
 
     fn parts() -> [(Sensor, Calibration); 2] {
-        let ohm = |kg: f64| 6e3 / Kind::Pad.stimulus(kg).powf(0.9);
+        let ohm = |kg: f64| 6e3 / SensorKind::Pad.stimulus(kg).powf(0.9);
         let loads = [0.03, 0.05, 0.1, 0.2, 0.35, 0.5].map(|kg| (kg, ohm(kg)));
         [
             (Sensor::FlexLeft, calibration(Sensor::FlexLeft, &[(0.0, 25e3), (45.0, 37.5e3), (90.0, 50e3)])),
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_load_that_bending_puts_on_a_pad_is_learned() -> Result<(), Fault> {
+    fn the_bending_zero_is_found_from_an_empty_close() -> Result<(), Fault> {
         let [strip, pad] = parts();
         let board = Board::default();
         let mut close = EmptyClose::begin(&board, pad.clone(), std::slice::from_ref(&strip), 4.0)?;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_learned_is_said() -> Result<(), Fault> {
+    fn an_unusable_empty_close_is_refused_with_the_reason() -> Result<(), Fault> {
         let [strip, pad] = parts();
         let board = Board::default();
         let begin = |sensor: &(Sensor, Calibration), serving: &[(Sensor, Calibration)]| {

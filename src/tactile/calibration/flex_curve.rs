@@ -2,16 +2,16 @@
 //!
 //!   R = R0 + s theta,
 //!
-//! fitted by least squares of the resistance on the angle, all points alike: what is uncertain about a point is how well
-//! its angle was set, not the mean of its readings. The angle is spread evenly over the active length L of the strip, so
+//! fitted by least squares of the resistance on the angle, all points alike: the uncertainty of a point is that of
+//! the angle set, not of the mean of its readings. The angle is spread evenly over the active length L of the strip, so
 //! that the curvature is kappa = theta / L; a right angle is 28.4 1/m.
 //!
-//! What such a part can be is in the data sheet of the FS-L-0055-253-ST: 25 kOhm flat, off by 30 % at most; distributors
+//! Plausible parts follow the data sheet of the FS-L-0055-253-ST: 25 kOhm flat, off by 30 % at most; distributors
 //! measure 2 to 2.5 times that at 90 degrees.
 
 use super::Fault;
 use super::input::Input;
-use super::point::{Kind, Point, check, merged};
+use super::point::{Point, SensorKind, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
 use crate::electronics::StripPart;
 use palpate_geometry::units::three_digits;
@@ -24,8 +24,8 @@ const FLAT_OHM: [f64; 2] = [
     StripPart::NOMINAL_OHM * (1.0 + StripPart::FLAT_TOLERANCE),
 ];
 
-/// Resistance at 90 degrees over flat that is believed: wider than the 2 to 2.5 of distributors, for the strip may sit on
-/// a finger that bends only in part along it.
+/// Resistance at 90 degrees over flat that is believed: wider than the 2 to 2.5 of distributors, for the strip may sit
+/// on a finger that bends only in part along it.
 const BENT_OVER_FLAT: [f64; 2] = [1.5, 3.5];
 
 /// Two angles nearer to each other than this are one (rad): 5 degrees.
@@ -55,19 +55,24 @@ pub struct FlexCurve {
 }
 
 impl FlexCurve {
-    /// Fits a strip; two points at least, a right angle apart if possible. Also says what is worth a word.
+    /// Fits a strip; two points at least, a right angle apart if possible. Also returns remarks.
     pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
-        check(points, Kind::Flex, input, FRAC_PI_2)?;
+        check(points, SensorKind::Flex, input, FRAC_PI_2)?;
         let distinct = merged(points, APART);
         if distinct.len() < 2 {
-            let more = "one with the finger straight and one bent by 90 degrees, better also 30 and 60";
-            return Err(Fault::TooFew { have: distinct.len(), need: 2, what: "different angles", more });
+            return Err(Fault::TooFew(format!(
+                "{} of at least 2 different angles: take one with the finger straight and one bent by 90 degrees, better \
+                 also 30 and 60",
+                distinct.len()
+            )));
         }
         let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
         if most - least < LEAST_SPAN {
-            let (from, to) = (Kind::Flex.told(least), Kind::Flex.told(most));
-            let wanted = "angles at least 45 degrees apart are needed, best 0 and 90";
-            return Err(Fault::TooClose { kind: Kind::Flex.label(), from, to, wanted });
+            let [from, to] = [least, most].map(|angle| SensorKind::Flex.with_unit(angle));
+            return Err(Fault::TooFew(format!(
+                "the flex strip has points from {from} to {to} only: angles at least 45 degrees apart are needed, best 0 \
+                 and 90"
+            )));
         }
         rises(&distinct, input)?;
         let weighted = |p: &Point| WeightedPoint { x: p.stimulus, y: input.ohm(p.counts), weight: 1.0 };
@@ -112,10 +117,11 @@ impl FlexCurve {
             let resistor = input.divider.fixed_ohm;
             let [low, high] = FLAT_OHM.map(|flat| three_digits(1e-3 * resistor * flat / self.flat_ohm));
             let said = three_digits(1e-3 * resistor);
-            let hint = format!(
-                "the resistor beside it is not the {said} kOhm it is said to be but {low} to {high}, or it is another part"
-            );
-            return Err(Fault::FlatResistance { flat_ohm: self.flat_ohm, hint });
+            return Err(Fault::ImplausiblePart(format!(
+                "the flat strip comes out at {} kOhm, but such parts have 17.5 to 32.5: the resistor beside it is not the \
+                 {said} kOhm entered but {low} to {high}, or it is another part",
+                three_digits(self.flat_ohm * 1e-3)
+            )));
         }
         let ratio = self.bent_over_flat();
         if !within(BENT_OVER_FLAT, ratio) {
@@ -124,7 +130,11 @@ impl FlexCurve {
             } else {
                 "the angles are smaller than what was bent, or the part is damaged"
             };
-            return Err(Fault::BentResistance { ratio, hint: hint.to_owned() });
+            return Err(Fault::ImplausiblePart(format!(
+                "bent by 90 degrees the strip comes out at {} times its flat resistance, but such parts rise to 1.5 to 3.5 \
+                 times: {hint}",
+                three_digits(ratio)
+            )));
         }
         Ok(())
     }
@@ -132,13 +142,14 @@ impl FlexCurve {
     fn remarks(&self, points: &[Point]) -> Result<Vec<String>, Fault> {
         let mut words = Vec::new();
         if points.len() == 2 {
-            words.push("two points fit any line: only a third one tells how good it is".to_owned());
+            words.push("two points fit any line: take a third one to check the fit".to_owned());
         }
         let worst = points.iter().zip(&self.residuals).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((point, residual)) = worst else { return Ok(words) };
-        let (at, off) = (Kind::Flex.told(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
+        let (at, off) =
+            (SensorKind::Flex.with_unit(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
         if residual.abs() > TOO_FAR {
-            return Err(Fault::Outlier { at, off });
+            return Err(Fault::BadPoint(format!("{at} is {off} off the curve through the others: take it again")));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!("{at} is {off} off the line; take it again if the strip may have slipped"));
@@ -153,14 +164,13 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
         let (before, after) = (input.ohm(pair[0].counts), input.ohm(pair[1].counts));
         if after <= before {
             let kilo = |ohm: f64| format!("{} kOhm", three_digits(ohm * 1e-3));
-            return Err(Fault::NotMonotone {
-                from: Kind::Flex.told(pair[0].stimulus),
-                to: Kind::Flex.told(pair[1].stimulus),
-                what: "resistance",
-                falls: format!("{} to {}", kilo(before), kilo(after)),
-                likely: "the strip bends towards its wrong side, its input is wired the other way round, or two angles \
-                         were mixed up",
-            });
+            let [from, to] = [0, 1].map(|i| SensorKind::Flex.with_unit(pair[i].stimulus));
+            return Err(Fault::BadPoint(format!(
+                "between {from} and {to} the resistance falls from {} to {}, but it must rise: the strip bends towards its \
+                 wrong side, its input is wired the other way round, or two angles were mixed up",
+                kilo(before),
+                kilo(after)
+            )));
         }
     }
     Ok(())
@@ -205,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_holds_the_truth_as_often_as_it_says() -> Result<(), Fault> {
+    fn an_interval_holds_the_truth_in_95_of_100_cases() -> Result<(), Fault> {
         // Angles set wrong by a degree or so: the interval at 45 degrees should hold the truth in 95 of 100.
         let mut held = 0;
         let mut drawn = 0x9e37_79b9_7f4a_7c15_u64;
@@ -244,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_resistor_is_told_with_what_it_may_be() {
+    fn a_wrong_resistor_is_reported_with_the_likely_range() {
         // Behind 10 kOhm instead of 47, a strip of 25 kOhm looks like one of 117.
         let actual = Input { divider: Divider::of_strip(10e3), ..input() };
         let text = fault(&points(25e3, 2.2, &[0.0, 45.0, 90.0], &actual));
@@ -253,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strip_the_wrong_way_round_is_told() {
+    fn a_strip_the_wrong_way_round_is_named() {
         let swapped = Input { divider: Divider::of_pad(47e3), ..input() };
         assert!(fault(&points(25e3, 2.2, &[0.0, 45.0, 90.0], &swapped)).contains("wired the other way round"));
         assert!(fault(&points(25e3, 1.2, &[0.0, 45.0, 90.0], &input())).contains("slips"));
@@ -263,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_wires_and_slipped_points_are_told() {
+    fn broken_wires_and_slipped_points_are_named() {
         let mut open = points(25e3, 2.2, &[0.0, 45.0, 90.0], &input());
         open[2].counts = 4095.0;
         assert!(fault(&open).contains("open"));

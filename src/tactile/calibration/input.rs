@@ -1,4 +1,4 @@
-//! An input of a board, read backwards: from counts to the resistance or conductance of what is connected.
+//! Input of a board: counts to the resistance or conductance of the sensor.
 //!
 //! Count c of a converter with full scale C stands for the share c / (C + 1) of the reference voltage; the rest is the
 //! [`Divider`]'s.
@@ -18,12 +18,12 @@ pub struct Input {
     pub reference_volt: f64,
 }
 
-/// Counts within this distance of an end of the converter's range say only that it has ended.
+/// Counts within this distance of an end of the converter's range are saturated.
 const RAIL_COUNTS: f64 = 1.5;
 
 impl Input {
-    /// The divider of a sensor on a board: what the board says of itself, and else what our firmware's wiring plan asks
-    /// for: strips to ground beside 47 kOhm, pads to the supply beside 4.7 kOhm.
+    /// The divider of a sensor on a board: as the board reports it, else as in the wiring plan of our firmware:
+    /// strips to ground beside 47 kOhm, pads to the supply beside 4.7 kOhm.
     pub fn on(board: &Board, sensor: Sensor) -> Self {
         let usual = match sensor.is_flex() {
             true => Divider::of_strip(StripPart::DIVIDER_OHM),
@@ -63,7 +63,7 @@ impl Input {
         self.divider.siemens(self.share(counts))
     }
 
-    /// What a resistance (ohm) is read as, before noise and rounding (counts).
+    /// Reading of a resistance (ohm) before noise and rounding (counts).
     pub fn counts(&self, ohm: f64) -> f64 {
         self.divider.share_of_ohm(ohm) * self.levels()
     }
@@ -74,14 +74,14 @@ impl Input {
         1.0 / (share * (1.0 - share) * self.divider.gain * self.levels())
     }
 
-    /// Why a reading says nothing of the resistance, where it is at an end of the converter's range. A pad that reads
-    /// nothing is only unloaded.
-    pub fn rail(&self, counts: f64) -> Option<Rail> {
+    /// End of the converter's range that a reading is at, if any: it then does not determine the resistance. A pad that
+    /// reads zero is only unloaded.
+    pub fn range_end(&self, counts: f64) -> Option<RangeEnd> {
         let high = counts >= f64::from(self.full_scale) - RAIL_COUNTS;
         let low = counts <= RAIL_COUNTS;
         match (self.divider.wiring, high, low) {
-            (Wiring::SensorToGround, true, _) | (Wiring::SensorToSupply, _, true) => Some(Rail::Open),
-            (Wiring::SensorToGround, _, true) | (Wiring::SensorToSupply, true, _) => Some(Rail::Short),
+            (Wiring::SensorToGround, true, _) | (Wiring::SensorToSupply, _, true) => Some(RangeEnd::Open),
+            (Wiring::SensorToGround, _, true) | (Wiring::SensorToSupply, true, _) => Some(RangeEnd::Short),
             _ => None,
         }
     }
@@ -95,7 +95,7 @@ impl Input {
     }
 }
 
-/// The resistor that a board says it has beside a sensor (ohm).
+/// Resistor beside a sensor that the board reports (ohm).
 pub(super) fn stated_resistor(board: &Board, sensor: Sensor) -> Option<f64> {
     let ohm = *board.divider_ohm.get(board.channel_of(sensor)?)?;
     (ohm.is_finite() && ohm > 0.0).then_some(ohm)
@@ -103,7 +103,7 @@ pub(super) fn stated_resistor(board: &Board, sensor: Sensor) -> Option<f64> {
 
 /// An end of the converter's range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rail {
+pub enum RangeEnd {
     /// As if nothing were connected: no current flows through the sensor.
     Open,
     /// As if the sensor were a wire.
@@ -145,13 +145,16 @@ mod tests {
     }
 
     #[test]
-    fn an_end_of_the_range_is_named_by_what_it_means() {
+    fn an_end_of_the_range_is_open_or_short() {
         let [strip, pad] = inputs();
         assert_eq!(
-            (strip.rail(4095.0), strip.rail(0.0), strip.rail(1400.0)),
-            (Some(Rail::Open), Some(Rail::Short), None)
+            (strip.range_end(4095.0), strip.range_end(0.0), strip.range_end(1400.0)),
+            (Some(RangeEnd::Open), Some(RangeEnd::Short), None)
         );
-        assert_eq!((pad.rail(0.0), pad.rail(4095.0), pad.rail(900.0)), (Some(Rail::Open), Some(Rail::Short), None));
+        assert_eq!(
+            (pad.range_end(0.0), pad.range_end(4095.0), pad.range_end(900.0)),
+            (Some(RangeEnd::Open), Some(RangeEnd::Short), None)
+        );
         assert!(pad.siemens(0.0) == 0.0 && pad.siemens(4095.0).is_finite() && pad.siemens(1e9).is_finite());
         assert!(strip.ohm(0.0) == 0.0 && strip.ohm(4095.0).is_finite());
     }

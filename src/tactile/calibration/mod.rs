@@ -10,8 +10,8 @@
 //! Only records are stored, so that a better fit serves old ones too, as a better calibration serves old trials:
 //! [`Readout`] derives [`super::Signals`] from stored readings with whatever calibrations it is given.
 //!
-//! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of these
-//! kinds from data sheets is used to refuse calibrations that cannot be; see [`Fault`].
+//! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of
+//! these kinds from data sheets is used to refuse calibrations that cannot be; see [`Fault`].
 
 mod empty_close;
 mod fault;
@@ -32,11 +32,11 @@ mod zero;
 pub use empty_close::EmptyClose;
 pub use fault::Fault;
 pub use flex_curve::FlexCurve;
-pub use input::{Input, Rail};
+pub use input::{Input, RangeEnd};
 pub use pad_curve::{ACTIVE_AREA, BendingZero, PadCurve};
-pub use point::{Kind, Point};
+pub use point::{Point, SensorKind};
 pub use procedure::{Procedure, Settling, Unsettled, plan};
-pub use readout::{Derived, Felt, Readout};
+pub use readout::{Derived, Readout, SensorEstimate};
 pub use record::{Calibration, Curve, Record};
 pub use straight_line::StraightLine;
 pub use zero::{Drift, DriftLevel, Unrest, Zero};

@@ -2,14 +2,14 @@
 //!
 //!   G = a F^b,
 //!
-//! a straight line in logarithms (data sheet of the FSR07CE; its threshold is below 15 g). The line is fitted with weights: a
-//! relative error of a pad is its repeatability, 2 %, and what the noise of the counts makes of it, which is much where
-//! a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is subtracted, and
-//! what bending does to it, the [`BendingZero`].
+//! a straight line in logarithms (data sheet of the FSR07CE; its threshold is below 15 g). The line is fitted with
+//! weights: a relative error of a pad is its repeatability, 2 %, and what the noise of the counts makes of it, which is
+//! much where a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is
+//! subtracted, and what bending does to it, the [`BendingZero`].
 
 use super::Fault;
 use super::input::Input;
-use super::point::{Kind, Point, check, merged};
+use super::point::{Point, SensorKind, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
 use crate::electronics::PadPart;
 use palpate_geometry::units::{STANDARD_GRAVITY, three_digits};
@@ -53,7 +53,7 @@ pub struct PadCurve {
     pub gain: f64,
     /// Exponent, b.
     pub exponent: f64,
-    /// Force below which it does not conduct, F0 (N): what the data sheet says, within what the weights showed.
+    /// Force below which it does not conduct, F0 (N): that of the data sheet, within the bounds of the weights.
     pub threshold: f64,
     /// Conductance at rest, when it was calibrated (S).
     pub idle_siemens: f64,
@@ -66,13 +66,13 @@ pub struct PadCurve {
 }
 
 impl PadCurve {
-    /// Fits a pad; five weights at least that make it conduct. Also says what is worth a word.
+    /// Fits a pad; five weights at least that make it conduct. Also returns remarks.
     pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
-        check(points, Kind::Pad, input, MOST)?;
+        check(points, SensorKind::Pad, input, MOST)?;
         let idle = idle_counts(points);
         let conducts = |p: &&Point| p.stimulus > 0.0 && p.counts > idle + CONDUCTING_COUNTS.max(4.0 * p.spread);
-        let felt: Vec<Point> = points.iter().filter(conducts).copied().collect();
-        let distinct = merged(&felt, 0.005 * STANDARD_GRAVITY);
+        let loaded: Vec<Point> = points.iter().filter(conducts).copied().collect();
+        let distinct = merged(&loaded, 0.005 * STANDARD_GRAVITY);
         enough(&distinct)?;
         rises(&distinct, input)?;
         let idle_siemens = input.siemens(idle);
@@ -82,7 +82,7 @@ impl PadCurve {
             let weight = 1.0 / (REPEATABILITY * REPEATABILITY + noise * noise);
             WeightedPoint { x: p.stimulus.ln(), y: conductance(p).ln(), weight }
         };
-        let line = StraightLine::through(&felt.iter().map(weighted).collect::<Vec<_>>());
+        let line = StraightLine::through(&loaded.iter().map(weighted).collect::<Vec<_>>());
         // Five different weights are five different logarithms: its numbers left the range.
         let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
         let silent = points.iter().filter(|p| !conducts(p)).map(|p| p.stimulus).fold(0.0, f64::max);
@@ -129,27 +129,31 @@ impl PadCurve {
         if !within(OHM_AT_1_N, ohm) {
             let [low, high] = OHM_AT_1_N.map(|wanted| three_digits(1e-3 * input.divider.fixed_ohm * wanted / ohm));
             let said = three_digits(1e-3 * input.divider.fixed_ohm);
-            let hint = format!(
-                "the resistor beside it is not the {said} kOhm it is said to be but {low} to {high}, or weights were given \
-                 in another unit than kg"
-            );
-            return Err(Fault::PadResistance { ohm, hint });
+            return Err(Fault::ImplausiblePart(format!(
+                "under 1 N the pad comes out at {} kOhm, but such parts have about 6 (1.5 to 25): the resistor beside it is \
+                 not the {said} kOhm entered but {low} to {high}, or weights were given in another unit than kg",
+                three_digits(ohm * 1e-3)
+            )));
         }
         if !within(EXPONENTS, self.exponent) {
-            return Err(Fault::Exponent { exponent: self.exponent });
+            return Err(Fault::ImplausiblePart(format!(
+                "the pad's conductance grows with the power {} of the force, but such parts have 0.6 to 1.2: weights that \
+                 rest partly beside the pad do this. Put a small stiff disc between, and the weight on its middle",
+                three_digits(self.exponent)
+            )));
         }
         Ok(())
     }
 
     fn remarks(&self, points: &[Point], silent: f64) -> Result<Vec<String>, Fault> {
         let mut words = Vec::new();
-        let told = |p: &Point| Kind::Pad.told(p.stimulus);
+        let at = |p: &Point| SensorKind::Pad.with_unit(p.stimulus);
         let off = |p: &Point| p.stimulus > self.threshold * 1.5 && p.stimulus < silent;
         if let Some(point) = points.iter().find(|p| off(p)) {
             words.push(format!(
-                "{} was felt, but {} was not: was the weight on the pad?",
-                told(point),
-                Kind::Pad.told(silent)
+                "{} was measured, but the heavier {} was not: check that the weight rests on the pad",
+                at(point),
+                SensorKind::Pad.with_unit(silent)
             ));
         }
         let residuals = points.iter().zip(&self.residuals).filter_map(|(p, r)| Some((p, (*r)?)));
@@ -158,22 +162,23 @@ impl PadCurve {
         };
         let percent = format!("{:.0} %", 100.0 * residual.abs());
         if residual.abs() > TOO_FAR {
-            return Err(Fault::Outlier { at: told(point), off: percent });
+            let at = at(point);
+            return Err(Fault::BadPoint(format!("{at} is {percent} off the curve through the others: take it again")));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!(
                 "{} is {percent} off the curve; take it again if the weight may have shifted",
-                told(point)
+                at(point)
             ));
         }
         if self.most < 0.45 * STANDARD_GRAVITY {
-            words.push(format!("forces above {} are read off beyond the last weight", Kind::Pad.told(self.most)));
+            words.push(format!("forces above {} are extrapolated", SensorKind::Pad.with_unit(self.most)));
         }
         Ok(words)
     }
 }
 
-/// What the pad reads without a weight (counts); nothing where that was not tried.
+/// Mean reading without a weight (counts); 0 where that was not measured.
 fn idle_counts(points: &[Point]) -> f64 {
     let bare: Vec<f64> = points.iter().filter(|p| p.stimulus <= 0.0).map(|p| p.counts).collect();
     if bare.is_empty() { 0.0 } else { bare.iter().sum::<f64>() / bare.len() as f64 }
@@ -181,16 +186,19 @@ fn idle_counts(points: &[Point]) -> f64 {
 
 fn enough(distinct: &[Point]) -> Result<(), Fault> {
     if distinct.len() < LEAST_WEIGHTS {
-        let more = "five or more between 0.03 and 0.5 kg, such as 0.03, 0.06, 0.1, 0.2, 0.35 and 0.5; lighter ones than \
-                    0.015 kg such a pad does not feel";
-        let what = "different weights that the pad feels";
-        return Err(Fault::TooFew { have: distinct.len(), need: LEAST_WEIGHTS, what, more });
+        return Err(Fault::TooFew(format!(
+            "{} of at least {LEAST_WEIGHTS} different weights that make the pad conduct: take five or more between 0.03 and \
+             0.5 kg, such as 0.03, 0.06, 0.1, 0.2, 0.35 and 0.5; such a pad does not respond below 0.015 kg",
+            distinct.len()
+        )));
     }
     let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
     if most < LEAST_SPAN * least {
-        let wanted = "the heaviest weight must be at least four times the lightest, best 0.05 to 0.5 kg";
-        let (from, to) = (Kind::Pad.told(least), Kind::Pad.told(most));
-        return Err(Fault::TooClose { kind: Kind::Pad.label(), from, to, wanted });
+        let [from, to] = [least, most].map(|force| SensorKind::Pad.with_unit(force));
+        return Err(Fault::TooFew(format!(
+            "the pad has points from {from} to {to} only: the heaviest weight must be at least four times the lightest, best \
+             0.05 to 0.5 kg"
+        )));
     }
     Ok(())
 }
@@ -201,22 +209,21 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
         let (before, after) = (input.siemens(pair[0].counts), input.siemens(pair[1].counts));
         if after <= before {
             let micro = |siemens: f64| format!("{} µS", three_digits(siemens * 1e6));
-            return Err(Fault::NotMonotone {
-                from: Kind::Pad.told(pair[0].stimulus),
-                to: Kind::Pad.told(pair[1].stimulus),
-                what: "conductance",
-                falls: format!("{} to {}", micro(before), micro(after)),
-                likely: "two weights were mixed up, one stood partly beside the pad, or the input is wired the other \
-                         way round",
-            });
+            let [from, to] = [0, 1].map(|i| SensorKind::Pad.with_unit(pair[i].stimulus));
+            return Err(Fault::BadPoint(format!(
+                "between {from} and {to} the conductance falls from {} to {}, but it must rise: two weights were mixed up, \
+                 one stood partly beside the pad, or the input is wired the other way round",
+                micro(before),
+                micro(after)
+            )));
         }
     }
     Ok(())
 }
 
-/// What bending does to a pad: what it reads without a load as a function of its finger's curvature, found from an empty
-/// close. Bending presses the layers of such pads together (Interlink's guide, "false triggering"), so that without this a
-/// bent finger feels a force.
+/// Bending zero of a pad: its reading without a load as a function of its finger's curvature, found from an empty
+/// close. Bending presses the layers of such pads together (Interlink's guide, "false triggering"), which reads as a
+/// force.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BendingZero {
     /// Curvature (1/m) and conductance (S), curvature rising.
@@ -226,15 +233,15 @@ pub struct BendingZero {
 /// Width of the bins that readings of an empty close are averaged in (1/m).
 const BIN: f64 = 1.5;
 
-/// Readings below which a bin says nothing.
+/// Readings that a bin must hold.
 const LEAST_READINGS: usize = 3;
 
 /// Curvature that an empty close must reach (1/m).
 const LEAST_CURVATURE: f64 = 5.0;
 
 impl BendingZero {
-    /// The zero from readings of an empty close, pairs of curvature (1/m) and conductance (S). The middle one of each bin
-    /// counts, so that a few readings in which something was touched do no harm.
+    /// The zero from readings of an empty close, pairs of curvature (1/m) and conductance (S). The middle one of each
+    /// bin counts, so that a few readings in which something was touched do no harm.
     pub fn from_empty_close(readings: &[(f64, f64)]) -> Result<Self, Fault> {
         let mut sorted: Vec<(f64, f64)> =
             readings.iter().copied().filter(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite()).collect();
@@ -253,17 +260,17 @@ impl BendingZero {
         Ok(Self { knots })
     }
 
-    /// Load that bending alone puts on a pad at a curvature (1/m), as if it were a force (N). It adds to what is touched as
-    /// a load and not as a conductance. Below the threshold nothing of it shows, but it cannot have jumped to where it
-    /// first does: up to there it is taken to rise straight from none.
+    /// Load that bending alone puts on a pad at a curvature (1/m), as if it were a force (N). It adds to the contact
+    /// force as a load and not as a conductance. Below the threshold nothing of it shows, but it cannot have jumped to
+    /// where it first does: up to there it is taken to rise straight from none.
     pub fn preload(&self, curve: &PadCurve, kappa: f64) -> f64 {
-        let felt = self.knots.iter().map(|(kappa, siemens)| (*kappa, curve.force(*siemens)));
-        let felt = felt.filter(|(kappa, force)| *kappa > 0.0 && *force > 0.0);
+        let loads = self.knots.iter().map(|(kappa, siemens)| (*kappa, curve.force(*siemens)));
+        let loads = loads.filter(|(kappa, force)| *kappa > 0.0 && *force > 0.0);
         let mut before = (0.0, 0.0);
         if kappa <= 0.0 {
             return 0.0;
         }
-        for knot in felt {
+        for knot in loads {
             if kappa <= knot.0 {
                 return before.1 + (knot.1 - before.1) * (kappa - before.0) / (knot.0 - before.0);
             }

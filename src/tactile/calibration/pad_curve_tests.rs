@@ -1,4 +1,4 @@
-//! Tests of the pad's curve: closed forms, and every fault that it tells.
+//! Tests of the pad's curve: closed forms, and every fault.
 
 use super::pad_curve::*;
 use super::*;
@@ -18,7 +18,7 @@ fn points(ohm_at_1_n: f64, exponent: f64, kilograms: &[f64], input: &Input) -> V
         false => input.counts(ohm_at_1_n / force.powf(exponent)),
     };
     let point = |&kg: &f64| {
-        let stimulus = Kind::Pad.stimulus(kg);
+        let stimulus = SensorKind::Pad.stimulus(kg);
         Point { stimulus, counts: counts(stimulus), spread: 2.0, readings: 50 }
     };
     kilograms.iter().map(point).collect()
@@ -46,7 +46,7 @@ fn a_power_law_is_found_exactly() -> Result<(), Fault> {
 }
 
 #[test]
-fn what_the_pad_shows_at_rest_is_taken_off() -> Result<(), Fault> {
+fn the_reading_at_rest_is_subtracted() -> Result<(), Fault> {
     let pinched = |point: &Point| {
         let siemens = input().siemens(point.counts) + 20e-6;
         Point { counts: input().counts(1.0 / siemens), ..*point }
@@ -67,10 +67,10 @@ fn too_few_too_close_and_too_light_weights_are_refused() {
 }
 
 #[test]
-fn wrong_resistors_wiring_units_and_weights_are_told() {
+fn wrong_resistors_wiring_units_and_weights_are_named() {
     let behind =
         |resistor_ohm: f64| points(6e3, 0.9, &WEIGHTS, &Input { divider: Divider::of_pad(resistor_ohm), ..input() });
-    // 47 kOhm where 4.7 are said to be: the pad looks ten times too conductive.
+    // 47 kOhm where 4.7 is entered: the pad looks ten times too conductive.
     let text = fault(&behind(47e3));
     assert!(text.contains("0.600 kOhm") && text.contains("is not the 4.70 kOhm"), "{text}");
     assert!(fault(&behind(330.0)).contains("is not the 4.70 kOhm"));
@@ -87,7 +87,7 @@ fn wrong_resistors_wiring_units_and_weights_are_told() {
 }
 
 #[test]
-fn a_weight_beside_the_pad_is_told() -> Result<(), Fault> {
+fn a_weight_beside_the_pad_is_named() -> Result<(), Fault> {
     let shifted = |share: f64| {
         let mut points = points(6e3, 0.9, &WEIGHTS, &input());
         let force = points[4].stimulus * share;

@@ -1,28 +1,39 @@
-//! What a calibration is made from: a known angle or weight, and what the board read at it.
+//! Calibration points: a known angle or weight, and the board's reading at it.
 
 use super::Fault;
-use super::input::{Input, Rail};
+use super::input::{Input, RangeEnd};
 use crate::board::Sensor;
 use palpate_geometry::units::{kg_of_load, three_digits};
+use palpate_sim::gripper::Side;
 use serde::{Deserialize, Serialize};
 
 /// The two kinds of sensors, each calibrated against another quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum SensorKind {
     /// A strip that reads an angle.
     Flex,
     /// A pad that reads a force.
     Pad,
 }
 
-impl Kind {
+impl SensorKind {
     /// The kind of a sensor.
     pub fn of(sensor: Sensor) -> Self {
         if sensor.is_flex() { Self::Flex } else { Self::Pad }
     }
 
-    /// What it is called in messages.
+    /// The sensor of this kind on a side.
+    pub fn on(self, side: Side) -> Sensor {
+        match (self, side) {
+            (Self::Flex, Side::Left) => Sensor::FlexLeft,
+            (Self::Flex, Side::Right) => Sensor::FlexRight,
+            (Self::Pad, Side::Left) => Sensor::PadLeft,
+            (Self::Pad, Side::Right) => Sensor::PadRight,
+        }
+    }
+
+    /// Name in messages.
     pub fn label(self) -> &'static str {
         match self {
             Self::Flex => "flex strip",
@@ -46,7 +57,7 @@ impl Kind {
         }
     }
 
-    /// The unit of [`Kind::shown`].
+    /// The unit of [`SensorKind::shown`].
     pub fn unit(self) -> &'static str {
         match self {
             Self::Flex => "degrees",
@@ -54,8 +65,8 @@ impl Kind {
         }
     }
 
-    /// A known angle or weight in words.
-    pub fn told(self, stimulus: f64) -> String {
+    /// A known angle or weight with its unit.
+    pub fn with_unit(self, stimulus: f64) -> String {
         format!("{} {}", three_digits(self.shown(stimulus)), self.unit())
     }
 }
@@ -70,7 +81,7 @@ pub struct Point {
     /// Standard deviation of a single reading (counts).
     #[serde(default)]
     pub spread: f64,
-    /// How many readings were averaged.
+    /// Number of averaged readings.
     #[serde(default = "one")]
     pub readings: u32,
 }
@@ -88,30 +99,41 @@ impl Point {
     }
 }
 
-/// What every point must fulfil, of whatever sensor.
-pub(super) fn check(points: &[Point], kind: Kind, input: &Input, most: f64) -> Result<(), Fault> {
+/// Checks of every point, for both kinds of sensor.
+pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64) -> Result<(), Fault> {
     if !input.is_possible() {
         return Err(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt });
     }
-    for point in points {
-        let at = || kind.told(point.stimulus);
-        // A hair more, for what was set in degrees or kilograms.
-        if !(point.stimulus >= -1e-9 && point.stimulus <= most * (1.0 + 1e-9)) {
-            return Err(Fault::OutOfRange { at: at(), most: kind.told(most), kind: kind.label() });
+    let full_scale = input.full_scale;
+    for Point { stimulus, counts, .. } in points {
+        let at = kind.with_unit(*stimulus);
+        // Rounding of values set in degrees or kilograms.
+        if !(*stimulus >= -1e-9 && *stimulus <= most * (1.0 + 1e-9)) {
+            let (kind, most) = (kind.label(), kind.with_unit(most));
+            return Err(Fault::BadPoint(format!("{at} is outside the range of a {kind}: take 0 to {most}")));
         }
-        let full_scale = input.full_scale;
-        if !(point.counts >= 0.0 && point.counts <= f64::from(full_scale)) {
-            return Err(Fault::NotCounts { at: at(), counts: point.counts, full_scale });
+        if !(*counts >= 0.0 && *counts <= f64::from(full_scale)) {
+            return Err(Fault::BadPoint(format!(
+                "{counts} is not a reading of a converter that counts to {full_scale} (at {at})"
+            )));
         }
-        match (kind, input.rail(point.counts)) {
+        let fault = match (kind, input.range_end(*counts)) {
             // An unloaded pad does not conduct.
-            (Kind::Pad, Some(Rail::Open)) | (_, None) => {}
-            (Kind::Flex, Some(Rail::Open)) => return Err(Fault::OpenCircuit { at: at(), counts: point.counts }),
-            (Kind::Flex, Some(Rail::Short)) => return Err(Fault::ShortCircuit { at: at(), counts: point.counts }),
-            (Kind::Pad, Some(Rail::Short)) => {
-                return Err(Fault::Saturated { at: at(), counts: point.counts, resistor_ohm: input.divider.fixed_ohm });
-            }
-        }
+            (SensorKind::Pad, Some(RangeEnd::Open)) | (_, None) => continue,
+            (SensorKind::Flex, Some(RangeEnd::Open)) => format!(
+                "at {at} the strip reads {counts:.0} counts, the end of the range: its circuit is open. Check the solder \
+                 tabs and the plug; a strip's crimp breaks when it is bent where the cable begins"
+            ),
+            (SensorKind::Flex, Some(RangeEnd::Short)) => format!(
+                "at {at} the strip reads {counts:.0} counts: it is short-circuited, or its pin is connected to ground"
+            ),
+            (SensorKind::Pad, Some(RangeEnd::Short)) => format!(
+                "at {at} the pad reads {counts:.0} counts, the end of the range: with {} kOhm in its divider it \
+                 saturates. Take smaller weights, or a smaller resistor (3.3 kOhm)",
+                three_digits(input.divider.fixed_ohm * 1e-3)
+            ),
+        };
+        return Err(Fault::BadPoint(fault));
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! Calibrating step by step: what to set next, whether the reading has settled, what came out. Terminal and window drive
-//! the same procedure; it knows neither of them, nor the port that its readings come from.
+//! Calibrating step by step: what to set next, whether the reading has settled, what came out. Terminal and window
+//! drive the same procedure; it knows neither of them, nor the port that its readings come from.
 //!
 //! ```text
 //!   next() -> "bend to 30 degrees"
@@ -11,14 +11,14 @@
 
 use super::input::Input;
 use super::pad_curve::BendingZero;
-use super::point::{Kind, Point};
+use super::point::{Point, SensorKind};
 use super::record::{Calibration, Record};
-use super::{Fault, Rail};
+use super::{Fault, RangeEnd};
 use crate::board::{Board, Reading, Sensor};
 use crate::electronics::Divider;
 use std::collections::VecDeque;
 
-/// When a reading counts as settled.
+/// Criterion for a settled reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settling {
     /// Length of the window that is averaged (s).
@@ -30,25 +30,25 @@ pub struct Settling {
 }
 
 impl Default for Settling {
-    /// A second: two and a half times the late part of a strip's bend lasts about 0.4 s, and 50 readings halve the noise
-    /// of 2 counts to a third of a count.
+    /// A second: two and a half times the late part of a strip's bend lasts about 0.4 s, and 50 readings halve the
+    /// noise of 2 counts to a third of a count.
     fn default() -> Self {
         Self { window_s: 1.0, least: 10, creep_counts: 1.0 }
     }
 }
 
-/// Why a point cannot be taken yet.
+/// Reason why no point can be taken yet.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsettled {
     /// Nothing, or not enough, has been read since the last point.
     #[error("reading: {have_s:.1} of {need_s:.1} s")]
     TooShort {
-        /// What there is (s).
+        /// Present length (s).
         have_s: f64,
-        /// What is needed (s).
+        /// Needed length (s).
         need_s: f64,
     },
-    /// The channel says nothing.
+    /// No numbers on the channel.
     #[error("the board sends no number on this channel: check the wire, or which channel it is")]
     Silent,
     /// Still on its way.
@@ -59,17 +59,17 @@ pub enum Unsettled {
     },
     /// At the end of the converter's range.
     #[error("{counts:.0} counts is the end of the range: the circuit is open, shorted, or the pad saturated")]
-    Rail {
-        /// What is read (counts).
+    RangeEnd {
+        /// Reading (counts).
         counts: f64,
     },
 }
 
-/// What is usually set, in rad or N: 0, 30, 60 and 90 degrees, or nothing and seven weights up to 0.5 kg.
-pub fn plan(kind: Kind) -> Vec<f64> {
+/// Default stimuli, in rad or N: 0, 30, 60 and 90 degrees, or no load and seven weights up to 0.5 kg.
+pub fn plan(kind: SensorKind) -> Vec<f64> {
     let shown: &[f64] = match kind {
-        Kind::Flex => &[0.0, 30.0, 60.0, 90.0],
-        Kind::Pad => &[0.0, 0.03, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
+        SensorKind::Flex => &[0.0, 30.0, 60.0, 90.0],
+        SensorKind::Pad => &[0.0, 0.03, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
     };
     shown.iter().map(|shown| kind.stimulus(*shown)).collect()
 }
@@ -80,28 +80,28 @@ pub struct Procedure {
     sensor: Sensor,
     column: usize,
     record: Record,
-    /// What is left to set, next one first.
+    /// Remaining stimuli, next one first.
     left: VecDeque<f64>,
     settling: Settling,
     /// Time (s) and counts of the last readings.
     window: VecDeque<(f64, f64)>,
     /// Readings since the last point that had no number.
     silent: usize,
-    /// Why the last point that was asked for was not taken.
+    /// Reason why the last requested point was not taken.
     refusal: Option<Unsettled>,
-    /// The user has said what resistor is beside the sensor.
+    /// The user has entered the resistor beside the sensor.
     resistor_is_given: bool,
 }
 
 impl Procedure {
-    /// Begins with a part in its place. `resistor_ohm` is the resistor beside it where the board does not say, or says
-    /// wrong. Refuses a board that has no such channel.
+    /// Begins a calibration of a mounted part. `resistor_ohm` overrides the resistor that the board reports. Refuses a
+    /// board that has no such channel.
     pub fn new(board: &Board, sensor: Sensor, part: &str, resistor_ohm: Option<f64>) -> Option<Self> {
         let mut input = Input::on(board, sensor);
         if let Some(ohm) = resistor_ohm {
             input.divider.fixed_ohm = ohm;
         }
-        let kind = Kind::of(sensor);
+        let kind = SensorKind::of(sensor);
         let part = part.trim().to_owned();
         Some(Self {
             sensor,
@@ -116,7 +116,7 @@ impl Procedure {
         })
     }
 
-    /// Learns more of the board: points are counts, and are read by what is known of it now.
+    /// Updates the board's properties, which apply to all points, as points are stored as counts.
     pub fn see(&mut self, board: &Board) {
         let input = &mut self.record.input;
         let seen = input.seen_by(board, self.sensor);
@@ -137,7 +137,7 @@ impl Procedure {
         self.sensor
     }
 
-    /// What has been measured so far.
+    /// Points measured so far.
     pub fn record(&self) -> &Record {
         &self.record
     }
@@ -147,18 +147,18 @@ impl Procedure {
         self.left.front().copied()
     }
 
-    /// How much of the plan is left.
+    /// Number of points left in the plan.
     pub fn left(&self) -> usize {
         self.left.len()
     }
 
-    /// What to do next, in words.
+    /// Instruction for the next step.
     pub fn instruction(&self) -> String {
         let place = self.sensor.label();
         let Some(next) = self.next() else {
             return match (self.record.kind, &self.record.bending) {
-                (Kind::Pad, None) => {
-                    "all points are taken; let the empty hand close once, so that its bending is not felt as \
+                (SensorKind::Pad, None) => {
+                    "all points are taken; let the empty hand close once, so that its bending is not read as \
                                       a force"
                         .to_owned()
                 }
@@ -166,10 +166,12 @@ impl Procedure {
             };
         };
         match self.record.kind {
-            Kind::Flex if next == 0.0 => format!("{place}: let the finger hang straight"),
-            Kind::Flex => format!("{place}: bend it by {:.0} degrees over its length and hold", next.to_degrees()),
-            Kind::Pad if next == 0.0 => format!("{place}: put nothing on it"),
-            Kind::Pad => format!("{place}: put {:.0} g on its middle", 1e3 * self.record.kind.shown(next)),
+            SensorKind::Flex if next == 0.0 => format!("{place}: let the finger hang straight"),
+            SensorKind::Flex => {
+                format!("{place}: bend it by {:.0} degrees over its length and hold", next.to_degrees())
+            }
+            SensorKind::Pad if next == 0.0 => format!("{place}: put nothing on it"),
+            SensorKind::Pad => format!("{place}: put {:.0} g on its middle", 1e3 * self.record.kind.shown(next)),
         }
     }
 
@@ -222,10 +224,10 @@ impl Procedure {
             return Err(Unsettled::Moving { by });
         }
         let counts = mean(&counts);
-        let unloaded = self.record.kind == Kind::Pad;
-        match self.record.input.rail(counts) {
-            Some(Rail::Open) if unloaded => {}
-            Some(_) => return Err(Unsettled::Rail { counts }),
+        let unloaded = self.record.kind == SensorKind::Pad;
+        match self.record.input.range_end(counts) {
+            Some(RangeEnd::Open) if unloaded => {}
+            Some(_) => return Err(Unsettled::RangeEnd { counts }),
             None => {}
         }
         Ok(Point { stimulus: f64::NAN, counts, spread, readings: self.window.len() as u32 })
@@ -253,7 +255,7 @@ impl Procedure {
         Ok(point)
     }
 
-    /// Why the point that was asked for last was not taken; none once another one was taken, left out or taken back.
+    /// Reason why the last requested point was not taken; none after a point was taken, skipped or undone.
     pub fn last_refusal(&self) -> Option<Unsettled> {
         self.refusal
     }
@@ -279,7 +281,7 @@ impl Procedure {
         self.record.bending = Some(bending);
     }
 
-    /// What the points so far come to.
+    /// Fits the points taken so far.
     pub fn fit(&self) -> Result<Calibration, Fault> {
         Calibration::fit(self.record.clone())
     }
@@ -327,7 +329,7 @@ mod tests {
         }
         assert_eq!(
             (procedure.left(), procedure.instruction().as_str()),
-            (0, "all points are taken; let the empty hand close once, so that its bending is not felt as a force")
+            (0, "all points are taken; let the empty hand close once, so that its bending is not read as a force")
         );
         let calibration = procedure.fit()?;
         assert_eq!(calibration.record.part, "P7");
@@ -346,7 +348,7 @@ mod tests {
         let creeping = |t: f64| (500.0 - 100.0 * (-t / 0.4).exp()) as f32;
         feed(&mut procedure, 10.0, 1.2, creeping);
         assert!(matches!(procedure.settled(), Err(Unsettled::Moving { by }) if by > 5.0), "{:?}", procedure.settled());
-        // Asked for too early, it says so until something else is done.
+        // A refused point stays the last refusal until another action.
         let refused = procedure.take(1.0);
         assert!(refused.is_err() && procedure.last_refusal() == refused.err() && procedure.record().points.is_empty());
         feed(&mut procedure, 20.0, 3.5, creeping);
@@ -360,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_learned_of_the_board_later_serves_all_points() -> Result<(), Unsettled> {
+    fn later_facts_about_the_board_apply_to_all_points() -> Result<(), Unsettled> {
         let mut procedure = procedure();
         feed(&mut procedure, 0.0, 1.1, |_| 600.0);
         procedure.take(1.0)?;
@@ -369,22 +371,23 @@ mod tests {
         procedure.see(&Board { full_scale: 1023, divider_ohm: vec![3.3e3, 33e3], channels, ..Board::default() });
         assert!((procedure.record().input.ohm(600.0) - 3.3e3 * (1024.0 / 600.0 - 1.0)).abs() < 1e-6);
         assert_eq!(procedure.column, 0);
-        // What the user says of the resistor holds against the board's word.
-        let mut told = Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
-        told.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
-        assert_eq!(told.record().input.divider.fixed_ohm, 1e3);
+        // The user's resistor takes precedence over the board's.
+        let mut procedure =
+            Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
+        procedure.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
+        assert_eq!(procedure.record().input.divider.fixed_ohm, 1e3);
         Ok(())
     }
 
     #[test]
-    fn silence_and_the_end_of_the_range_are_told() {
+    fn silence_and_the_end_of_the_range_are_reported() {
         let mut procedure = procedure();
         for k in 0..60 {
             procedure.feed(&reading(f64::from(k) * 0.02, None));
         }
         assert_eq!(procedure.settled(), Err(Unsettled::Silent));
         feed(&mut procedure, 5.0, 2.0, |_| 4095.0);
-        assert!(matches!(procedure.settled(), Err(Unsettled::Rail { .. })));
+        assert!(matches!(procedure.settled(), Err(Unsettled::RangeEnd { .. })));
         let no_channel = Board { channels: vec!["flexL".into()], ..Board::default() };
         assert!(Procedure::new(&no_channel, Sensor::PadRight, "x", None).is_none());
     }

@@ -1,19 +1,20 @@
 //! Readings of a board through the calibrations of its parts, one by one or a whole trial.
 
-use super::input::{Input, Rail, stated_resistor};
+use super::Fault;
+use super::input::{Input, RangeEnd, stated_resistor};
 use super::pad_curve::ACTIVE_AREA;
 use super::record::{Calibration, Curve};
 use super::zero::{Drift, DriftLevel, Unrest, Zero};
-use super::{Fault, Kind};
 use crate::board::{Board, Reading, Sensor};
 use crate::electronics::StripPart;
 use crate::{Channel, Quantity, Signals, whole_fingers};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::Side;
 
-/// What one reading comes to; left and right. None where a sensor is missing, not calibrated, or at an end of its range.
+/// Sensor estimates from one reading, left and right. None where a sensor is missing, not calibrated, or at an end of
+/// its range.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Felt {
+pub struct SensorEstimate {
     /// Angle over the active length of each strip (rad).
     pub angle: [Option<f64>; 2],
     /// Curvature of each finger (1/m).
@@ -24,7 +25,7 @@ pub struct Felt {
     pub pressure: [Option<f64>; 2],
 }
 
-impl Felt {
+impl SensorEstimate {
     /// The value of a channel of the layout C1+F, in its unit.
     pub fn of(&self, channel: &Channel) -> Option<f64> {
         let side = channel.side.index();
@@ -41,11 +42,11 @@ impl Felt {
 pub struct Derived {
     /// The channels of layout C1+F that could be derived. Readings in which one of them is missing are left out.
     pub signals: Signals,
-    /// How far the zeros had moved before the closing.
+    /// Drift of the zeros before the closing.
     pub drift: Vec<Drift>,
     /// Readings left out.
     pub left_out: usize,
-    /// What should be known, in sentences.
+    /// Remarks, in sentences.
     pub warnings: Vec<String>,
 }
 
@@ -72,18 +73,18 @@ const MOST_MISSING: f64 = 0.2;
 /// Length of the window before the closing that is taken where the line pressure is not known (s).
 const REST_WINDOW_S: f64 = 0.3;
 
-/// Angles farther out than this of those that a strip was calibrated with are told (rad): 3 degrees.
+/// Margin beyond the calibrated angles of a strip before a warning (rad): 3 degrees.
 const ANGLE_BEYOND: f64 = 0.052;
 
-/// Forces larger by this share than the largest that a pad was calibrated with are told.
+/// Share beyond the largest calibrated force of a pad before a warning.
 const FORCE_BEYOND: f64 = 0.1;
 
-/// Readings below which a window says nothing of a zero.
+/// Readings that a window must hold for a zero.
 const LEAST_READINGS: usize = 5;
 
 impl Readout {
-    /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board does
-    /// not have is left out with a word.
+    /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board
+    /// does not have is left out with a warning.
     pub fn new(board: &Board, calibrations: &[(Sensor, Calibration)]) -> Result<Self, Fault> {
         let mut wired = [const { None }; 4];
         let mut warnings = Vec::new();
@@ -105,7 +106,7 @@ impl Readout {
             {
                 let [was, now] = [made_with.divider.fixed_ohm, ohm].map(|ohm| three_digits(ohm * 1e-3));
                 warnings.push(format!(
-                    "the {label} was calibrated beside {was} kOhm, but the board says {now}; its word is taken"
+                    "the {label} was calibrated beside {was} kOhm, but the board reports {now}; the board's value is used"
                 ));
             }
             let input = made_with.seen_by(board, sensor);
@@ -114,7 +115,7 @@ impl Readout {
         Ok(Self { wired, zero: Zero::default(), warnings })
     }
 
-    /// What is missing or doubtful, in sentences.
+    /// Warnings about missing or doubtful channels, in sentences.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -135,7 +136,7 @@ impl Readout {
         self
     }
 
-    /// What the sensors show in readings taken at rest: the middle one of each, so that a knock does no harm.
+    /// Zero from readings taken at rest: the median of each sensor, so that a knock does no harm.
     pub fn zero_from(&self, readings: &[Reading]) -> Zero {
         let mut zero = Zero::default();
         for (offset, wired) in zero.offsets.iter_mut().zip(&self.wired) {
@@ -147,8 +148,9 @@ impl Readout {
         zero
     }
 
-    /// The zero of readings taken while the hand is open and left alone: a tare. Sensors whose zero is so far away that it is
-    /// no drift are left out, as [`Readout::with_zero`] does; [`Readout::drift`] of [`Readout::zero_from`] tells of them.
+    /// The zero of readings taken while the hand is open and left alone: a tare. Sensors whose zero is so far away that
+    /// it is no drift are left out, as [`Readout::with_zero`] does; [`Readout::drift`] of [`Readout::zero_from`] lists
+    /// them.
     pub fn tare(&self, readings: &[Reading]) -> Result<Zero, Unrest> {
         if readings.len() < 2 * LEAST_READINGS {
             return Err(Unrest::TooFew { have: readings.len() });
@@ -169,7 +171,7 @@ impl Readout {
         Ok(self.clone().with_zero(self.zero_from(readings)).zero)
     }
 
-    /// How far a zero is from that of the calibrations.
+    /// Drift of a zero from that of the calibrations.
     pub fn drift(&self, zero: &Zero) -> Vec<Drift> {
         let each = Sensor::ALL.into_iter().zip(&self.wired).zip(zero.offsets);
         each.filter_map(|((sensor, wired), offset)| {
@@ -182,26 +184,26 @@ impl Readout {
         .collect()
     }
 
-    /// What one reading comes to.
-    pub fn felt(&self, reading: &Reading) -> Felt {
-        let mut felt = Felt::default();
+    /// Estimates curvature, force and pressure from one reading.
+    pub fn estimate(&self, reading: &Reading) -> SensorEstimate {
+        let mut estimate = SensorEstimate::default();
         for side in Side::BOTH {
             let side = side.index();
             let angle = self.raw(reading, side).map(|angle| angle - self.offset(side));
             let curvature = angle.map(|angle| angle / StripPart::ACTIVE_LENGTH);
-            felt.angle[side] = angle;
-            felt.curvature[side] = curvature;
+            estimate.angle[side] = angle;
+            estimate.curvature[side] = curvature;
             let force = self.raw(reading, 2 + side).and_then(|siemens| self.force(2 + side, siemens, curvature));
-            felt.force[side] = force;
-            felt.pressure[side] = force.map(|force| force / ACTIVE_AREA);
+            estimate.force[side] = force;
+            estimate.pressure[side] = force.map(|force| force / ACTIVE_AREA);
         }
-        felt
+        estimate
     }
 
-    /// Which sensors, in the order of [`Sensor::ALL`], show more than they were calibrated with, by more than what a
-    /// calibration promises: what is told of them is read off the curve's extension.
-    pub fn beyond(&self, felt: &Felt) -> [bool; 4] {
-        let values = [felt.angle[0], felt.angle[1], felt.force[0], felt.force[1]];
+    /// Sensors, in the order of [`Sensor::ALL`], whose estimate is outside the calibrated range by more than the
+    /// calibration's accuracy: such estimates are extrapolated.
+    pub fn beyond(&self, estimate: &SensorEstimate) -> [bool; 4] {
+        let values = [estimate.angle[0], estimate.angle[1], estimate.force[0], estimate.force[1]];
         std::array::from_fn(|place| {
             let (Some(wired), Some(value)) = (&self.wired[place], values[place]) else { return false };
             let [least, most] = wired.calibration.range();
@@ -212,29 +214,28 @@ impl Readout {
         })
     }
 
-    /// What of a trial was beyond the calibrations, in sentences.
-    fn beyond_remarks(&self, felt: &[Felt]) -> Vec<String> {
+    /// Remarks on estimates outside the calibrated range, in sentences.
+    fn beyond_remarks(&self, estimates: &[SensorEstimate]) -> Vec<String> {
         let mut counts = [0; 4];
-        for felt in felt {
-            counts.iter_mut().zip(self.beyond(felt)).for_each(|(count, beyond)| *count += u32::from(beyond));
+        for estimate in estimates {
+            counts.iter_mut().zip(self.beyond(estimate)).for_each(|(count, beyond)| *count += u32::from(beyond));
         }
-        let all = felt.len();
+        let all = estimates.len();
         let of = |((sensor, wired), count): ((Sensor, &Option<Wired>), u32)| {
             let calibration = &wired.as_ref()?.calibration;
-            let [least, most] = calibration.range().map(|end| calibration.record.kind.told(end));
+            let [least, most] = calibration.range().map(|end| calibration.record.kind.with_unit(end));
             let label = sensor.label();
             (count > 0).then(|| {
                 format!(
-                    "the {label} was outside of what it was calibrated with, {least} to {most}, in {count} of {all} readings: \
-                     it is read off the curve's extension there"
+                    "the {label} was outside its calibrated range, {least} to {most}, in {count} of {all} readings: extrapolated"
                 )
             })
         };
         Sensor::ALL.into_iter().zip(&self.wired).zip(counts).filter_map(of).collect()
     }
 
-    /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`] is
-    /// made from.
+    /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`]
+    /// is made from.
     pub fn bending(&self, side: Side, readings: &[Reading]) -> Vec<(f64, f64)> {
         let pair = |reading: &Reading| {
             let angle = self.raw(reading, side.index())? - self.offset(side.index());
@@ -254,17 +255,17 @@ impl Readout {
         let drift = self.drift(&zero);
         let mut warnings = self.warnings.clone();
         warnings.extend(drift.iter().filter_map(Drift::remark));
-        let felt: Vec<Felt> = {
+        let estimates: Vec<SensorEstimate> = {
             let zeroed = self.clone().with_zero(zero);
-            readings.iter().map(|reading| zeroed.felt(reading)).collect()
+            readings.iter().map(|reading| zeroed.estimate(reading)).collect()
         };
         warnings.extend(self.saturated(readings));
-        warnings.extend(self.beyond_remarks(&felt));
+        warnings.extend(self.beyond_remarks(&estimates));
         let mut channels = Vec::new();
         for channel in self.channels() {
-            let missing = felt.iter().filter(|felt| felt.of(&channel).is_none()).count();
-            if missing as f64 > MOST_MISSING * felt.len() as f64 {
-                let (name, all) = (channel.name(), felt.len());
+            let missing = estimates.iter().filter(|estimate| estimate.of(&channel).is_none()).count();
+            if missing as f64 > MOST_MISSING * estimates.len() as f64 {
+                let (name, all) = (channel.name(), estimates.len());
                 warnings.push(format!(
                     "{name} is left out: {missing} of {all} readings have no number for it, or are at the end of its range"
                 ));
@@ -274,8 +275,8 @@ impl Readout {
         }
         let mut signals = Signals { channels: channels.iter().map(Channel::name).collect(), ..Signals::default() };
         let mut left_out = 0;
-        for (reading, felt) in readings.iter().zip(&felt) {
-            let row: Option<Vec<f32>> = channels.iter().map(|channel| felt.of(channel).map(|v| v as f32)).collect();
+        for (reading, estimate) in readings.iter().zip(&estimates) {
+            let row: Option<Vec<f32>> = channels.iter().map(|channel| estimate.of(channel).map(|v| v as f32)).collect();
             // Time that does not rise comes from a clock that was set back; such a reading has no place.
             let rises = signals.t_s.last().is_none_or(|last| reading.t_s > *last) && reading.t_s.is_finite();
             match row.filter(|_| rises && !channels.is_empty()) {
@@ -290,7 +291,7 @@ impl Readout {
     fn saturated(&self, readings: &[Reading]) -> Vec<String> {
         let at_its_end = |wired: &Wired, reading: &Reading| {
             let counts = reading.counts.get(wired.column).copied().flatten();
-            counts.is_some_and(|counts| wired.input.rail(f64::from(counts)) == Some(Rail::Short))
+            counts.is_some_and(|counts| wired.input.range_end(f64::from(counts)) == Some(RangeEnd::Short))
         };
         let pads = Sensor::ALL.into_iter().zip(&self.wired).filter(|(sensor, _)| !sensor.is_flex());
         pads.filter_map(|(sensor, wired)| {
@@ -340,19 +341,19 @@ impl Wired {
         if !counts.is_finite() {
             return None;
         }
-        match (&self.calibration.curve, self.input.rail(counts)) {
+        match (&self.calibration.curve, self.input.range_end(counts)) {
             (Curve::Flex(curve), None) => Some(curve.angle(self.input.ohm(counts))),
             (Curve::Flex(_), Some(_)) => None,
             // A pad at its end is saturated: the number is what it takes to get there, and no less.
-            (Curve::Pad(curve), None | Some(Rail::Open | Rail::Short)) => {
+            (Curve::Pad(curve), None | Some(RangeEnd::Open | RangeEnd::Short)) => {
                 Some(self.input.siemens(counts) - curve.idle_siemens)
             }
         }
     }
 }
 
-/// How many readings at the beginning were taken before the closing: until the line pressure rises, or the first 0.3 s
-/// where nothing is told.
+/// Number of readings before the closing: until the line pressure rises, or the first 0.3 s
+/// where it is not known.
 fn rest_window(readings: &[Reading], closing_s: Option<f64>) -> usize {
     if let Some(closing_s) = closing_s {
         return readings.partition_point(|reading| reading.t_s < closing_s);
@@ -363,16 +364,4 @@ fn rest_window(readings: &[Reading], closing_s: Option<f64>) -> usize {
         return readings.iter().position(pressed).unwrap_or(readings.len());
     }
     readings.partition_point(|reading| reading.t_s < first.t_s + REST_WINDOW_S)
-}
-
-impl Kind {
-    /// The sensor of this kind on a side.
-    pub fn on(self, side: Side) -> Sensor {
-        match (self, side) {
-            (Self::Flex, Side::Left) => Sensor::FlexLeft,
-            (Self::Flex, Side::Right) => Sensor::FlexRight,
-            (Self::Pad, Side::Left) => Sensor::PadLeft,
-            (Self::Pad, Side::Right) => Sensor::PadRight,
-        }
-    }
 }

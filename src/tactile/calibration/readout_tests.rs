@@ -86,18 +86,19 @@ fn a_calibration_recovers_angle_within_a_degree_and_force_within_5_per_cent() {
         for step in 0..=60 {
             let share = f64::from(step) / 60.0;
             let (degrees, force) = (90.0 * share, 0.3 + 4.6 * share);
-            // What a finger at rest reads in half a second.
+            // Readings of a finger at rest during half a second.
             let mut mean = [0.0; 4];
             for _ in 0..25 {
-                let felt = readout.felt(&parts.read(0.0, [degrees; 2], [force; 2]));
+                let estimate = readout.estimate(&parts.read(0.0, [degrees; 2], [force; 2]));
                 for side in 0..2 {
-                    mean[side] += felt.angle[side].unwrap().to_degrees() / 25.0;
-                    mean[2 + side] += felt.force[side].unwrap() / 25.0;
+                    mean[side] += estimate.angle[side].unwrap().to_degrees() / 25.0;
+                    mean[2 + side] += estimate.force[side].unwrap() / 25.0;
                     assert!(
-                        (felt.pressure[side].unwrap() * ACTIVE_AREA / felt.force[side].unwrap() - 1.0).abs() < 1e-12
+                        (estimate.pressure[side].unwrap() * ACTIVE_AREA / estimate.force[side].unwrap() - 1.0).abs()
+                            < 1e-12
                     );
                     // Each reading for itself, too.
-                    assert!((felt.force[side].unwrap() / force - 1.0).abs() < 0.05, "seed {seed}: {force} N");
+                    assert!((estimate.force[side].unwrap() / force - 1.0).abs() < 0.05, "seed {seed}: {force} N");
                 }
             }
             for side in 0..2 {
@@ -109,7 +110,7 @@ fn a_calibration_recovers_angle_within_a_degree_and_force_within_5_per_cent() {
 }
 
 #[test]
-fn a_bent_finger_feels_nothing_once_its_zero_is_known() {
+fn a_bent_finger_reads_no_force_once_its_zero_is_known() {
     let mut parts = Parts::new(1);
     parts.bending = 0.02;
     let plain = parts.readout();
@@ -124,13 +125,18 @@ fn a_bent_finger_feels_nothing_once_its_zero_is_known() {
     }
     let zeroed = Readout::new(&Board::default(), &calibrations).unwrap();
     for degrees in [10.0, 30.0, 50.0] {
-        let felt = |readout: &Readout, reading: &Reading| readout.felt(reading).force.map(|force| force.unwrap());
+        let estimate =
+            |readout: &Readout, reading: &Reading| readout.estimate(reading).force.map(|force| force.unwrap());
         let empty = parts.read(0.0, [degrees; 2], [0.0; 2]);
-        let nothing = felt(&zeroed, &empty);
+        let nothing = estimate(&zeroed, &empty);
         assert!(nothing.iter().all(|force| *force < 0.03), "{degrees} degrees: {nothing:?}");
         let held = parts.read(0.0, [degrees; 2], [1.0; 2]);
-        assert!(felt(&zeroed, &held).iter().all(|force| (force - 1.0).abs() < 0.05), "{:?}", felt(&zeroed, &held));
-        assert!(degrees < 50.0 || felt(&plain, &empty).iter().all(|force| *force > 0.15));
+        assert!(
+            estimate(&zeroed, &held).iter().all(|force| (force - 1.0).abs() < 0.05),
+            "{:?}",
+            estimate(&zeroed, &held)
+        );
+        assert!(degrees < 50.0 || estimate(&plain, &empty).iter().all(|force| *force > 0.15));
     }
 }
 
@@ -187,7 +193,7 @@ fn a_zero_that_is_no_drift_is_not_corrected() {
 }
 
 #[test]
-fn what_is_missing_is_left_out_and_never_invented() {
+fn missing_channels_are_left_out_and_never_invented() {
     let mut parts = Parts::new(4);
     let readout = parts.readout();
     let mut readings: Vec<Reading> = (0..100).map(|i| parts.read(0.02 * f64::from(i), [20.0; 2], [1.0; 2])).collect();
@@ -210,14 +216,14 @@ fn what_is_missing_is_left_out_and_never_invented() {
 }
 
 #[test]
-fn boards_without_a_channel_and_parts_without_a_calibration_are_told() {
+fn missing_channels_and_calibrations_give_warnings() {
     let mut parts = Parts::new(5);
     let only = [(Sensor::FlexLeft, parts.calibrate(Sensor::FlexLeft))];
     let board = Board { channels: vec!["flexL".into(), "fsrL".into()], divider_ohm: vec![33e3], ..Board::default() };
     let readout = Readout::new(&board, &only).unwrap();
-    let told = readout.warnings().join("\n");
-    assert!(told.contains("no channel \"flexR\""), "{told}");
-    assert!(told.contains("calibrated beside 47.0 kOhm, but the board says 33.0"), "{told}");
+    let warnings = readout.warnings().join("\n");
+    assert!(warnings.contains("no channel \"flexR\""), "{warnings}");
+    assert!(warnings.contains("calibrated beside 47.0 kOhm, but the board reports 33.0"), "{warnings}");
     let wrong = [(Sensor::PadLeft, only[0].1.clone())];
     let text = Readout::new(&board, &wrong).expect_err("a strip is no pad").to_string();
     assert!(text.contains("flexL") && text.contains("left pad"), "{text}");
@@ -245,8 +251,8 @@ fn a_tare_wants_an_open_hand_at_rest() {
     let levels: Vec<&str> = readout.drift(&zero).iter().map(Drift::badge).collect();
     assert_eq!(levels, ["moved", "steady", "steady", "steady"]);
     // Subtracted, it is straight.
-    let felt = readout.clone().with_zero(zero).felt(&steady[7]);
-    assert!(felt.angle[0].unwrap().to_degrees().abs() < 1.0, "{felt:?}");
+    let estimate = readout.clone().with_zero(zero).estimate(&steady[7]);
+    assert!(estimate.angle[0].unwrap().to_degrees().abs() < 1.0, "{estimate:?}");
     assert_eq!(readout.tare(&rest(&|_| [30.0, 0.0])).unwrap().offsets[0], None, "a bent finger is no drift");
     assert_eq!(readout.tare(&rest(&|t| [6.0 * t, 0.0])), Err(Unrest::Moving { sensor: Sensor::FlexLeft }));
     assert_eq!(readout.tare(&steady[..5]), Err(Unrest::TooFew { have: 5 }));
@@ -255,18 +261,21 @@ fn a_tare_wants_an_open_hand_at_rest() {
 }
 
 #[test]
-fn what_is_beyond_the_calibrated_range_is_told() {
+fn estimates_outside_the_calibrated_range_give_warnings() {
     let mut parts = Parts::new(6);
     let readout = parts.readout();
     let mut beyond = |degrees, force| {
-        let felt = readout.felt(&parts.read(0.0, degrees, force));
-        readout.beyond(&felt)
+        let estimate = readout.estimate(&parts.read(0.0, degrees, force));
+        readout.beyond(&estimate)
     };
     assert_eq!(beyond([90.0, 0.0], [4.9, 0.0]), [false; 4]);
     assert_eq!(beyond([100.0, -9.0], [0.0, 6.5]), [true, true, false, true]);
     let mut readings: Vec<Reading> = (0..50).map(|i| parts.read(0.02 * f64::from(i), [0.0; 2], [0.0; 2])).collect();
     readings.extend((50..60).map(|i| parts.read(0.02 * f64::from(i), [30.0; 2], [0.0, 7.0])));
-    let told = readout.derive(&readings, Some(0.9)).warnings;
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].contains("right pad was outside") && told[0].contains("0.500 kg, in 10 of 60"), "{told:?}");
+    let warnings = readout.derive(&readings, Some(0.9)).warnings;
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(
+        warnings[0].contains("right pad was outside") && warnings[0].contains("0.500 kg, in 10 of 60"),
+        "{warnings:?}"
+    );
 }

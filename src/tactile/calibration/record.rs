@@ -1,28 +1,28 @@
-//! What is known of a part: the points that were measured, and the curve through them.
+//! Calibration of a part: its measured points, and the curve through them.
 
 use super::flex_curve::FlexCurve;
 use super::input::Input;
 use super::pad_curve::{BendingZero, PadCurve};
-use super::point::{Kind, Point};
-use super::{Fault, Rail};
+use super::point::{Point, SensorKind};
+use super::{Fault, RangeEnd};
 use crate::board::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// Longest name of a part that is kept (characters).
 const LONGEST_NAME: usize = 80;
 
-/// What was measured of a part. This is what is stored and exchanged.
+/// Measured points of a part: the form in which calibrations are stored and exchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Name of the part, such as what is written on its tail.
     pub part: String,
-    /// What it is.
-    pub kind: Kind,
+    /// SensorKind of the sensor.
+    pub kind: SensorKind,
     /// The input and converter it was measured with.
     pub input: Input,
     /// The known angles (rad) or forces (N), and what was read.
     pub points: Vec<Point>,
-    /// How the zero of a pad moves with the bending of its finger, where an empty close was recorded.
+    /// Bending zero of a pad, where an empty close was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bending: Option<BendingZero>,
     /// Whatever should be known besides.
@@ -43,12 +43,12 @@ pub enum Curve {
 /// A record with the curve fitted to it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Calibration {
-    /// What was measured.
+    /// Measured points.
     #[serde(flatten)]
     pub record: Record,
-    /// What came out.
+    /// Fitted curve.
     pub curve: Curve,
-    /// What should be known of it, in sentences.
+    /// Remarks, in sentences.
     pub warnings: Vec<String>,
 }
 
@@ -59,17 +59,17 @@ impl Calibration {
             return Err(Fault::NoName);
         }
         let (curve, warnings) = match record.kind {
-            Kind::Flex => {
+            SensorKind::Flex => {
                 let (curve, warnings) = FlexCurve::fit(&record.points, &record.input)?;
                 (Curve::Flex(curve), warnings)
             }
-            Kind::Pad => {
+            SensorKind::Pad => {
                 let (curve, warnings) = PadCurve::fit(&record.points, &record.input)?;
                 (Curve::Pad(curve), warnings)
             }
         };
         match &record.bending {
-            Some(_) if record.kind == Kind::Flex => Err(Fault::NoBending),
+            Some(_) if record.kind == SensorKind::Flex => Err(Fault::NoBending),
             Some(bending) if !bending.is_possible() => Err(Fault::BendingTooShort { have: 0, span: 0.0 }),
             _ => Ok(Self { record, curve, warnings }),
         }
@@ -77,7 +77,7 @@ impl Calibration {
 
     /// Refuses to be used for a sensor of the other kind.
     pub fn check_fits(&self, sensor: Sensor) -> Result<(), Fault> {
-        let wanted = Kind::of(sensor);
+        let wanted = SensorKind::of(sensor);
         if self.record.kind == wanted {
             return Ok(());
         }
@@ -85,15 +85,15 @@ impl Calibration {
         Err(Fault::WrongKind { part, made, place: sensor.label(), wanted: wanted.label() })
     }
 
-    /// What a reading comes to through a input: an angle (rad) or a force (N), without any zero. None where the reading
+    /// Angle (rad) or force (N) of a reading, without any zero. None where the reading
     /// is at an end of the range; a pad that does not conduct is unloaded.
     pub fn stimulus(&self, input: &Input, counts: f64) -> Option<f64> {
-        match (&self.curve, input.rail(counts)) {
+        match (&self.curve, input.range_end(counts)) {
             (Curve::Flex(curve), None) => Some(curve.angle(input.ohm(counts))),
-            (Curve::Pad(curve), None | Some(Rail::Open)) => {
+            (Curve::Pad(curve), None | Some(RangeEnd::Open)) => {
                 Some(curve.force(input.siemens(counts) - curve.idle_siemens))
             }
-            (Curve::Flex(_), Some(_)) | (Curve::Pad(_), Some(Rail::Short)) => None,
+            (Curve::Flex(_), Some(_)) | (Curve::Pad(_), Some(RangeEnd::Short)) => None,
         }
     }
 
@@ -106,8 +106,8 @@ impl Calibration {
         }
     }
 
-    /// How uncertain its gain is: half the width of the 95 % interval as a share, at the middle of the usual range; none
-    /// where the points do not tell.
+    /// Half-width of the 95 % interval of its gain as a share, at the middle of the usual range; none
+    /// where the points do not determine it.
     pub fn gain_interval(&self) -> Option<f64> {
         match &self.curve {
             Curve::Flex(curve) => curve.gain_interval(),
@@ -121,7 +121,7 @@ impl Calibration {
         [set.clone().fold(f64::INFINITY, f64::min), set.fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// What came out, in a line.
+    /// One-line summary of the fit.
     pub fn summary(&self) -> String {
         let often = |interval: Option<f64>, unit: &str| {
             interval.map_or_else(|| ", interval unknown".to_owned(), |half| format!(" ± {half:.2} {unit} (95 %)"))

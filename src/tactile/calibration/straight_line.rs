@@ -12,7 +12,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 pub(super) struct WeightedPoint {
     pub(super) x: f64,
     pub(super) y: f64,
-    /// How much it counts: proportional to 1 over its variance.
+    /// Weight in the fit, proportional to 1 over its variance.
     pub(super) weight: f64,
 }
 

@@ -1,29 +1,29 @@
-//! Where zero is: tare, dynamic re-zero, and how far it has drifted.
+//! Zeros of the sensors: tare, dynamic re-zero, and drift.
 //!
-//! Strips creep and pads are pinched, so that what a sensor shows of a finger at rest wanders. A [`Zero`] is what each
-//! sensor showed while nothing touched the fingers and no pressure was on: pressed by the user it is a tare, taken from the
-//! window before each trial's closing it is the dynamic calibration that the paper asks for in its outlook. It is
-//! subtracted, unless it is so large that something else must be the matter.
+//! Strips creep and pads are pinched, so that the reading of a finger at rest drifts. A [`Zero`] holds the reading of
+//! each sensor without contact and pressure: taken on request it is a tare; taken from the window before each trial's
+//! closing it is the dynamic calibration that the paper proposes in its outlook. It is subtracted, unless it is so
+//! large that it must have another cause.
 
 use crate::board::Sensor;
 use crate::electronics::PadPart;
 use serde::{Deserialize, Serialize};
 
-/// What a sensor shows at rest: the angle of a strip (rad) or the conductance of a pad (S), in the order of
-/// [`Sensor::ALL`]; none where it was not read.
+/// Readings at rest: the angle of a strip (rad) or the conductance of a pad (S), in the order of [`Sensor::ALL`]; none
+/// where it was not read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Zero {
     /// Offset of each sensor.
     pub offsets: [Option<f64>; 4],
 }
 
-/// Why readings give no tare.
+/// Reason why readings give no tare.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unrest {
     /// Too few readings.
     #[error("only {have} readings came: is the board sending?")]
     TooFew {
-        /// How many.
+        /// Number of readings.
         have: usize,
     },
     /// Pressure is on.
@@ -35,12 +35,12 @@ pub enum Unrest {
     /// A sensor moves.
     #[error("the {place} moves: leave the fingers alone until they have come to rest, and try again", place = .sensor.label())]
     Moving {
-        /// Which.
+        /// Sensor that moves.
         sensor: Sensor,
     },
 }
 
-/// How far a zero has moved.
+/// Severity of a zero drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DriftLevel {
@@ -57,9 +57,9 @@ pub enum DriftLevel {
 pub struct Drift {
     /// The sensor.
     pub sensor: Sensor,
-    /// How far its zero has moved: an angle (rad), or the force (N) that a pad would seem to feel.
+    /// Shift of the zero: an angle (rad), or the apparent force on a pad (N).
     pub moved: f64,
-    /// What that means.
+    /// Severity.
     pub level: DriftLevel,
 }
 
@@ -67,7 +67,7 @@ pub struct Drift {
 const MOVED_RAD: f64 = std::f64::consts::PI / 180.0;
 /// Beyond this it is no drift but a bent finger (rad): 15 degrees.
 const TOO_FAR_RAD: f64 = 15.0 * MOVED_RAD;
-/// Beyond this a pad's zero has moved (N): what such a pad feels at all.
+/// Beyond this a pad's zero has moved (N): the pad's threshold.
 const MOVED_N: f64 = PadPart::LEAST_FORCE;
 /// Beyond this it is no drift but something on the pad (N).
 const TOO_FAR_N: f64 = 1.0;
@@ -84,7 +84,7 @@ impl Drift {
         Self { sensor, moved, level }
     }
 
-    /// The level in a word, as a badge.
+    /// Short name of the level, for a badge.
     pub fn badge(&self) -> &'static str {
         match self.level {
             DriftLevel::Steady => "steady",
@@ -93,8 +93,8 @@ impl Drift {
         }
     }
 
-    /// How far, with its unit: `+1.3°`, `0.2 N`.
-    pub fn told(&self) -> String {
+    /// Shift with its unit: `+1.3°`, `0.2 N`.
+    pub fn with_unit(&self) -> String {
         if self.sensor.is_flex() {
             format!("{:+.1}°", self.moved.to_degrees())
         } else {
@@ -102,9 +102,9 @@ impl Drift {
         }
     }
 
-    /// What should be said of it, with what to do; nothing where it is steady.
+    /// Warning with a remedy; none where the zero is steady.
     pub fn remark(&self) -> Option<String> {
-        let (place, moved) = (self.sensor.label(), self.told());
+        let (place, moved) = (self.sensor.label(), self.with_unit());
         match self.level {
             DriftLevel::Steady => None,
             DriftLevel::Moved => {

@@ -1,6 +1,6 @@
 //! The analogue input that reads a divider: an Arduino Due with 12 bits over 3.3 V, 0.806 mV a count.
 //!
-//! Voltages are given as shares of the 3.3 V. Count c stands for c / 4096, so that no reading says that the whole
+//! Voltages are given as shares of the 3.3 V. Count c stands for c / 4096, so that no reading means that the whole
 //! supply is across the divider, which no finite resistance explains.
 
 /// An analogue input.
@@ -8,7 +8,7 @@
 pub struct Converter {
     /// Counts over the supply, a power of two: 4096 for 12 bits (SAM3X; 3.3 V / 4096 = 0.806 mV).
     pub levels: f64,
-    /// Whether it gives whole counts, as a converter does.
+    /// True for whole counts, false for exact values.
     pub whole_counts: bool,
 }
 
@@ -16,7 +16,7 @@ impl Converter {
     /// That of the Due, set to 12 bits.
     pub const DUE: Self = Self { levels: 4096.0, whole_counts: true };
 
-    /// What a voltage is read as, between the rails, as counts. `noise` is added to the voltage (counts).
+    /// Reading of a voltage within the converter's range (counts). `noise` is added to the voltage (counts).
     pub fn counts(&self, share: f64, noise: f64) -> f64 {
         let counts = share * self.levels + noise;
         let counts = if self.whole_counts { counts.floor() } else { counts };

@@ -1,11 +1,11 @@
 //! A voltage divider: the sensor and a fixed resistor between supply and ground, read where they meet.
 //!
-//! With the sensor to ground the share of the supply that is read is R / (R + R_fixed); with the sensor to the supply it is
-//! r / (1 + r), r = G R_fixed. Only ratios of resistances count, so that they may be in ohm or in anything else.
+//! With the sensor to ground the share of the supply that is read is R / (R + R_fixed); with the sensor to the supply
+//! it is r / (1 + r), r = G R_fixed. Only ratios of resistances count, so that they may be in ohm or in anything else.
 
 use serde::{Deserialize, Serialize};
 
-/// Which side of the divider the sensor is on.
+/// Side of the divider that the sensor is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wiring {
@@ -20,7 +20,7 @@ pub enum Wiring {
 pub struct Divider {
     /// The fixed resistor (ohm).
     pub fixed_ohm: f64,
-    /// Where the sensor is.
+    /// Side of the sensor.
     pub wiring: Wiring,
     /// Factor on the voltage before it is read; 1 without an amplifier.
     pub gain: f64,
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_leads_back_to_the_sensor() {
+    fn readings_invert_to_the_sensor() {
         for divider in [Divider::of_strip(47e3), Divider { gain: 2.0, ..Divider::of_pad(4.7e3) }] {
             for ohm in [1e3, 25e3, 50e3, 1e6] {
                 let share = divider.share_of_ohm(ohm);

@@ -26,11 +26,11 @@ impl StripPart {
     /// Resistance of a nominal flat part (ohm): code 253.
     pub const NOMINAL_OHM: f64 = 25e3;
 
-    /// How far a part's flat resistance is from nominal, at most, as a share of it (data sheet).
+    /// Tolerance of a part's flat resistance, as a share of the nominal (data sheet).
     pub const FLAT_TOLERANCE: f64 = 0.30;
 
-    /// Resistance at 90 degrees over flat, from part to part: 2 (25 to 50 kOhm, amperka) to 2.5 (30 to 70 kOhm, SparkFun,
-    /// is 2.3). The nominal part is in the middle.
+    /// Resistance at 90 degrees over flat, from part to part: 2 (25 to 50 kOhm, amperka) to 2.5 (30 to 70 kOhm,
+    /// SparkFun, is 2.3). The nominal part is in the middle.
     pub const BENT_OVER_FLAT: [f64; 2] = [2.0, 2.5];
 
     /// The other resistor of its divider (ohm): near the root of flat times bent resistance, for the widest span.
@@ -61,7 +61,7 @@ const CREEP_S: f64 = 0.4;
 /// A strip that is read at regular times.
 #[derive(Clone, Debug)]
 pub struct FlexStrip {
-    /// What it is made of.
+    /// Part constants.
     pub part: StripPart,
     /// Bent backwards the ink is not stretched.
     pub one_way: bool,
@@ -71,7 +71,7 @@ pub struct FlexStrip {
     pub creeps: bool,
     /// Times per second at which it is read (1/s).
     pub rate_hz: f64,
-    /// What follows late has come so far (rad); `None` before the first sample.
+    /// Present value of the delayed part (rad); `None` before the first sample.
     late: Option<f64>,
 }
 
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_late_does_so_in_time_and_not_in_readings() {
+    fn delayed_parts_follow_time_and_not_the_number_of_readings() {
         let after = |rate_hz: f64, seconds: f64| {
             let mut strip = FlexStrip::new(StripPart::nominal(), rate_hz);
             strip.creeps = true;

@@ -1,7 +1,7 @@
 //! A force-sensing pad, Ohmite FSR07CE (paper, section IV-B): from the load on it to its conductance.
 //!
-//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b. The load may be a force
-//! or a pressure, in any unit: a is the conductance at one [`PadPart::full`] of it.
+//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b. The load may be a
+//! force or a pressure, in any unit: a is the conductance at one [`PadPart::full`] of it.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +14,17 @@ pub struct PadPart {
     pub gain: f64,
     /// Exponent, b.
     pub exponent: f64,
-    /// Least load that it feels; none where it feels any.
+    /// Threshold load; none where it responds to any load.
     pub threshold: Option<f64>,
     /// Share of the load that reaches it.
     pub reaching: f64,
 }
 
 impl PadPart {
-    /// Least force that a pad feels (N). Data sheet: less than 15 g, 0.15 N, actuates.
+    /// Threshold force of a pad (N). Data sheet: less than 15 g, 0.15 N, actuates.
     pub const LEAST_FORCE: f64 = 0.15;
 
-    /// Least pressure that a pad feels (Pa): 15 g on the 170 mm² of the pad are 0.9 kPa.
+    /// Threshold pressure of a pad (Pa): 15 g on the 170 mm² of the pad are 0.9 kPa.
     pub const LEAST_PRESSURE: f64 = 0.9e3;
 
     /// Conductance at 1 N (S): 6 kOhm (Interlink 402, the table of Adafruit; there is none for the FSR07).
@@ -36,14 +36,14 @@ impl PadPart {
     /// The exponent of the nominal part.
     pub const NOMINAL_EXPONENT: f64 = 0.5 * (Self::EXPONENT[0] + Self::EXPONENT[1]);
 
-    /// How far a part's conductance is from nominal, at most, as a share of it (data sheet, parts of one batch).
+    /// Tolerance of a part's conductance, as a share of the nominal (data sheet, parts of one batch).
     pub const GAIN_TOLERANCE: f64 = 0.04;
 
     /// Resistor of its divider (ohm): the value recommended for the lowest tenth of the pad's range.
     pub const DIVIDER_OHM: f64 = 4.7e3;
 }
 
-/// How much more an unloading pad reads than a loading one, as a share of the load (data sheet).
+/// Hysteresis: reading of an unloading pad above that of a loading one, as a share of the load (data sheet).
 const HYSTERESIS: f64 = 0.05;
 
 /// Growth of the conductance for every tenfold time under load (data sheet, 1 % per log time).
@@ -55,7 +55,7 @@ const DRIFT_FROM_S: f64 = 0.1;
 /// A pad that is read at regular times.
 #[derive(Clone, Debug)]
 pub struct ForcePad {
-    /// What it is made of.
+    /// Part constants.
     pub part: PadPart,
     /// Unloading reads more than loading.
     pub hysteretic: bool,
@@ -67,7 +67,7 @@ pub struct ForcePad {
     pub rate_hz: f64,
     /// The load that shows, with hysteresis.
     shown: f64,
-    /// How long it has conducted (s).
+    /// Time since it began to conduct (s).
     loaded_s: f64,
 }
 

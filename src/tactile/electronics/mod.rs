@@ -1,5 +1,5 @@
-//! The electronics of a sensorised gripper (paper, section IV-B): a part whose resistance follows what it feels, a
-//! divider that makes a voltage of it, a converter that makes counts.
+//! The electronics of a sensorised gripper (paper, section IV-B): a part whose resistance follows its load or bend, a
+//! divider to a voltage, a converter to counts.
 //!
 //! | step | flex strip | force pad |
 //! |---|---|---|
@@ -7,8 +7,8 @@
 //! | divider | R_f to the supply, strip to ground | pad to the supply, R_m to ground |
 //! | converter | count c of 2^bits stands for the share c / 2^bits of the supply | the same |
 //!
-//! Both who pretend to have such a gripper use it: the sensor model of simulated trials ([`super::model`]), and the
-//! pretended board that prints counts. Whatever is tuned or drawn at random stands with them; here is only the law.
+//! Used by the sensor model of simulated trials ([`super::model`]) and by the emulator's sensors. Random and tuned
+//! values stand there; this module holds only the laws.
 
 mod converter;
 mod divider;

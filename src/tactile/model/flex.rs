@@ -71,7 +71,7 @@ impl ReadStrip {
         self.divider.ohm(share) / flat_ohm
     }
 
-    /// What the calibration makes of this part's rise: 1 is right.
+    /// Gain of this part under the nominal calibration: 1 is right.
     #[cfg(test)]
     pub(super) fn gain(&self) -> f64 {
         self.strip.part.reaching * self.strip.part.rise_per_rad / StripPart::nominal_rise()
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_late_arrives_in_the_end() {
+    fn delayed_parts_settle_in_the_end() {
         let mut strip = strip(&PhysicalLike { hysteresis: true, ..PhysicalLike::OFF });
         assert!(strip.read(0.0).abs() < 1e-12, "starts at rest");
         let step: Vec<f64> = (0..200).map(|_| strip.read(10.0)).collect();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn the_default_gripper_has_parts_that_keep_what_is_known_of_the_real_one() {
+    fn the_default_gripper_has_parts_that_match_the_real_one() {
         let gain = |gripper, side: usize| {
             let settings = PhysicalLike { asymmetry: true, parts: true, ..PhysicalLike::OFF };
             let channel = ["curvature_left", "curvature_right"][side];

@@ -1,8 +1,8 @@
 //! The force-sensing pad that reads force or pressure: Ohmite FSR07CE (paper, section IV-B).
 //!
 //! Its law stands in [`crate::electronics`]; here it saturates at last, and the divider is amplified so that the
-//! converter meets its rail where the pad saturates. Loads are counted here as shares u of the load that saturates the nominal pad:
-//! G = G_full u^b.
+//! converter meets its rail where the pad saturates. Loads are counted here as shares u of the load that saturates the
+//! nominal pad: G = G_full u^b.
 //!
 //! Recordings of the real gripper know three levels: idle, touched, and saturated soon after the touch. No circuit or
 //! curve of it is published, so the load that saturates is assumed, and a setting: [`PhysicalLike::full_force`] and
@@ -15,13 +15,13 @@ use super::sampling::SAMPLE_HZ;
 use super::streams::Streams;
 use crate::electronics::{Divider, ForcePad, PadPart};
 
-/// Least force that a pad feels, left and right (N). The right is assumed a third duller.
+/// Threshold force of a pad, left and right (N). The right is assumed a third less sensitive.
 const LEAST_FORCE: [f64; 2] = [PadPart::LEAST_FORCE, 0.20];
 
-/// Least pressure that a pad feels, left and right (Pa).
+/// Threshold pressure of a pad, left and right (Pa).
 const LEAST_PRESSURE: [f64; 2] = [PadPart::LEAST_PRESSURE, 1.2e3];
 
-/// From the least load that a pad feels to the one that saturates it, in the unit of its channel.
+/// Range of a pad from threshold to saturation, in the unit of its channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PadRange {
     least: [f64; 2],
@@ -46,8 +46,8 @@ const REACHING: [f64; 2] = [1.0, 0.7];
 /// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
 const SLIP: f64 = 0.02;
 
-/// The divider's resistor over the pad's at the load that saturates, G_full R_m. That load is assumed to make of the pad
-/// what 1 N makes of a common one.
+/// The divider's resistor over the pad's at the load that saturates, G_full R_m. That load is assumed to make of the
+/// pad what 1 N makes of a common one.
 const FULL_RATIO: f64 = PadPart::DIVIDER_OHM * PadPart::NOMINAL_SIEMENS;
 
 /// Voltage over R_m at the load that saturates, as a share of the supply.

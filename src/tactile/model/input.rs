@@ -26,7 +26,7 @@ impl Input {
         self.noise.is_none() && !self.converter.whole_counts
     }
 
-    /// What a voltage is read as, between the rails; both as shares of the supply.
+    /// Reading of a voltage, within the range of the converter; both as shares of the supply.
     pub(super) fn read(&mut self, share: f64) -> f64 {
         let noise = self.noise.as_mut().map_or(0.0, |noise| NOISE_COUNTS * noise.normal());
         self.converter.share(share, noise)

@@ -1,4 +1,4 @@
-//! What sits between a finger and its readings: nothing, as in the paper's simulation, or the strips, pads, dividers
+//! Sensor models: perfect sensors, as in the paper's simulation, or the strips, pads, dividers
 //! and clock of a real sensorised gripper (paper, section IV-B). A model is applied to the clean signals of a finished
 //! trial, so that one simulation serves both.
 //!
@@ -16,14 +16,15 @@
 //! | drift | rest resistance of this grasp | conductance grows under load |
 //! | noise, counts | divider, converter | divider, amplifier, converter |
 //!
-//! What comes out is in the units that went in, by a nominal calibration in two points, as a user of the real gripper
-//! would have one: what the nominal part does not share with the actual one stays in the readings. Absent on purpose:
-//! a real pad also fires when it is bent (Interlink's guide, "false triggering"); here no channel knows of another, so
+//! Readings have the units of the clean signals, by a nominal two-point calibration, as a user of the real gripper
+//! would have one: the difference between nominal and actual part stays in the readings. Deliberately left out:
+//! a real pad also fires when it is bent (Interlink's guide, "false triggering"); here channels are independent, so
 //! that a channel reads the same in every layout that has it.
 //!
-//! A number without a source is marked as assumed. They were settled from data sheets and from what is known of the
-//! real recordings, before any recogniser saw the result.
+//! Constants without a source are marked as assumed. They were chosen from data sheets and from the published facts
+//! about the real recordings, before any recogniser was trained on the result.
 
+mod chain;
 mod flex;
 mod force_pad;
 mod input;
@@ -41,7 +42,7 @@ pub use streams::Stream;
 use super::Signals;
 use serde::{Deserialize, Serialize};
 
-/// Which sensors a gripper has.
+/// Sensor model of a gripper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorModel {
@@ -69,7 +70,7 @@ impl SensorModel {
         Self::BOTH.into_iter().find(|model| model.name().eq_ignore_ascii_case(name.trim()))
     }
 
-    /// What the sensors report of a grasp whose clean signals are given. `seed` names the grasp's noise, drift, jitter
+    /// Readings of a grasp from its clean signals. `seed` determines the grasp's noise, drift, jitter
     /// and slip; the parts of the gripper are the same for every seed.
     pub fn apply(self, clean: &Signals, seed: u64) -> Signals {
         match self {

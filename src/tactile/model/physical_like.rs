@@ -1,18 +1,12 @@
 //! Sensors such as a real gripper has, each of their faults a switch.
 
-use super::flex::ReadStrip;
-use super::force_pad::{PadRange, ReadPad};
-use super::sampling::{Trace, instants};
-use super::stepping::stepped;
-use super::streams::Streams;
-use crate::Signals;
 use serde::{Deserialize, Serialize};
 
-/// The gripper whose parts are drawn unless another is asked for: the first whose two whole-finger strips rise within
-/// 2 % of what the calibration believes, as what is known of the real gripper's readings asks.
+/// Default gripper whose parts are drawn: the first whose two whole-finger strips rise within
+/// 2 % of the nominal calibration, which the published readings of the real gripper suggest.
 pub const GRIPPER: u64 = 127;
 
-/// Which faults the sensors have, and whose parts they are made of. Other numbers stand with the parts.
+/// Faults of the sensors and the gripper whose parts they are made of. Other constants stand with the parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PhysicalLike {
@@ -32,18 +26,20 @@ pub struct PhysicalLike {
     pub hysteresis: bool,
     /// The rest angle of strips is another in every grasp; the conductance of pads grows under load.
     pub drift: bool,
-    /// Pads do not feel a light touch, strips do not feel being bent backwards.
+    /// Pads do not respond to a light touch, strips not to bending backwards.
     pub threshold: bool,
-    /// Pads meet the rail at full force or pressure, strips cannot be bent beyond a fold.
+    /// Pads saturate at full force or pressure, strips cannot be bent beyond a fold.
     pub saturation: bool,
     /// Voltages are noisy.
     pub noise: bool,
     /// Voltages are read in whole counts of 12 bits.
     pub counts: bool,
-    /// Force at which the nominal pad saturates (N). Assumed: 0.3 N. Real recordings have nearly three levels only, idle,
-    /// touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as well.
+    /// Force at which the nominal pad saturates (N). Assumed: 0.3 N. Real recordings have nearly three levels only,
+    /// idle, touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as
+    /// well.
     pub full_force: f64,
-    /// Pressure at which the nominal pad saturates (Pa). Assumed: 12 kPa, what 0.3 N makes on a usual contact of 25 mm².
+    /// Pressure at which the nominal pad saturates (Pa). Assumed: 12 kPa, what 0.3 N makes on a usual contact of 25
+    /// mm².
     pub full_pressure: f64,
 }
 
@@ -85,58 +81,4 @@ impl PhysicalLike {
         full_force: 0.3,
         full_pressure: 12e3,
     };
-
-    /// What such sensors report of a grasp whose clean signals are given, at 50 Hz and always finite. `seed` names the
-    /// grasp. Channels are told apart by their names; one that is neither curvature, pressure nor force is read
-    /// without a sensor.
-    pub fn apply(&self, clean: &Signals, seed: u64) -> Signals {
-        let instants = instants(clean, self.jitter, seed);
-        let width = clean.channels.len();
-        let mut values = vec![0.0; instants.len() * width];
-        for (column, channel) in clean.channels.iter().enumerate() {
-            let trace = Trace::new(clean, column);
-            let mut sensor = Sensor::new(self, Streams { gripper: self.gripper, trial: seed, channel });
-            for (instant, row) in instants.iter().zip(values.chunks_exact_mut(width)) {
-                let stimulus =
-                    if self.stepping { stepped(trace, instants[0].t, instant.taken) } else { trace.at(instant.taken) };
-                row[column] = finite(sensor.read(stimulus));
-            }
-        }
-        Signals { channels: clean.channels.clone(), t_s: instants.iter().map(|i| i.t).collect(), values }
-    }
-}
-
-/// A sensor of either kind, or none.
-enum Sensor {
-    Strip(ReadStrip),
-    Pad(ReadPad),
-    None,
-}
-
-impl Sensor {
-    /// The sensor that a channel's name asks for, as in `curvature_left_distal`.
-    fn new(settings: &PhysicalLike, streams: Streams<'_>) -> Self {
-        let mut words = streams.channel.split('_');
-        let quantity = words.next();
-        let side = usize::from(words.next() == Some("right"));
-        match quantity {
-            Some("curvature") => Self::Strip(ReadStrip::new(settings, side, streams)),
-            Some("force") => Self::Pad(ReadPad::new(settings, PadRange::force(settings), side, streams)),
-            Some("pressure") => Self::Pad(ReadPad::new(settings, PadRange::pressure(settings), side, streams)),
-            _ => Self::None,
-        }
-    }
-
-    fn read(&mut self, stimulus: f64) -> f64 {
-        match self {
-            Self::Strip(strip) => strip.read(stimulus),
-            Self::Pad(pad) => pad.read(stimulus),
-            Self::None => stimulus,
-        }
-    }
-}
-
-/// The nearest number a file can hold; none becomes 0.
-fn finite(value: f64) -> f32 {
-    if value.is_nan() { 0.0 } else { value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32 }
 }

@@ -9,17 +9,17 @@ use crate::Signals;
 /// Samples per second (Hz) (paper, section IV-B).
 pub const SAMPLE_HZ: f64 = 50.0;
 
-/// How far the recording starts before or after the closing, at most (s). Assumed: half an actuation tick of the
+/// Largest offset of the recording's start from the closing (s). Assumed: half an actuation tick of the
 /// simulated gripper.
 const START_OFFSET_S: f64 = 0.05;
 
-/// How far a sample is taken from its time, at most (s). Assumed: a tenth of the sampling period.
+/// Largest jitter of a sample (s). Assumed: a tenth of the sampling period.
 const JITTER_S: f64 = 0.002;
 
 /// Length at which a recording is cut (s). A grasp lasts seconds; a wrong time cannot fill the memory.
 const LONGEST_S: f64 = 600.0;
 
-/// When a sample is said to have been taken, and when it was.
+/// Reported and actual time of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Instant {
     /// As reported (s).
@@ -28,7 +28,7 @@ pub(super) struct Instant {
     pub(super) taken: f64,
 }
 
-/// The instants of a recording as long as the clean one. Without `jitter`, samples are taken when they are said to be.
+/// The instants of a recording as long as the clean one. Without `jitter`, samples are taken at the reported times.
 pub(super) fn instants(clean: &Signals, jitter: bool, seed: u64) -> Vec<Instant> {
     let (Some(&start), Some(&end)) = (clean.t_s.first(), clean.t_s.last()) else { return Vec::new() };
     // A hair more, so that the last of evenly divided time counts.

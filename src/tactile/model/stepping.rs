@@ -1,5 +1,6 @@
 //! Closing in steps. The real control box raises the pressure in steps, and signals are sampled after the transient of
-//! each (paper, section IV-B and Fig. 3). In the recordings curvature rises about every 0.7 s of 7.5 s, ten steps or so.
+//! each (paper, section IV-B and Fig. 3). In the recordings curvature rises about every 0.7 s of 7.5 s, ten steps or
+//! so.
 //!
 //! This is a *quasi-static re-timing* of a grasp that was simulated with a pressure rising ten times a second. The
 //! signals are held at the instants of a grid; from one to the next they go by a first-order transient, and every
@@ -47,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_level_stays_so() {
+    fn level_signals_stay_level() {
         let signals = Signals { channels: vec!["x".to_owned()], t_s: vec![1.0, 2.0], values: vec![3.0, 3.0] };
         for t in [0.0, 1.0, 1.5, 2.0, 5.0] {
             assert_eq!(stepped(Trace::new(&signals, 0), 1.0, t), 3.0);

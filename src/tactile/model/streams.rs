@@ -16,12 +16,12 @@ pub(super) struct Streams<'a> {
 }
 
 impl Streams<'_> {
-    /// What is drawn once for a gripper.
+    /// Stream of an effect that is drawn once for a gripper.
     pub(super) fn of_gripper(&self, effect: &str) -> Stream {
         Stream::new(self.gripper, self.channel, effect)
     }
 
-    /// What is drawn for every grasp.
+    /// Stream of an effect that is drawn for every grasp.
     pub(super) fn of_trial(&self, effect: &str) -> Stream {
         Stream::new(self.trial, self.channel, effect)
     }

@@ -1,7 +1,7 @@
-//! What was recorded and what the fit makes of it, to be drawn over each other.
+//! Recorded and fitted curvature over time, for a plot.
 
+use super::fitted_model::FittedModel;
 use super::observation::Observation;
-use super::twin::Twin;
 use palpate_sim::gripper::Side;
 
 /// Curvature of one finger over a recording.
@@ -9,21 +9,21 @@ use palpate_sim::gripper::Side;
 pub struct Course {
     /// The recording.
     pub name: String,
-    /// Which finger.
+    /// Finger.
     pub side: Side,
     /// Times since the first command (s).
     pub t_s: Vec<f64>,
     /// As recorded (1/m).
     pub recorded: Vec<f64>,
-    /// As the fitted twin shows it through the strip (1/m).
+    /// As the fitted model shows it through the strip (1/m).
     pub fitted: Vec<f64>,
 }
 
-/// The courses that belong to residuals in the order of the twin's places.
-pub(super) fn courses(observations: &[Observation], twin: &Twin<'_>, residuals: &[f64]) -> Vec<Course> {
+/// The courses that belong to residuals in the order of the fitted model's places.
+pub(super) fn courses(observations: &[Observation], fitted: &FittedModel<'_>, residuals: &[f64]) -> Vec<Course> {
     let mut courses: Vec<Course> = Vec::new();
     let mut last = None;
-    for ((number, track, k), residual) in twin.places().zip(residuals).filter(|((_, track, _), _)| !track.is_force) {
+    for ((number, track, k), residual) in fitted.places().zip(residuals).filter(|((_, track, _), _)| !track.is_force) {
         let Observation { name, signals, .. } = &observations[number];
         if last.replace((number, track.side)) != Some((number, track.side)) {
             let (name, side) = (name.clone(), track.side);

@@ -1,11 +1,11 @@
 //! Nonlinear least squares with prior knowledge (Levenberg 1944, Marquardt 1963), and what the data leave open.
 //!
-//! Minimises sum r_i(x)² + sum ((x_j - m_j) / s_j)², where the residuals r are in units of their deviation and a parameter may
-//! be known beforehand as m_j, give or take s_j. The covariance is the inverse of J'J + S⁻² at the minimum, the data's part
-//! of it widened by what the residuals show beyond their assumed noise, and by how far neighbouring residuals go
-//! together: n residuals with correlation rho count as n (1 - rho) / (1 + rho).
+//! Minimises sum r_i(x)² + sum ((x_j - m_j) / s_j)², where the residuals r are in units of their deviation and a
+//! parameter may be known beforehand as m_j, give or take s_j. The covariance is the inverse of J'J + S⁻² at the
+//! minimum, the data's part of it widened by what the residuals show beyond their assumed noise, and by how far
+//! neighbouring residuals go together: n residuals with correlation rho count as n (1 - rho) / (1 + rho).
 
-/// What is fitted.
+/// Least-squares problem.
 pub(super) trait Problem {
     /// Residuals at a point, each in units of its deviation; always as many, in the order of time within runs.
     fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, String>;
@@ -17,7 +17,7 @@ pub(super) trait Problem {
     fn least(&self, parameter: usize) -> f64;
 }
 
-/// What is known of a parameter beforehand.
+/// Prior of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Prior {
     /// Its value.
@@ -26,7 +26,7 @@ pub(super) struct Prior {
     pub(super) deviation: f64,
 }
 
-/// Where the sum is least.
+/// Minimum of the sum of squares.
 #[derive(Clone, Debug)]
 pub(super) struct Minimum {
     /// The parameters.
@@ -73,7 +73,7 @@ pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) 
             damping = (damping * 0.2).max(1e-9);
             jacobian = differences(problem, &x, &residuals)?;
         } else {
-            // Where even short steps lead up, this is the bottom as far as the numbers go.
+            // If even short steps lead up, this is the minimum to numerical precision.
             settled = damping > 1e6 || sum_there - sum < SETTLED * sum * 1e-3;
             damping *= 8.0;
         }
@@ -84,7 +84,7 @@ pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) 
     for (j, prior) in priors.iter().enumerate() {
         matrix[j][j] += 1.0 / (prior.deviation * prior.deviation);
     }
-    let covariance = inverse(&matrix).ok_or("the data do not tell the parameters apart at all")?;
+    let covariance = inverse(&matrix).ok_or("the parameters cannot be identified from these data")?;
     Ok(Minimum { x, covariance, residuals, widened, steps, settled })
 }
 
@@ -93,7 +93,7 @@ fn total(residuals: &[f64], x: &[f64], priors: &[Prior]) -> f64 {
     dot(residuals, residuals) + known
 }
 
-/// How the residuals change with each parameter: `[parameters][residuals]`.
+/// Derivatives of the residuals: `[parameters][residuals]`.
 fn differences(problem: &mut impl Problem, x: &[f64], residuals: &[f64]) -> Result<Vec<Vec<f64>>, String> {
     let mut columns = Vec::with_capacity(x.len());
     for j in 0..x.len() {
@@ -131,7 +131,7 @@ fn damped_step(matrix: &[Vec<f64>], slope: &[f64], damping: f64) -> Option<Vec<f
     Some(inverse.iter().map(|row| dot(row, slope)).collect())
 }
 
-/// How much wider than by noise alone: what the residuals show, and how they go together. Never narrower.
+/// Factor on the intervals from the size and the autocorrelation of the residuals; at least 1.
 fn widening(residuals: &[f64], parameters: usize) -> f64 {
     let freedom = residuals.len().saturating_sub(parameters).max(1) as f64;
     let scatter = dot(residuals, residuals) / freedom;
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_the_truth_as_often_as_they_say() -> Result<(), String> {
+    fn intervals_hold_the_truth_in_95_of_100_cases() -> Result<(), String> {
         let mut held = [0; 2];
         for seed in 0..200 {
             let found = minimise(&mut decay(seed, 0.05), &[2.0, 1.0], &[OPEN; 2])?;
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_beforehand_counts_and_bounds_hold() -> Result<(), String> {
+    fn priors_count_and_bounds_hold() -> Result<(), String> {
         let known = [Prior { mean: 2.0, deviation: 1e-6 }, OPEN];
         let found = minimise(&mut decay(1, 0.05), &[2.0, 1.0], &known)?;
         assert!((found.x[0] - 2.0).abs() < 1e-3 && found.covariance[0][0].sqrt() < 1.1e-6);

@@ -1,24 +1,24 @@
-//! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so that the
-//! simulated finger lies on the real one.
+//! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so
+//! that the simulated finger lies on the real one.
 //!
-//! The twin is simulated with what the control box did, and its curvature and force laid over what was recorded; see
-//! `least_squares` for how the difference is made least. Fitted in logarithms: bending stiffness EI, damping time, the torques at
+//! The fitted model is simulated under the recorded line pressure; `least_squares` minimises the difference of its
+//! curvature and force from the recording. Fitted in logarithms: bending stiffness EI, damping time, the torques at
 //! points of the curve every 0.2 bar; and the time in which a chamber fills. Beside them, and only as far as their
-//! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and when
-//! each recording began.
+//! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and
+//! when each recording began.
 //!
-//! **What the data can tell.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
-//! stiffness bends alike. What gives a scale is the finger's weight and inertia, which resist with k/m and g/k: with
-//! closes alone, EI and torques are known as well as the mass is, and less well the stiffer the finger. A press on a
-//! calibrated pad measures a force, and so the scale itself. The intervals say how much of this was in the data.
+//! **Identifiability.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
+//! stiffness bends alike. The scale comes from the finger's weight and inertia, which resist with k/m and g/k: with
+//! closes alone, EI and torques are as uncertain as the mass, and more uncertain the stiffer the finger. A press on a
+//! calibrated pad measures a force, and so the scale itself. The intervals show how much of this was in the data.
 
 mod course;
+mod fitted_model;
 mod least_squares;
 mod observation;
 mod recorded;
 #[cfg(test)]
 mod tests;
-mod twin;
 mod watched;
 
 pub use course::Course;
@@ -27,15 +27,17 @@ pub use observation::Observation;
 pub use recorded::{RecordedGraspError, RecordedGrasps};
 pub use watched::FitWatch;
 
+use fitted_model::{
+    DAMPING, FittedModel, LAG, PAD_BENDING, PAD_GAIN, SHIFT, STIFFNESS, STRIP_GAIN, STRIP_OFFSET, TORQUES,
+};
 use least_squares::{Minimum, Prior, minimise};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::Gripper;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
-use twin::{DAMPING, LAG, PAD_BENDING, PAD_GAIN, SHIFT, STIFFNESS, STRIP_GAIN, STRIP_OFFSET, TORQUES, Twin};
 use watched::Watched;
 
-/// How well the sensors are known: one deviation each, left and right.
+/// Standard deviations of the sensors' gains and offsets, left and right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trust {
     /// Gain of the strips, as a share.
@@ -45,13 +47,13 @@ pub struct Trust {
 }
 
 impl Default for Trust {
-    /// What a careful calibration comes to: strips within one part in a hundred, pads within five.
+    /// A careful calibration: strips within 1 %, pads within 5 %.
     fn default() -> Self {
         Self { strip_gain: [0.01; 2], pad_gain: [0.05; 2] }
     }
 }
 
-/// How well a parameter is known.
+/// Identifiability of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Known {
@@ -59,14 +61,14 @@ pub enum Known {
     Well,
     /// Within a half.
     Roughly,
-    /// The data do not tell.
+    /// Not identifiable from the data.
     Hardly,
 }
 
 /// One parameter with its 95 % interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Estimate {
-    /// What it is: a key of the scene, or a ratio.
+    /// Name: a key of the scene, or a ratio.
     pub name: String,
     /// Its unit.
     pub unit: &'static str,
@@ -76,11 +78,11 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// How well it is known.
+    /// Identifiability.
     pub known: Known,
 }
 
-/// What is left between twin and recording.
+/// Remaining difference between fitted model and recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remainder {
     /// The recording.
@@ -89,33 +91,33 @@ pub struct Remainder {
     pub curvature_per_m: f64,
     /// Root mean square over both pads as a share of the force; null where no force was usable.
     pub force_share: Option<f64>,
-    /// By how much it began later than it says (s).
+    /// Delay of its begin against its time stamps (s).
     pub shift_s: f64,
 }
 
-/// What a fit came to.
+/// Result of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FingerFit {
     /// The gripper of the first recording's scene, with the fitted finger.
     pub gripper: Gripper,
-    /// What was fitted, with intervals.
+    /// Estimates, with intervals.
     pub estimates: Vec<Estimate>,
-    /// Each recording against its twin.
+    /// Each recording against its fitted model.
     pub remainders: Vec<Remainder>,
     /// By which factor intervals are wider than noise alone would make them: what the model does not explain.
     pub widened: f64,
     /// Steps that the fit took.
     pub steps: u32,
-    /// What should be known, in sentences.
+    /// Remarks, in sentences.
     pub remarks: Vec<String>,
     /// Curvature over time, recorded and fitted, of each finger of each recording.
     #[serde(skip)]
     pub courses: Vec<Course>,
 }
 
-/// Why there is no fit.
+/// Error of a fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
+pub enum FingerFitError {
     /// No recording.
     #[error("nothing to fit: name a few recorded empty closes, and presses against something held in place")]
     Nothing,
@@ -146,30 +148,30 @@ pub enum FitError {
     /// It was given up from outside.
     #[error("the fit was stopped; nothing was changed")]
     Stopped,
-    /// The twin cannot be computed.
+    /// The fitted model cannot be computed.
     #[error("the fit failed: {0}")]
     Failed(String),
 }
 
-/// Pressure between points of the torque curve (bar), at most. A curve that bends between them is not met: what is left
-/// over then shows in the widening of the intervals.
+/// Pressure between points of the torque curve (bar), at most. A curve that bends between them cannot be fitted: the
+/// rest over then shows in the widening of the intervals.
 const KNOT_BAR: f64 = 0.2;
 
 /// Points of the torque curve besides zero, fewest and most; each costs a simulation of every recording a step.
 const KNOTS: [f64; 2] = [2.0, 8.0];
 
-/// How far the finger's parameters are from where the fit begins, one deviation in logarithms: a factor of four and a
-/// half, so that it hardly counts.
+/// Prior deviation of the finger's parameters from their start, in logarithms: a factor of four and a half, so that it
+/// hardly counts.
 const OPEN: f64 = 1.5;
 
-/// What is usual of a filling time (s).
+/// Usual filling time (s).
 const USUAL_LAG: Prior = Prior { mean: 0.05, deviation: 0.3 };
 
 /// Deviation of a strip's zero after it was taken anew (1/m): 0.3 degrees.
 const OFFSET: f64 = 0.1;
 
-/// Deviation of what bending adds to a pad besides its known zero, per curvature (N m). Below its threshold an empty close
-/// shows nothing of it: 0.15 N at 15 1/m.
+/// Deviation of what bending adds to a pad besides its known zero, per curvature (N m). Below its threshold an empty
+/// close shows nothing of it: 0.15 N at 15 1/m.
 const PRELOAD: f64 = 0.01;
 
 /// Deviation of the instant at which a recording begins (s): half an actuation tick.
@@ -182,54 +184,54 @@ const HALF: f64 = 1.96;
 const LEAST_CURVATURE: f64 = 2.0;
 
 /// Fits the finger to recordings; it begins at the gripper of the first one's scene.
-pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FitError> {
+pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FingerFitError> {
     fit_finger_watched(observations, trust, &FitWatch { progress: &|_| (), stop: &AtomicBool::new(false) })
 }
 
-/// The same while somebody watches.
+/// The same with progress and cancellation.
 pub fn fit_finger_watched(
     observations: &[Observation],
     trust: &Trust,
     watch: &FitWatch<'_>,
-) -> Result<FingerFit, FitError> {
-    let first = observations.first().ok_or(FitError::Nothing)?;
+) -> Result<FingerFit, FingerFitError> {
+    let first = observations.first().ok_or(FingerFitError::Nothing)?;
     observations.iter().try_for_each(usable)?;
     let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
     let count = (peak / KNOT_BAR - 1e-6).ceil().clamp(KNOTS[0], KNOTS[1]);
     let knots: Vec<f64> = (1..=count as u32).map(|k| peak * f64::from(k) / count).collect();
-    let mut twin = Twin::new(observations, knots.clone());
+    let mut fitted = FittedModel::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
-    let minimum = minimise(&mut Watched::new(&mut twin, watch), &start, &priors)
-        .map_err(|cause| if watch.is_over() { FitError::Stopped } else { FitError::Failed(cause) })?;
-    let gripper = twin.gripper(&first.scene.gripper, &minimum.x);
+    let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)
+        .map_err(|cause| if watch.is_over() { FingerFitError::Stopped } else { FingerFitError::Failed(cause) })?;
+    let gripper = fitted.gripper(&first.scene.gripper, &minimum.x);
     let estimates = estimates(&minimum, &knots);
-    let remainders = remainders(observations, &twin, &minimum);
-    let remarks = remarks(first, &twin, &minimum, &estimates, &remainders);
-    let courses = course::courses(observations, &twin, &minimum.residuals);
+    let remainders = remainders(observations, &fitted, &minimum);
+    let remarks = remarks(first, &fitted, &minimum, &estimates, &remainders);
+    let courses = course::courses(observations, &fitted, &minimum.residuals);
     let Minimum { widened, steps, .. } = minimum;
     Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks, courses })
 }
 
-fn usable(seen: &Observation) -> Result<(), FitError> {
+fn usable(seen: &Observation) -> Result<(), FingerFitError> {
     let name = seen.name.clone();
     let tracks = seen.tracks();
     if !tracks.iter().any(|track| !track.is_force) {
-        return Err(FitError::NoCurvature { name });
+        return Err(FingerFitError::NoCurvature { name });
     }
     let duration_s = seen.duration();
     if !(0.5..=60.0).contains(&duration_s) {
-        return Err(FitError::Length { name, duration_s });
+        return Err(FingerFitError::Length { name, duration_s });
     }
     let bends = tracks.iter().filter(|track| !track.is_force);
     let all = bends.flat_map(|track| (0..seen.signals.len()).map(|k| f64::from(seen.signals.row(k)[track.column])));
     let (curvature, bar) = (all.fold(0.0, f64::max), seen.peak_bar());
     if curvature < LEAST_CURVATURE || bar <= 0.0 {
-        return Err(FitError::NoMotion { name, curvature, bar });
+        return Err(FingerFitError::NoMotion { name, curvature, bar });
     }
     Ok(())
 }
 
-/// Where the fit begins, and what is known of each parameter.
+/// Start values and priors of the parameters.
 fn beginning(gripper: &Gripper, knots: &[f64], recordings: usize, trust: &Trust) -> (Vec<f64>, Vec<Prior>) {
     let open = |value: f64| Prior { mean: value.max(1e-6).ln(), deviation: OPEN };
     let mut priors = vec![open(gripper.finger.bending_stiffness), open(gripper.finger.damping_time), USUAL_LAG];
@@ -298,9 +300,9 @@ impl Known {
     }
 }
 
-fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) -> Vec<Remainder> {
+fn remainders(observations: &[Observation], fitted: &FittedModel<'_>, minimum: &Minimum) -> Vec<Remainder> {
     let mut sums = vec![[(0.0, 0u32); 2]; observations.len()];
-    for ((number, track, k), residual) in twin.places().zip(&minimum.residuals) {
+    for ((number, track, k), residual) in fitted.places().zip(&minimum.residuals) {
         let value = f64::from(observations[number].signals.row(k)[track.column]);
         let off = residual * track.deviation(value).unwrap_or(0.0);
         let off = if track.is_force { off / value } else { off };
@@ -308,7 +310,7 @@ fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) 
         (*sum, *count) = (*sum + off * off, *count + 1);
     }
     let mean = |(sum, count): (f64, u32)| (count > 0).then(|| (sum / f64::from(count)).sqrt());
-    let shift = |number: usize| minimum.x[twin.of_finger() + SHIFT + number];
+    let shift = |number: usize| minimum.x[fitted.of_finger() + SHIFT + number];
     let each = observations.iter().zip(sums).enumerate();
     each.map(|(number, (seen, [curvature, force]))| Remainder {
         name: seen.name.clone(),
@@ -321,7 +323,7 @@ fn remainders(observations: &[Observation], twin: &Twin<'_>, minimum: &Minimum) 
 
 fn remarks(
     first: &Observation,
-    twin: &Twin<'_>,
+    fitted: &FittedModel<'_>,
     minimum: &Minimum,
     estimates: &[Estimate],
     remainders: &[Remainder],
@@ -340,19 +342,21 @@ fn remarks(
     }
     for estimate in estimates.iter().filter(|estimate| estimate.known == Known::Hardly) {
         let (name, low, high) = (&estimate.name, three_digits(estimate.low), three_digits(estimate.high));
-        remarks
-            .push(format!("the recordings do not tell {name}: anything from {low} to {high} {} fits", estimate.unit));
+        remarks.push(format!(
+            "{name} cannot be identified from the recordings: any value from {low} to {high} {} fits",
+            estimate.unit
+        ));
     }
     if estimates[STIFFNESS].known != Known::Well && estimates.last().is_some_and(|ratio| ratio.known == Known::Well) {
         remarks.push(
             "torque over stiffness is known well, each of them is not: they may only be changed together".to_owned(),
         );
     }
-    remarks.extend(corrected_sensors(twin, minimum));
+    remarks.extend(corrected_sensors(fitted, minimum));
     if minimum.widened > 5.0 {
         let factor = minimum.widened;
         remarks.push(format!(
-            "the twin explains the recordings only in part: intervals are {factor:.0} times as wide as the noise would make \
+            "the fitted model explains the recordings only in part: intervals are {factor:.0} times as wide as the noise would make \
              them. Look at the residuals: contact in an empty close, a strip that creeps, another pressure than commanded?"
         ));
     }
@@ -360,8 +364,8 @@ fn remarks(
 }
 
 /// Sensors that the fit had to correct by more than their calibration allows.
-fn corrected_sensors(twin: &Twin<'_>, minimum: &Minimum) -> Vec<String> {
-    let sensor = |j: usize| minimum.x[twin.of_finger() + j];
+fn corrected_sensors(fitted: &FittedModel<'_>, minimum: &Minimum) -> Vec<String> {
+    let sensor = |j: usize| minimum.x[fitted.of_finger() + j];
     let mut words = Vec::new();
     for (side, name) in ["left", "right"].into_iter().enumerate() {
         let strip = sensor(STRIP_GAIN + side).exp_m1();

@@ -1,4 +1,4 @@
-//! What a real grasp gives to fit a finger to: curvature and force over time, and what the control box did meanwhile.
+//! Observation of a real grasp for a fit: curvature and force over time, and the line pressure.
 
 use palpate_sim::gripper::Side;
 use palpate_sim::objects::ObjectModel;
@@ -8,19 +8,19 @@ use palpate_tactile::Signals;
 /// One recorded grasp, an empty close or a press against something held in place.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// What it is called in messages: `trial 3`.
+    /// Name in messages: `trial 3`.
     pub name: String,
     /// Channels of layout C1 or C1+F; time counts from the first command (s).
     pub signals: Signals,
     /// Line pressure: time (s), rising, and pressure from then on (bar).
     pub line: Vec<(f64, f64)>,
-    /// What was grasped and how; its gripper is where the fit begins.
+    /// Scene of the grasp; the fit starts at its gripper.
     pub scene: Scene,
-    /// What is grasped; none for an empty close.
+    /// Grasped object; none for an empty close.
     pub object: Option<ObjectModel>,
 }
 
-/// Force below which a real pad's word is not taken (N): its threshold, and a margin for where it begins to conduct.
+/// Force below which a real pad is ignored (N): its threshold, and a margin for where it begins to conduct.
 const LEAST_FORCE: f64 = 0.2;
 
 /// A force is known to this share of itself besides its noise: the repeatability of such pads (data sheet).
@@ -90,7 +90,7 @@ impl Observation {
         self.line.iter().map(|(_, bar)| *bar).fold(0.0, f64::max)
     }
 
-    /// How long it lasts (s).
+    /// Duration (s).
     pub(super) fn duration(&self) -> f64 {
         self.signals.t_s.last().copied().unwrap_or(0.0)
     }

@@ -1,5 +1,5 @@
-//! Stored trials as the fit takes them: what the board sent, through its calibrations, which also say how far their gains
-//! can be relied on.
+//! Stored trials as input of the fit: the board's readings through its calibrations, which also bound how far their
+//! gains can be relied on.
 
 use super::{Observation, Trust};
 use palpate_sim::gripper::Gripper;
@@ -9,24 +9,24 @@ use palpate_store::{CalibrationId, Serving, Store, StoreError};
 use palpate_tactile::Sensors;
 use palpate_tactile::trial::TrialId;
 
-/// How well a strip's gain repeats once it is calibrated, as a share. Assumed: half a degree in 90.
+/// Repeatability of a calibrated strip's gain, as a share. Assumed: half a degree in 90.
 const STRIP_REPEATS: f64 = 0.005;
 
-/// How well a pad's gain repeats (data sheet, one deviation).
+/// Repeatability of a pad's gain (data sheet, one deviation).
 const PAD_REPEATS: f64 = 0.02;
 
-/// RecordedGrasps grasps to fit a finger to.
+/// Stored grasps for a fit.
 #[derive(Clone, Debug, Default)]
 pub struct RecordedGrasps {
     /// The grasps.
     pub observations: Vec<Observation>,
-    /// How well their sensors are known.
+    /// Standard deviations of their sensors.
     pub trust: Trust,
-    /// What should be known of them, in sentences.
+    /// Remarks, in sentences.
     pub warnings: Vec<String>,
 }
 
-/// Why a stored trial cannot be taken.
+/// Error of reading a stored trial for a fit.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedGraspError {
     /// The store.
@@ -37,7 +37,7 @@ pub enum RecordedGraspError {
     Scene {
         /// The trial.
         id: TrialId,
-        /// What is wrong.
+        /// Cause.
         cause: SceneError,
     },
     /// Its object cannot be loaded.
@@ -45,14 +45,14 @@ pub enum RecordedGraspError {
     Object {
         /// The trial.
         id: TrialId,
-        /// What is wrong.
+        /// Cause.
         cause: ObjectError,
     },
 }
 
 impl RecordedGrasps {
-    /// Reads a trial. The fit begins at `gripper`, or else at the trial's own; `calibrations` are used instead of the newest of
-    /// each part.
+    /// Reads a trial. The fit begins at `gripper`, or else at the trial's own; `calibrations` are used instead of the
+    /// newest of each part.
     pub fn add(
         &mut self,
         store: &Store,
@@ -61,14 +61,14 @@ impl RecordedGrasps {
         calibrations: &[CalibrationId],
     ) -> Result<(), RecordedGraspError> {
         let trial = store.load(id)?;
-        // What was recorded elsewhere has no scene of its own.
+        // Imported trials have no scene of their own.
         let own = match trial.info.scene.is_empty() {
             true => Scene::default(),
             false => Scene::from_toml(&trial.info.scene).map_err(|cause| RecordedGraspError::Scene { id, cause })?,
         };
         let mut scene = own.clone();
         if let Some(gripper) = gripper {
-            // What was grasped and how is the trial's.
+            // Object and pose are the trial's.
             scene.gripper = gripper.clone();
         }
         let empty = trial.info.object == EMPTY;
@@ -76,7 +76,7 @@ impl RecordedGrasps {
             if empty { None } else { own.load_object().map_err(|cause| RecordedGraspError::Object { id, cause })? };
         if object.is_some() && !own.holds_object() {
             self.warnings.push(format!(
-                "trial {id} grasps something that can move: presses against what is held in place tell more"
+                "trial {id} grasps an object that can move: presses against a fixed object are more informative"
             ));
         }
         let programme = Observation::line_of(&own);
@@ -96,7 +96,7 @@ impl RecordedGrasps {
 }
 
 impl Trust {
-    /// How well calibrations know the gain of their parts: what their points say, and no better than parts of these kinds
+    /// Standard deviations of the gains: from the calibration's interval, and no better than parts of these kinds
     /// repeat.
     fn take(&mut self, serving: &Serving) {
         const HALF: f64 = 1.96;
@@ -105,8 +105,8 @@ impl Trust {
                 true => (&mut self.strip_gain, STRIP_REPEATS),
                 false => (&mut self.pad_gain, PAD_REPEATS),
             };
-            let told = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
-            gains[*sensor as usize % 2] = told.max(usual);
+            let deviation = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
+            gains[*sensor as usize % 2] = deviation.max(usual);
         }
     }
 }

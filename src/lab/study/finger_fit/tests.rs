@@ -6,7 +6,7 @@ use palpate_sim::gripper::{Side, TorquePoint};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::board::{Board, Reading, Sensor};
-use palpate_tactile::calibration::{Calibration, Input, Kind, Point, Readout, Record, plan};
+use palpate_tactile::calibration::{Calibration, Input, Point, Readout, Record, SensorKind, plan};
 use palpate_tactile::electronics::{Converter, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::{PressureArea, SensorLayout, Sensors, Signals};
 use rand::{RngExt, SeedableRng};
@@ -50,7 +50,7 @@ fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
 }
 
 fn observed(name: &str, signals: Signals, scene: &Scene, object: Option<ObjectModel>) -> Observation {
-    // What the fit is told: everything but the finger.
+    // The fit knows everything but the finger.
     let scene = Scene { gripper: Gripper::default(), ..scene.clone() };
     Observation { name: name.to_owned(), signals, line: Observation::line_of(&scene), scene, object }
 }
@@ -96,7 +96,7 @@ impl Box4 {
     }
 
     fn calibrate(&mut self, sensor: Sensor) -> Calibration {
-        let kind = Kind::of(sensor);
+        let kind = SensorKind::of(sensor);
         let mut point = |stimulus: f64| {
             let (kappa, force) =
                 if sensor.is_flex() { (stimulus / StripPart::ACTIVE_LENGTH, 0.0) } else { (0.0, stimulus) };
@@ -109,7 +109,7 @@ impl Box4 {
         Calibration::fit(Record { part, kind, input, points, bending: None, note: String::new() }).expect("sound")
     }
 
-    /// What a board reports of clean signals, and what its calibrations make of that.
+    /// Clean signals through a board's converter and its calibrations.
     fn through(&mut self, clean: &Signals) -> Signals {
         let calibrations = Sensor::ALL.map(|sensor| (sensor, self.calibrate(sensor)));
         let readings: Vec<Reading> = (0..clean.len())
@@ -135,14 +135,19 @@ fn truths() -> [f64; 7] {
 }
 
 #[test]
-fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FitError> {
+fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FingerFitError> {
     let truth = scene(&hidden());
     let close = observed("close", clean(&truth, None), &truth, None);
-    let heard = Cell::new(0.0);
-    let watch = FitWatch { progress: &|steps| heard.set(steps), stop: &AtomicBool::new(false) };
+    let steps_seen = Cell::new(0.0);
+    let watch = FitWatch { progress: &|steps| steps_seen.set(steps), stop: &AtomicBool::new(false) };
     let fit = fit_finger_watched(&[close], &Trust::default(), &watch)?;
-    assert!(heard.get() > 1.0 && heard.get() <= f64::from(fit.steps), "{} of {} steps", heard.get(), fit.steps);
-    // Both fingers over all of the recording, and as far off as is told.
+    assert!(
+        steps_seen.get() > 1.0 && steps_seen.get() <= f64::from(fit.steps),
+        "{} of {} steps",
+        steps_seen.get(),
+        fit.steps
+    );
+    // Both fingers over all of the recording, with the reported RMS error.
     assert_eq!(fit.courses.iter().map(|c| (c.side, c.t_s.len())).collect::<Vec<_>>(), Side::BOTH.map(|s| (s, 80)));
     let off = fit.courses.iter().flat_map(|c| c.recorded.iter().zip(&c.fitted).map(|(a, b)| (a - b) * (a - b)));
     let rms = (off.sum::<f64>() / 160.0).sqrt();
@@ -150,7 +155,7 @@ fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FitError> {
     for (estimate, truth) in fit.estimates.iter().zip(truths()) {
         assert!((estimate.value / truth - 1.0).abs() < 0.03, "{estimate:?} instead of {truth}");
     }
-    // But a close alone cannot know this well, and says so.
+    // A close alone cannot determine this well; the result shows it.
     assert!(fit.estimates[0].known == Known::Roughly && fit.estimates[6].known == Known::Well, "{:?}", fit.estimates);
     assert!(fit.remarks.iter().any(|r| r.contains("weight of the finger, 30.0 g")), "{:?}", fit.remarks);
     assert!(fit.remarks.iter().any(|r| r.contains("only be changed together")), "{:?}", fit.remarks);
@@ -158,7 +163,7 @@ fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FitError> {
 }
 
 #[test]
-fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent() -> Result<(), FitError> {
+fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent() -> Result<(), FingerFitError> {
     let (free, pressed) = (scene(&hidden()), {
         let mut scene = scene(&hidden());
         scene.set_object_fixed(true);
@@ -187,16 +192,16 @@ fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent(
 }
 
 #[test]
-fn a_fit_ends_when_it_is_told_to() {
+fn a_fit_can_be_cancelled() {
     let truth = scene(&hidden());
     let close = observed("close", clean(&truth, None), &truth, None);
     let stop = AtomicBool::new(false);
     let watch = FitWatch { progress: &|steps| stop.store(steps > 0.5, Ordering::Relaxed), stop: &stop };
-    assert_eq!(fit_finger_watched(&[close], &Trust::default(), &watch), Err(FitError::Stopped));
+    assert_eq!(fit_finger_watched(&[close], &Trust::default(), &watch), Err(FingerFitError::Stopped));
 }
 
 #[test]
-fn what_cannot_be_fitted_is_told() {
+fn unusable_recordings_are_refused_with_the_reason() {
     let truth = scene(&hidden());
     let signals = clean(&truth, None);
     let fault = |signals: Signals| {

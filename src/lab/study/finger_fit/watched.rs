@@ -1,9 +1,9 @@
-//! A fit that tells how far it is and can be given up.
+//! Progress and cancellation of a fit.
 
 use super::least_squares::Problem;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Who follows a fit.
+/// Observer of a fit.
 pub struct FitWatch<'a> {
     /// Hears how many steps of [`super::MOST_STEPS`] at most are done, and parts of one; few fits need them all.
     pub progress: &'a dyn Fn(f64),
@@ -38,7 +38,7 @@ impl<P: Problem> Problem for Watched<'_, P> {
         }
         let residuals = self.problem.residuals(x);
         self.looks += 1;
-        // A step looks at its end, and beside that along each parameter; so does what comes before the first one.
+        // A step evaluates the residuals at its end and along each parameter; so does the preparation of the first one.
         let in_steps = f64::from(self.looks) / (x.len() + 1) as f64 - 1.0;
         (self.watch.progress)(in_steps.max(0.0));
         residuals

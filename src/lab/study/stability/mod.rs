@@ -1,6 +1,6 @@
-//! Do hard cases stay numerically stable? A table of named cases, each with what must hold of it, run at every accuracy;
-//! and random scenes over wide ranges, each computed a second time with a quarter of the step, to count the answers that
-//! are wrong without a word.
+//! Do hard cases stay numerically stable? A table of named cases, each with what must hold of it, run at every
+//! accuracy; and random scenes over wide ranges, each computed a second time with a quarter of the step, to count the
+//! answers that are silently wrong.
 //!
 //! A case is one line in [`CASES`] and one function that measures. What it asserts is data: a measured value and its
 //! limit, so that the table can be printed, stored and tested alike.
@@ -15,16 +15,16 @@ use palpate_sim::physics::NotFinite;
 use palpate_sim::scene::{Accuracy, Timing};
 use serde::Serialize;
 
-/// How finely a case is computed.
+/// Accuracy or step length of a case.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setting {
+pub enum CaseAccuracy {
     /// One of the settings a user has.
     Accuracy(Accuracy),
     /// A step of its own (s).
     Step(f64),
 }
 
-impl Setting {
+impl CaseAccuracy {
     /// Its name in tables.
     pub fn name(self) -> String {
         match self {
@@ -53,8 +53,8 @@ impl Setting {
 /// Under what a case is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// How finely.
-    pub setting: Setting,
+    /// Accuracy or step length.
+    pub setting: CaseAccuracy,
     /// Every variant and the whole duration, rather than what a few seconds allow.
     pub thorough: bool,
 }
@@ -85,7 +85,7 @@ pub const ACCURACIES: [Accuracy; 5] =
 /// Of these, as many as a few seconds allow.
 pub const QUICK_ACCURACIES: &[Accuracy] = ACCURACIES.split_at(2).0;
 
-/// What a measured value must be.
+/// Limit of a measured value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
@@ -104,7 +104,7 @@ impl Limit {
         }
     }
 
-    /// How much of the limit a value uses up: one is all of it.
+    /// Share of the limit that a value uses; one is all of it.
     fn used(self, value: f64) -> f64 {
         match self {
             Self::AtMost(limit) if limit > 0.0 => value / limit,
@@ -123,18 +123,18 @@ impl std::fmt::Display for Limit {
     }
 }
 
-/// One thing that was measured.
+/// Measured value with its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    /// What, with its unit in brackets.
+pub struct Measurement {
+    /// Name, with its unit in brackets.
     pub what: String,
-    /// How much.
+    /// Value.
     pub measured: f64,
-    /// What it must be.
+    /// Limit.
     pub limit: Limit,
 }
 
-impl Finding {
+impl Measurement {
     fn at_most(what: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { what: what.into(), measured, limit: Limit::AtMost(limit) }
     }
@@ -143,13 +143,13 @@ impl Finding {
         Self { what: what.into(), measured, limit: Limit::AtLeast(limit) }
     }
 
-    /// True when it is as it must be.
+    /// True when the value keeps to its limit.
     pub fn holds(&self) -> bool {
         self.limit.holds(self.measured)
     }
 }
 
-/// Where a case is run.
+/// Accuracies and steps that a case is run at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settings {
     /// At every accuracy, and at further steps of its own (s).
@@ -158,17 +158,17 @@ pub enum Settings {
     Once,
 }
 
-/// What a case finds, or the number that left the range.
-pub type Findings = Result<Vec<Finding>, NotFinite>;
+/// Measurements of a case, or the number that is not finite.
+pub type Findings = Result<Vec<Measurement>, NotFinite>;
 
 /// A hard case.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     /// Its name in tables.
     pub name: &'static str,
-    /// What must hold, in a sentence.
+    /// Claim, in a sentence.
     pub claim: &'static str,
-    /// Where it is run.
+    /// Accuracies and steps.
     pub settings: Settings,
     /// Measures.
     pub measure: fn(&Conditions) -> Findings,
@@ -179,35 +179,37 @@ pub struct Case {
 pub struct CaseRow {
     /// The case.
     pub case: &'static str,
-    /// What must hold.
+    /// Claim.
     pub claim: &'static str,
     /// The setting.
     pub setting: String,
     /// All that was measured; the one that comes closest to its limit, or fails, is the first.
-    pub findings: Vec<Finding>,
-    /// What left the range of numbers, if anything did.
+    pub findings: Vec<Measurement>,
+    /// Body whose state is not finite; none if all stayed finite.
     pub not_finite: Option<String>,
-    /// True when everything is as it must be.
+    /// True when all limits hold.
     pub holds: bool,
 }
 
 impl Case {
-    /// The settings it is run at, out of the accuracies asked for.
-    pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<Setting> {
+    /// The settings it is run at, out of the chosen accuracies.
+    pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<CaseAccuracy> {
         /// Steps below this are for thorough runs (s).
         const FINE: f64 = 1e-3;
         match self.settings {
             Settings::EveryAccuracyAnd(further) => {
                 let further = further.iter().filter(|h| thorough || **h >= FINE);
-                let accuracies = accuracies.iter().map(|accuracy| Setting::Accuracy(*accuracy));
-                accuracies.chain(further.map(|h| Setting::Step(*h))).collect()
+                let accuracies = accuracies.iter().map(|accuracy| CaseAccuracy::Accuracy(*accuracy));
+                accuracies.chain(further.map(|h| CaseAccuracy::Step(*h))).collect()
             }
-            Settings::Once => accuracies.first().map(|accuracy| Setting::Accuracy(*accuracy)).into_iter().collect(),
+            Settings::Once => {
+                accuracies.first().map(|accuracy| CaseAccuracy::Accuracy(*accuracy)).into_iter().collect()
+            }
         }
     }
 
     /// Runs it at one setting.
-    pub fn run(&self, setting: Setting, thorough: bool) -> CaseRow {
+    pub fn run(&self, setting: CaseAccuracy, thorough: bool) -> CaseRow {
         let name = if self.settings == Settings::Once { "any".to_owned() } else { setting.name() };
         let outcome = (self.measure)(&Conditions { setting, thorough });
         let (mut findings, not_finite) = match outcome {
@@ -215,7 +217,7 @@ impl Case {
             Err(NotFinite { body }) => (Vec::new(), Some(body)),
         };
         findings.sort_by(|a, b| b.limit.used(b.measured).total_cmp(&a.limit.used(a.measured)));
-        let holds = not_finite.is_none() && findings.iter().all(Finding::holds);
+        let holds = not_finite.is_none() && findings.iter().all(Measurement::holds);
         CaseRow { case: self.name, claim: self.claim, setting: name, findings, not_finite, holds }
     }
 }
@@ -225,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_refuse_what_is_no_number() {
+    fn limits_refuse_nan() {
         assert!(Limit::AtMost(1.0).holds(1.0) && !Limit::AtMost(1.0).holds(1.1) && !Limit::AtMost(1.0).holds(f64::NAN));
         assert!(Limit::AtLeast(1.0).holds(2.0) && !Limit::AtLeast(1.0).holds(f64::NAN));
     }

@@ -1,8 +1,8 @@
-//! Random scenes over wide ranges: does every step converge, and is the answer right where nothing says otherwise?
+//! Random scenes over wide ranges: does every step converge, and is the answer right where it is not flagged?
 //!
-//! Each scene closes, holds and comes to an end; then it is computed again with a quarter of the step. Where the two end
-//! apart, the first was wrong. Where no flag had been raised, it was *silently* wrong. Some scenes have no right answer:
-//! their end depends on a push of a micrometre at the start, however fine the step; these are told apart.
+//! Each scene closes, holds and ends; then it is computed again with a quarter of the step. Where the two end apart,
+//! the first was wrong. Where no flag had been raised, it was *silently* wrong. Some scenes have no right answer: their
+//! end depends on a push of a micrometre at the start, however fine the step; these are counted apart.
 
 use glam::DVec3;
 use palpate_geometry::Primitive;
@@ -20,12 +20,12 @@ const DURATION: f64 = 1.5;
 const SAME_ANGLE: f64 = 0.02;
 /// Places farther apart than this are different answers (m).
 const SAME_PLACE: f64 = 2e-3;
-/// An object this far from its start, or this far below it, has left the hand, and it does not matter where it is (m).
+/// An object this far from its start, or this far below it, has left the hand; its position is ignored (m).
 const GONE: f64 = 0.15;
 const FALLEN: f64 = 0.03;
-/// How much more finely a scene is computed the second time.
+/// Refinement of the second computation.
 const FINER: f64 = 4.0;
-/// A push that must not matter (m).
+/// Perturbation of the start that must not change the result (m).
 const PUSH: f64 = 1e-6;
 
 /// A random scene.
@@ -33,7 +33,7 @@ const PUSH: f64 = 1e-6;
 pub struct RandomScene {
     /// Gripper, support and materials.
     pub scene: Scene,
-    /// What is grasped.
+    /// Grasped object.
     pub object: ObjectModel,
     /// Step (s).
     pub h: f64,
@@ -94,7 +94,7 @@ impl RandomScene {
         (DURATION / self.h).round() as u64
     }
 
-    /// What drives it at a time (s).
+    /// Drive at a time (s).
     pub fn drive(&self, t: f64) -> Drive {
         let rise = if self.closing > 0.0 { (t / self.closing).min(1.0) } else { 1.0 };
         let jump = if (0.6..0.7).contains(&t) { self.jump } else { 1.0 };
@@ -132,7 +132,7 @@ impl RandomScene {
     }
 }
 
-/// How far anything has gone in the last step: the object or a fingertip (m).
+/// Largest displacement in the last step, of the object or a fingertip (m).
 fn travel(run: &SteppedScene) -> f64 {
     let (joints, joint_count) = (&run.state.velocity, run.state.q.len());
     let n = joint_count / 2;
@@ -142,7 +142,7 @@ fn travel(run: &SteppedScene) -> f64 {
     tips.max(run.object_velocity().0.length()) * run.h
 }
 
-/// What a run came to.
+/// Result of a run.
 struct Ran {
     finite: bool,
     steps: u64,
@@ -157,7 +157,7 @@ struct Ran {
     /// Speed of the object at the end (m/s).
     speed: f64,
     q: Vec<f64>,
-    /// How far the object has moved; absent where it is gone.
+    /// Displacement of the object; absent where it is gone.
     place: Option<DVec3>,
 }
 
@@ -196,7 +196,7 @@ impl Ran {
     }
 }
 
-/// What is kept of a scene that has been computed twice.
+/// Summary of a scene computed twice.
 struct Judged {
     number: u64,
     /// Step (s).
@@ -222,7 +222,7 @@ impl Judged {
     }
 }
 
-/// From where on what is measured beside an answer says that it should not be trusted.
+/// Thresholds above which an answer is flagged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Flags {
     /// Largest outer friction residual of any step.
@@ -236,7 +236,7 @@ pub struct Flags {
 impl Flags {
     /// Suspects much.
     pub const SHARP: Self = Self { friction_residual: 0.5, static_residual: 3e-3, travel: 8e-3 };
-    /// What counts as flagged. Tuned on seed 1; see [`RandomReport::flags`] for what it catches.
+    /// Criterion of a flag. Tuned on seed 1; see [`RandomReport::flags`] for its recall.
     pub const CHOSEN: Self = Self { friction_residual: 2.0, static_residual: 0.02, travel: 16e-3 };
     /// Suspects little.
     pub const BLUNT: Self = Self { friction_residual: 10.0, static_residual: 0.1, travel: 64e-3 };
@@ -261,7 +261,7 @@ fn step_rows(judged: &[Judged]) -> Vec<StepRow> {
         .collect()
 }
 
-/// How well a flag tells wrong answers from right ones.
+/// Detection performance of a flag.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FlagRow {
     /// The flag and its limit.
@@ -275,7 +275,7 @@ pub struct FlagRow {
 /// Scenes up to a length of step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StepRow {
-    /// Longest step (s); the row before says the shortest.
+    /// Longest step (s); the row before holds the shortest.
     pub longest_s: f64,
     /// Scenes.
     pub scenes: usize,
@@ -290,7 +290,7 @@ pub struct StepRow {
 /// The longest steps of the rows (s): standard, draft, and beyond what a trial can have.
 const STEP_ROWS: [f64; 4] = [1.0 / 300.0, 1.0 / 150.0, 0.02, 0.06];
 
-/// What random scenes came to.
+/// Results of random scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RandomReport {
     /// Seed of the scenes.
@@ -315,7 +315,7 @@ pub struct RandomReport {
     pub friction_residual_p99: f64,
     /// Answers that change with the step.
     pub wrong: usize,
-    /// Of these, answers that a push of a micrometre changes too: there is no right one.
+    /// Of these, answers that a push of a micrometre changes too: no answer is right.
     pub no_answer: usize,
     /// Wrong answers, other than those, that no flag was raised for.
     pub silently_wrong: usize,
@@ -323,7 +323,7 @@ pub struct RandomReport {
     pub examples: Vec<u64>,
     /// The same by length of step.
     pub by_step: Vec<StepRow>,
-    /// The flags, singly and together, over all answers but those to which there is no right one.
+    /// The flags, singly and together, over all answers except those without a right one.
     pub flags: Vec<FlagRow>,
 }
 
@@ -360,7 +360,7 @@ impl RandomReport {
     }
 }
 
-/// True when anything says that an answer should not be trusted.
+/// True when any criterion flags an answer.
 fn raised(judged: &Judged, flags: &Flags) -> bool {
     let ran = &judged.coarse;
     !ran.finite
@@ -402,8 +402,8 @@ fn flag_rows(judged: &[Judged]) -> Vec<FlagRow> {
     rows
 }
 
-/// Computes random scenes, twice each, until they have taken `steps` steps together; `tell` hears how many of how many
-/// scenes are done. The result does not depend on the number of threads.
+/// Computes random scenes, twice each, until they have taken `steps` steps together; `tell` receives how many of how
+/// many scenes are done. The result does not depend on the number of threads.
 pub fn random_scenes(seed: u64, steps: u64, threads: usize, tell: &(dyn Fn(usize, usize) + Sync)) -> RandomReport {
     let (mut scenes, mut planned) = (0, 0);
     while planned < steps {
@@ -424,7 +424,7 @@ pub fn random_scenes(seed: u64, steps: u64, threads: usize, tell: &(dyn Fn(usize
     };
     let mut judged: Vec<Judged> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
-        // A fault in a thread is a fault of ours; it goes on as one.
+        // A panic in a thread is a bug: pass it on.
         let join = |thread: std::thread::ScopedJoinHandle<'_, _>| {
             thread.join().unwrap_or_else(|fault| std::panic::resume_unwind(fault))
         };

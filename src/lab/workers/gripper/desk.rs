@@ -381,7 +381,7 @@ impl Desk {
 
     fn hear_reading(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
-        let felt = connection.readout.felt(reading);
+        let felt = connection.readout.estimate(reading);
         let commanded = self.recording.as_ref().and_then(|recording| recording.controller().line_bar());
         // A board that tells its pressure knows better than whoever commands it.
         let line_bar = reading.line_bar.or(commanded);

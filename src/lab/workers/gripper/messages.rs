@@ -11,7 +11,7 @@ use palpate_device::serial::{LinkStatus, PortInfo};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
-use palpate_tactile::calibration::{Drift, Felt};
+use palpate_tactile::calibration::{Drift, SensorEstimate};
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -63,7 +63,7 @@ pub struct LatestReading {
     /// Counts by channel of the board.
     pub counts: Vec<Option<f32>>,
     /// Angle, curvature, force and pressure by the calibrations; nothing where there are none.
-    pub felt: Felt,
+    pub felt: SensorEstimate,
     /// Which sensors, in the order of `Sensor::ALL`, show more than they were calibrated with.
     pub beyond: [bool; 4],
     /// Line pressure: as commanded, or as the board reports it (bar).

@@ -3,7 +3,7 @@
 use crate::grasping::Row;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Reading;
-use palpate_tactile::calibration::Felt;
+use palpate_tactile::calibration::SensorEstimate;
 
 /// Above this rate readings are gathered (1/s).
 const MOST_HZ: f64 = 110.0;
@@ -38,7 +38,7 @@ impl Plotted {
     }
 
     /// The row of a reading: derived channels, then counts of the board.
-    pub(super) fn row(&self, reading: &Reading, felt: &Felt, line_bar: Option<f64>) -> Row {
+    pub(super) fn row(&self, reading: &Reading, felt: &SensorEstimate, line_bar: Option<f64>) -> Row {
         let derived = self.channels.iter().map(|channel| felt.of(channel).map_or(f32::NAN, |value| value as f32));
         let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
         let values = derived.chain((0..self.counts).map(count)).collect();
@@ -106,8 +106,11 @@ mod tests {
     fn slow_boards_are_plotted_reading_by_reading() {
         let mut plotted = Plotted::new(Vec::new(), 2);
         for k in 0..10u8 {
-            let rows =
-                plotted.push(plotted.row(&reading(0.02 * f64::from(k), f32::from(k)), &Felt::default(), Some(0.5)));
+            let rows = plotted.push(plotted.row(
+                &reading(0.02 * f64::from(k), f32::from(k)),
+                &SensorEstimate::default(),
+                Some(0.5),
+            ));
             assert_eq!(rows.len(), 1);
             assert_eq!((rows[0].values[0], rows[0].line_bar), (f32::from(k), 0.5));
             assert!(rows[0].values[1].is_nan());
@@ -120,7 +123,11 @@ mod tests {
         let mut rows = Vec::new();
         for k in 0..10_000u32 {
             let spike = if k == 5003 { 4095.0 } else { 100.0 };
-            rows.extend(plotted.push(plotted.row(&reading(1e-3 * f64::from(k), spike), &Felt::default(), None)));
+            rows.extend(plotted.push(plotted.row(
+                &reading(1e-3 * f64::from(k), spike),
+                &SensorEstimate::default(),
+                None,
+            )));
         }
         assert!((980..=1010).contains(&rows.len()), "{}", rows.len());
         assert!(rows.windows(2).all(|pair| pair[0].t_s < pair[1].t_s));

@@ -1,11 +1,11 @@
-//! Creep: a joint under lasting load goes on yielding, as silicone does. A standard linear solid in every joint:
+//! Creep: a joint under lasting load keeps yielding, as silicone does. A standard linear solid in every joint:
 //!
 //! ```text
 //!   torque = (1 - s) k q  +  s k e        e' = q' - e / tau
 //!            spring          spring and dashpot in series (Maxwell), e the strain of its spring
 //! ```
 //!
-//! k is the stiffness at once, (1 - s) k what is left of it in the end; s and tau are the finger's `creep_share` and
+//! k is the stiffness at once, (1 - s) k the final stiffness; s and tau are the finger's `creep_share` and
 //! `creep_time`. Under a constant torque T, and at a held angle q0,
 //!
 //! - creep       q = T / ((1 - s) k) (1 - s exp(-(1 - s) t / tau))
@@ -22,7 +22,7 @@ use crate::gripper::Finger;
 use palpate_geometry::units::three_digits;
 
 pub(super) const RULE: Rule = Rule {
-    about: "Joints under lasting load go on yielding, as silicone does.",
+    about: "Joints under lasting load keep yielding, as silicone does.",
     number: "hold time / relaxation time",
     threshold: 0.1, // by then a tenth of the share that relaxes has done so: a hundredth of the stiffness
     ruling,
@@ -77,7 +77,7 @@ impl Relaxation {
         q + h * rate - (a * (q - crept) + b * rate)
     }
 
-    /// What is missing of the elastic energy k q² / 2 of a joint that has not crept (J).
+    /// Elastic energy k q² / 2 of a joint without creep, less that of the crept joint (J).
     pub(in crate::physics) fn energy_lost(&self, q: f64, crept: f64) -> f64 {
         0.5 * self.stiffness * (q * q - (q - crept) * (q - crept))
     }

@@ -1,29 +1,13 @@
-//! Finger against finger: the strands of each pad meet the other finger's skin.
+//! Finger against finger: the contact springs of each pad meet the other finger's skin; see `physics/finger_pair.rs`.
 //!
-//! Two pads that press on each other are two strands in series, and every place of contact is found twice, once from
-//! either side. A strand that overlaps the other skin by x is therefore given half the force at half the compression:
-//!
-//! ```text
-//!   f(x) = 1/2 f_{k,H}(x / 2) = f_{k/4, 2H}(x)          exactly, for the linear and the neo-Hookean law
-//! ```
-//!
-//! so that both sides together press with f_{k,H}(x / 2), as one pad does that is pushed x / 2 into a rigid plane midway.
-//! Neither finger is preferred: a mirrored scene stays mirrored. Forces act on both fingers at the same point.
-//!
-//! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
-//! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its strands. Both fingers bend in one plane, so that nothing
-//! moves across.
-//!
-//! Where `auto` finds that the pads cannot meet, a guard still looks how far the pads stand out towards each other. That
-//! is cheap, and it is also what keeps apart fingers from being searched when the effect is on.
+//! Where `auto` finds that the pads cannot meet, a guard still computes how far they protrude towards each other. The
+//! guard is cheap; with the effect on, it also skips the search while the fingers are apart.
 
 use super::situation::Situation;
 use super::{Rule, Ruling, ratio};
 use crate::frame::Plan;
-use crate::gripper::{BentFinger, FingerPlane, SegmentPose};
-use crate::physics::model::Model;
+use crate::gripper::BentFinger;
 use crate::scene::{Effect, Setting};
-use glam::{DVec2, DVec3};
 use palpate_geometry::units::mm;
 
 pub(super) const RULE: Rule = Rule {
@@ -55,7 +39,7 @@ fn ruling(situation: &Situation<'_>) -> Ruling {
     Ruling { possible: true, number: ratio(reach, room), facts }
 }
 
-/// How far the skin of a freely bending finger gets inward on its way to the programme's peak (m).
+/// Largest inward reach of a freely bending finger's skin up to the programme's peak (m).
 fn reach(situation: &Situation<'_>) -> f64 {
     let finger = situation.finger();
     let limit = finger.curvature_limit * finger.segment_length();
@@ -69,14 +53,14 @@ fn reach(situation: &Situation<'_>) -> f64 {
     (0..=STAGES).map(furthest).fold(0.0, f64::max)
 }
 
-/// Whether pads are looked at for contact with each other.
+/// Treatment of contact between the fingers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::physics) enum FingerContact {
-    /// They pass through each other, because the scene says so.
+    /// Fingers pass through each other, as set in the scene.
     Never,
-    /// They should not meet; when they come near all the same, they do touch, and the trial says so.
+    /// No contact expected; it is turned on if they come near each other, with a note in the trial.
     Guarded,
-    /// They touch.
+    /// Contact is computed.
     Always,
 }
 
@@ -87,164 +71,5 @@ impl FingerContact {
             Some(effect) if effect.setting == Setting::Auto.name() => Self::Guarded,
             _ => Self::Never,
         }
-    }
-}
-
-/// Strand of a pad against another strand like it, as seen from one of them: small-strain stiffness (N/m) and rest
-/// length (m). See the top of this file.
-pub(in crate::physics) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
-    (0.25 * stiffness, 2.0 * height)
-}
-
-/// How far each finger stands out inward from its own neutral axis when straight (m).
-#[derive(Clone, Copy, Debug)]
-pub(in crate::physics) struct Fronts([f64; 2]);
-
-impl Fronts {
-    pub(in crate::physics) fn new(model: &Model, segments: &[SegmentPose]) -> Self {
-        let n = model.chain.joints;
-        Self([0, 1].map(|finger| {
-            let own = &segments[finger * (n + 1)..(finger + 1) * (n + 1)];
-            own.iter().zip(&model.chain.lengths).map(|(s, l)| front(model, s, *l)).fold(f64::NEG_INFINITY, f64::max)
-        }))
-    }
-
-    /// True where this segment of a finger may come within `margin` (m) of any of the other finger.
-    pub(in crate::physics) fn may_meet(
-        &self,
-        model: &Model,
-        finger: usize,
-        segment: (&SegmentPose, f64),
-        margin: f64,
-    ) -> bool {
-        front(model, segment.0, segment.1) + self.0[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
-    }
-
-    /// True where any of one finger may come within `margin` (m) of any of the other.
-    pub(in crate::physics) fn are_near(&self, model: &Model, margin: f64) -> bool {
-        self.0[0] + self.0[1] + margin > 2.0 * model.planes[0].half_gap
-    }
-}
-
-/// Most inward point of a segment, pad and bellows included (m).
-fn front(model: &Model, segment: &SegmentPose, length: f64) -> f64 {
-    let faces = model.skin.thickness * segment.inward().x;
-    let back = -model.skin.back * segment.inward().x;
-    segment.start.x + (length * segment.along.x).max(0.0) + faces.max(back)
-}
-
-/// A finger as the other one meets it.
-pub(in crate::physics) struct OtherFinger<'a> {
-    model: &'a Model,
-    plane: FingerPlane,
-    segments: &'a [SegmentPose],
-}
-
-/// A point seen from a finger.
-struct Place {
-    /// The nearest segment.
-    segment: usize,
-    /// Arc length from the tip, negative before it (m).
-    beyond_tip: f64,
-    /// Height above the neutral axis, towards the inner side (m).
-    height: f64,
-    /// Direction in which the height grows.
-    up: DVec2,
-}
-
-impl<'a> OtherFinger<'a> {
-    /// The finger opposite to `finger`.
-    pub(in crate::physics) fn opposite(model: &'a Model, segments: &'a [SegmentPose], finger: usize) -> Self {
-        let (other, n) = (1 - finger, model.chain.joints);
-        let segments = &segments[other * (n + 1)..(other + 1) * (n + 1)];
-        Self { model, plane: model.planes[other], segments }
-    }
-
-    /// A point of the gripper frame in the finger's plane.
-    fn in_plane(&self, p: DVec3) -> DVec2 {
-        DVec2::new(self.plane.sign * p.x + self.plane.half_gap, -p.z)
-    }
-
-    fn place(&self, p: DVec3) -> Place {
-        let p = self.in_plane(p);
-        let (lengths, last) = (&self.model.chain.lengths, self.segments.len() - 1);
-        let mut nearest = (f64::INFINITY, 0, 0.0, DVec2::ZERO);
-        for (j, segment) in self.segments.iter().enumerate() {
-            let from_start = p - segment.start;
-            let along = from_start.dot(segment.along);
-            // The first segment goes on into the palm, the last one beyond the tip.
-            let low = if j == 0 { f64::NEG_INFINITY } else { 0.0 };
-            let high = if j == last { f64::INFINITY } else { lengths[j] };
-            let within = along.clamp(low, high);
-            let offset = from_start - segment.along * within;
-            let squared = offset.length_squared();
-            if squared < nearest.0 {
-                nearest = (squared, j, within, offset);
-            }
-        }
-        let (squared, segment, along, offset) = nearest;
-        let inward = self.segments[segment].inward();
-        let side = if offset.dot(inward) < 0.0 { -1.0 } else { 1.0 };
-        let size = squared.sqrt();
-        // On the axis itself the offset has no direction.
-        let up = if size > 1e-12 { offset * (side / size) } else { inward };
-        let remaining: f64 = lengths[segment..].iter().sum();
-        Place { segment, beyond_tip: along - remaining, height: side * size, up }
-    }
-
-    /// How far a point lies beyond the core of the rounded box, along the finger and away from its middle (m).
-    fn excess(&self, place: &Place, across: f64) -> (f64, f64, bool) {
-        let skin = &self.model.skin;
-        let radius = self.model.strands.radius;
-        let front = place.height - (skin.height(across) - radius);
-        let back = -place.height - (skin.back - radius).max(0.0);
-        (place.beyond_tip + skin.last_row, front.max(back), front >= back)
-    }
-
-    /// Distance of a point from the skin (m), negative inside.
-    pub(in crate::physics) fn distance(&self, p: DVec3) -> f64 {
-        let (along, away, _) = self.excess(&self.place(p), p.y);
-        let outside = along.max(0.0).hypot(away.max(0.0));
-        outside + along.max(away).min(0.0) - self.model.strands.radius
-    }
-
-    /// Outward normal of the skin nearest to a point.
-    pub(in crate::physics) fn normal(&self, p: DVec3) -> DVec3 {
-        let place = self.place(p);
-        let (along, away, in_front) = self.excess(&place, p.y);
-        let ahead = self.segments[place.segment].along;
-        let up = if in_front { place.up } else { -place.up };
-        let direction = match (along > 0.0, away > 0.0) {
-            (true, true) => (ahead * along + up * away).normalize_or(up),
-            (true, false) => ahead,
-            (false, true) => up,
-            (false, false) => {
-                if along > away {
-                    ahead
-                } else {
-                    up
-                }
-            }
-        };
-        self.plane.direction(direction)
-    }
-
-    /// The segment that a point touches.
-    pub(in crate::physics) fn segment(&self, p: DVec3) -> usize {
-        self.place(p).segment
-    }
-
-    /// The taxel that a point of the skin lies on; `None` on the bellows behind the pad.
-    pub(in crate::physics) fn taxel(&self, p: DVec3) -> Option<usize> {
-        let place = self.place(p);
-        let skin = &self.model.skin;
-        if place.height < 0.0 {
-            return None;
-        }
-        let length: f64 = self.model.chain.lengths.iter().sum();
-        let cell = |share: f64, count: usize| ((share * count as f64).max(0.0) as usize).min(count - 1);
-        let row = cell((place.beyond_tip + length) / length, skin.rows);
-        let column = cell(p.y / skin.width + 0.5, skin.columns);
-        Some(row * skin.columns + column)
     }
 }

@@ -1,4 +1,5 @@
-//! The object moves. Six more unknowns, and the reason why a real grasp is easier to recognise: the object aligns itself.
+//! The object moves. Six more unknowns, and the reason why a real grasp is easier to recognise: the object aligns
+//! itself.
 
 use super::situation::Situation;
 use super::{Rule, Ruling, ratio};
@@ -7,7 +8,7 @@ use palpate_geometry::units::three_digits;
 pub(super) const RULE: Rule = Rule {
     about: "The object moves when it is pushed, instead of being held in place.",
     number: "grip force / weight",
-    threshold: 0.0, // however weak the grip: whether the object is held is the user's to say
+    threshold: 0.0, // however weak the grip: the user decides whether the object is held
     ruling,
 };
 

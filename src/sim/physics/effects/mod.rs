@@ -1,7 +1,7 @@
-//! Which physical effects are simulated: one file per effect, one line each in [`rule_of`].
+//! Physical effects: one file per effect, one line each in [`rule_of`].
 //!
 //! An effect that is left to `auto` is decided once, when the scene is built: it is on where it is possible at all and
-//! one dimensionless number, which says how much the scene calls for it, lies above a threshold. What was decided and
+//! one dimensionless number, defined by the effect's rule, lies above a threshold. The decision and
 //! why is the [`Plan`], which is stored with the trial. A step reads only what the plan has made of the model; an
 //! effect that is off costs it nothing and leaves no trace.
 //!
@@ -20,7 +20,7 @@ mod situation;
 mod support;
 
 pub(super) use creep::Relaxation;
-pub(super) use finger_contact::{FingerContact, Fronts, OtherFinger, in_series};
+pub(super) use finger_contact::FingerContact;
 pub(super) use pneumatic_lag::{Chamber, went_on};
 use situation::Situation;
 
@@ -29,23 +29,23 @@ use crate::frame::{Plan, PlannedEffect};
 use crate::objects::ObjectModel;
 use crate::scene::{Effect, Scene, Setting};
 
-/// What is fixed about an effect.
+/// Rule that decides whether an effect is simulated.
 pub struct Rule {
-    /// What it is, in a sentence.
+    /// Description, one sentence.
     pub about: &'static str,
-    /// What its number is the ratio of, in words.
+    /// Definition of its number as a ratio.
     pub number: &'static str,
     /// `auto` means on where the number is above this.
     pub threshold: f64,
-    /// What a scene makes of it.
+    /// Evaluation for a scene.
     ruling: fn(&Situation<'_>) -> Ruling,
 }
 
-/// What a scene makes of an effect.
+/// Evaluation of an effect for a scene.
 struct Ruling {
-    /// Whether it can occur at all.
+    /// True where the effect can occur at all.
     possible: bool,
-    /// How much the scene calls for it.
+    /// Dimensionless number that is compared with the threshold.
     number: f64,
     /// The facts, with numbers.
     facts: String,
@@ -90,13 +90,13 @@ fn planned(effect: Effect, situation: &Situation<'_>) -> PlannedEffect {
     let reason = if setting == Setting::Auto || on == called_for {
         facts
     } else {
-        format!("the scene wants it {}; {facts}", setting.name())
+        format!("set to {} in the scene; {facts}", setting.name())
     };
     let (name, setting) = (effect.name().to_owned(), setting.name().to_owned());
     PlannedEffect { name, setting, on, number, threshold: rule.threshold, reason }
 }
 
-/// Ratios beyond this are told as this: a stored number has to be finite.
+/// Upper bound of a ratio: a stored number has to be finite.
 const LARGEST_NUMBER: f64 = 1e9;
 
 /// a / b for two sizes that are not negative, finite whatever b is.
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn the_setting_overrules_the_number_and_the_plan_says_so() {
+    fn the_setting_overrules_the_number_and_the_plan_gives_the_reason() {
         let mut scene = Scene::default();
         let made = |scene: &Scene| {
             let plan = plan(scene, None, &Placement::new(scene, None));
@@ -122,16 +122,16 @@ mod tests {
             plan.effects.into_iter().find(|e| e.name == "finger-gravity").expect("registered")
         };
         let auto = made(&scene);
-        assert!(auto.on && auto.number > auto.threshold && !auto.reason.contains("wants"), "{auto:?}");
+        assert!(auto.on && auto.number > auto.threshold && !auto.reason.contains("set to"), "{auto:?}");
         scene.effects.set(Effect::FingerGravity, Setting::Off);
         let off = made(&scene);
-        assert!(!off.on && off.number == auto.number && off.reason.contains("wants it off"), "{off:?}");
+        assert!(!off.on && off.number == auto.number && off.reason.contains("set to off"), "{off:?}");
         scene.effects.set(Effect::FingerGravity, Setting::On);
-        assert_eq!(made(&scene).reason, auto.reason, "what is on anyhow needs no word about who wanted it");
+        assert_eq!(made(&scene).reason, auto.reason, "a setting that changes nothing is not mentioned");
     }
 
     #[test]
-    fn every_effect_is_told_in_words_with_its_numbers() {
+    fn every_effect_is_described_with_its_numbers() {
         for effect in Effect::ALL {
             let rule = rule_of(*effect);
             assert!(rule.about.ends_with('.') && rule.number.contains('/'), "{}", effect.name());

@@ -11,7 +11,7 @@ use palpate_geometry::units::three_digits;
 pub(super) const RULE: Rule = Rule {
     about: "The chambers take time to fill and to empty.",
     number: "filling time / sample interval",
-    threshold: 1.0, // quicker than a sample nobody sees it
+    threshold: 1.0, // invisible if quicker than a sample
     ruling,
 };
 
@@ -48,8 +48,8 @@ impl Chamber {
     }
 }
 
-/// Pressure (bar) after `share` as much time again, where it has gone from `before` to `now` towards `line`: no straight
-/// line but the same exponential, so that a step made of stages is as exact as a single one.
+/// Pressure (bar) after `share` as much time again, where it has gone from `before` to `now` towards `line`: no
+/// straight line but the same exponential, so that a step made of stages is as exact as a single one.
 pub(in crate::physics) fn went_on(before: f64, now: f64, line: f64, share: f64) -> f64 {
     let left = (now - line) / (before - line);
     if left > 0.0 && left < 1.0 { line + (now - line) * left.powf(share) } else { now }
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_goes_on_stays_on_its_exponential() {
+    fn extrapolation_follows_the_exponential() {
         let chamber = chamber(0.1);
         let (before, line) = (0.2, 1.0);
         let now = chamber.filled(before, line, 0.03);

@@ -1,4 +1,4 @@
-//! What effects are decided from: the scene, the object, where both stand, and the few quantities several effects need.
+//! Inputs of the effect rules: scene, object, placement, and the few quantities that several effects need.
 
 use crate::gripper::{Finger, Gripper};
 use crate::objects::ObjectModel;

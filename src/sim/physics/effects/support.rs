@@ -8,7 +8,7 @@ use palpate_geometry::units::mm;
 pub(super) const RULE: Rule = Rule {
     about: "The table and the pedestal push back at the object and at the fingers.",
     number: "reach / distance of the support",
-    threshold: 0.97, // fingers do not stretch; 3 % to spare for the round ends of the strands at the tip
+    threshold: 0.97, // fingers do not stretch; 3 % to spare for the round ends of the contact springs at the tip
     ruling,
 };
 

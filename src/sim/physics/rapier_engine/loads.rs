@@ -1,5 +1,5 @@
 //! From points of contact to taxels. rapier's segments are rigid: they touch an object in a few points, wherever these
-//! happen to be found. What a skin would feel of such a force is spread as the pad's own law would spread it.
+//! happen to be found. Such a force is spread over the skin by the pad's own law.
 //!
 //! For every loaded segment the object is pushed on into the skin by a depth delta, the same for all its taxels, until
 //!
@@ -7,9 +7,9 @@
 //! sum over taxels  f_t(c_t + delta) = F
 //! ```
 //!
-//! with F rapier's force along the segment's inward axis, f_t the law of a strand and c_t the overlap of the undeformed
-//! skin with the object, negative where they are apart. Shear is shared out in proportion. The sum over a segment is
-//! rapier's force; where on the segment it acts is the pad's answer, not rapier's.
+//! with F rapier's force along the segment's inward axis, f_t the law of a contact spring and c_t the overlap of the
+//! undeformed skin with the object, negative where they are apart. Shear is shared out in proportion. The sum over a
+//! segment is rapier's force; where on the segment it acts is the pad's answer, not rapier's.
 
 use super::world::Touch;
 use crate::frame::TaxelLoad;
@@ -38,7 +38,7 @@ impl Skin {
         Self { grid, finger: finger.clone(), law, by_segment }
     }
 
-    /// Overlap of the undeformed skin over a taxel with what is `gap` away (m).
+    /// Overlap of the undeformed skin over a taxel with a surface at distance `gap` (m).
     fn overlap(&self, plane: &FingerPlane, segments: &[SegmentPose], taxel: usize, gap: &impl Fn(DVec3) -> f64) -> f64 {
         let (segment, along) = self.grid.place(taxel, &self.finger);
         let skin = segments[segment].point(along, self.grid.height(taxel));
@@ -50,7 +50,7 @@ impl Skin {
         (0..self.grid.count()).map(|taxel| self.overlap(plane, segments, taxel, gap)).fold(0.0, f64::max)
     }
 
-    /// What the taxels of one finger feel of forces on its segments.
+    /// Loads on the taxels of one finger, from the forces on its segments.
     pub(super) fn loads(
         &self,
         plane: &FingerPlane,
@@ -63,7 +63,7 @@ impl Skin {
         let mut loads = Vec::new();
         for ((segment, touches), taxels) in segments.iter().zip(touches).zip(&self.by_segment) {
             let [along, inward] = [segment.along, segment.inward()].map(|axis| plane.direction(axis));
-            // What touches behind the neutral axis, as at the end of the tip, no taxel feels.
+            // Contacts behind the neutral axis, as at the end of the tip, load no taxel.
             let axis = plane.point(segment.start, 0.0);
             let on_pad = |touch: &&Touch| (touch.point - axis).dot(inward) > 0.0;
             let force: DVec3 = touches.iter().filter(on_pad).map(|touch| touch.force).sum();
@@ -72,12 +72,12 @@ impl Skin {
                 continue;
             }
             let overlaps: Vec<f64> = taxels.iter().map(|taxel| self.overlap(plane, segments, *taxel, gap)).collect();
-            for (taxel, felt) in taxels.iter().zip(self.spread(taxels, &overlaps, pressing)) {
-                if felt > 0.0 {
-                    let share = felt / pressing;
+            for (taxel, normal) in taxels.iter().zip(self.spread(taxels, &overlaps, pressing)) {
+                if normal > 0.0 {
+                    let share = normal / pressing;
                     loads.push(TaxelLoad {
                         taxel: (first + taxel) as u16,
-                        normal: felt as f32,
+                        normal: normal as f32,
                         along: (share * force.dot(along)) as f32,
                         across: (share * force.y) as f32,
                     });
@@ -88,17 +88,17 @@ impl Skin {
         loads
     }
 
-    /// Forces of the strands (N) that add up to `total` (N).
+    /// Forces of the contact springs (N) that add up to `total` (N).
     fn spread(&self, taxels: &[usize], overlaps: &[f64], total: f64) -> Vec<f64> {
         let forces = |delta: f64| -> Vec<f64> {
-            let strand = |(taxel, overlap): (&usize, &f64)| {
+            let spring = |(taxel, overlap): (&usize, &f64)| {
                 self.law.force(self.grid.stiffness(*taxel), self.grid.height(*taxel), overlap + delta).0
             };
-            taxels.iter().zip(overlaps).map(strand).collect()
+            taxels.iter().zip(overlaps).map(spring).collect()
         };
         let sum = |delta: f64| forces(delta).iter().sum::<f64>();
         let mut low = -overlaps.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Every strand stiffens, so that doubling the depth at least doubles the force.
+        // Every contact spring stiffens, so that doubling the depth at least doubles the force.
         let mut reach = self.finger.length;
         while sum(low + reach) < total && reach.is_finite() {
             reach *= 2.0;
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_the_tip_feels_nothing() {
+    fn the_end_of_the_tip_loads_no_taxel() {
         assert!(plate_loads(DVec3::new(-0.1, 0.0, 1.0), 0.0, -0.002).is_empty());
     }
 }

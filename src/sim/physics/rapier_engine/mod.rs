@@ -2,7 +2,7 @@
 //! detection with Palpate's own step, and writes the same frames on the same clock.
 //!
 //! Fingers are multibody chains of rigid segments with springs from `set_spring` (springs made of motors do not
-//! converge), joint damping as the scene says, and the actuation torque as the rest angle of the springs. Numbers are
+//! converge), joint damping from the scene, and the actuation torque as the rest angle of the springs. Numbers are
 //! single precision, in units of 50 mm. Of each tick rapier makes four small steps of four sweeps.
 //!
 //! # What differs, and why
@@ -12,7 +12,7 @@
 //! | free bend | M / k | M / k to 1e-5 | nothing |
 //! | skin | compresses by millimetres, stiffening | rigid; overlap is pushed out | hold force 3 to 7 % higher, joints 0.05 to 0.15 degrees RMS apart |
 //! | friction | shear springs with a slip limit | sticks or slides | fixed objects: hold force 12 to 27 % lower, joints 0.2 to 0.3 degrees apart, since what touches first cannot yield along the skin |
-//! | tip | round strands | an edge with a chamfer | flat and small things are touched up to 50 ms later; lip balm, syringe and push button, thinner than 20 mm, end in another grasp or none |
+//! | tip | round contact springs | an edge with a chamfer | flat and small things are touched up to 50 ms later; lip balm, syringe and push button, thinner than 20 mm, end in another grasp or none |
 //! | contacts | some tens of taxels | one to four points on a segment | taxels: see `loads` |
 //! | cost | 10 to 20 ms | 160 to 250 ms | 4 s of a grasp |
 //!
@@ -32,20 +32,20 @@
 //! | 21 x 5 x 5 | -10.4 % | 7 ms | -14 % at Poisson's ratio 0.45, -19 % at 0.49, which is rubber's |
 //! | 41 x 5 x 5 | -6.1 % | 16 ms | |
 //!
-//! In metres the same beams from 21 x 3 x 3 on fly away at the speed limit, finite and without a word; solved by
-//! constraint rows instead, they come out 20 to 240 % too soft and keep swinging. Linear tetrahedra lock in bending and near
-//! incompressibility, so that a soft finger at 1 % would take some 10⁵ particles: they are no reference for a finger or
-//! for a soft object here, and Palpate does not use them.
+//! In metres the same beams from 21 x 3 x 3 on fly away at the speed limit, finite and without an error; solved by
+//! constraint rows instead, they come out 20 to 240 % too soft and keep swinging. Linear tetrahedra lock in bending and
+//! near incompressibility, so that a soft finger at 1 % would take some 10⁵ particles: they are no reference for a
+//! finger or for a soft object here, and Palpate does not use them.
 
 mod loads;
 mod world;
 
 use super::chain::{ChainModel, turning};
 use super::effects::plan;
-use super::engine::Engine;
+use super::engine::{Engine, SimulationError};
 use super::environment::Environment;
 use super::placement::Placement;
-use super::simulation::{Refinement, SimulationError};
+use super::simulation::Refinement;
 use super::step::NotFinite;
 use crate::frame::{Frame, Plan, Quality};
 use crate::gripper::{Actuation, FingerPlane, Phase, SegmentPose, Side};
@@ -56,11 +56,11 @@ use loads::Skin;
 use palpate_geometry::{DistanceField, Pose};
 use world::{Hand, Touch};
 
-/// Effects that this engine has or lacks whatever the scene says.
+/// Effects that this engine always or never has.
 const SETTLED: [(Effect, bool, &str); 4] = [
     (Effect::FingerInertia, true, "rapier's chains always have inertia"),
     (Effect::FingerContact, false, "rapier's fingers do not meet each other here"),
-    (Effect::PneumaticLag, false, "rapier is given the line pressure as it is"),
+    (Effect::PneumaticLag, false, "rapier follows the line pressure without lag"),
     (Effect::Creep, false, "rapier's springs do not creep"),
 ];
 
@@ -112,7 +112,7 @@ impl RapierSimulation {
             Some(_) => Accuracy::Standard,
             None => scene.solver.accuracy,
         };
-        let parts = if refinement == Refinement::Companion { 2 } else { 1 };
+        let parts = if refinement == Refinement::Refined { 2 } else { 1 };
         let clock = scene.timing.clock(accuracy).refined(parts);
         let gripper = &scene.gripper;
         let plan = simulated(plan(scene, object, &placement));
@@ -337,11 +337,11 @@ mod tests {
         let start = placement.world_from_object.expect("a ball").position.z;
         let risen = frames[29].world_from_object.expect("a ball").position.z - start;
         assert!(risen > 1e-3, "the ball rose by {risen} m");
-        let felt: DVec3 = simulation.hand.touches().iter().map(|touch| touch.force).sum();
+        let on_fingers: DVec3 = simulation.hand.touches().iter().map(|touch| touch.force).sum();
         let weight = ball.mass.mass * scene.world.gravity;
-        assert!((-felt.z / weight - 1.0).abs() < 0.01, "{felt} N carry {weight} N");
-        assert!(felt.truncate().length() < 0.02 * weight, "{felt}");
-        // What taxels feel is what segments feel.
+        assert!((-on_fingers.z / weight - 1.0).abs() < 0.01, "{on_fingers} N carry {weight} N");
+        assert!(on_fingers.truncate().length() < 0.02 * weight, "{on_fingers}");
+        // Taxels carry the same force as segments.
         let frame = simulation.frame();
         let squeeze: f64 = Side::BOTH.iter().map(|side| frame.normal_force(*side, 160)).sum();
         assert!(squeeze > 5.0 * weight && squeeze < 1.5, "{squeeze} N");
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_scene_gives_the_same_frames_and_a_copy_goes_on_alike() {
+    fn the_same_scene_gives_the_same_frames_and_a_copy_continues_alike() {
         let (scene, ball) = (Scene::default(), ball());
         let [mut a, mut b] = [(); 2].map(|()| RapierSimulation::new(&scene, Some(&ball)).0);
         assert_eq!(run_to(&mut a, &scene, 0.9), run_to(&mut b, &scene, 0.9));
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_the_range_of_numbers_is_named() {
+    fn a_body_that_is_not_finite_is_named() {
         let (mut simulation, _) = RapierSimulation::new(&Scene::default(), Some(&ball()));
         simulation.pull_object(DVec3::splat(1e300));
         let error = simulation.advance_by(1).expect_err("infinite");

@@ -1,7 +1,7 @@
 //! The scene as rapier3d's bodies: two multibody chains, the object, what it stands on.
 //!
 //! Everything is in the gripper frame, in rapier's own units: rapier and parry hold absolute tolerances made for bodies
-//! of about a metre, so that 50 mm are one unit of length here (what `length_unit` = 0.05 says, but for parry too).
+//! of about a metre, so that 50 mm are one unit of length here (like `length_unit` = 0.05, but for parry too).
 
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, Gripper, Side};
@@ -37,14 +37,14 @@ const CONTACT_FREQUENCY: f32 = 200.0;
 const CONTACT_DAMPING: f32 = 5.0;
 /// The angle of a revolute joint among the six coordinates of a joint.
 const HINGE: usize = 3;
-/// What is cut off the front edge of the tip (m), about what the round ends of Palpate's strands leave out: a sharp edge
-/// catches on a pedestal that a soft one slides over.
+/// Chamfer of the front edge of the tip (m), like the round ends of Palpate's contact springs: a sharp edge catches on
+/// a pedestal that a soft one slides over.
 const TIP_CHAMFER: f64 = 0.00125;
 /// A mesh whose hull is larger by less than this share is taken to be convex: the holes of a button are too small for a
 /// segment to enter, and a hull is found 20 times as fast as a mesh.
 const NEARLY_CONVEX: f64 = 0.1;
 
-/// Groups: what is in which, so that fingers meet neither themselves nor each other, as in Palpate's own engine.
+/// Collision groups: fingers meet neither themselves nor each other, as in Palpate's own engine.
 const FINGERS: Group = Group::GROUP_1;
 const OBJECT: Group = Group::GROUP_2;
 const SUPPORT: Group = Group::GROUP_3;
@@ -63,11 +63,11 @@ pub(super) struct Hand {
 /// A force on a segment, at one point of contact, in the gripper frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
-    /// Which of the 2 (N + 1) segments.
+    /// Index among the 2 (N + 1) segments.
     pub(super) link: usize,
-    /// Where (m).
+    /// Position (m).
     pub(super) point: DVec3,
-    /// What the segment feels (N).
+    /// Force on the segment (N).
     pub(super) force: DVec3,
 }
 
@@ -129,7 +129,7 @@ impl Hand {
     }
 
     fn add_finger(&mut self, gripper: &Gripper, chain: &ChainModel, side: Side, plan: &Plan) {
-        // Where either surface has no friction there is none.
+        // No friction where either surface has none.
         let friction = if plan.is_on(Effect::Friction.name()) { gripper.pad.friction } else { 0.0 };
         let gravity_scale = if plan.is_on(Effect::FingerGravity.name()) { 1.0 } else { 0.0 };
         let plane = gripper.plane(side);
@@ -230,8 +230,8 @@ impl Hand {
         self.object = Some(body);
     }
 
-    /// Sets the actuation torque on every joint of a finger (N m), as the rest angle tau / k of its springs: springs are
-    /// taken at the end of a step, torques would not be.
+    /// Sets the actuation torque on every joint of a finger (N m), as the rest angle tau / k of its springs: springs
+    /// are taken at the end of a step, torques would not be.
     pub(super) fn set_torque(&mut self, side: Side, torque: f64) {
         let (stiffness, rest) = ((self.stiffness * TORQUE) as f32, (torque / self.stiffness) as f32);
         for handle in &self.joints[side.index()] {
@@ -267,7 +267,7 @@ impl Hand {
         Some(palpate_geometry::Pose::new(position, rotation))
     }
 
-    /// What went beyond the range of numbers, for people: rapier takes such a body out of the world and goes on.
+    /// Display name of a body whose state is not finite: rapier disables such a body and continues.
     pub(super) fn not_finite(&self) -> Option<String> {
         for side in Side::BOTH {
             let lost = |handle: &RigidBodyHandle| !self.world.bodies[*handle].is_enabled();
@@ -322,7 +322,7 @@ impl Hand {
     }
 }
 
-/// How rapier is to solve, in steps of h (s).
+/// Solver settings of rapier for steps of h (s).
 fn parameters(h: f64) -> IntegrationParameters {
     let softness = SpringCoefficients::new(CONTACT_FREQUENCY, CONTACT_DAMPING);
     IntegrationParameters {
@@ -332,13 +332,13 @@ fn parameters(h: f64) -> IntegrationParameters {
         contact_softness: softness,
         static_contact_softness: softness,
         friction_model: FrictionModel::Coulomb,
-        // Contacts are found anew in every step: what is reused is up to 2.5 mm old.
+        // Contacts are found anew in every step: reused ones would be up to 2.5 mm old.
         contact_recycling: false,
         ..IntegrationParameters::default()
     }
 }
 
-/// Which segment a collider belongs to, counted from 1 over both fingers; 0 is for everything else.
+/// Segment that a collider belongs to, counted from 1 over both fingers; 0 for all others.
 fn user_data(side: Side, links_per_finger: usize, j: usize) -> u128 {
     (side.index() * links_per_finger + j + 1) as u128
 }
@@ -371,7 +371,8 @@ fn segment_shape(gripper: &Gripper, plane: &FingerPlane, reach: f64, chamfer: f6
     SharedShape::convex_hull(&corners)
 }
 
-/// A solid of the object as rapier's shape, and its place in the object's frame. A mesh that is not convex stays a mesh.
+/// A solid of the object as rapier's shape, and its place in the object's frame. A mesh that is not convex stays a
+/// mesh.
 fn part_shape(part: &SolidPart) -> Option<(SharedShape, Pose)> {
     match part {
         SolidPart::Primitive(shape, object_from_shape) => {

@@ -1,6 +1,6 @@
 //! Hard cases of contact.
 
-use super::super::{Conditions, Finding, Findings};
+use super::super::{Conditions, Findings, Measurement};
 use super::fingers::missed;
 use super::{FULL_TORQUE, bare, stepped, torque};
 use glam::DVec3;
@@ -33,21 +33,21 @@ pub(super) fn squeezed_masses(conditions: &Conditions) -> Findings {
             run.cover(1.5, ramp)?;
             let pulled = |t: f64| Drive { object_force: DVec3::Y * (pull * t.min(1.0)), ..torque(FULL_TORQUE) };
             run.cover(5.0, pulled)?;
-            // Of means over half a second, since what is held may still ring.
+            // Means over half a second, since a held object may still ring.
             let [early, late] = [mean_centre(&mut run, pulled(1.0))?, mean_centre(&mut run, pulled(1.0))?];
             let creep = (late - early).length() / 0.5;
             let moved = (run.object_centre() - start).length();
-            findings.push(Finding::at_most(format!("creep at {mass} kg [m/s]"), creep, 1e-6));
-            findings.push(Finding::at_most(format!("moved at {mass} kg [m]"), moved, 0.01));
+            findings.push(Measurement::at_most(format!("creep at {mass} kg [m/s]"), creep, 1e-6));
+            findings.push(Measurement::at_most(format!("moved at {mass} kg [m]"), moved, 0.01));
             let depth = run.deepest() / scene.gripper.pad.thickness;
-            findings.push(Finding::at_most(format!("depth over the pad's thickness at {mass} kg"), depth, 1.0));
+            findings.push(Measurement::at_most(format!("depth over the pad's thickness at {mass} kg"), depth, 1.0));
             findings.push(missed(&run));
         }
     }
     Ok(findings)
 }
 
-/// Where the object's centre of mass is on average over half a second (m).
+/// Mean position of the object's centre of mass over half a second (m).
 fn mean_centre(run: &mut SteppedScene, drive: Drive) -> Result<DVec3, NotFinite> {
     let steps = (0.5 / run.h).round().max(1.0) as u32;
     let mut sum = DVec3::ZERO;
@@ -72,8 +72,8 @@ pub(super) fn light_stiff_sticky(conditions: &Conditions) -> Findings {
             rest(SteppedScene::new(&scene, Some(&object), if conditions.thorough { 1e-4 } else { 5e-4 }))?;
         let (place, depth, missed) = rest(stepped(&scene, Some(&object), conditions))?;
         let apart = (place - reference).length();
-        findings.push(Finding::at_most("resting place apart from the reference [m]", apart, 5e-3));
-        findings.push(Finding::at_most("depth over the pad's thickness", depth / scene.gripper.pad.thickness, 1.0));
+        findings.push(Measurement::at_most("resting place apart from the reference [m]", apart, 5e-3));
+        findings.push(Measurement::at_most("depth over the pad's thickness", depth / scene.gripper.pad.thickness, 1.0));
         findings.push(missed);
     }
     Ok(findings)
@@ -104,9 +104,13 @@ pub(super) fn born_inside(conditions: &Conditions) -> Findings {
         }
         let bound = (2.0 * start / ball.mass.mass).sqrt();
         let at = format!("at E x {stiffer}");
-        findings.push(Finding::at_most(format!("exit speed over what the energy allows {at}"), fastest / bound, 1.0));
-        findings.push(Finding::at_least(format!("exit speed {at} [m/s]"), fastest, 0.01));
-        findings.push(Finding::at_most(format!("most energy over the first {at}"), most / start, 1.0 + 1e-9));
+        findings.push(Measurement::at_most(
+            format!("exit speed over what the energy allows {at}"),
+            fastest / bound,
+            1.0,
+        ));
+        findings.push(Measurement::at_least(format!("exit speed {at} [m/s]"), fastest, 0.01));
+        findings.push(Measurement::at_most(format!("most energy over the first {at}"), most / start, 1.0 + 1e-9));
         findings.push(missed(&run));
     }
     // A plate of 1 mm that the axis of the left finger has just come through: the finger goes back the way it came.
@@ -123,8 +127,8 @@ pub(super) fn born_inside(conditions: &Conditions) -> Findings {
         forward = forward.max(run.tip().0);
         most = most.max(run.energy());
     }
-    findings.push(Finding::at_most("way on through a plate [m]", forward, 0.0));
-    findings.push(Finding::at_most("most energy over the first at a plate", most / start, 1.0 + 1e-9));
+    findings.push(Measurement::at_most("way on through a plate [m]", forward, 0.0));
+    findings.push(Measurement::at_most("most energy over the first at a plate", most / start, 1.0 + 1e-9));
     findings.push(missed(&run));
     Ok(findings)
 }
@@ -146,8 +150,12 @@ pub(super) fn thrown_object(conditions: &Conditions) -> Findings {
             farthest = farthest.max(-run.object_centre().x - run.tip_sway());
         }
         let at = format!("at {speed} m/s");
-        findings.push(Finding::at_most(format!("beyond the finger's root {at} [m]"), farthest - run.half_gap(), 0.0));
-        findings.push(Finding::at_most(format!("most energy over the first {at}"), most / start, 1.0 + 1e-9));
+        findings.push(Measurement::at_most(
+            format!("beyond the finger's root {at} [m]"),
+            farthest - run.half_gap(),
+            0.0,
+        ));
+        findings.push(Measurement::at_most(format!("most energy over the first {at}"), most / start, 1.0 + 1e-9));
         findings.push(missed(&run));
     }
     Ok(findings)
@@ -175,11 +183,11 @@ pub(super) fn friction_extremes(conditions: &Conditions) -> Findings {
                 cone = cone.max(used / (mu * normal));
             }
         }
-        findings.push(Finding::at_least(format!("largest normal force at mu = {mu} [N]"), pressed, 0.1));
+        findings.push(Measurement::at_least(format!("largest normal force at mu = {mu} [N]"), pressed, 0.1));
         if mu == 0.0 {
-            findings.push(Finding::at_most("friction at mu = 0 [N]", dragged, 1e-12));
+            findings.push(Measurement::at_most("friction at mu = 0 [N]", dragged, 1e-12));
         } else {
-            findings.push(Finding::at_most(format!("friction over its cone at mu = {mu}"), cone, 1.05));
+            findings.push(Measurement::at_most(format!("friction over its cone at mu = {mu}"), cone, 1.05));
         }
         findings.push(missed(&run));
     }
@@ -202,17 +210,17 @@ pub(super) fn thin_things(conditions: &Conditions) -> Findings {
         scene.gripper.mount.offset = [0.0, 0.0007, -0.012];
         let object = ObjectModel::from_primitive(name, shape, 400.0, 0.6);
         let mut run = stepped(&scene, Some(&object), conditions);
-        let mut felt = 0.0f64;
+        let mut force = 0.0f64;
         for k in 0..(3.0 / conditions.h()) as usize {
             let t = k as f64 * conditions.h();
             run.step(&torque(2.0 * FULL_TORQUE * (t / 1.5).min(1.0)))?;
-            felt = felt.max(run.skin_forces().map(|force| force.normal).fold(0.0, f64::max));
+            force = force.max(run.skin_forces().map(|force| force.normal).fold(0.0, f64::max));
         }
         let depth = run.deepest() / scene.gripper.pad.thickness;
-        findings.push(Finding::at_least(format!("force felt on the {name} [N]"), felt, 0.01));
-        findings.push(Finding::at_most(format!("depth over the pad's thickness: {name}"), depth, 1.0));
+        findings.push(Measurement::at_least(format!("force on the {name} [N]"), force, 0.01));
+        findings.push(Measurement::at_most(format!("depth over the pad's thickness: {name}"), depth, 1.0));
         let across = run.tip().0 - run.half_gap();
-        findings.push(Finding::at_most(format!("tip beyond the {name} [m]"), across, 0.002));
+        findings.push(Measurement::at_most(format!("tip beyond the {name} [m]"), across, 0.002));
         findings.push(missed(&run));
     }
     Ok(findings)
@@ -230,5 +238,5 @@ pub(super) fn crushing_torque(conditions: &Conditions) -> Findings {
         deepest = deepest.max(run.deepest());
     }
     let pad = &scene.gripper.pad;
-    Ok(vec![Finding::at_most("depth over the pad's thickness", deepest / pad.thickness, 1.0), missed(&run)])
+    Ok(vec![Measurement::at_most("depth over the pad's thickness", deepest / pad.thickness, 1.0), missed(&run)])
 }

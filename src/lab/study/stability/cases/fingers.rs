@@ -1,6 +1,6 @@
 //! Hard cases of the fingers by themselves.
 
-use super::super::{Conditions, Finding, Findings};
+use super::super::{Conditions, Findings, Measurement};
 use super::{FULL_TORQUE, bare, stepped, torque};
 use palpate_geometry::Primitive;
 use palpate_sim::objects::ObjectModel;
@@ -19,7 +19,7 @@ pub(super) fn stiff_joints(conditions: &Conditions) -> Findings {
         }
         let want = 0.05 / run.joint_stiffness();
         let error = run.state.q.iter().map(|q| (q / want - 1.0).abs()).fold(0.0, f64::max);
-        findings.push(Finding::at_most(format!("error of the bend at k x {factor:e}"), error, 1e-3));
+        findings.push(Measurement::at_most(format!("error of the bend at k x {factor:e}"), error, 1e-3));
         findings.push(missed(&run));
     }
     Ok(findings)
@@ -39,8 +39,8 @@ pub(super) fn twentyfold_actuation(conditions: &Conditions) -> Findings {
     }
     // Bellows a hundred times as stiff as the joint give way by 4 % under this torque.
     Ok(vec![
-        Finding::at_most("largest joint angle at rest, over its limit", settled, 1.05),
-        Finding::at_most("largest joint angle on the way, over its limit", swing, 1.5),
+        Measurement::at_most("largest joint angle at rest, over its limit", settled, 1.05),
+        Measurement::at_most("largest joint angle on the way, over its limit", swing, 1.5),
         missed(&run),
     ])
 }
@@ -55,8 +55,8 @@ pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
     run.state.q[..10].fill(-0.06);
     run.state.q[10..].fill(-0.05);
     let start = run.energy();
-    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows what an error of it in every joint
-    // is worth when the springs are at their tightest.
+    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows what an error of it in every
+    // joint is worth when the springs are at their tightest.
     let tightest: f64 = run.state.q.iter().map(|q| q.abs()).sum();
     let allowed = 1e-6 + conditions.setting.tolerance() * scene.gripper.finger.joint_stiffness() * tightest;
     let (mut before, mut largest) = (start, 0.0f64);
@@ -67,8 +67,8 @@ pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
         before = now;
     }
     Ok(vec![
-        Finding::at_most("largest gain in one tick [J]", largest, allowed),
-        Finding::at_most("net gain [J]", before - start, 0.0),
+        Measurement::at_most("largest gain in one tick [J]", largest, allowed),
+        Measurement::at_most("net gain [J]", before - start, 0.0),
         missed(&run),
     ])
 }
@@ -97,14 +97,14 @@ pub(super) fn explicit_step(_conditions: &Conditions) -> Findings {
     let (reported_after, beyond) = swing(Stepping::Explicit, 1.05);
     let (_, convex) = swing(Stepping::Convex, 20.0);
     Ok(vec![
-        Finding::at_most("explicit at 0.95 x 2/omega_max: largest angle over the first", below, 20.0),
-        Finding::at_least("explicit at 1.05 x 2/omega_max: largest angle over the first", beyond, f64::INFINITY),
-        Finding::at_most("explicit at 1.05 x 2/omega_max: steps until reported", reported_after as f64, 3999.0),
-        Finding::at_most("convex at 20 x 2/omega_max: largest angle over the first", convex, 1.0),
+        Measurement::at_most("explicit at 0.95 x 2/omega_max: largest angle over the first", below, 20.0),
+        Measurement::at_least("explicit at 1.05 x 2/omega_max: largest angle over the first", beyond, f64::INFINITY),
+        Measurement::at_most("explicit at 1.05 x 2/omega_max: steps until reported", reported_after as f64, 3999.0),
+        Measurement::at_most("convex at 20 x 2/omega_max: largest angle over the first", convex, 1.0),
     ])
 }
 
 /// Steps that missed the solver's tolerance: never, in any hard case.
-pub(super) fn missed(run: &SteppedScene) -> Finding {
-    Finding::at_most("steps that missed the tolerance", run.missed as f64, 0.0)
+pub(super) fn missed(run: &SteppedScene) -> Measurement {
+    Measurement::at_most("steps that missed the tolerance", run.missed as f64, 0.0)
 }

@@ -1,18 +1,18 @@
-//! The hard cases: one line each, and a function that measures in one of the files beside.
+//! The hard cases: one line each, with a measuring function in one of the submodules.
 
 mod contact;
 mod fingers;
 mod motion;
 mod program;
 
-use super::{Case, Setting, Settings};
+use super::{Case, CaseAccuracy, Settings};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::{Drive, SteppedScene};
 use palpate_sim::scene::{Scene, SupportKind};
 
 /// At every accuracy and no step besides.
 const EVERY: Settings = Settings::EveryAccuracyAnd(&[]);
-/// What hard contact must bear beyond the accuracies (s).
+/// Further step lengths of the hard-contact cases (s).
 const WIDE: Settings = Settings::EveryAccuracyAnd(&[0.02, 2e-5]);
 
 /// All hard cases.
@@ -73,7 +73,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "thin things",
-        claim: "a 1 mm plate, a card edge-on and needles are felt and not crossed",
+        claim: "a 1 mm plate, a card edge-on and needles are touched and not crossed",
         settings: Settings::EveryAccuracyAnd(&[0.02]),
         measure: contact::thin_things,
     },
@@ -85,7 +85,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "resting masses",
-        claim: "0.1 g .. 100 kg on the pedestal, pulled at as on a slope, sink as far as the scene says and do not creep",
+        claim: "0.1 g .. 100 kg on the pedestal, pulled at as on a slope, sink as far as set in the scene and do not creep",
         settings: EVERY,
         measure: motion::resting_masses,
     },
@@ -134,7 +134,7 @@ const FULL_TORQUE: f64 = 0.06;
 /// A scene about to be stepped under the conditions of a case.
 fn stepped(scene: &Scene, object: Option<&ObjectModel>, conditions: &super::Conditions) -> SteppedScene {
     match conditions.setting {
-        Setting::Accuracy(accuracy) => SteppedScene::at(scene, object, conditions.h(), accuracy),
-        Setting::Step(h) => SteppedScene::new(scene, object, h),
+        CaseAccuracy::Accuracy(accuracy) => SteppedScene::at(scene, object, conditions.h(), accuracy),
+        CaseAccuracy::Step(h) => SteppedScene::new(scene, object, h),
     }
 }

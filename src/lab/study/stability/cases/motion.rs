@@ -1,6 +1,6 @@
 //! Hard cases of an object over long times: resting, held, in flight.
 
-use super::super::{Conditions, Finding, Findings};
+use super::super::{Conditions, Findings, Measurement};
 use super::fingers::missed;
 use super::{FULL_TORQUE, bare, stepped, torque};
 use glam::DVec3;
@@ -30,15 +30,15 @@ pub(super) fn resting_masses(conditions: &Conditions) -> Findings {
         run.cover(conditions.span(10.0), |_| pull)?;
         let slid = (run.object_centre() - early).length();
         let of = format!("of {mass} kg");
-        findings.push(Finding::at_most(
+        findings.push(Measurement::at_most(
             format!("sinking {of} over what is allowed"),
             -moved.z / scene.support.sink,
             1.1,
         ));
-        findings.push(Finding::at_least(format!("sinking {of} [m]"), -moved.z, 0.0));
-        findings.push(Finding::at_most(format!("creep {of} [m]"), moved.truncate().length(), 1e-9));
-        findings.push(Finding::at_most(format!("creep {of} on a slope [m]"), slid, 1e-7));
-        findings.push(Finding::at_most(format!("load {of} not carried"), (carried / weight - 1.0).abs(), 1e-5));
+        findings.push(Measurement::at_least(format!("sinking {of} [m]"), -moved.z, 0.0));
+        findings.push(Measurement::at_most(format!("creep {of} [m]"), moved.truncate().length(), 1e-9));
+        findings.push(Measurement::at_most(format!("creep {of} on a slope [m]"), slid, 1e-7));
+        findings.push(Measurement::at_most(format!("load {of} not carried"), (carried / weight - 1.0).abs(), 1e-5));
         findings.push(missed(&run));
     }
     Ok(findings)
@@ -54,8 +54,8 @@ pub(super) fn long_hold(conditions: &Conditions) -> Findings {
     run.cover(conditions.span(600.0), |_| torque(FULL_TORQUE))?;
     let drift = (run.object_centre() - place).length();
     Ok(vec![
-        Finding::at_most("drift [m]", drift, 1e-5),
-        Finding::at_most("change of energy [J]", (run.energy() - energy).abs(), 1e-6),
+        Measurement::at_most("drift [m]", drift, 1e-5),
+        Measurement::at_most("change of energy [J]", (run.energy() - energy).abs(), 1e-6),
         missed(&run),
     ])
 }
@@ -84,15 +84,19 @@ pub(super) fn free_flight(conditions: &Conditions) -> Findings {
         let passed = run.steps as f64 * conditions.h();
         let at = format!("at {turn} rad per step");
         let off = (run.object_centre() - start - way * passed).length();
-        findings.push(Finding::at_most(
+        findings.push(Measurement::at_most(
             format!("change of momentum {at}"),
             (after.0 - linear).length() / linear.length(),
             1e-9,
         ));
         let turned = (after.1 - angular).length() / angular.length();
-        findings.push(Finding::at_most(format!("change of angular momentum {at}"), turned, 1e-8));
-        findings.push(Finding::at_most(format!("spin over what the momentum allows {at}"), spin / fastest, 1.0 + 1e-9));
-        findings.push(Finding::at_most(format!("off the straight line {at} [m]"), off, 1e-9));
+        findings.push(Measurement::at_most(format!("change of angular momentum {at}"), turned, 1e-8));
+        findings.push(Measurement::at_most(
+            format!("spin over what the momentum allows {at}"),
+            spin / fastest,
+            1.0 + 1e-9,
+        ));
+        findings.push(Measurement::at_most(format!("off the straight line {at} [m]"), off, 1e-9));
         findings.push(missed(&run));
     }
     Ok(findings)

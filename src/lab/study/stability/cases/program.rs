@@ -1,6 +1,6 @@
 //! Hard cases of the program around the solver.
 
-use super::super::{Conditions, Finding, Findings, Setting};
+use super::super::{CaseAccuracy, Conditions, Findings, Measurement};
 use crate::grasping::grasp;
 use glam::DVec3;
 use palpate_geometry::Primitive;
@@ -11,8 +11,8 @@ use palpate_tactile::trial::Trial;
 pub(super) fn same_bytes(conditions: &Conditions) -> Findings {
     let mut scene = Scene::default();
     scene.solver.accuracy = match conditions.setting {
-        Setting::Accuracy(accuracy) => accuracy,
-        Setting::Step(_) => Accuracy::Standard,
+        CaseAccuracy::Accuracy(accuracy) => accuracy,
+        CaseAccuracy::Step(_) => Accuracy::Standard,
     };
     scene.timing.duration_s = conditions.span(4.0).max(0.8);
     let shapes =
@@ -32,9 +32,9 @@ pub(super) fn same_bytes(conditions: &Conditions) -> Findings {
         lost + pairs.filter(|(a, b)| a != b).count()
     };
     Ok(vec![
-        Finding::at_most("frames that differ in another thread", differing(&forth) as f64, 0.0),
-        Finding::at_most("frames that differ in another order", differing(&back) as f64, 0.0),
-        Finding::at_least("frames", once.iter().map(|t| t.frames.len()).sum::<usize>() as f64, 100.0),
+        Measurement::at_most("frames that differ in another thread", differing(&forth) as f64, 0.0),
+        Measurement::at_most("frames that differ in another order", differing(&back) as f64, 0.0),
+        Measurement::at_least("frames", once.iter().map(|t| t.frames.len()).sum::<usize>() as f64, 100.0),
     ])
 }
 
@@ -51,8 +51,8 @@ pub(super) fn numbers_that_are_none(_conditions: &Conditions) -> Findings {
         }
     }
     Ok(vec![
-        Finding::at_most("values let in", f64::from(let_in), 0.0),
-        Finding::at_most("refusals that do not name the key", f64::from(unnamed), 0.0),
-        Finding::at_least("values tried", f64::from(tried), 100.0),
+        Measurement::at_most("values let in", f64::from(let_in), 0.0),
+        Measurement::at_most("refusals that do not name the key", f64::from(unnamed), 0.0),
+        Measurement::at_least("values tried", f64::from(tried), 100.0),
     ])
 }

@@ -44,7 +44,7 @@ impl Desk {
     /// Recognises the readings since the closing began, where that was detected later.
     pub(super) fn catch_up(&mut self, closing_s: f64, until_s: f64) {
         let Some(connection) = &self.connection else { return };
-        let row = |reading: &Reading| connection.plotted.row(reading, &connection.readout.felt(reading), None);
+        let row = |reading: &Reading| connection.plotted.row(reading, &connection.readout.estimate(reading), None);
         let rows: Vec<Row> = connection.recent.between(closing_s, until_s).iter().map(row).collect();
         rows.iter().for_each(|row| self.recognise(row));
     }

@@ -1,4 +1,4 @@
-//! The twin: what a finger of given parameters would have shown, by simulating what the control box did.
+//! The fitted model: signals of a finger with given parameters, simulated under the recorded line pressure.
 
 use super::least_squares::Problem;
 use super::observation::{Observation, Track};
@@ -7,12 +7,12 @@ use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::{Effect, Scene, Setting, Timing};
 use palpate_tactile::{Sensors, Signals};
 
-/// Rate at which the twin is commanded (Hz): commands of any control box fall on its ticks nearly enough. At 50 Hz they would be
-/// 10 ms late on average, some more than others, and the fit would make lag and damping of that.
+/// Command rate of the fitted model (Hz): fine enough for the commands of any control box. At 50 Hz they would be
+/// 10 ms late on average, which biases lag and damping.
 const COMMAND_HZ: u32 = 300;
 
-/// Rate at which it is sampled (Hz). A finger swings at some 7 Hz; straight between samples at 50 Hz would miss a twelfth of
-/// it, and the fit would make stiffness of that.
+/// Sampling rate of the fitted model (Hz). A finger swings at some 7 Hz; linear interpolation of samples at 50 Hz would
+/// lose a twelfth of it, which biases stiffness.
 const SAMPLE_HZ: u32 = 300;
 
 /// Fitted parameters of the finger, in front of those that only explain the sensors.
@@ -21,7 +21,7 @@ pub(super) const DAMPING: usize = 1;
 pub(super) const LAG: usize = 2;
 pub(super) const TORQUES: usize = 3;
 
-/// What explains the sensors, behind those of the finger: gain and offset of each strip, gain of each pad and what
+/// Sensor parameters, behind those of the finger: gain and offset of each strip, gain of each pad and what
 /// bending adds to it, then a shift in time of each observation.
 pub(super) const STRIP_GAIN: usize = 0;
 pub(super) const STRIP_OFFSET: usize = 2;
@@ -29,23 +29,23 @@ pub(super) const PAD_GAIN: usize = 4;
 pub(super) const PAD_BENDING: usize = 6;
 pub(super) const SHIFT: usize = 8;
 
-/// The fit as a problem of least squares.
-pub(super) struct Twin<'a> {
+/// Least-squares problem of the fit.
+pub(super) struct FittedModel<'a> {
     observations: &'a [Observation],
     tracks: Vec<Vec<Track>>,
     /// Pressures of the torque curve's points (bar).
     knots: Vec<f64>,
-    /// What was simulated last, and with which parameters of the finger.
+    /// Last simulation, with the finger's parameters it was made with.
     last: Option<(Vec<f64>, Vec<Signals>)>,
 }
 
-impl<'a> Twin<'a> {
+impl<'a> FittedModel<'a> {
     pub(super) fn new(observations: &'a [Observation], knots: Vec<f64>) -> Self {
         let tracks = observations.iter().map(Observation::tracks).collect();
         Self { observations, tracks, knots, last: None }
     }
 
-    /// How many parameters belong to the finger.
+    /// Number of parameters of the finger.
     pub(super) fn of_finger(&self) -> usize {
         TORQUES + self.knots.len()
     }
@@ -73,7 +73,7 @@ impl<'a> Twin<'a> {
         Ok(())
     }
 
-    /// Which residuals belong to which track: observation, track, sample, in the order of [`Problem::residuals`].
+    /// Place of each residual: observation, track and sample, in the order of [`Problem::residuals`].
     pub(super) fn places(&self) -> impl Iterator<Item = (usize, &Track, usize)> + '_ {
         self.tracks.iter().enumerate().flat_map(move |(number, tracks)| {
             let seen = &self.observations[number].signals;
@@ -85,7 +85,7 @@ impl<'a> Twin<'a> {
     }
 }
 
-impl Problem for Twin<'_> {
+impl Problem for FittedModel<'_> {
     fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, String> {
         let of_finger = self.of_finger();
         self.simulate(&x[..of_finger])?;
@@ -140,12 +140,12 @@ fn at(signals: &Signals, column: usize, t: f64) -> f64 {
     }
 }
 
-/// What the twin shows of an observation: curvature, pressure and force, left and right.
+/// Signals of the fitted model for an observation: curvature, pressure and force, left and right.
 fn shown(seen: &Observation, gripper: Gripper) -> Result<Signals, String> {
     let lag = gripper.actuation.filling_time > 0.0;
     let mut scene = Scene { gripper, ..seen.scene.clone() };
     scene.timing = Timing { sample_hz: SAMPLE_HZ, actuation_hz: COMMAND_HZ, duration_s: seen.duration() + 0.1 };
-    // What lags a little lags, too: `auto` would leave it out and make a corner for the fit.
+    // A small lag stays in: `auto` would switch it off and make the residuals jump.
     scene.effects.set(Effect::PneumaticLag, if lag { Setting::On } else { Setting::Off });
     let sensors = Sensors::whole_fingers(&scene.gripper);
     let (mut rig, _) = SimRun::new(&scene, seen.object.as_ref());

@@ -1,12 +1,12 @@
-//! The elastic strands of one finger: one under each taxel, and a few that guard the blunt end of the tip.
+//! The elastic contact springs of one finger: one under each taxel, and a few that guard the blunt end of the tip.
 
 use crate::gripper::{Finger, Pad, SegmentPose, TaxelGrid};
 use glam::DVec2;
 use std::ops::Range;
 
-/// An elastic strand: a short rod with a round end that can be pushed in along its axis.
+/// An elastic contact spring: a short rod with a round end that can be pushed in along its axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Strand {
+pub(super) struct ContactSpring {
     /// The foot, along and inward of its segment's start (m).
     foot: DVec2,
     /// Distance across the finger (m).
@@ -19,7 +19,7 @@ pub(super) struct Strand {
     pub(super) stiffness: f64,
 }
 
-impl Strand {
+impl ContactSpring {
     /// Foot and axis in the finger plane.
     #[inline]
     pub(super) fn ray(&self, segment: &SegmentPose) -> (DVec2, DVec2) {
@@ -28,17 +28,17 @@ impl Strand {
     }
 }
 
-/// All strands of a finger, those of the pad first, in the order of the taxels.
+/// All contact springs of a finger, those of the pad first, in the order of the taxels.
 #[derive(Clone, Debug)]
-pub(super) struct Strands {
-    pub(super) all: Vec<Strand>,
-    /// How many belong to taxels.
+pub(super) struct ContactSprings {
+    pub(super) all: Vec<ContactSpring>,
+    /// Number of springs that belong to taxels.
     pub(super) on_pad: usize,
     /// Those carried by each of the N + 1 segments.
     by_segment: Vec<Range<usize>>,
     /// Radius of the round ends (m): half the wider pitch, so that a needle cannot pass between neighbours.
     pub(super) radius: f64,
-    /// For each segment the radius of a ball about its middle that holds its strands (m).
+    /// For each segment the radius of a ball about its middle that holds its contact springs (m).
     pub(super) reach: Vec<f64>,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Strands {
 const TIP_ROWS: usize = 2;
 const TIP_COLUMNS: usize = 3;
 
-impl Strands {
+impl ContactSprings {
     pub(super) fn new(finger: &Finger, pad: &Pad, grid: &TaxelGrid) -> Self {
         let lengths: Vec<f64> = finger.segment_lengths().collect();
         let mut all = Vec::with_capacity(grid.count() + TIP_ROWS * TIP_COLUMNS);
@@ -56,7 +56,7 @@ impl Strands {
             // Rows follow each other along the finger, so that a segment's taxels are neighbours.
             while all.len() < grid.count() && grid.segment(all.len(), finger.joints) == j {
                 let taxel = all.len();
-                all.push(Strand {
+                all.push(ContactSpring {
                     foot: DVec2::new(grid.place(taxel, finger).1, 0.0),
                     across: grid.across(taxel),
                     points_ahead: false,
@@ -92,9 +92,9 @@ impl Strands {
     }
 }
 
-/// Strands that look out of the blunt end, so that the tip does not sink into a table or the top of an object.
-/// They guard the end of the bellows; the pad in front of them has its own strands.
-fn tip_guards(finger: &Finger, pad: &Pad, last_length: f64) -> impl Iterator<Item = Strand> {
+/// Contact springs that look out of the blunt end, so that the tip does not sink into a table or the top of an object.
+/// They guard the end of the bellows; the pad in front of them has its own contact springs.
+fn tip_guards(finger: &Finger, pad: &Pad, last_length: f64) -> impl Iterator<Item = ContactSpring> {
     let (from, to) = (-finger.back, 0.0);
     let (width, height) = (finger.width, pad.thickness);
     let area = (finger.back + pad.thickness) * width / (TIP_ROWS * TIP_COLUMNS) as f64;
@@ -102,7 +102,7 @@ fn tip_guards(finger: &Finger, pad: &Pad, last_length: f64) -> impl Iterator<Ite
     (0..TIP_ROWS * TIP_COLUMNS).map(move |k| {
         let share = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
         let inward = from + (to - from) * share(k / TIP_COLUMNS, TIP_ROWS);
-        Strand {
+        ContactSpring {
             foot: DVec2::new(last_length - height, inward),
             across: width * (share(k % TIP_COLUMNS, TIP_COLUMNS) - 0.5),
             points_ahead: true,
@@ -117,19 +117,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_taxel_has_a_strand_at_its_place() {
+    fn every_taxel_has_a_contact_spring_at_its_place() {
         let (finger, pad) = (Finger::default(), Pad::default());
         for joints in [2, 7, 10, 80] {
             let finger = Finger { joints, ..finger.clone() };
             let grid = TaxelGrid::new(&finger, &pad);
-            let strands = Strands::new(&finger, &pad, &grid);
-            assert_eq!(strands.on_pad, grid.count());
+            let springs = ContactSprings::new(&finger, &pad, &grid);
+            assert_eq!(springs.on_pad, grid.count());
             let mut segments = vec![SegmentPose::default(); joints + 1];
             let lengths: Vec<f64> = finger.segment_lengths().collect();
             crate::gripper::bend(&lengths, &vec![0.0; joints], &mut segments);
             for (j, segment) in segments.iter().enumerate() {
-                for k in strands.of_segment(j).filter(|k| *k < strands.on_pad) {
-                    let (foot, axis) = strands.all[k].ray(segment);
+                for k in springs.of_segment(j).filter(|k| *k < springs.on_pad) {
+                    let (foot, axis) = springs.all[k].ray(segment);
                     assert!((foot.y - grid.arc(k)).abs() < 1e-12 && axis == DVec2::X, "N = {joints}, {k}");
                 }
             }

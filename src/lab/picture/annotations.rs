@@ -1,4 +1,4 @@
-//! What helps to read a picture: axis gizmo, scale bar, legend of the pressure map, and a badge.
+//! Annotations of a picture: axis gizmo, scale bar, legend of the pressure map, and a badge.
 
 use super::{PictureView, ink};
 use glam::{Vec2, Vec3};
@@ -6,7 +6,7 @@ use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
 use palpate_geometry::units::three_digits;
 
-/// Distance of furniture from the edges (points).
+/// Distance of annotations from the edges (points).
 const MARGIN: f32 = 18.0;
 /// Height of its text (points).
 const TEXT: f32 = 14.0;
