@@ -55,7 +55,7 @@ typedef struct {
   uint32_t seq;                /* number of the next sample */
   volatile uint32_t heard_us;  /* when the last line came that was understood */
   volatile uint8_t steps;      /* pressure that is on */
-  volatile uint8_t vented;     /* the watchdog has vented, and the host has not been told */
+  volatile uint8_t vented;     /* the watchdog has vented, and the remark is not yet printed */
   uint8_t heard;               /* bytes of the host's line so far */
   uint8_t overlong;            /* the line is too long: wait for its end */
   char line[GRIPPER_LONGEST_HEARD];
@@ -139,7 +139,7 @@ static void gripper_say_ok(const GripperState *state, const GripperPins *pins) {
   gripper_send(pins, &out);
 }
 
-static void gripper_say_hello(const GripperSetup *setup, const GripperPins *pins) {
+static void gripper_say_handshake(const GripperSetup *setup, const GripperPins *pins) {
   GripperText out = {{0}, 0, 0};
   uint8_t channel;
   gripper_put(&out, "# tactile-gripper fw=");
@@ -169,14 +169,14 @@ static void gripper_set_pressure(GripperState *state, const GripperPins *pins, u
   pins->put_pressure(steps);
 }
 
-/* To be called once: vents, says hello, and takes the first sample now. */
+/* To be called once: vents, prints the handshake, and takes the first sample now. */
 static void gripper_begin(GripperState *state, const GripperSetup *setup, const GripperPins *pins, uint32_t now_us) {
   GripperState fresh = {0};
   *state = fresh;
   state->next_us = now_us;
   state->heard_us = now_us;
   gripper_set_pressure(state, pins, 0);
-  gripper_say_hello(setup, pins);
+  gripper_say_handshake(setup, pins);
 }
 
 /* "0.55" in hundredths, or -1: one digit or two, then at most two decimals, and nothing else. */
@@ -222,7 +222,7 @@ static uint8_t gripper_press(GripperState *state, const GripperSetup *setup, con
 }
 
 /* Answers one line of the host; true when it was understood. */
-static uint8_t gripper_obey(GripperState *state, const GripperSetup *setup, const GripperPins *pins, const char *line) {
+static uint8_t gripper_execute(GripperState *state, const GripperSetup *setup, const GripperPins *pins, const char *line) {
   if (line[0] == 'P' && line[1] == ' ') return gripper_press(state, setup, pins, line + 2);
   if (line[0] && !line[1]) {
     switch (line[0]) {
@@ -234,7 +234,7 @@ static uint8_t gripper_obey(GripperState *state, const GripperSetup *setup, cons
         gripper_say_ok(state, pins);
         return 1;
       case '?':
-        gripper_say_hello(setup, pins);
+        gripper_say_handshake(setup, pins);
         return 1;
     }
   }
@@ -258,10 +258,10 @@ static void gripper_hear(GripperState *state, const GripperSetup *setup, const G
   if (state->overlong) {
     gripper_say(pins, "# refused reason=too-long");
   } else if (state->heard) {
-    /* Before it is obeyed, so that the watchdog does not take a pressure that is put on just now for an old one. */
+    /* Before it is executed, so that the watchdog does not take a pressure that is put on just now for an old one. */
     uint32_t before = state->heard_us;
     state->heard_us = now_us;
-    if (!gripper_obey(state, setup, pins, state->line)) state->heard_us = before;
+    if (!gripper_execute(state, setup, pins, state->line)) state->heard_us = before;
   }
   state->heard = 0;
   state->overlong = 0;

@@ -46,6 +46,7 @@ pub struct HiddenParts {
 impl HiddenParts {
     /// Parts within the tolerances of their data sheets, drawn from a seed.
     pub fn drawn(seed: u64) -> Self {
+        // The name is part of the draw: another would give other parts for the same seed.
         let mut random = Stream::new(seed, "pretended gripper", "parts");
         let mut strip = || {
             let off = random.within(-StripPart::FLAT_TOLERANCE, StripPart::FLAT_TOLERANCE);

@@ -114,7 +114,7 @@ impl StreamClock {
             _ => TimeSource::Arrival,
         };
         if source != self.source {
-            self.begin_anew(source);
+            self.restart(source);
         }
         let before = (self.sequence, self.time);
         let step = counters.seq.map(|seq| self.sequence.step(seq));
@@ -127,7 +127,7 @@ impl StreamClock {
         self.doubted = false;
         let restarted = elsewhere || step == Some(Step::Restarted);
         if restarted {
-            self.begin_anew(source);
+            self.restart(source);
             x = self.count(counters, arrived_s);
         }
         let broken = std::mem::take(&mut self.broken) && source == TimeSource::Arrival;
@@ -154,7 +154,7 @@ impl StreamClock {
         Some(Stamp { t_s, seq, restarted, missing, step_s })
     }
 
-    fn begin_anew(&mut self, source: TimeSource) {
+    fn restart(&mut self, source: TimeSource) {
         self.source = source;
         self.time = None;
         self.line = DelayLine::new((source == TimeSource::Device).then_some(1.0));

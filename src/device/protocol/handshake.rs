@@ -116,6 +116,6 @@ mod tests {
             assert!(!matches!(parse(&lost), Ok(Some(_))), "{lost}");
         }
         assert_eq!(parse(body), Err("checksum missing"));
-        assert!(parse(&body.replace("fw=2", "fw=1")).expect("sound").is_some_and(|hello| !hello.checked));
+        assert!(parse(&body.replace("fw=2", "fw=1")).expect("sound").is_some_and(|handshake| !handshake.checked));
     }
 }

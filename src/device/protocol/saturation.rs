@@ -132,7 +132,7 @@ mod tests {
     use palpate_tactile::model::Stream;
 
     #[test]
-    fn an_end_is_told_after_half_a_second() {
+    fn an_end_is_reported_after_half_a_second() {
         let mut watch = SaturationWatch::default();
         for i in 0..100u32 {
             let t = 0.02 * f64::from(i);
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(watch.at(), [None; 5]);
     }
 
-    /// Readings of shares of the supply at 50 Hz for ten seconds, and how often each end is told of each.
+    /// How often each end is reported of each channel, in ten seconds of readings at 50 Hz.
     fn told(levels: f64, average: u32, shares: [f64; 3]) -> [[u32; 2]; 3] {
         let converter = Converter { levels, ..Converter::DUE };
         let mut noise = Stream::new(1, "rails", "noise");

@@ -10,85 +10,21 @@
 
 use super::baud::Baud;
 use super::port_error::PortError;
-use super::ports::{PortInfo, choose, describe, list_ports};
-use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
+use super::ports::{BoardKind, PortInfo, describe, list_ports};
+use super::queue::{LinkEvent, WhenFull, lock};
 use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
-use crate::protocol::{AdcRange, ConsoleLine, Decoder, Saturation};
-use palpate_tactile::board::Detected;
-use palpate_tactile::board::{Board, Sensor};
+use super::shared::{LinkOptions, LinkState, Shared};
+use crate::protocol::{AdcRange, ConsoleLine, Saturation};
+use palpate_tactile::board::{Board, Detected, Sensor};
 use palpate_tactile::cadence::Cadence;
-use palpate_tactile::capture::Captured;
 use serde::Serialize;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
-
-/// Port and settings of a link.
-#[derive(Clone, Debug)]
-pub struct LinkOptions {
-    /// A port, a link to one, or a file of captured bytes; none for the only likely port.
-    pub path: Option<PathBuf>,
-    /// Baud rate; none to scan the usual ones.
-    pub baud: Option<Baud>,
-    /// Wait for a board that disconnects.
-    pub reconnect: bool,
-    /// Speed of a replay, as a multiple of the original; infinite for as fast as it is read.
-    pub replay_speed: f64,
-}
-
-impl Default for LinkOptions {
-    fn default() -> Self {
-        Self { path: None, baud: None, reconnect: true, replay_speed: 1.0 }
-    }
-}
-
-/// State of a link.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case", tag = "state")]
-pub enum LinkState {
-    /// Just opened: a board may restart.
-    Waiting,
-    /// Readings come.
-    Listening,
-    /// Nothing comes.
-    Silent {
-        /// What to try.
-        hint: String,
-    },
-    /// Bytes come that are no lines of a board, at any speed.
-    Unreadable {
-        /// What to try.
-        hint: String,
-    },
-    /// The port is gone; it is looked for.
-    Lost {
-        /// Why.
-        cause: String,
-    },
-    /// It is over.
-    Ended {
-        /// Why, where it was not asked for.
-        cause: Option<String>,
-    },
-}
-
-impl LinkState {
-    /// In a sentence for the user.
-    pub fn sentence(&self) -> String {
-        match self {
-            Self::Waiting => "Waiting for the board (it restarts on connection)".to_owned(),
-            Self::Listening => "Listening".to_owned(),
-            Self::Silent { hint } | Self::Unreadable { hint } => hint.clone(),
-            Self::Lost { cause } => format!("Connection lost: {cause}. Trying again every second"),
-            Self::Ended { cause: Some(cause) } => format!("Ended: {cause}"),
-            Self::Ended { cause: None } => "Ended".to_owned(),
-        }
-    }
-}
+use std::time::Duration;
 
 /// Status of a link, for display.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -181,87 +117,11 @@ impl LinkStatus {
     }
 }
 
-/// What the threads of a link share.
-#[derive(Debug)]
-pub(super) struct Shared {
-    pub(super) bytes: ByteQueue,
-    pub(super) events: EventQueue,
-    pub(super) decoder: Mutex<Decoder>,
-    pub(super) state: Mutex<LinkState>,
-    pub(super) port: Mutex<PortInfo>,
-    /// The way back to the board, while there is one.
-    pub(super) writer: Mutex<Option<Box<dyn serialport::SerialPort>>>,
-    pub(super) baud: AtomicU32,
-    pub(super) reconnects: AtomicU32,
-    /// Readings so far, for the reader: it tells noise from a board by them.
-    pub(super) readings: AtomicU64,
-    pub(super) stop: AtomicBool,
-    pub(super) began: Instant,
-}
-
-impl Shared {
-    fn new(port: PortInfo, when_full: WhenFull) -> Arc<Self> {
-        Arc::new(Self {
-            bytes: ByteQueue::new(when_full),
-            events: EventQueue::new(when_full),
-            decoder: Mutex::default(),
-            state: Mutex::new(LinkState::Waiting),
-            port: Mutex::new(port),
-            writer: Mutex::new(None),
-            baud: AtomicU32::new(0),
-            reconnects: AtomicU32::new(0),
-            readings: AtomicU64::new(0),
-            stop: AtomicBool::new(false),
-            began: Instant::now(),
-        })
-    }
-
-    pub(super) fn set_state(&self, state: LinkState) {
-        *lock(&self.state) = state;
-    }
-
-    pub(super) fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
-    /// Sleeps in pieces, so that stopping is prompt.
-    pub(super) fn sleep(&self, time: Duration) {
-        const PIECE: Duration = Duration::from_millis(20);
-        let until = Instant::now() + time;
-        while !self.is_stopped() {
-            match until.checked_duration_since(Instant::now()) {
-                Some(left) if !left.is_zero() => std::thread::sleep(left.min(PIECE)),
-                _ => return,
-            }
-        }
-    }
-
-    /// Decodes until there is nothing more to come.
-    fn decode(&self) {
-        let mut heard = Vec::new();
-        while let Some(pieces) = self.bytes.take() {
-            for piece in pieces {
-                {
-                    let mut decoder = lock(&self.decoder);
-                    match &piece {
-                        Captured::Bytes { arrived_s, bytes } => decoder.push(bytes, *arrived_s, &mut heard),
-                        Captured::Interrupted { cause, .. } => decoder.interrupt(cause),
-                    }
-                    self.readings.store(decoder.readings(), Ordering::Relaxed);
-                }
-                let events = heard.drain(..).map(LinkEvent::Decoded);
-                self.events.push(std::iter::once(LinkEvent::Captured(piece)).chain(events));
-            }
-        }
-        self.events.close();
-    }
-}
-
 /// Why a line could not be sent to the board.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
     /// There is no board at the moment.
-    #[error("the board is not connected, so that it was not told")]
+    #[error("the board is not connected: nothing was sent")]
     NotConnected,
     /// The port did not take it.
     #[error("cannot send to the board: {0}")]
@@ -298,7 +158,7 @@ impl SerialLink {
             path: path.to_owned(),
             title: "captured bytes".to_owned(),
             usb: None,
-            kind: super::ports::BoardKind::default(),
+            kind: BoardKind::default(),
         };
         let shared = Shared::new(port, WhenFull::Wait);
         let for_thread = Arc::clone(&shared);
@@ -396,4 +256,38 @@ impl Drop for SerialLink {
 /// True for a file of bytes; ports are devices.
 fn is_capture(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file())
+}
+
+/// Chooses the only likely port.
+fn choose(ports: &[PortInfo]) -> Result<PortInfo, PortError> {
+    let best = ports.iter().map(|port| port.kind.rank).max().unwrap_or(0);
+    let mut likely = ports.iter().filter(|port| best > 0 && port.kind.rank == best);
+    match (likely.next(), likely.next()) {
+        (Some(port), None) => Ok(port.clone()),
+        (Some(_), Some(_)) => Err(PortError::several(ports)),
+        (None, _) => Err(PortError::no_board(ports)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serialport::{SerialPortType, UsbPortInfo};
+
+    fn usb(path: &str, vid: u16, pid: u16) -> PortInfo {
+        let info = UsbPortInfo { vid, pid, serial_number: None, manufacturer: None, product: None };
+        PortInfo::new(path.to_owned(), &SerialPortType::UsbPort(info))
+    }
+
+    #[test]
+    fn one_likely_board_is_chosen_and_several_are_listed() {
+        let built_in = PortInfo::new("/dev/ttyS0".to_owned(), &SerialPortType::PciPort);
+        let due = usb("/dev/ttyACM0", 0x2341, 0x003d);
+        let other = usb("/dev/ttyUSB0", 0x1a86, 0x7523);
+        assert_eq!(choose(&[built_in.clone(), other, due.clone()]), Ok(due.clone()));
+        let both = choose(&[due, usb("/dev/ttyACM1", 0x2341, 0x003e)]).map_err(|e| e.to_string());
+        assert!(both.is_err_and(|text| text.contains("native port") && text.contains("/dev/ttyACM0")));
+        assert!(choose(&[built_in]).is_err_and(|e| e.to_string().contains("/dev/ttyS0")));
+        assert!(choose(&[]).is_err());
+    }
 }

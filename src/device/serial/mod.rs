@@ -10,9 +10,11 @@ mod queue;
 mod reader;
 mod replay;
 mod scan;
+mod shared;
 
 pub use baud::{Baud, BaudError};
-pub use link::{LinkOptions, LinkState, LinkStatus, SendError, SerialLink};
+pub use link::{LinkStatus, SendError, SerialLink};
 pub use port_error::{ACCESS_RULE, MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};
 pub use queue::LinkEvent;
+pub use shared::{LinkOptions, LinkState};

@@ -1,6 +1,5 @@
 //! Serial ports, their boards, and the choice among them. Names and numbers come from the USB device.
 
-use super::port_error::PortError;
 use serde::Serialize;
 use serialport::{SerialPortType, available_ports};
 use std::path::{Path, PathBuf};
@@ -65,7 +64,7 @@ const KNOWN: &[(u16, u16, &str, BoardKind)] = &[
 
 impl PortInfo {
     /// A port as the system describes it.
-    fn new(path: String, kind: &SerialPortType) -> Self {
+    pub(super) fn new(path: String, kind: &SerialPortType) -> Self {
         let path = PathBuf::from(path);
         let SerialPortType::UsbPort(usb) = kind else {
             let title = match kind {
@@ -108,17 +107,6 @@ pub fn list_ports() -> Vec<PortInfo> {
     ports
 }
 
-/// Chooses the only likely port.
-pub(super) fn choose(ports: &[PortInfo]) -> Result<PortInfo, PortError> {
-    let best = ports.iter().map(|port| port.kind.rank).max().unwrap_or(0);
-    let mut likely = ports.iter().filter(|port| best > 0 && port.kind.rank == best);
-    match (likely.next(), likely.next()) {
-        (Some(port), None) => Ok(port.clone()),
-        (Some(_), Some(_)) => Err(PortError::several(ports)),
-        (None, _) => Err(PortError::no_board(ports)),
-    }
-}
-
 /// Describes the port at a path.
 pub(super) fn describe(path: &Path) -> PortInfo {
     let real = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -154,17 +142,5 @@ mod tests {
         assert!(usb("/dev/ttyACM1", 0x2a03, 0x003e, None).kind.native);
         assert_eq!(usb("/dev/ttyACM1", 0x2341, 0x9999, None).title, "Arduino (USB 2341:9999)");
         assert_eq!(usb("/dev/ttyUSB0", 0x1234, 0x5678, Some("Odd thing")).title, "Odd thing (USB 1234:5678)");
-    }
-
-    #[test]
-    fn one_likely_board_is_chosen_and_several_are_listed() {
-        let built_in = PortInfo::new("/dev/ttyS0".to_owned(), &SerialPortType::PciPort);
-        let due = usb("/dev/ttyACM0", 0x2341, 0x003d, None);
-        let other = usb("/dev/ttyUSB0", 0x1a86, 0x7523, None);
-        assert_eq!(choose(&[built_in.clone(), other, due.clone()]), Ok(due.clone()));
-        let both = choose(&[due, usb("/dev/ttyACM1", 0x2341, 0x003e, None)]).map_err(|e| e.to_string());
-        assert!(both.is_err_and(|text| text.contains("native port") && text.contains("/dev/ttyACM0")));
-        assert!(choose(&[built_in]).is_err_and(|e| e.to_string().contains("/dev/ttyS0")));
-        assert!(choose(&[]).is_err());
     }
 }

@@ -2,11 +2,11 @@
 //! data is unreadable.
 
 use super::baud::Baud;
-use super::link::{LinkOptions, LinkState, Shared};
 use super::port_error::PortError;
 use super::ports::{BoardKind, PortInfo, describe, find, list_ports};
 use super::queue::lock;
 use super::scan::{Scan, scan};
+use super::shared::{LinkOptions, LinkState, Shared};
 use palpate_tactile::capture::Captured;
 use serialport::{ClearBuffer, SerialPort};
 use std::io::ErrorKind;

@@ -1,7 +1,7 @@
 //! Replay of a file of captured bytes in place of a port.
 
-use super::link::{LinkState, Shared};
 use super::port_error::PortError;
+use super::shared::{LinkState, Shared};
 use crate::protocol::CaptureReader;
 use palpate_tactile::capture::Captured;
 use std::fs::File;
