@@ -7,7 +7,7 @@ use crate::app::features::simulation::SimulationAction;
 use crate::app::features::tools::ToolAction;
 use crate::app::features::view::ViewAction;
 use crate::app::notices::UserMessage;
-use palpate_lab::workers::{Command, GripperWish, LabelWish, LabellingAction};
+use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingAction};
 
 /// Action of the user, by the feature that applies it.
 #[derive(Clone)]
@@ -73,6 +73,6 @@ actions_from! {
     FileAction => |action| Self::File(action);
     UserMessage => |message| Self::Tell(message);
     Command => |command| Self::Simulation(SimulationAction::Send(command));
-    GripperWish => |wish| Self::Gripper(GripperAction::Send(wish));
-    LabelWish => |wish| Self::Labelling(LabellingAction::Edit(wish));
+    GripperCommand => |wish| Self::Gripper(GripperAction::Send(wish));
+    LabelCommand => |wish| Self::Labelling(LabellingAction::Edit(wish));
 }

@@ -71,7 +71,7 @@ pub use workbench::{Workbench, WorkbenchSetup};
 
 use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::listen_to_port;
-use palpate_lab::workers::{GripperWish, examine_port, explain_scene, fit_trials};
+use palpate_lab::workers::{GripperCommand, examine_port, explain_scene, fit_trials};
 use palpate_learn::shipped_model;
 use palpate_render::wgpu;
 use palpate_sim::scene::Scene;
@@ -132,7 +132,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         };
         let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
         if let Some(port) = options.port {
-            workbench.act(&creation.egui_ctx, GripperWish::Connect(Some(port)));
+            workbench.act(&creation.egui_ctx, GripperCommand::Connect(Some(port)));
         }
         Ok(Box::new(Window { workbench }))
     });

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::theme::colour;
 use egui::{Button, Label, RichText, TextEdit, Ui};
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::GripperWish;
+use palpate_lab::workers::GripperCommand;
 use std::path::PathBuf;
 
 /// Text that wraps.
@@ -60,6 +60,6 @@ pub(super) fn stop_button(ui: &mut Ui, theme: Theme, actions: &mut Actions) {
     let response = ui.add_sized([84.0, 26.0], button).on_hover_text("Vent the fingers and end the trial (Esc)");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Stop and vent"));
     if response.clicked() {
-        actions.push(GripperWish::Vent);
+        actions.push(GripperCommand::Vent);
     }
 }

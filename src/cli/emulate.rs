@@ -4,7 +4,7 @@ use super::Failure;
 use super::setup::SceneArguments;
 use super::terminal::{say, say_json};
 use palpate_device::emulator::{
-    EmulatedGripper, EmulatorSetup, Fault, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
+    EmulatedFault, EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
 };
 #[cfg(unix)]
 use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
@@ -76,7 +76,7 @@ pub(super) struct EmulateArguments {
 
 /// The faults of one argument.
 #[derive(Clone, Debug)]
-struct Faults(Vec<Fault>);
+struct Faults(Vec<EmulatedFault>);
 
 fn parse_faults_once(text: &str) -> Result<Faults, String> {
     parse_faults(text).map(Faults).map_err(|error| error.to_string())

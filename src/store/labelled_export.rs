@@ -15,7 +15,7 @@ use super::csv_export::{CsvError, number};
 use super::store::Store;
 use super::store_error::StoreError;
 use crate::labels::LabelledTrial;
-use palpate_sim::gripper::Gripper;
+use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::catalogue;
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Channel, SensorLayout, Signals};
@@ -107,7 +107,7 @@ fn beside(folder: &Path) -> PathBuf {
 fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
     let raw = folder.join("raw");
     std::fs::create_dir_all(&raw).map_err(|e| cannot(&raw, &e))?;
-    let layout = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&Gripper::default()));
+    let layout = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&GripperModel::default()));
     let channels: Vec<Channel> = layout.unwrap_or_default();
     let (list, signals) = (folder.join("trials.csv"), folder.join("signals.csv"));
     let mut list_out = create(&list)?;

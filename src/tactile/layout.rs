@@ -5,7 +5,7 @@
 //! over pairs of joints, at every joint; C5 to C8 the same with the curvature of both halves. `+F` adds force as a
 //! channel of its own beside each pressure.
 
-use palpate_sim::gripper::{Gripper, Side};
+use palpate_sim::gripper::{GripperModel, Side};
 use std::borrow::Cow;
 
 /// A stretch of a finger, as shares of its length from the palm.
@@ -202,7 +202,7 @@ impl SensorLayout {
     }
 
     /// The channels on a gripper: curvature left and right, then pressure, then force, each from palm to tip.
-    pub fn channels(&self, gripper: &Gripper) -> Result<Vec<Channel>, LayoutError> {
+    pub fn channels(&self, gripper: &GripperModel) -> Result<Vec<Channel>, LayoutError> {
         let pressure = self.pressure_spans(gripper.finger.joints);
         let grid = gripper.taxels();
         let covered = |span: &Span| (0..grid.rows).any(|r| span.holds((r as f64 + 0.5) / grid.rows as f64));
@@ -260,12 +260,12 @@ mod tests {
     #[test]
     fn whole_fingers_are_the_layout_of_that_name() {
         let named = SensorLayout::named("C1+F").expect("in the catalogue");
-        assert_eq!(named.channels(&Gripper::default()).expect("fits"), whole_fingers());
+        assert_eq!(named.channels(&GripperModel::default()).expect("fits"), whole_fingers());
     }
 
     #[test]
     fn every_layout_has_the_channels_it_promises() {
-        let gripper = Gripper::default();
+        let gripper = GripperModel::default();
         let per_finger = [2, 3, 6, 11, 3, 4, 7, 12];
         for (layout, want) in CATALOGUE.iter().zip(per_finger) {
             let channels = layout.channels(&gripper).expect("fits");
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn too_fine_and_unknown_layouts_are_refused() {
-        let mut gripper = Gripper::default();
+        let mut gripper = GripperModel::default();
         gripper.finger.joints = 80;
         assert!(matches!(CATALOGUE[3].channels(&gripper), Err(LayoutError::EmptySpan { sensors: 80, .. })));
         assert!(SensorLayout::named("C9").is_err());

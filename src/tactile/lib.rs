@@ -59,7 +59,7 @@ pub use signals::Signals;
 
 use crate::trial::Trial;
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, Gripper, Side, TaxelGrid};
+use palpate_sim::gripper::{BentFinger, GripperModel, Side, TaxelGrid};
 
 /// A layout on a gripper, ready to read frames.
 #[derive(Clone, Debug)]
@@ -72,17 +72,17 @@ pub struct Sensors {
 
 impl Sensors {
     /// Places a layout on a gripper. `area` selects the area of pressure.
-    pub fn new(layout: &SensorLayout, gripper: &Gripper, area: PressureArea) -> Result<Self, LayoutError> {
+    pub fn new(layout: &SensorLayout, gripper: &GripperModel, area: PressureArea) -> Result<Self, LayoutError> {
         Ok(Self::of(layout.channels(gripper)?, gripper, area))
     }
 
     /// Reads these channels of a gripper.
-    pub fn of(channels: Vec<Channel>, gripper: &Gripper, area: PressureArea) -> Self {
+    pub fn of(channels: Vec<Channel>, gripper: &GripperModel, area: PressureArea) -> Self {
         Self { channels, finger: gripper.finger.clone(), grid: gripper.taxels(), area }
     }
 
     /// Layout C1+F, which suits any gripper.
-    pub fn whole_fingers(gripper: &Gripper) -> Self {
+    pub fn whole_fingers(gripper: &GripperModel) -> Self {
         let (finger, grid) = (gripper.finger.clone(), gripper.taxels());
         Self { channels: whole_fingers(), finger, grid, area: PressureArea::Participation }
     }
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_frame_is_read_channel_by_channel() {
-        let gripper = Gripper::default();
+        let gripper = GripperModel::default();
         let layout = SensorLayout::named("C6+F").expect("in the catalogue");
         let sensors = Sensors::new(&layout, &gripper, PressureArea::Participation).expect("fits");
         let frame = Frame {

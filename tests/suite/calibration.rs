@@ -13,7 +13,7 @@ use palpate_device::protocol::{DecodedEvent, Decoder};
 use palpate_lab::gripper::Listen;
 use palpate_lab::study::{FingerFit, Known, Observation, Trust, fit_finger};
 use palpate_sim::gripper::Phase;
-use palpate_sim::gripper::{Gripper, Side, TorquePoint};
+use palpate_sim::gripper::{GripperModel, Side, TorquePoint};
 use palpate_sim::objects::{EMPTY, ObjectModel};
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Store};
@@ -226,7 +226,7 @@ fn the_hidden_finger_is_fitted_within_3_per_cent() {
     let fit = fitted(&parts(5, false), 5);
     println!("{:+.4} {:?} {} steps {:?}", off(&fit), fit.estimates, fit.steps, fit.remainders);
     assert!(off(&fit).abs() < 0.03 && fit.estimates[0].known == Known::Well, "{}", off(&fit));
-    assert_ne!(fit.gripper, Gripper::default());
+    assert_ne!(fit.gripper, GripperModel::default());
 }
 
 /// A file of a strip's points, as `palpate calibrate --points` takes them.

@@ -9,7 +9,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::{Mode, ViewAction};
-use palpate_lab::workers::{GripperWish, LabellingAction};
+use palpate_lab::workers::{GripperCommand, LabellingAction};
 use palpate_store::Store;
 use palpate_tactile::trial::Control;
 
@@ -222,7 +222,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
 #[test]
 fn stop_works_while_something_is_typed() {
     let mut desk = desk();
-    desk.tell(GripperWish::Connect(None));
+    desk.tell(GripperCommand::Connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.press(Key::M);
     desk.record();
@@ -239,7 +239,7 @@ fn stop_works_while_something_is_typed() {
 #[test]
 fn blind_hides_the_models_guess_until_the_label_is_given() {
     let mut desk = desk();
-    desk.tell(GripperWish::Connect(None));
+    desk.tell(GripperCommand::Connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.press(Key::M);
     desk.record();

@@ -9,8 +9,8 @@ use palpate_lab::grasping::GraspStage;
 use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{
-    CalibrationPlan, CalibrationWish, Examine, ExamineRequest, GripperSetup, GripperView, GripperWish, GripperWorker,
-    Notice, TraceRow,
+    CalibrationCommand, CalibrationPlan, Examine, ExamineRequest, GripperCommand, GripperSetup, GripperView,
+    GripperWorker, Notice, TraceRow,
 };
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
@@ -102,8 +102,8 @@ impl Desk {
         Self { worker: worker.unwrap(), woken, store, notices: Vec::new(), rows: Vec::new(), folder }
     }
 
-    pub(crate) fn wish(&self, wish: GripperWish) {
-        self.worker.wish(wish);
+    pub(crate) fn command(&self, command: GripperCommand) {
+        self.worker.command(command);
     }
 
     /// Waits until everything stands as wanted.
@@ -136,14 +136,19 @@ impl Desk {
     }
 
     pub(crate) fn connect(&mut self) {
-        self.wish(GripperWish::Connect(None));
+        self.command(GripperCommand::Connect(None));
         self.until(|view| view.latest.is_some());
     }
 
     /// A whole trial.
     fn trial(&mut self, control: Control, adds: bool) -> i64 {
         let before = self.worker.view().and_then(|view| view.ended.as_ref().map(|ended| ended.id));
-        self.wish(GripperWish::Begin(TrialRequest { object: Some("lemon".to_owned()), length_s: None, control, adds }));
+        self.command(GripperCommand::Begin(TrialRequest {
+            object: Some("lemon".to_owned()),
+            length_s: None,
+            control,
+            adds,
+        }));
         self.until(|view| view.trial.is_some());
         let ended = self.until(|view| view.trial.is_none() && view.ended.as_ref().map(|e| e.id) != before);
         ended.ended.as_ref().unwrap().id
@@ -199,12 +204,17 @@ fn a_driven_trial_is_recorded_with_its_rest_and_its_phases() {
 #[test]
 fn stop_vents_ends_the_trial_and_says_so() {
     let mut desk = Desk::on(board(&parts(1, false)));
-    desk.wish(GripperWish::Vent);
+    desk.command(GripperCommand::Vent);
     desk.until_said("no board is connected: vent at the control box");
     desk.connect();
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
+    desk.command(GripperCommand::Begin(TrialRequest {
+        object: None,
+        length_s: None,
+        control: Control::Driven,
+        adds: false,
+    }));
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
-    desk.wish(GripperWish::Vent);
+    desk.command(GripperCommand::Vent);
     let view = desk.until(|view| view.trial.is_none() && view.ended.is_some());
     desk.until_said("Vent sent");
     let ended = view.ended.clone().unwrap();
@@ -219,7 +229,12 @@ fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
     // What waits is written about once a second of the clock, which must come before the trial's end.
     let mut desk = Desk::on(emulated(&parts(1, false), None, TRUE_TO_TIME, 30));
     desk.connect();
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
+    desk.command(GripperCommand::Begin(TrialRequest {
+        object: None,
+        length_s: None,
+        control: Control::Driven,
+        adds: false,
+    }));
     let pressed = desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
     // Another program throws it away for good: nothing more can be written of it.
     let id = pressed.trial.as_ref().and_then(|trial| trial.id).unwrap();
@@ -238,27 +253,27 @@ fn fingers_are_not_left_under_pressure_when_a_trial_breaks_off() {
 fn trials_are_ended_begun_anew_and_given_up() {
     let mut desk = Desk::on(board(&parts(1, false)));
     let request = || TrialRequest { object: None, length_s: None, control: Control::ByHand, adds: false };
-    desk.wish(GripperWish::Begin(request()));
+    desk.command(GripperCommand::Begin(request()));
     desk.until_said("connect the gripper first");
     desk.connect();
-    desk.wish(GripperWish::Begin(request()));
+    desk.command(GripperCommand::Begin(request()));
     let first = desk.until(numbered).trial.clone().unwrap();
     assert_eq!((first.stage, first.length_s.map(|s| (s * 10.0).round())), (GraspStage::Lead, Some(44.0)));
     // Another begins: the first ends there and is kept.
-    desk.wish(GripperWish::Begin(request()));
+    desk.command(GripperCommand::Begin(request()));
     let second = desk.until(|view| numbered(view) && view.trial.as_ref().is_some_and(|trial| trial.id != first.id));
     let second = second.trial.clone().unwrap().id;
-    desk.wish(GripperWish::Discard);
+    desk.command(GripperCommand::Discard);
     desk.until(|view| view.trial.is_none());
-    desk.wish(GripperWish::Begin(TrialRequest { control: Control::Free, ..request() }));
+    desk.command(GripperCommand::Begin(TrialRequest { control: Control::Free, ..request() }));
     desk.until(|view| view.trial.as_ref().is_some_and(|trial| trial.t_s > 7.0));
-    desk.wish(GripperWish::End);
+    desk.command(GripperCommand::End);
     let free = desk.until(|view| view.trial.is_none() && ended(view) > second).ended.clone().unwrap().id;
     let rows = desk.store().list(true).unwrap();
     let deleted: Vec<(i64, bool)> = rows.iter().map(|row| (row.id, row.deleted.is_some())).collect();
     assert_eq!(deleted, [(first.id.unwrap(), false), (second.unwrap(), true), (free, false)]);
     // Closing the window ends what goes on.
-    desk.wish(GripperWish::Begin(request()));
+    desk.command(GripperCommand::Begin(request()));
     desk.until(|view| view.trial.is_some());
     let Desk { worker, store, folder, .. } = desk;
     drop(worker);
@@ -278,7 +293,7 @@ fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
     desk.trial(Control::Driven, true);
     let view = desk.until(|view| view.recognition_off.is_some());
     assert!(view.recognition_off.as_deref().unwrap().contains("it needs curvature_left"), "{:?}", view.recognition_off);
-    desk.wish(GripperWish::Disconnect);
+    desk.command(GripperCommand::Disconnect);
     desk.until(|view| !view.is_connected());
     store_calibrations(&desk.store, &parts);
     desk.connect();
@@ -304,7 +319,7 @@ fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
     let of_trial = desk.rows.iter().filter(|row| row.grasp == 5);
     let most = |k: usize| of_trial.clone().map(|row| row.values[k]).fold(f32::MIN, f32::max);
     assert!(most(0) > 3.0 && (most(0) - most(1)).abs() < 0.5, "{} {}", most(0), most(1));
-    desk.wish(GripperWish::Tare);
+    desk.command(GripperCommand::Tare);
     let tared =
         desk.until(|view| view.latest.as_ref().is_some_and(|l| l.felt.curvature[0].is_some_and(|k| k.abs() < 0.3)));
     assert!(tared.latest.as_ref().unwrap().felt.force[0].is_some_and(|force| force < 0.05));
@@ -316,32 +331,32 @@ fn a_calibration_shares_the_port_or_brings_its_own() {
     let begin = |port: Option<&str>| {
         let port = port.map(PathBuf::from);
         let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A7".to_owned(), port };
-        GripperWish::Calibrate(CalibrationWish::Begin(plan))
+        GripperCommand::Calibrate(CalibrationCommand::Begin(plan))
     };
     let running = |view: &GripperView| view.calibration.as_ref().is_some_and(|c| c.running.is_some());
-    desk.wish(begin(Some("nowhere")));
+    desk.command(begin(Some("nowhere")));
     let failed = desk.until(|view| view.calibration.as_ref().is_some_and(|c| c.ended.is_some()));
     let ended = failed.calibration.as_ref().unwrap().ended.clone();
     assert_eq!(ended, Some(Err("there is no nowhere".to_owned())));
-    desk.wish(begin(None));
+    desk.command(begin(None));
     // Twice at once: the second reading has not settled, and that is said.
     desk.until(|view| {
         let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
         calibration.is_some_and(|c| c.settled.is_ok())
     });
     for _ in 0..2 {
-        desk.wish(GripperWish::Calibrate(CalibrationWish::Take(0.0)));
+        desk.command(GripperCommand::Calibrate(CalibrationCommand::Take(0.0)));
     }
     desk.until(|view| {
         let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
         calibration.is_some_and(|c| c.not_taken.as_ref().is_some_and(|text| text.starts_with("not taken: ")))
     });
-    desk.wish(GripperWish::Calibrate(CalibrationWish::Stop));
+    desk.command(GripperCommand::Calibrate(CalibrationCommand::Stop));
     desk.until(|view| !running(view) && !view.is_connected());
     desk.connect();
-    desk.wish(begin(None));
+    desk.command(begin(None));
     desk.until(running);
-    desk.wish(GripperWish::Calibrate(CalibrationWish::Stop));
+    desk.command(GripperCommand::Calibrate(CalibrationCommand::Stop));
     let view = desk.until(|view| !running(view));
     assert!(view.is_connected(), "the live view goes on");
 }
@@ -372,7 +387,7 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
     store_calibrations(&desk.store, &parts);
     let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
     desk.connect();
-    desk.wish(GripperWish::Watch(Some(request)));
+    desk.command(GripperCommand::Watch(Some(request)));
     for number in 1..=2 {
         desk.until(|view| view.trial.is_some());
         let ended = desk.until(|view| view.trial.is_none() && view.ended.as_ref().is_some_and(|e| e.id == number));
@@ -388,7 +403,7 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
         assert!(view.beliefs.len() == 1 && view.verdict.is_some(), "{:?}", ended.recognition_off);
         assert!(store.labels().guess(number).unwrap().is_some_and(|guess| guess.pmf.len() == 17));
     }
-    desk.wish(GripperWish::Watch(None));
+    desk.command(GripperCommand::Watch(None));
     desk.until(|view| view.watching.is_none());
 }
 
@@ -398,7 +413,7 @@ fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
     let mut desk = Desk::on(emulated(&parts(1, false), None, FAST, 10));
     desk.connect();
     let id = desk.trial(Control::Driven, false);
-    desk.until_said("the trial was ended, and the fingers vented: the board said: refused reason=above-maximum");
+    desk.until_said("trial ended and fingers vented: the board refused a command (above-maximum");
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     let trial = desk.store().board_trial(id).unwrap().unwrap();
     // The refused step is the last that it was told.
@@ -415,8 +430,8 @@ fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
     let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
     desk.connect();
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
-    desk.wish(GripperWish::Watch(Some(request.clone())));
-    desk.wish(GripperWish::Begin(request));
+    desk.command(GripperCommand::Watch(Some(request.clone())));
+    desk.command(GripperCommand::Begin(request));
     let id = desk.until(numbered).trial.as_ref().unwrap().id;
     // A whole grasp passes.
     for pressed in [true, false] {
@@ -424,7 +439,7 @@ fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
         let view = desk.until(|view| view.latest.as_ref().is_some_and(|latest| is(latest.line_bar)));
         assert_eq!(view.trial.as_ref().map(|trial| trial.id), Some(id));
     }
-    desk.wish(GripperWish::End);
+    desk.command(GripperCommand::End);
     let ended = desk.until(|view| view.ended.is_some()).ended.clone().unwrap();
     assert_eq!(Some(ended.id), id);
 }
@@ -437,12 +452,12 @@ fn a_port_that_another_program_has_is_opened_when_that_lets_it_go() {
         0 | 1 => Err(NotOpened { may_pass: true, ..NotOpened::from("it is open in another program".to_owned()) }),
         _ => free(port),
     }));
-    desk.wish(GripperWish::Connect(None));
+    desk.command(GripperCommand::Connect(None));
     desk.until_said("it is open in another program; until then it is tried each second");
     let view = desk.until(|view| view.latest.is_some());
     assert!(view.refused.is_none() && view.is_connected());
     // What does not pass is not tried again.
-    desk.wish(GripperWish::Connect(Some("/dev/nothing".into())));
+    desk.command(GripperCommand::Connect(Some("/dev/nothing".into())));
     let view = desk.until(|view| view.refused.is_some());
     let refused = view.refused.as_ref().map(|refused| refused.text.as_str());
     assert_eq!((refused, view.is_connected()), (Some("there is no /dev/nothing"), false));
@@ -455,23 +470,33 @@ fn zeros_are_taken_from_open_hands_alone() {
     store_calibrations(&desk.store, &parts);
     desk.connect();
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
-    desk.wish(GripperWish::Tare);
+    desk.command(GripperCommand::Tare);
     desk.until_said("bar is on: vent");
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Free, adds: false }));
-    desk.wish(GripperWish::Tare);
+    desk.command(GripperCommand::Begin(TrialRequest {
+        object: None,
+        length_s: None,
+        control: Control::Free,
+        adds: false,
+    }));
+    desk.command(GripperCommand::Tare);
     desk.until_said("nothing was tared: a trial goes on");
     assert!(desk.store().calibrations().tare().unwrap().is_none());
 }
 
 #[test]
-fn a_store_that_cannot_be_written_is_told_before_a_trial() {
+fn a_store_that_cannot_be_written_ends_a_trial_before_the_fingers_close() {
     let mut desk = Desk::with(board(&parts(1, false)), "notes.txt");
     std::fs::write(&desk.store, "not a store".repeat(100)).unwrap();
     desk.connect();
-    desk.wish(GripperWish::Begin(TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }));
+    desk.command(GripperCommand::Begin(TrialRequest {
+        object: None,
+        length_s: None,
+        control: Control::Driven,
+        adds: false,
+    }));
     desk.until_said("not a store");
-    let view = desk.until(|view| view.latest.is_some());
-    assert!(view.trial.is_none() && view.is_connected());
-    desk.wish(GripperWish::Disconnect);
+    let view = desk.until(|view| view.trial.is_none());
+    assert!(view.is_connected() && desk.rows.iter().all(|row| !(row.line_bar > 0.01)));
+    desk.command(GripperCommand::Disconnect);
     desk.until(|view| !view.is_connected());
 }

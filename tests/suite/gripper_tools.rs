@@ -17,7 +17,7 @@ use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIden
 use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
-use palpate_lab::workers::{CalibrationPlan, CalibrationWish, Examine, FitTrials, FittedFinger, GripperWish};
+use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, Examine, FitTrials, FittedFinger, GripperCommand};
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
 use palpate_store::{BOARD_RIG, BoardInfo, Store};
@@ -205,7 +205,7 @@ fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
         let listen: Listen = Arc::new(|_| Ok(Box::new(once_with_a_gap())));
         let setup = BenchSetup { size: [480.0, 220.0], listen, ..BenchSetup::default() };
         let mut bench = bench("counts", theme, setup);
-        bench.tell(GripperWish::Connect(None));
+        bench.tell(GripperCommand::Connect(None));
         // It is silent then, and wakes the window now and then.
         for _ in 0..20 {
             bench.wait();
@@ -230,7 +230,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     let mut bench = bench("doctor", Theme::Dark, BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() });
     let calibrate = || {
         let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A".to_owned(), port: None };
-        GripperWish::Calibrate(CalibrationWish::Begin(plan))
+        GripperCommand::Calibrate(CalibrationCommand::Begin(plan))
     };
     // What has the fingers is not disturbed.
     bench.tell(calibrate());
@@ -238,7 +238,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
     bench.until_shown(true, "a calibration goes on: end it first");
-    bench.tell(GripperWish::Calibrate(CalibrationWish::Stop));
+    bench.tell(GripperCommand::Calibrate(CalibrationCommand::Stop));
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
     for (asked, moved) in [("Bend the left", 0), ("Bend the right", 1), ("Press the left", 2), ("Press the right", 3)] {

@@ -9,7 +9,7 @@ use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkEvent, LinkStatus, SendError};
 use palpate_lab::gripper::{BoardStream, SerialGripper};
 use palpate_lab::recording::{TrialRequest, record};
-use palpate_lab::workers::GripperWish;
+use palpate_lab::workers::GripperCommand;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_store::labels::Flag;
@@ -149,7 +149,7 @@ fn by_command(fault: BoardFault) -> Essence {
 fn by_window(fault: BoardFault) -> Essence {
     let mut desk = Desk::on(Arc::new(move |_| Ok(Box::new(FaultyLink::new(fault)))));
     desk.connect();
-    desk.wish(GripperWish::Begin(request()));
+    desk.command(GripperCommand::Begin(request()));
     let ended = desk.until(|view| view.ended.is_some()).ended.clone().unwrap();
     let trial = desk.store().board_trial(ended.id).unwrap().unwrap();
     Essence::new(&trial, &ended.warnings)

@@ -271,7 +271,7 @@ fn ports_that_cannot_be_recorded_say_cause_and_fix() {
     refused(folder.path(), &["record", "--port", "/dev/null"], &["not a serial port"]);
     let empty = folder.path().join("empty.bytes");
     std::fs::write(&empty, "").unwrap();
-    refused(folder.path(), &["record", "--port", empty.to_str().unwrap()], &["no reading is in"]);
+    refused(folder.path(), &["record", "--port", empty.to_str().unwrap()], &["has no reading"]);
     let _board = Board::plug_in(&port, 0);
     let _held = serialport::new(path, 115_200).open_native().unwrap();
     refused(folder.path(), &["record", "--port", path], &["it is", "then connect"]);

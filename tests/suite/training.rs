@@ -8,7 +8,7 @@ use crate::panels::side_by_side;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::{TrainRequest, TrainWish, Trainer, TrainerView};
+use palpate_lab::workers::{TrainCommand, TrainRequest, Trainer, TrainerView};
 use palpate_learn::Model;
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
@@ -114,15 +114,15 @@ fn until(trainer: &Trainer, woken: &Receiver<()>, wanted: impl Fn(&TrainerView) 
     }
 }
 
-fn request(method: &str) -> TrainWish {
-    TrainWish::Train(TrainRequest { method: method.to_owned(), seed: 1, quick: true })
+fn request(method: &str) -> TrainCommand {
+    TrainCommand::Train(TrainRequest { method: method.to_owned(), seed: 1, quick: true })
 }
 
 #[test]
 fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     let folder = tempfile::tempdir().unwrap();
     let (mut trainer, woken) = trainer(folder.path(), labelled);
-    trainer.ask(TrainWish::Look);
+    trainer.ask(TrainCommand::Look);
     let view = until(&trainer, &woken, |view| view.classes.is_some());
     let classes = view.classes.clone().unwrap().unwrap();
     let counts: Vec<(&str, usize)> = classes.iter().map(|class| (class.name.as_str(), class.trials)).collect();
@@ -131,7 +131,7 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
 
     // A long training is given up, and nothing comes of it.
     let long = TrainRequest { method: "committee".to_owned(), seed: 1, quick: false };
-    trainer.ask(TrainWish::Train(long));
+    trainer.ask(TrainCommand::Train(long));
     until(&trainer, &woken, |view| view.running.is_some());
     trainer.give_up();
     trainer.ask(request("knn"));
@@ -148,7 +148,7 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
 
     // From its file it comes back with its card.
     let path = view.models[0].path.clone();
-    trainer.ask(TrainWish::Load(path.clone()));
+    trainer.ask(TrainCommand::Load(path.clone()));
     let view = until(&trainer, &woken, |view| view.loaded.0 == 1);
     let loaded = view.loaded.1.clone().unwrap().unwrap();
     assert_eq!((&loaded.path, &loaded.model.card), (&path, &finished.trained.model.card));
@@ -161,7 +161,7 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     foreign.save(&odd).unwrap();
     for (file, told) in [("gone.safetensors", "cannot read the model"), ("odd.safetensors", "it needs grip")] {
         let before = trainer.view().unwrap().loaded.0;
-        trainer.ask(TrainWish::Load(folder.path().join(file)));
+        trainer.ask(TrainCommand::Load(folder.path().join(file)));
         let view = until(&trainer, &woken, |view| view.loaded.0 > before);
         let cause = view.loaded.1.clone().unwrap().unwrap_err();
         assert!(cause.contains(told), "{cause}");

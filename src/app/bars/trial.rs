@@ -7,7 +7,7 @@ use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
 use palpate_geometry::palette::Rgb;
 use palpate_lab::grasping::{GraspStage, LEAD_S};
-use palpate_lab::workers::{GripperView, GripperWish, LabellingAction, TrialView};
+use palpate_lab::workers::{GripperCommand, GripperView, LabellingAction, TrialView};
 use palpate_sim::gripper::Phase;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -26,7 +26,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             "Record a grasp; during a trial, discard it and start again (R)",
             LabellingAction::Record.into(),
         );
-        let end = GripperWish::End.into();
+        let end = GripperCommand::End.into();
         button(trial.is_some(), "End  Q", "End the trial and keep it (Q)", end);
         button(trial.is_some(), "Discard  D", "Discard the trial (D)", LabellingAction::Discard.into());
         ui.separator();

@@ -7,7 +7,7 @@ use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
-use palpate_lab::workers::{Command, GripperWish, GripperWorker, Notice, TrialView};
+use palpate_lab::workers::{Command, GripperCommand, GripperWorker, Notice, TrialView};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::Control;
@@ -16,7 +16,7 @@ use palpate_tactile::trial::Control;
 #[derive(Clone)]
 pub enum GripperAction {
     /// Send a command to the gripper.
-    Send(GripperWish),
+    Send(GripperCommand),
     /// Connect to the last port, or disconnect.
     ToggleConnection,
     /// Set the actuation.
@@ -69,7 +69,7 @@ impl GripperFeature {
     ) {
         if self.scene != *simulation.scene() {
             self.scene = simulation.scene().clone();
-            self.worker.wish(GripperWish::SetScene(Box::new(self.scene.clone())));
+            self.worker.command(GripperCommand::SetScene(Box::new(self.scene.clone())));
         }
         if self.worker.take_rows_lost() {
             self.traces.clear();
@@ -100,15 +100,15 @@ impl GripperFeature {
     pub(in crate::app) fn apply(&mut self, action: GripperAction, view: &mut ViewState, notices: &mut Notices) {
         match action {
             GripperAction::Send(wish) => {
-                if let GripperWish::Connect(Some(port)) = &wish {
+                if let GripperCommand::Connect(Some(port)) = &wish {
                     view.port = Some(port.clone());
                 }
-                self.worker.wish(wish);
+                self.worker.command(wish);
             }
             GripperAction::ToggleConnection => {
-                self.worker.wish(match self.connected {
-                    true => GripperWish::Disconnect,
-                    false => GripperWish::Connect(view.port.clone()),
+                self.worker.command(match self.connected {
+                    true => GripperCommand::Disconnect,
+                    false => GripperCommand::Connect(view.port.clone()),
                 });
             }
             GripperAction::SetControl(control) => view.control = control,
@@ -120,7 +120,7 @@ impl GripperFeature {
             GripperAction::ToggleWatch => {
                 let watching = self.worker.view().is_some_and(|gripper| gripper.watching.is_some());
                 let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
-                self.worker.wish(GripperWish::Watch((!watching).then_some(request)));
+                self.worker.command(GripperCommand::Watch((!watching).then_some(request)));
                 let state = if watching { "press R to record" } else { "detected automatically" };
                 notices.info(format!("Trials: {state}."));
             }
@@ -130,7 +130,7 @@ impl GripperFeature {
     /// Vents the fingers, where a board is connected.
     pub(in crate::app) fn stop(&self) {
         if self.connected {
-            self.worker.wish(GripperWish::Vent);
+            self.worker.command(GripperCommand::Vent);
         }
     }
 

@@ -6,7 +6,7 @@ use crate::app::features::view::ViewState;
 use crate::app::modes::mode::Mode;
 use crate::app::notices::Notices;
 use palpate_lab::workers::{
-    Command, GripperView, GripperWish, LabelView, LabelWish, Labeller, LabellingAction, LabellingEffect,
+    Command, GripperCommand, GripperView, LabelCommand, LabelView, Labeller, LabellingAction, LabellingEffect,
     LabellingSession, SessionContext,
 };
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub(in crate::app) struct LabellingFeature {
 
 impl LabellingFeature {
     pub(in crate::app) fn new(labeller: Labeller, store: PathBuf) -> Self {
-        labeller.ask(LabelWish::Refresh);
+        labeller.ask(LabelCommand::Refresh);
         Self { labeller, session: LabellingSession::new(store) }
     }
 
@@ -33,7 +33,7 @@ impl LabellingFeature {
 
     /// Reads the store again.
     pub(in crate::app) fn refresh(&self) {
-        self.labeller.ask(LabelWish::Refresh);
+        self.labeller.ask(LabelCommand::Refresh);
     }
 
     /// True while the model's prediction is hidden.
@@ -91,11 +91,11 @@ impl LabellingFeature {
             match effect {
                 LabellingEffect::Edit(wish) => self.labeller.ask(wish),
                 LabellingEffect::BeginTrial(request) => {
-                    let number = gripper.worker().wish(GripperWish::Begin(request));
+                    let number = gripper.worker().command(GripperCommand::Begin(request));
                     self.session.trial_requested(number);
                 }
                 LabellingEffect::DiscardRunning => {
-                    gripper.worker().wish(GripperWish::Discard);
+                    gripper.worker().command(GripperCommand::Discard);
                 }
                 LabellingEffect::SetBlind(blind) => view.blind = blind,
                 LabellingEffect::Inform(text) => notices.info(text),

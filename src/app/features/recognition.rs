@@ -6,7 +6,7 @@ use crate::app::features::tools::{GripperTools, ToolAction};
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
-use palpate_lab::workers::{Command, GripperWish, TrainWish, TrainedModel};
+use palpate_lab::workers::{Command, GripperCommand, TrainCommand, TrainedModel};
 use palpate_learn::Model;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl RecognitionFeature {
         notices: &mut Notices,
     ) -> Self {
         if let Some(path) = view.gripper_model.take() {
-            tools.apply(ToolAction::Train(TrainWish::Load(path)), notices);
+            tools.apply(ToolAction::Train(TrainCommand::Load(path)), notices);
         }
         Self { shipped }
     }
@@ -58,21 +58,21 @@ impl RecognitionFeature {
     ) {
         match action {
             RecognitionAction::SetThreshold(threshold) => {
-                on.gripper.worker().wish(GripperWish::SetThreshold(threshold));
+                on.gripper.worker().command(GripperCommand::SetThreshold(threshold));
                 on.simulation.send(Command::SetThreshold(threshold), notices);
             }
             RecognitionAction::NextObject => match view.source {
                 ViewSource::Gripper => {
-                    on.gripper.worker().wish(GripperWish::AnotherObject);
+                    on.gripper.worker().command(GripperCommand::AnotherObject);
                 }
                 ViewSource::Simulation => on.simulation.open_next(notices),
             },
             RecognitionAction::UseModel(Some(path)) => {
-                on.tools.apply(ToolAction::Train(TrainWish::Load(path)), notices);
+                on.tools.apply(ToolAction::Train(TrainCommand::Load(path)), notices);
             }
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
-                on.gripper.worker().wish(GripperWish::SetModel(self.shipped.clone()));
+                on.gripper.worker().command(GripperCommand::SetModel(self.shipped.clone()));
             }
         }
     }
@@ -105,6 +105,6 @@ impl RecognitionFeature {
 /// Uses a model for the real gripper from now on.
 fn use_model(trained: &TrainedModel, gripper: &GripperFeature, view: &mut ViewState, notices: &mut Notices) {
     view.gripper_model = Some(trained.path.clone());
-    gripper.worker().wish(GripperWish::SetModel(Some(Arc::clone(&trained.model))));
+    gripper.worker().command(GripperCommand::SetModel(Some(Arc::clone(&trained.model))));
     notices.info(format!("Model for the real gripper: {}", trained.about));
 }

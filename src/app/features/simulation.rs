@@ -3,7 +3,7 @@
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::traces::TraceHistory;
-use palpate_lab::grasping::ObjectDeck;
+use palpate_lab::grasping::ShuffledObjects;
 use palpate_lab::workers::{Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SimWorker, Snapshot};
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::{EMPTY, anchored, catalogue};
@@ -42,12 +42,12 @@ pub(in crate::app) struct SimulationFeature {
     unsent: bool,
     /// Object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
-    deck: ObjectDeck,
+    deck: ShuffledObjects,
 }
 
 impl SimulationFeature {
     pub(in crate::app) fn new(worker: SimWorker, effects: EffectsWorker, scene: Scene) -> Self {
-        let deck = ObjectDeck::new(DECK_SEED);
+        let deck = ShuffledObjects::new(DECK_SEED);
         Self { worker, effects, scene, traces: TraceHistory::default(), unsent: false, seen: None, deck }
     }
 
@@ -182,7 +182,7 @@ impl SimulationFeature {
 /// Shows a notice of a gripper's thread.
 pub(in crate::app) fn show_notice(notice: Notice, notices: &mut Notices) {
     match notice {
-        Notice::Told(text) => notices.info(text),
+        Notice::Info(text) => notices.info(text),
         Notice::Warning(text) => notices.warning(text),
         Notice::Failed(text) => notices.error(text),
         Notice::SceneRefused(refusal) => notices.error(refusal.cause),

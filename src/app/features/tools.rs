@@ -3,8 +3,8 @@
 use crate::app::notices::Notices;
 use crate::app::startup::ThreadError;
 use palpate_lab::workers::{
-    Examine, ExamineRequest, Examiner, FinishedTraining, FitTrials, FitWish, Fitter, TrainRequest, TrainWish,
-    TrainedModel, Trainer, Wake,
+    DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, TrainCommand,
+    TrainRequest, TrainedModel, Trainer, Wake,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -32,11 +32,11 @@ pub enum ToolAction {
     /// Stop the examination and report so far.
     StopExamining,
     /// List trials, or fit the finger to some.
-    Fit(FitWish),
+    Fit(FitCommand),
     /// Cancel the fit.
     StopFitting,
     /// Train on labelled trials, list them, or load a model.
-    Train(TrainWish),
+    Train(TrainCommand),
     /// Train with the default method, and use the model.
     TrainAndUse,
     /// Cancel the training.
@@ -46,7 +46,7 @@ pub enum ToolAction {
 /// The tools' threads.
 pub struct GripperTools {
     /// Diagnostics of board and port.
-    pub examiner: Examiner,
+    pub examiner: DiagnosticsJob,
     /// Fit of the simulated finger.
     pub fitter: Fitter,
     /// Training on labelled trials.
@@ -69,7 +69,7 @@ impl GripperTools {
     pub(in crate::app) fn start(setup: GripperToolsSetup, store: &Path, wake: &Wake) -> Result<Self, ThreadError> {
         let wake = || Arc::clone(wake);
         Ok(Self {
-            examiner: Examiner::start(setup.examine, wake()).map_err(ThreadError::of("the doctor"))?,
+            examiner: DiagnosticsJob::start(setup.examine, wake()).map_err(ThreadError::of("the doctor"))?,
             fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(ThreadError::of("the finger fit"))?,
             trainer: Trainer::start(store.to_owned(), setup.models, wake()).map_err(ThreadError::of("training"))?,
             loads: 0,
@@ -88,7 +88,7 @@ impl GripperTools {
                 let before = self.trainer.view().and_then(|view| view.finished.clone());
                 self.awaited = Some(Awaited { before, begun: false });
                 let method = DEFAULT_METHOD.to_owned();
-                self.trainer.ask(TrainWish::Train(TrainRequest { method, seed: TRAINING_SEED, quick: false }));
+                self.trainer.ask(TrainCommand::Train(TrainRequest { method, seed: TRAINING_SEED, quick: false }));
                 notices.info("Training on all labelled trials: see panel Training.");
             }
             ToolAction::StopTraining => self.trainer.give_up(),

@@ -14,7 +14,7 @@ use crate::app::modes::mode::Mode;
 use binding::{Binding, key};
 use egui::{Key, Modifiers};
 use palpate_geometry::drawing::{Camera, StandardView};
-use palpate_lab::workers::{Command, GripperWish, LabelWish, LabellingAction};
+use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingAction};
 
 /// Ctrl and Shift.
 const COMMAND_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };
@@ -26,15 +26,15 @@ static COMMON: [Binding; 26] = [
     }),
     key(Modifiers::NONE, Key::Q, "end the trial and keep it", |c| {
         c.gripper?.trial.as_ref()?;
-        Some(GripperWish::End.into())
+        Some(GripperCommand::End.into())
     }),
     key(Modifiers::NONE, Key::D, "discard the trial", |_| Some(LabellingAction::Discard.into())),
-    key(Modifiers::NONE, Key::T, "tare the sensors of the real gripper", |_| Some(GripperWish::Tare.into())),
+    key(Modifiers::NONE, Key::T, "tare the sensors of the real gripper", |_| Some(GripperCommand::Tare.into())),
     key(Modifiers::COMMAND, Key::G, "connect or disconnect the real gripper", |_| {
         Some(GripperAction::ToggleConnection.into())
     }),
-    key(COMMAND_SHIFT, Key::Z, "redo", |_| Some(LabelWish::Redo.into())),
-    key(Modifiers::COMMAND, Key::Z, "undo the last label or discard", |_| Some(LabelWish::Undo.into())),
+    key(COMMAND_SHIFT, Key::Z, "redo", |_| Some(LabelCommand::Redo.into())),
+    key(Modifiers::COMMAND, Key::Z, "undo the last label or discard", |_| Some(LabelCommand::Undo.into())),
     key(Modifiers::NONE, Key::Space, "play or pause", |c| {
         let playing = c.snapshot?.status.playing;
         Some(if playing { Command::Pause } else { Command::Play }.into())

@@ -9,7 +9,7 @@ use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::workers::{CalibrationPlan, CalibrationView, CalibrationWish, GripperWish, RunningCalibration};
+use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, RunningCalibration};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Curve, Point, SensorKind};
 use std::path::PathBuf;
@@ -83,7 +83,7 @@ fn begin_ui(ui: &mut Ui, context: &PanelContext<'_>, ended: Option<&Result<Strin
     if begin.on_disabled_hover_text("Name the part: calibrations belong to parts").clicked() {
         let port = Some(form.port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
         let plan = CalibrationPlan { sensor: form.sensor, part: form.part.trim().to_owned(), port };
-        actions.push(GripperWish::Calibrate(CalibrationWish::Begin(plan)));
+        actions.push(GripperCommand::Calibrate(CalibrationCommand::Begin(plan)));
     }
     ui.data_mut(|data| data.insert_temp(id, form));
 }
@@ -118,33 +118,33 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
 }
 
 fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
-    let mut button = |ready: bool, text: &str, about: &str, wish: Option<CalibrationWish>| {
+    let mut button = |ready: bool, text: &str, about: &str, wish: Option<CalibrationCommand>| {
         let clicked = ui.add_enabled(ready && wish.is_some(), Button::new(text)).on_hover_text(about).clicked();
         if let Some(wish) = wish.filter(|_| clicked) {
-            actions.push(GripperWish::Calibrate(wish));
+            actions.push(GripperCommand::Calibrate(wish));
         }
     };
-    let take = running.next.map(CalibrationWish::Take);
+    let take = running.next.map(CalibrationCommand::Take);
     button(running.settled.is_ok(), "Take point", "Take the settled reading", take);
     let free = !running.closing;
-    button(free && running.next.is_some(), "Skip", "Leave this point out", Some(CalibrationWish::Skip));
+    button(free && running.next.is_some(), "Skip", "Leave this point out", Some(CalibrationCommand::Skip));
     button(
         running.closing || !running.points.is_empty(),
         "Undo",
         "Measure the last point again",
-        Some(CalibrationWish::Undo),
+        Some(CalibrationCommand::Undo),
     );
     if SensorKind::of(running.plan.sensor) == SensorKind::Pad {
         let about = "Watch the empty hand close for 15 s, to correct the pad's zero for bending";
-        button(running.can_close, "Empty close", about, Some(CalibrationWish::EmptyClose));
+        button(running.can_close, "Empty close", about, Some(CalibrationCommand::EmptyClose));
     }
     button(
         free && running.fit.is_ok(),
         "Save",
         "Store the calibration; it applies to earlier trials too",
-        Some(CalibrationWish::Keep),
+        Some(CalibrationCommand::Keep),
     );
-    button(true, "Cancel", "Discard the calibration", Some(CalibrationWish::Stop));
+    button(true, "Cancel", "Discard the calibration", Some(CalibrationCommand::Stop));
 }
 
 /// Reading of a part in the unit of the plot: kilohms of a strip, microsiemens of a pad.

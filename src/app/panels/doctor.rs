@@ -13,7 +13,9 @@ use palpate_device::doctor::{
     Bleed, CHECKS, CheckFinding, CheckStatus, SKETCH, USUAL_LISTEN_S, WIRING_RULES, is_sound, summary, wires,
 };
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::{CrosstalkView, CrosstalkWish, Examination, ExamineRequest, GripperWish, RunningCrosstalk};
+use palpate_lab::workers::{
+    CrosstalkCommand, CrosstalkView, DiagnosticsReport, ExamineRequest, GripperCommand, RunningCrosstalk,
+};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let view = context.tools.examiner.view().unwrap_or_default();
@@ -52,7 +54,7 @@ fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
         }
         let about = "Move each sensor in turn; those of the other finger must not follow";
         if ui.button("Test for crosstalk").on_hover_text(about).clicked() {
-            actions.push(GripperWish::Crosstalk(CrosstalkWish::Begin(port)));
+            actions.push(GripperCommand::Crosstalk(CrosstalkCommand::Begin(port)));
         }
     });
     wrapped(ui, RichText::new(hint).weak());
@@ -96,11 +98,11 @@ fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCros
     wrapped(ui, RichText::new(format!("{}.", sentence(&running.instruction))).strong());
     ui.horizontal_wrapped(|ui| {
         for (text, about, wish) in [
-            ("Skip", "Continue with the next sensor", CrosstalkWish::Skip),
-            ("Stop", "End the test and report so far", CrosstalkWish::Stop),
+            ("Skip", "Continue with the next sensor", CrosstalkCommand::Skip),
+            ("Stop", "End the test and report so far", CrosstalkCommand::Stop),
         ] {
             if ui.button(text).on_hover_text(about).clicked() {
-                actions.push(GripperWish::Crosstalk(wish));
+                actions.push(GripperCommand::Crosstalk(wish));
             }
         }
     });
@@ -154,7 +156,7 @@ fn running_ui(ui: &mut Ui, request: &ExamineRequest, listened_s: f64, actions: &
     }
 }
 
-fn examination_ui(ui: &mut Ui, theme: Theme, examination: &Examination) {
+fn examination_ui(ui: &mut Ui, theme: Theme, examination: &DiagnosticsReport) {
     ui.add_space(6.0);
     let sound = is_sound(&examination.findings);
     let ink = if sound { ui.visuals().strong_text_color() } else { ui.visuals().error_fg_color };

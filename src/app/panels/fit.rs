@@ -15,7 +15,7 @@ use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{Course, Estimate, FingerFit, Known, MOST_STEPS, Remainder};
-use palpate_lab::workers::{FitWish, FittedFinger};
+use palpate_lab::workers::{FitCommand, FittedFinger};
 use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "fit") {
-        actions.push(ToolAction::Fit(FitWish::List));
+        actions.push(ToolAction::Fit(FitCommand::List));
     }
     let view = context.tools.fitter.view().unwrap_or_default();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -81,10 +81,10 @@ fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         let fit = ui.add_enabled(!chosen.is_empty(), Button::new("Fit"));
         if fit.on_disabled_hover_text("Choose at least one trial").clicked() {
-            actions.push(ToolAction::Fit(FitWish::Fit(chosen.iter().copied().collect())));
+            actions.push(ToolAction::Fit(FitCommand::Fit(chosen.iter().copied().collect())));
         }
         if ui.button("Refresh").on_hover_text("Reload the trials").clicked() {
-            actions.push(ToolAction::Fit(FitWish::List));
+            actions.push(ToolAction::Fit(FitCommand::List));
         }
     });
     ui.data_mut(|data| data.insert_temp(id, chosen));

@@ -9,7 +9,7 @@ use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::workers::{GripperView, GripperWish, LatestReading};
+use palpate_lab::workers::{GripperCommand, GripperView, LatestReading};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
@@ -39,10 +39,10 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         let connect = Button::new("Connect").fill(accented(context.view.theme));
         if ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)").clicked() {
-            actions.push(GripperWish::Connect(None));
+            actions.push(GripperCommand::Connect(None));
         }
         if ui.button("List ports").clicked() {
-            actions.push(GripperWish::ListPorts);
+            actions.push(GripperCommand::ListPorts);
         }
     });
     let ports: &[PortInfo] = context.gripper.map_or(&[], |gripper| &gripper.ports);
@@ -50,7 +50,7 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         let path = port.path.display().to_string();
         let button = Button::new(format!("{path}\n{}", port.title)).wrap();
         if ui.add_sized([ui.available_width(), 40.0], button).on_hover_text("Connect to this port").clicked() {
-            actions.push(GripperWish::Connect(Some(port.path.clone())));
+            actions.push(GripperCommand::Connect(Some(port.path.clone())));
         }
     }
     let id = egui::Id::unique("port path");
@@ -61,7 +61,7 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
             TextEdit::singleline(&mut path).hint_text("/dev/ttyACM0 or captured bytes").desired_width(f32::INFINITY);
         let response = ui.add(field).labelled_by(label.id);
         if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-            actions.push(GripperWish::Connect(Some(PathBuf::from(path.trim()))));
+            actions.push(GripperCommand::Connect(Some(PathBuf::from(path.trim()))));
         }
     });
     ui.data_mut(|data| data.insert_temp(id, path));
@@ -81,10 +81,10 @@ fn connected_ui(
             .on_hover_text("Set the present readings as zero; nothing may touch the fingers (T)")
             .clicked()
         {
-            actions.push(GripperWish::Tare);
+            actions.push(GripperCommand::Tare);
         }
         if ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)").clicked() {
-            actions.push(GripperWish::Disconnect);
+            actions.push(GripperCommand::Disconnect);
         }
     });
     health_ui(ui, link);

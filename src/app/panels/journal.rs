@@ -4,15 +4,15 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Ui};
-use palpate_lab::workers::LabelWish;
+use palpate_lab::workers::LabelCommand;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         if ui.button("Undo").on_hover_text("Undo the last change (Ctrl+Z)").clicked() {
-            actions.push(LabelWish::Undo);
+            actions.push(LabelCommand::Undo);
         }
         if ui.button("Redo").on_hover_text("Redo it (Ctrl+Shift+Z)").clicked() {
-            actions.push(LabelWish::Redo);
+            actions.push(LabelCommand::Redo);
         }
     });
     let journal = context.labels.map(|view| &view.journal).filter(|journal| !journal.is_empty());

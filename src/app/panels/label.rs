@@ -8,7 +8,7 @@ use crate::app::widgets::wrapped;
 use egui::text_edit::TextEditState;
 use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
 use palpate_lab::workers::{
-    GripperView, LabelView, LabelWish, LabellingAction, NUMBERED_OBJECTS, TrialView, object_title, parse_tags,
+    GripperView, LabelCommand, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, object_title, parse_tags,
 };
 use palpate_sim::objects::catalogue;
 use palpate_store::labels::{LabelledTrial, NextTrial};
@@ -185,7 +185,7 @@ fn question_ui(
         }
         let mut unsure = trial.unsure;
         if ui.checkbox(&mut unsure, "unsure  U").changed() {
-            actions.push(LabelWish::Unsure(trial.id, unsure));
+            actions.push(LabelCommand::Unsure(trial.id, unsure));
         }
     });
     let (names, chosen) = (draft.objects(view), draft.chosen.unwrap_or(0));
@@ -289,7 +289,7 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
             actions.push(LabellingAction::WriteNote(trial.id, note.clone()));
         }
         if response.lost_focus() && note != trial.note {
-            actions.push(LabelWish::Note(trial.id, note));
+            actions.push(LabelCommand::Note(trial.id, note));
         }
         ui.end_row();
         let mut tags = own(&draft.tags, trial.tags.join(", "));
@@ -304,7 +304,7 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
         }
         let list = parse_tags(&tags);
         if response.lost_focus() && list != trial.tags {
-            actions.push(LabelWish::Tags(trial.id, list));
+            actions.push(LabelCommand::Tags(trial.id, list));
         }
         ui.end_row();
     });

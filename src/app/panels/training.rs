@@ -10,14 +10,14 @@ use crate::app::widgets::{just_opened, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
-use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainWish, TrainerView};
+use palpate_lab::workers::{FinishedTraining, TrainCommand, TrainRequest, TrainerView};
 use palpate_learn::metrics::Confusion;
 use palpate_learn::{Labels, METHODS, method};
 use std::path::Path;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "training") {
-        actions.push(ToolAction::Train(TrainWish::Look));
+        actions.push(ToolAction::Train(TrainCommand::Look));
     }
     let view = context.tools.trainer.view().unwrap_or_default();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -60,7 +60,7 @@ fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Actions) {
             .on_hover_text("Train on all labelled trials of the real gripper");
         if train.on_disabled_hover_text(too_little.unwrap_or_default()).clicked() {
             let request = TrainRequest { method: chosen.clone(), seed: TRAINING_SEED, quick: false };
-            actions.push(ToolAction::Train(TrainWish::Train(request)));
+            actions.push(ToolAction::Train(TrainCommand::Train(request)));
         }
     });
     if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
@@ -177,7 +177,7 @@ fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, action
     ui.horizontal(|ui| {
         ui.strong("Models for the real gripper");
         if ui.button("Refresh").on_hover_text("Reload trials and models").clicked() {
-            actions.push(ToolAction::Train(TrainWish::Look));
+            actions.push(ToolAction::Train(TrainCommand::Look));
         }
     });
     let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);

@@ -5,7 +5,7 @@ use crate::app::context::PanelContext;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Trace;
-use palpate_lab::workers::{LabelView, LabelWish, LabellingAction, TrialFilter, object_title};
+use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter, object_title};
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::TrialId;
 
@@ -115,10 +115,10 @@ fn row_ui(
     };
     response.on_hover_text(about()).context_menu(|ui| {
         if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
-            actions.push(LabelWish::Reviewed(trial.id));
+            actions.push(LabelCommand::Reviewed(trial.id));
         }
         if ui.button("Discard").clicked() {
-            actions.push(LabelWish::Discard(trial.id));
+            actions.push(LabelCommand::Discard(trial.id));
         }
     });
     if clicked {

@@ -83,7 +83,7 @@ impl FaultKind {
 
 /// A fault and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fault {
+pub struct EmulatedFault {
     /// Its kind.
     pub kind: FaultKind,
     /// Its parameter; see [`fault_help`].
@@ -94,14 +94,14 @@ pub struct Fault {
     pub until_s: f64,
 }
 
-impl Fault {
+impl EmulatedFault {
     /// True while it is active (s).
     pub fn is_on(&self, t: f64) -> bool {
         (self.from_s..self.until_s).contains(&t)
     }
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for EmulatedFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}@{}", self.kind.name(), self.value, self.from_s)?;
         if self.until_s.is_finite() { write!(f, "/{}", self.until_s - self.from_s) } else { Ok(()) }
@@ -143,12 +143,12 @@ pub enum FaultProblem {
 }
 
 /// Parses a list of faults.
-pub fn parse_faults(text: &str) -> Result<Vec<Fault>, FaultError> {
+pub fn parse_faults(text: &str) -> Result<Vec<EmulatedFault>, FaultError> {
     let parse = |text| parse_fault(text).map_err(|problem| FaultError { text: String::from(text), problem });
     text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse).collect()
 }
 
-fn parse_fault(text: &str) -> Result<Fault, FaultProblem> {
+fn parse_fault(text: &str) -> Result<EmulatedFault, FaultProblem> {
     let (named, times) = text.split_once('@').ok_or(FaultProblem::NoTime)?;
     let (name, value) = named.split_once('=').map_or((named, None), |(name, value)| (name, Some(value)));
     let row = TABLE.iter().find(|row| row.name == name).ok_or(FaultProblem::Unknown)?;
@@ -159,7 +159,7 @@ fn parse_fault(text: &str) -> Result<Fault, FaultProblem> {
     };
     let from_s = number(Some(from), 0.0)?;
     let until_s = from_s + number(duration, row.duration_s)?;
-    Ok(Fault { kind: row.kind, value: number(value, row.value)?, from_s, until_s })
+    Ok(EmulatedFault { kind: row.kind, value: number(value, row.value)?, from_s, until_s })
 }
 
 #[cfg(test)]
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn a_list_of_faults_is_read() {
         let faults = parse_faults("vanish@5, garbage@7/2,stuck=2@10").expect("sound");
-        let garbage = Fault { kind: FaultKind::Garbage, value: 0.0, from_s: 7.0, until_s: 9.0 };
+        let garbage = EmulatedFault { kind: FaultKind::Garbage, value: 0.0, from_s: 7.0, until_s: 9.0 };
         assert_eq!((faults.len(), faults[1]), (3, garbage));
         assert_eq!((faults[0].kind, faults[0].until_s), (FaultKind::Vanish, 6.0));
         assert!(faults[2].value == 2.0 && faults[2].until_s.is_infinite() && faults[2].is_on(1e9));

@@ -1,7 +1,7 @@
 //! The emulated gripper: fingers, sensors, board and connection, with its faults. It has no port and no clock of its own: time
 //! and the host's bytes go in, the board's bytes come out. The same seed, times and input give the same bytes.
 
-use super::faults::{Fault, FaultKind};
+use super::faults::{EmulatedFault, FaultKind};
 use super::firmware::{BoardSetup, FirmwareBoard};
 use super::hand::{Began, Hand, HandPlan};
 use super::parts::{HiddenParts, Sensors, Stimulus};
@@ -36,7 +36,7 @@ pub struct EmulatorSetup {
     /// Start of the board's clock (µs).
     pub clock_start_us: u32,
     /// Faults.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<EmulatedFault>,
     /// Random seed of noise and faults.
     pub seed: u64,
 }
@@ -112,7 +112,7 @@ pub struct EmulatedGripper {
     /// Handshake after a restart.
     restarted: String,
     clock_start_us: u32,
-    faults: Vec<Fault>,
+    faults: Vec<EmulatedFault>,
     /// Faults that have been reported.
     struck: Vec<bool>,
     converter: Conversions,
@@ -195,7 +195,7 @@ impl EmulatedGripper {
     }
 
     /// The active fault of a kind.
-    pub fn fault(&self, kind: FaultKind) -> Option<Fault> {
+    pub fn fault(&self, kind: FaultKind) -> Option<EmulatedFault> {
         self.faults.iter().copied().find(|fault| fault.kind == kind && fault.is_on(self.now_s))
     }
 
@@ -407,7 +407,7 @@ impl Conversions {
     }
 
     /// Sets the faults of a time (s).
-    fn strike(&mut self, faults: &[Fault], t: f64) {
+    fn strike(&mut self, faults: &[EmulatedFault], t: f64) {
         let on = |kind: FaultKind| faults.iter().filter(move |fault| fault.kind == kind && fault.is_on(t));
         self.ten_bits = on(FaultKind::TenBit).next().is_some();
         self.crosstalk = on(FaultKind::Crosstalk).map(|fault| fault.value).next().unwrap_or(0.0);

@@ -23,7 +23,7 @@ mod script;
 mod tests;
 mod uart;
 
-pub use faults::{Fault, FaultError, FaultKind, FaultProblem, fault_help, parse_faults};
+pub use faults::{EmulatedFault, FaultError, FaultKind, FaultProblem, fault_help, parse_faults};
 pub use gripper::{EmulatedGripper, EmulatorEvent, EmulatorEventKind, EmulatorSetup};
 pub use hand::HandPlan;
 pub use parts::{HiddenParts, PadSetup, PartsError, Stimulus, StripSetup};

@@ -1,7 +1,7 @@
 //! Data sets from the store: a query for trials, and the sensors through which simulated trials are read.
 
 use palpate_learn::{Class, DataCard, Dataset, Example, Labels, Sequence};
-use palpate_sim::gripper::{Gripper, Phase};
+use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
 use palpate_store::{BOARD_RIG, Store, StoreError, TrialRow};
@@ -345,7 +345,7 @@ fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<Signal
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
     let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
-    let channels = layout.channels(&Gripper::default()).map_err(|cause| DatasetError::Layout { cause })?;
+    let channels = layout.channels(&GripperModel::default()).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
     read.grasp(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
         id,

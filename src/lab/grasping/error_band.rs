@@ -15,7 +15,7 @@
 
 use super::run::prepare_refined;
 use palpate_sim::objects::ObjectModel;
-use palpate_sim::scene::{EngineKind, Method, Scene};
+use palpate_sim::scene::{EngineKind, IntegrationMethod, Scene};
 use palpate_tactile::trial::Trial;
 use palpate_tactile::{Channel, Quantity, Sensors};
 use serde::Serialize;
@@ -45,8 +45,8 @@ impl ErrorBand {
         let named = scene.solver.accuracy.tolerance().is_none();
         let factor = match (scene.solver.engine, scene.solver.method()) {
             (EngineKind::Palpate, _) if named => SAFETY_BESIDE_THE_TRUTH,
-            (EngineKind::Palpate, Method::Sdirk2) => SAFETY / (1.0 - 0.25),
-            (EngineKind::Palpate, Method::Euler) | (EngineKind::Rapier, _) => SAFETY / (1.0 - 0.5),
+            (EngineKind::Palpate, IntegrationMethod::Sdirk2) => SAFETY / (1.0 - 0.25),
+            (EngineKind::Palpate, IntegrationMethod::Euler) | (EngineKind::Rapier, _) => SAFETY / (1.0 - 0.5),
         };
         Self { factor, t_s: Vec::new(), estimates: vec![Vec::new(); channels] }
     }

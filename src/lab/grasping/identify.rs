@@ -3,7 +3,7 @@
 
 use super::row::Row;
 use palpate_learn::{Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, StopReason, StopRule, Verdict};
-use palpate_sim::gripper::{Gripper, Phase};
+use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::{Channel, LayoutError, SensorLayout};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -122,7 +122,7 @@ impl Identification {
     }
 
     /// The channels that the model reads, on this gripper.
-    pub fn channels_on(&self, gripper: &Gripper) -> Result<Vec<Channel>, IdentifyError> {
+    pub fn channels_on(&self, gripper: &GripperModel) -> Result<Vec<Channel>, IdentifyError> {
         let layout = self.model.card.data.layout.as_deref().unwrap_or("C1+F");
         SensorLayout::named(layout)
             .and_then(|layout| layout.channels(gripper))

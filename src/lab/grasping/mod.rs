@@ -3,18 +3,18 @@
 
 mod collect;
 mod controller;
-mod deck;
 mod error_band;
 mod identify;
 mod row;
 mod run;
+mod shuffled_objects;
 mod summary;
 
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
-pub use deck::ObjectDeck;
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use identify::{Identification, IdentificationView, IdentifyError};
 pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
+pub use shuffled_objects::ShuffledObjects;
 pub use summary::{GraspSummary, HoldSummary};

@@ -2,7 +2,7 @@
 //! recogniser reads is found once per grasp.
 
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{Gripper, Phase};
+use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors};
 
 /// One sample: a value per channel, in the channel's unit; NaN where it is undefined.
@@ -26,14 +26,14 @@ pub struct FrameReader {
 
 impl FrameReader {
     /// Reads the channels of a layout, followed by those of `more` that it lacks.
-    pub fn new(layout: &SensorLayout, gripper: &Gripper, more: &[Channel]) -> Result<Self, LayoutError> {
+    pub fn new(layout: &SensorLayout, gripper: &GripperModel, more: &[Channel]) -> Result<Self, LayoutError> {
         let mut sensors = Sensors::new(layout, gripper, PressureArea::Participation)?;
         sensors.add(more);
         Ok(Self { sensors })
     }
 
     /// Reads these channels.
-    pub fn of(channels: Vec<Channel>, gripper: &Gripper) -> Self {
+    pub fn of(channels: Vec<Channel>, gripper: &GripperModel) -> Self {
         Self { sensors: Sensors::of(channels, gripper, PressureArea::Participation) }
     }
 

@@ -3,11 +3,11 @@
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, TaxelField};
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, FingerPlane, Gripper, SegmentPose, Side, TaxelGrid};
+use palpate_sim::gripper::{BentFinger, FingerPlane, GripperModel, SegmentPose, Side, TaxelGrid};
 
 /// Both fingers as draw-list items.
 pub(super) fn soft_fingers(
-    gripper: &Gripper,
+    gripper: &GripperModel,
     world_from_gripper: &Pose,
     frame: &Frame,
     full_scale: f32,
@@ -32,7 +32,7 @@ pub(super) fn soft_fingers(
 
 /// The palm, the middle of each whole segment, and the tip: a smooth curve through these with their directions
 /// passes where the rigid segments are.
-fn axis_frames(gripper: &Gripper, world_from_gripper: &Pose, frame: &Frame, side: Side) -> Vec<FingerFrame> {
+fn axis_frames(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, side: Side) -> Vec<FingerFrame> {
     let bent = BentFinger::new(&gripper.finger, frame.joints(side));
     let plane = gripper.plane(side);
     let last = bent.segments.len() - 1;
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn straight_fingers_hang_from_the_palm() {
-        let gripper = Gripper::default();
+        let gripper = GripperModel::default();
         let frame = Frame {
             sample: 0,
             t: 0.0,

@@ -5,7 +5,7 @@ use palpate_geometry::Pose;
 use palpate_geometry::drawing::Arrow;
 use palpate_geometry::palette::pressure_colour;
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, Gripper, Side};
+use palpate_sim::gripper::{BentFinger, GripperModel, Side};
 
 /// Length of the arrow of one newton (m).
 const METRES_PER_NEWTON: f64 = 0.07;
@@ -19,7 +19,7 @@ const FULL_SCALE: f64 = 0.5;
 const RADIUS: f32 = 0.0010;
 
 /// Arrows from the places of contact along the force that the object exerts on the finger.
-pub(super) fn arrows(gripper: &Gripper, world_from_gripper: &Pose, frame: &Frame) -> Vec<Arrow> {
+pub(super) fn arrows(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Vec<Arrow> {
     let grid = gripper.taxels();
     let mut arrows = Vec::new();
     for side in Side::BOTH {

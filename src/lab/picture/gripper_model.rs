@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::{Pose, Primitive, SurfaceMesh, TriMesh, rounded_box};
-use palpate_sim::gripper::{Gripper, Side};
+use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::scene::Support;
 
 const BODY: Rgb = Rgb(98, 106, 116);
@@ -15,7 +15,7 @@ const WRIST_RADIUS: f64 = 0.013;
 const PEDESTAL: Rgb = Rgb(176, 181, 188);
 
 /// The palm in the gripper frame: z = 0 is where the fingers leave it.
-pub(super) fn palm(gripper: &Gripper) -> SurfaceMesh {
+pub(super) fn palm(gripper: &GripperModel) -> SurfaceMesh {
     let finger = &gripper.finger;
     let half_gap = gripper.half_gap();
     let half_width = 0.5 * finger.width;

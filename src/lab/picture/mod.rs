@@ -15,7 +15,7 @@ use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid};
 use palpate_geometry::palette::{Rgb, Theme, Trace};
 use palpate_geometry::{Pose, SurfaceMesh};
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::Gripper;
+use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Scene, SupportKind};
 use std::sync::Arc;
@@ -56,7 +56,7 @@ impl Default for PictureView {
 /// Constant parts of a picture: meshes, and the gripper they belong to.
 #[derive(Clone, Debug)]
 pub struct Stage {
-    gripper: Gripper,
+    gripper: GripperModel,
     world_from_gripper: Pose,
     object: Option<Arc<SurfaceMesh>>,
     /// Radius of a ball that holds the object (m); zero for an empty hand.

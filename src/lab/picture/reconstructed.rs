@@ -1,10 +1,10 @@
 //! A real finger reconstructed from its flex strip: bent evenly, because one strip reads one number.
 
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{Gripper, Phase, Side};
+use palpate_sim::gripper::{GripperModel, Phase, Side};
 
 /// A frame in which each finger is an arc of the curvature that its strip reads (1/m); straight where nothing is read.
-pub(super) fn evenly_bent(gripper: &Gripper, curvature: [Option<f64>; 2]) -> Frame {
+pub(super) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -> Frame {
     let (joints, segment) = (gripper.finger.joints, gripper.finger.segment_length());
     let angle = |side: Side| curvature[side.index()].filter(|kappa| kappa.is_finite()).unwrap_or(0.0) * segment;
     let q = Side::BOTH.into_iter().flat_map(|side| std::iter::repeat_n(angle(side), joints)).collect();
@@ -18,7 +18,7 @@ mod tests {
 
     #[test]
     fn a_reconstructed_finger_has_the_curvature_of_its_strip() {
-        let gripper = Gripper::default();
+        let gripper = GripperModel::default();
         let layout = SensorLayout::named("C1").expect("a layout");
         let sensors = Sensors::new(&layout, &gripper, PressureArea::Participation).expect("fits");
         for curvature in [[0.0, 5.0], [-3.0, 12.0]] {

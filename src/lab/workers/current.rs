@@ -1,6 +1,6 @@
 //! The grasp that is going on in the simulation's thread.
 
-use super::companion::Companion;
+use super::refined_run::RefinedRun;
 use crate::grasping::{FrameReader, GraspRun};
 use crate::gripper::SimulatedGripper;
 use crate::picture::Stage;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub(super) struct Current {
     pub(super) run: GraspRun<SimulatedGripper>,
     /// Runs along for the error band, where one is wanted.
-    pub(super) companion: Option<Companion>,
+    pub(super) refined_run: Option<RefinedRun>,
     pub(super) plan: Arc<Plan>,
     pub(super) scene: Arc<Scene>,
     pub(super) stage: Arc<Stage>,
@@ -36,8 +36,8 @@ impl Current {
                 .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
         }
         self.run.gripper_mut().run_mut().pull_object(force);
-        if let Some(companion) = &mut self.companion {
-            companion.pull(force);
+        if let Some(refined_run) = &mut self.refined_run {
+            refined_run.pull(force);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Measuring what effects cost and change, beside the simulation: the newest wish replaces older ones, and what has been
+//! Measuring what effects cost and change, beside the simulation: the newest command replaces older ones, and what has been
 //! measured is kept for when the scene comes back.
 
 use super::latest::Latest;
@@ -56,7 +56,7 @@ struct Wish {
 #[derive(Debug)]
 pub struct EffectsWorker {
     /// Absent once the thread is being ended.
-    wishes: Option<Sender<Wish>>,
+    commands: Option<Sender<Wish>>,
     asked: Option<(Arc<Scene>, Arc<AtomicBool>)>,
     view: Arc<Latest<EffectsView>>,
     thread: Option<JoinHandle<()>>,
@@ -65,11 +65,11 @@ pub struct EffectsWorker {
 impl EffectsWorker {
     /// Starts the thread.
     pub fn start(explain: Explain, wake: Wake) -> std::io::Result<Self> {
-        let (wishes, inbox) = channel();
+        let (commands, inbox) = channel();
         let view = Arc::new(Latest::default());
-        let desk = Desk { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
+        let desk = BackgroundJob { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
         let thread = std::thread::Builder::new().name("effects".to_owned()).spawn(move || desk.work(&inbox))?;
-        Ok(Self { wishes: Some(wishes), asked: None, view, thread: Some(thread) })
+        Ok(Self { commands: Some(commands), asked: None, view, thread: Some(thread) })
     }
 
     /// Asks for a scene to be measured instead of whatever was asked for before.
@@ -78,11 +78,11 @@ impl EffectsWorker {
             return;
         }
         self.give_up();
-        let wish = Wish { scene: Arc::new(scene.clone()), cancelled: Arc::new(AtomicBool::new(false)) };
-        self.asked = Some((Arc::clone(&wish.scene), Arc::clone(&wish.cancelled)));
-        if let Some(wishes) = &self.wishes {
+        let command = Wish { scene: Arc::new(scene.clone()), cancelled: Arc::new(AtomicBool::new(false)) };
+        self.asked = Some((Arc::clone(&command.scene), Arc::clone(&command.cancelled)));
+        if let Some(commands) = &self.commands {
             // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
-            let _heard = wishes.send(wish);
+            let _heard = commands.send(command);
         }
     }
 
@@ -107,7 +107,7 @@ impl EffectsWorker {
 impl Drop for EffectsWorker {
     fn drop(&mut self) {
         self.give_up();
-        self.wishes = None;
+        self.commands = None;
         if let Some(thread) = self.thread.take() {
             let _ended = thread.join();
         }
@@ -115,46 +115,46 @@ impl Drop for EffectsWorker {
 }
 
 /// What the thread owns.
-struct Desk {
+struct BackgroundJob {
     explain: Explain,
     view: Arc<Latest<EffectsView>>,
     wake: Wake,
     kept: VecDeque<(Arc<Scene>, Arc<Explanation>)>,
 }
 
-impl Desk {
+impl BackgroundJob {
     fn work(mut self, inbox: &Receiver<Wish>) {
         let mut next = inbox.recv().ok();
-        while let Some(wish) = next.take() {
-            if let Some((_, known)) = self.kept.iter().find(|(scene, _)| *scene == wish.scene) {
-                self.publish(&wish.scene, EffectsState::Ready(Arc::clone(known)));
+        while let Some(command) = next.take() {
+            if let Some((_, known)) = self.kept.iter().find(|(scene, _)| *scene == command.scene) {
+                self.publish(&command.scene, EffectsState::Ready(Arc::clone(known)));
             } else {
-                self.publish(&wish.scene, EffectsState::Measuring(0, 0));
+                self.publish(&command.scene, EffectsState::Measuring(0, 0));
                 match inbox.recv_timeout(SETTLE) {
                     Ok(newer) => {
                         next = Some(newer);
                         continue;
                     }
                     Err(RecvTimeoutError::Disconnected) => return,
-                    Err(RecvTimeoutError::Timeout) => self.measure(&wish),
+                    Err(RecvTimeoutError::Timeout) => self.measure(&command),
                 }
             }
             next = inbox.recv().ok();
         }
     }
 
-    fn measure(&mut self, wish: &Wish) {
-        let progress = |done: usize, of: usize| self.publish(&wish.scene, EffectsState::Measuring(done, of));
+    fn measure(&mut self, command: &Wish) {
+        let progress = |done: usize, of: usize| self.publish(&command.scene, EffectsState::Measuring(done, of));
         // One core is left to the simulation that is being watched.
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
-        let how = Measuring { threads, cancelled: &wish.cancelled, progress: &progress };
-        let explanation = match (self.explain)(&wish.scene, &how) {
+        let how = Measuring { threads, cancelled: &command.cancelled, progress: &progress };
+        let explanation = match (self.explain)(&command.scene, &how) {
             Ok(Some(explanation)) => Arc::new(explanation),
             Ok(None) => return,
-            Err(cause) => return self.publish(&wish.scene, EffectsState::Failed(cause)),
+            Err(cause) => return self.publish(&command.scene, EffectsState::Failed(cause)),
         };
-        self.publish(&wish.scene, EffectsState::Ready(Arc::clone(&explanation)));
-        self.kept.push_back((Arc::clone(&wish.scene), explanation));
+        self.publish(&command.scene, EffectsState::Ready(Arc::clone(&explanation)));
+        self.kept.push_back((Arc::clone(&command.scene), explanation));
         if self.kept.len() > KEPT {
             self.kept.pop_front();
         }

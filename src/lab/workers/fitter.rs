@@ -1,7 +1,7 @@
 //! Fitting the simulated finger beside a window: a thread "fit" that lists the recorded trials of the real gripper, and fits
 //! the finger to some of them.
 
-use super::desk::{Desk, Outlet};
+use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::study::{FingerFit, FitWatch, RecordedGrasps, fit_finger_watched};
 use palpate_sim::scene::Scene;
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the user wants of a fit.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum FitWish {
+pub enum FitCommand {
     /// Look which trials there are.
     List,
     /// Fit the finger to these.
@@ -62,16 +62,16 @@ pub struct FitterView {
 }
 
 /// A handle on the thread.
-pub type Fitter = Desk<FitWish, FitterView>;
+pub type Fitter = BackgroundJob<FitCommand, FitterView>;
 
 impl Fitter {
     /// Starts the thread; trials come from the store at `store`.
     pub fn start(store: PathBuf, fit: FitTrials, wake: Wake) -> std::io::Result<Self> {
         let mut view = FitterView::default();
-        Self::spawn("fit", wake, move |wish, stop, outlet| {
-            match wish {
-                FitWish::List => view.trials = Some(listed(&store)),
-                FitWish::Fit(trials) => {
+        Self::spawn("fit", wake, move |command, stop, outlet| {
+            match command {
+                FitCommand::List => view.trials = Some(listed(&store)),
+                FitCommand::Fit(trials) => {
                     let ended = fitted(&fit, &store, &trials, stop, outlet, &view);
                     if !stop.load(Ordering::Relaxed) {
                         view.ended = Some(ended.map(Arc::new));
@@ -105,7 +105,7 @@ fn listed(store: &Path) -> Result<Arc<[TrialRow]>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::desk::watch::{until, waker};
+    use super::super::background_job::watch::{until, waker};
     use super::*;
     use crate::grasping::{grasp, prepare};
     use palpate_store::BoardInfo;
@@ -139,14 +139,14 @@ mod tests {
         }
         let (wake, woken) = waker();
         let mut desk = Fitter::start(path, Arc::new(fit_trials), wake)?;
-        desk.ask(FitWish::List);
+        desk.ask(FitCommand::List);
         let view = until(&desk, &woken, |view| view.trials.is_some());
         let rows = view.trials.clone().ok_or("looked for")??;
         let listed: Vec<&str> = rows.iter().map(|row| row.object.as_str()).collect();
         assert_eq!(listed, ["empty", "lemon"], "whole trials of the board, newest first");
 
         // Any trial can be fitted; this one's finger is known.
-        desk.ask(FitWish::Fit(vec![simulated]));
+        desk.ask(FitCommand::Fit(vec![simulated]));
         until(&desk, &woken, |view| view.running.is_some_and(|steps| steps > 1.0));
         let view = until(&desk, &woken, |view| view.running.is_none() && view.ended.is_some());
         let fitted = view.ended.clone().ok_or("it has ended")??;
@@ -155,12 +155,12 @@ mod tests {
         assert!((found / truth - 1.0).abs() < 0.03 && found != truth, "{found} instead of {truth}");
         assert_eq!(fitted.scene.object, close().object);
 
-        desk.ask(FitWish::Fit(vec![simulated]));
+        desk.ask(FitCommand::Fit(vec![simulated]));
         until(&desk, &woken, |view| view.running.is_some_and(|steps| steps > 0.0));
         desk.give_up();
         let view = until(&desk, &woken, |view| view.running.is_none());
         assert!(matches!(&view.ended, Some(Ok(kept)) if Arc::ptr_eq(kept, &fitted)), "what was there stays");
-        desk.ask(FitWish::Fit(vec![77]));
+        desk.ask(FitCommand::Fit(vec![77]));
         let view = until(&desk, &woken, |view| matches!(view.ended, Some(Err(_))));
         assert!(matches!(&view.ended, Some(Err(cause)) if cause.contains("77")), "{:?}", view.ended);
         Ok(())

@@ -1,7 +1,7 @@
 //! Labels, plan and journal for a window: a thread "label" that holds the store, does what is asked, and publishes what
 //! there is. The window never waits for the disk.
 
-use super::desk::{Desk, Outlet};
+use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::labelling::{Disagreement, disagreements};
 use palpate_store::labels::{LabelledTrial, NextTrial, Progress};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// What can be asked for.
 #[derive(Clone, Debug, PartialEq)]
-pub enum LabelWish {
+pub enum LabelCommand {
     /// Look at the store anew.
     Refresh,
     /// Say what a trial is of.
@@ -52,7 +52,7 @@ pub struct LabelView {
     pub disagreements: Vec<Disagreement>,
     /// What was changed last, newest first.
     pub journal: Vec<JournalEntry>,
-    /// What came of wishes, oldest first, numbered: a sentence, or why it was not done.
+    /// What came of commands, oldest first, numbered: a sentence, or why it was not done.
     pub told: Vec<(u64, Result<String, String>)>,
 }
 
@@ -74,13 +74,13 @@ const ENTRIES: usize = 60;
 const OUTCOMES: usize = 16;
 
 /// The handle.
-pub type Labeller = Desk<LabelWish, LabelView>;
+pub type Labeller = BackgroundJob<LabelCommand, LabelView>;
 
 /// Starts the thread on a store, which is opened when it is first needed.
 pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
     let mut clerk = Clerk { path, store: None, told: VecDeque::new(), number: 0 };
-    Desk::spawn("label", wake, move |wish: LabelWish, _stop, outlet: &Outlet<LabelView>| {
-        let outcome = clerk.grant(&wish);
+    BackgroundJob::spawn("label", wake, move |command: LabelCommand, _stop, outlet: &Outlet<LabelView>| {
+        let outcome = clerk.grant(&command);
         clerk.tell(outcome);
         let view = clerk.view().unwrap_or_else(|cause| {
             clerk.tell(Some(Err(cause)));
@@ -116,7 +116,7 @@ impl Clerk {
     }
 
     /// Does what is asked; what is worth saying of it.
-    fn grant(&mut self, wish: &LabelWish) -> Option<Result<String, String>> {
+    fn grant(&mut self, command: &LabelCommand) -> Option<Result<String, String>> {
         let store = match self.store() {
             Ok(store) => store,
             Err(cause) => return Some(Err(cause)),
@@ -124,22 +124,24 @@ impl Clerk {
         let undone = |entry: JournalEntry| format!("taken back: {}", entry.sentence());
         let redone = |entry: JournalEntry| format!("made again: {}", entry.restored());
         let told = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
-        let done: Result<Option<String>, StoreError> = match wish {
-            LabelWish::Refresh => Ok(None),
-            LabelWish::Label(id, object) => store.labels().set_label(*id, object).map(|()| None),
-            LabelWish::Discard(id) => {
+        let done: Result<Option<String>, StoreError> = match command {
+            LabelCommand::Refresh => Ok(None),
+            LabelCommand::Label(id, object) => store.labels().set_label(*id, object).map(|()| None),
+            LabelCommand::Discard(id) => {
                 let text = format!("trial {id} discarded; Ctrl+Z brings it back");
                 store.delete(&[*id]).map(|()| Some(text))
             }
-            LabelWish::Note(id, note) => store.labels().set_note(*id, note).map(|()| None),
-            LabelWish::Tags(id, tags) => store.labels().set_tags(*id, tags).map(|()| None),
-            LabelWish::Unsure(id, unsure) => store.labels().set_unsure(*id, *unsure).map(|()| None),
-            LabelWish::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
-            LabelWish::Undo => store.journal().undo().map(|entry| told(entry.map(undone), "nothing to take back")),
-            LabelWish::Redo => store.journal().redo().map(|entry| told(entry.map(redone), "nothing to make again")),
-            LabelWish::Want(name, wanted) => return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err),
-            LabelWish::Unplan(name) => return change_plan(store, |plan| plan.remove(name)).err().map(Err),
-            LabelWish::Export(folder) => return Some(exported(store, folder)),
+            LabelCommand::Note(id, note) => store.labels().set_note(*id, note).map(|()| None),
+            LabelCommand::Tags(id, tags) => store.labels().set_tags(*id, tags).map(|()| None),
+            LabelCommand::Unsure(id, unsure) => store.labels().set_unsure(*id, *unsure).map(|()| None),
+            LabelCommand::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
+            LabelCommand::Undo => store.journal().undo().map(|entry| told(entry.map(undone), "nothing to take back")),
+            LabelCommand::Redo => store.journal().redo().map(|entry| told(entry.map(redone), "nothing to make again")),
+            LabelCommand::Want(name, wanted) => {
+                return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err);
+            }
+            LabelCommand::Unplan(name) => return change_plan(store, |plan| plan.remove(name)).err().map(Err),
+            LabelCommand::Export(folder) => return Some(exported(store, folder)),
         };
         done.map_err(|error| error.to_string()).transpose()
     }
@@ -181,7 +183,7 @@ fn change_plan<E: std::fmt::Display>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::desk::watch::{until, waker};
+    use super::super::background_job::watch::{until, waker};
     use super::*;
     use crate::recording::board_trial_info;
     use palpate_store::BoardInfo;
@@ -201,20 +203,20 @@ mod tests {
         let ids = [recorded(&mut store), recorded(&mut store)];
         let (wake, woken) = waker();
         let desk = start_labeller(path, wake).expect("starts");
-        desk.ask(LabelWish::Refresh);
+        desk.ask(LabelCommand::Refresh);
         let first = until(&desk, &woken, |view| view.trials.len() == 2);
         assert_eq!((first.unlabelled().map(|trial| trial.id), first.progress.done()), (Some(ids[1]), 0));
         let next = first.next.clone().expect("all is to be done").object;
-        desk.ask(LabelWish::Label(ids[1], next.clone()));
+        desk.ask(LabelCommand::Label(ids[1], next.clone()));
         let labelled = until(&desk, &woken, |view| view.progress.done() == 1);
         assert_eq!(labelled.unlabelled().map(|trial| trial.id), Some(ids[0]));
         assert_ne!(labelled.next.as_ref().map(|n| n.object.clone()), Some(next.clone()), "never twice in a row");
-        desk.ask(LabelWish::Discard(ids[0]));
+        desk.ask(LabelCommand::Discard(ids[0]));
         until(&desk, &woken, |view| view.unlabelled().is_none());
         for _ in 0..2 {
-            desk.ask(LabelWish::Undo);
+            desk.ask(LabelCommand::Undo);
         }
-        desk.ask(LabelWish::Redo);
+        desk.ask(LabelCommand::Redo);
         until(&desk, &woken, |view| {
             view.told.iter().any(|(_, told)| {
                 told.as_ref().is_ok_and(|text| {
@@ -222,14 +224,14 @@ mod tests {
                 })
             })
         });
-        desk.ask(LabelWish::Undo);
+        desk.ask(LabelCommand::Undo);
         let back = until(&desk, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
         assert!(back.told.iter().any(|(_, told)| told.as_ref().is_ok_and(|text| text.starts_with("taken back: "))));
-        desk.ask(LabelWish::Want("mug".to_owned(), 3));
+        desk.ask(LabelCommand::Want("mug".to_owned(), 3));
         until(&desk, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
-        desk.ask(LabelWish::Want("mug".to_owned(), 0));
+        desk.ask(LabelCommand::Want("mug".to_owned(), 0));
         until(&desk, &woken, |view| view.told.iter().any(|(_, told)| told.is_err()));
-        desk.ask(LabelWish::Label(99, "mug".to_owned()));
+        desk.ask(LabelCommand::Label(99, "mug".to_owned()));
         let refused = until(&desk, &woken, |view| view.told.iter().filter(|(_, told)| told.is_err()).count() == 2);
         assert!(format!("{:?}", refused.told).contains("99"), "{:?}", refused.told);
     }

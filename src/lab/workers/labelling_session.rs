@@ -8,7 +8,7 @@
 //! ```
 
 use super::gripper::GripperView;
-use super::labeller::{LabelView, LabelWish};
+use super::labeller::{LabelCommand, LabelView};
 use crate::recording::TrialRequest;
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_store::labels::LabelledTrial;
@@ -70,14 +70,14 @@ pub enum LabellingAction {
     /// Export all labelled trials into a new folder beside the store.
     Export,
     /// Change labels or plan.
-    Edit(LabelWish),
+    Edit(LabelCommand),
 }
 
 /// Consequence of a session's step, for the owner of gripper and labels to carry out.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LabellingEffect {
     /// Change labels or plan.
-    Edit(LabelWish),
+    Edit(LabelCommand),
     /// Begin a trial, then report its number with [`LabellingSession::trial_requested`].
     BeginTrial(TrialRequest),
     /// Discard the running trial.
@@ -205,14 +205,14 @@ impl LabelDraft {
     }
 
     /// Text that is not stored yet: note and tags.
-    fn unsaved(&self, view: &LabelView) -> Vec<LabelWish> {
+    fn unsaved(&self, view: &LabelView) -> Vec<LabelCommand> {
         let note = self
             .note
             .as_ref()
-            .and_then(|(id, text)| (view.trial(*id)?.note != *text).then(|| LabelWish::Note(*id, text.clone())));
+            .and_then(|(id, text)| (view.trial(*id)?.note != *text).then(|| LabelCommand::Note(*id, text.clone())));
         let tags = self.tags.as_ref().and_then(|(id, text)| {
             let tags = parse_tags(text);
-            (view.trial(*id)?.tags != tags).then_some(LabelWish::Tags(*id, tags))
+            (view.trial(*id)?.tags != tags).then_some(LabelCommand::Tags(*id, tags))
         });
         note.into_iter().chain(tags).collect()
     }
@@ -263,7 +263,7 @@ impl LabellingSession {
                 self.ended = ended;
                 // Text typed while it was running answers its question.
                 self.draft.selected = None;
-                effects.push(LabellingEffect::Edit(LabelWish::Refresh));
+                effects.push(LabellingEffect::Edit(LabelCommand::Refresh));
             }
             let recording = gripper.trial.is_some();
             if recording && !self.recording {
@@ -321,7 +321,7 @@ impl LabellingSession {
             LabellingAction::WriteTags(id, text) => self.draft.tags = Some((id, text)),
             LabellingAction::ToggleUnsure => {
                 let trial = self.in_question(now);
-                effects.extend(trial.map(|trial| LabellingEffect::Edit(LabelWish::Unsure(trial.id, !trial.unsure))));
+                effects.extend(trial.map(|trial| LabellingEffect::Edit(LabelCommand::Unsure(trial.id, !trial.unsure))));
             }
             LabellingAction::ToggleBlind => {
                 let state = if now.blind { "shown" } else { "hidden until the label is given" };
@@ -329,9 +329,9 @@ impl LabellingSession {
                 effects.push(LabellingEffect::Inform(format!("Model prediction: {state}.")));
             }
             LabellingAction::Export => {
-                effects.push(LabellingEffect::Edit(LabelWish::Export(new_export_folder(&self.store))));
+                effects.push(LabellingEffect::Edit(LabelCommand::Export(new_export_folder(&self.store))));
             }
-            LabellingAction::Edit(wish) => effects.push(LabellingEffect::Edit(wish)),
+            LabellingAction::Edit(command) => effects.push(LabellingEffect::Edit(command)),
         }
         effects
     }
@@ -375,7 +375,7 @@ impl LabellingSession {
 
     /// A trial has been requested and is not running yet.
     fn is_beginning(&self, now: &SessionContext<'_>) -> bool {
-        now.gripper.map_or(0, |gripper| gripper.granted) < self.requested_by
+        now.gripper.map_or(0, |gripper| gripper.handled) < self.requested_by
     }
 
     fn has_trial(&self, now: &SessionContext<'_>) -> bool {
@@ -390,7 +390,7 @@ impl LabellingSession {
         if self.has_trial(now) {
             effects.push(LabellingEffect::DiscardRunning);
         } else if let Some(trial) = self.in_question(now).filter(|trial| again && trial.object.is_none()) {
-            effects.push(LabellingEffect::Edit(LabelWish::Discard(trial.id)));
+            effects.push(LabellingEffect::Edit(LabelCommand::Discard(trial.id)));
         }
         self.draft.reset();
         let request = TrialRequest { object: None, length_s: None, control: now.control, adds: !now.labelling };
@@ -404,7 +404,7 @@ impl LabellingSession {
         }
         let Some(id) = self.in_question(now).map(|trial| trial.id) else { return Vec::new() };
         self.draft.reset();
-        vec![LabellingEffect::Edit(LabelWish::Discard(id))]
+        vec![LabellingEffect::Edit(LabelCommand::Discard(id))]
     }
 
     fn give_label(&mut self, now: &SessionContext<'_>) -> Vec<LabellingEffect> {
@@ -413,9 +413,9 @@ impl LabellingSession {
         }
         let (Some(labels), Some(trial)) = (now.labels, self.in_question(now)) else { return Vec::new() };
         let Some(label) = self.draft.label(labels) else { return Vec::new() };
-        let mut effects = vec![LabellingEffect::Edit(LabelWish::Label(trial.id, label))];
+        let mut effects = vec![LabellingEffect::Edit(LabelCommand::Label(trial.id, label))];
         if labels.disagreements.iter().any(|found| found.id == trial.id) {
-            effects.push(LabellingEffect::Edit(LabelWish::Reviewed(trial.id)));
+            effects.push(LabellingEffect::Edit(LabelCommand::Reviewed(trial.id)));
         }
         self.draft.reset();
         effects
@@ -495,8 +495,8 @@ mod tests {
         }
     }
 
-    fn edit(wish: LabelWish) -> LabellingEffect {
-        LabellingEffect::Edit(wish)
+    fn edit(command: LabelCommand) -> LabellingEffect {
+        LabellingEffect::Edit(command)
     }
 
     #[test]
@@ -524,7 +524,7 @@ mod tests {
         assert_eq!(draft.label(&view).as_deref(), Some("garlic"));
         draft.note = Some((4, "slipped".to_owned()));
         draft.tags = Some((3, " ,".to_owned()));
-        assert_eq!(draft.unsaved(&view), [LabelWish::Note(4, "slipped".to_owned())]);
+        assert_eq!(draft.unsaved(&view), [LabelCommand::Note(4, "slipped".to_owned())]);
         draft.reset();
         assert_eq!(draft, LabelDraft::default());
     }
@@ -549,7 +549,7 @@ mod tests {
         let mut session = LabellingSession::default();
         let next = labels.next.as_ref().map(|next| next.object.clone()).expect("a plan");
         let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-        assert_eq!(given, [edit(LabelWish::Label(4, next))]);
+        assert_eq!(given, [edit(LabelCommand::Label(4, next))]);
         // Not while the outcome of the last key is unknown.
         let busy = SessionContext { settled: false, ..now(&gripper, &labels) };
         assert!(matches!(session.apply(LabellingAction::GiveLabel, &busy)[..], [LabellingEffect::Inform(_)]));
@@ -558,7 +558,7 @@ mod tests {
         let labels = LabelView { disagreements: vec![found], ..labels };
         session.apply(LabellingAction::Select(Some(3)), &now(&gripper, &labels));
         let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-        assert_eq!(given, [edit(LabelWish::Label(3, "ball".to_owned())), edit(LabelWish::Reviewed(3))]);
+        assert_eq!(given, [edit(LabelCommand::Label(3, "ball".to_owned())), edit(LabelCommand::Reviewed(3))]);
     }
 
     #[test]
@@ -576,11 +576,11 @@ mod tests {
         );
         // A trial that is requested counts as running.
         session.trial_requested(7);
-        let gripper = GripperView { granted: 6, ..GripperView::default() };
+        let gripper = GripperView { handled: 6, ..GripperView::default() };
         assert_eq!(session.apply(LabellingAction::Discard, &now(&gripper, &labels)), [LabellingEffect::DiscardRunning]);
-        let gripper = GripperView { granted: 7, ..GripperView::default() };
+        let gripper = GripperView { handled: 7, ..GripperView::default() };
         let discarded = session.apply(LabellingAction::Discard, &now(&gripper, &labels));
-        assert_eq!(discarded, [edit(LabelWish::Discard(4))]);
+        assert_eq!(discarded, [edit(LabelCommand::Discard(4))]);
         // Elsewhere a grasp adds to the ones before.
         let elsewhere = SessionContext { labelling: false, ..now(&gripper, &labels) };
         let begun = session.apply(LabellingAction::Record, &elsewhere);
@@ -599,12 +599,12 @@ mod tests {
         // Text being written is kept when a trial begins by itself.
         session.apply(LabellingAction::WriteNote(3, "slipped".to_owned()), &now(&idle, &labels));
         let kept = session.observe(&now(&during, &labels));
-        assert_eq!(kept, [edit(LabelWish::Note(3, "slipped".to_owned()))]);
+        assert_eq!(kept, [edit(LabelCommand::Note(3, "slipped".to_owned()))]);
         session.apply(LabellingAction::FocusSearch("cu".to_owned()), &now(&during, &labels));
         session.apply(LabellingAction::SearchFocused, &now(&during, &labels));
         // It ends; the list does not have it yet, so no key is about an older trial.
         let after = ended(5);
-        assert_eq!(session.observe(&now(&after, &labels)), [edit(LabelWish::Refresh)]);
+        assert_eq!(session.observe(&now(&after, &labels)), [edit(LabelCommand::Refresh)]);
         assert!(session.apply(LabellingAction::GiveLabel, &now(&after, &labels)).is_empty());
         let mut labels = labels;
         labels.trials.insert(0, trial(5, None));
@@ -612,7 +612,7 @@ mod tests {
         session.apply(LabellingAction::Search("cube".to_owned()), &now(&after, &labels));
         assert!(session.keeps_trial_in_sight(&now(&after, &labels)));
         let given = session.apply(LabellingAction::GiveLabel, &now(&after, &labels));
-        assert_eq!(given, [edit(LabelWish::Label(5, "cube".to_owned()))]);
+        assert_eq!(given, [edit(LabelCommand::Label(5, "cube".to_owned()))]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use crate::grasping::{Identification, IdentificationView, IdentifyError, Row};
 use palpate_learn::{Model, StopReason, StopRule};
-use palpate_sim::gripper::Gripper;
+use palpate_sim::gripper::GripperModel;
 use palpate_tactile::Channel;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ impl Listener {
     }
 
     /// The channels that the model reads on this gripper; none where it cannot.
-    pub(super) fn channels_on(&self, gripper: &Gripper) -> Vec<Channel> {
+    pub(super) fn channels_on(&self, gripper: &GripperModel) -> Vec<Channel> {
         self.identification.channels_on(gripper).unwrap_or_default()
     }
 

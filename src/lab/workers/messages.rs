@@ -49,7 +49,7 @@ pub enum Command {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
     /// Something that was asked for is done.
-    Told(String),
+    Info(String),
     /// Something about the grasp that the user should know.
     Warning(String),
     /// Something failed; the sentence says what, and what to try.

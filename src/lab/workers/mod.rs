@@ -20,13 +20,12 @@
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
-mod companion;
+mod accuracy_job;
+mod background_job;
 mod current;
-mod desk;
+mod diagnostics_job;
 mod effects;
-mod examiner;
 mod fitter;
-mod gauge;
 mod ghost;
 mod gripper;
 mod held_object;
@@ -38,23 +37,24 @@ mod listener;
 mod listener_tests;
 mod messages;
 mod pace;
-mod session;
+mod refined_run;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
+mod simulation_session;
 mod trainer;
 
-pub use desk::Desk;
+pub use background_job::BackgroundJob;
+pub use diagnostics_job::{DiagnosticsJob, DiagnosticsReport, DiagnosticsView, Examine, ExamineRequest, examine_port};
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
-pub use examiner::{Examination, Examine, ExamineRequest, Examiner, ExaminerView, examine_port};
-pub use fitter::{FitTrials, FitWish, FittedFinger, Fitter, FitterView, fit_trials};
+pub use fitter::{FitCommand, FitTrials, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{
-    CalibrationPlan, CalibrationView, CalibrationWish, CrosstalkView, CrosstalkWish, EndedTrial, GripperSetup,
-    GripperView, GripperWish, GripperWorker, LatestReading, ObserveRequest, RunningCalibration, RunningCrosstalk,
+    CalibrationCommand, CalibrationPlan, CalibrationView, CrosstalkCommand, CrosstalkView, EndedTrial, GripperCommand,
+    GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest, RunningCalibration, RunningCrosstalk,
     TrialView,
 };
-pub use labeller::{LabelView, LabelWish, Labeller, start_labeller};
+pub use labeller::{LabelCommand, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
     object_title, parse_tags,
@@ -65,4 +65,4 @@ pub use messages::{
     Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
 };
 pub use sim::{SimWorker, SimWorkerSetup};
-pub use trainer::{FinishedTraining, TrainRequest, TrainWish, TrainedModel, Trainer, TrainerView};
+pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -3,7 +3,7 @@
 use super::ghost::GhostGrasp;
 use super::latest::Latest;
 use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, Snapshot, TraceRow, Wake};
-use super::session::{Outlets, Session};
+use super::simulation_session::{Outlets, Session};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
 use palpate_tactile::SensorLayout;

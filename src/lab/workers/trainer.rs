@@ -1,12 +1,12 @@
 //! Training beside a window: a thread "train" that counts the labelled trials of the real gripper, trains a recogniser on
 //! them, keeps it as a file, and loads such files.
 
-use super::desk::{Desk, Outlet};
+use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::datasets::{SavedModel, new_model_path, saved_models};
 use crate::study::{JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingStage, labelled_classes};
 use palpate_learn::{Model, ModelError, method};
-use palpate_sim::gripper::Gripper;
+use palpate_sim::gripper::GripperModel;
 use palpate_store::Store;
 use palpate_tactile::{Channel, SensorLayout};
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the user wants of training.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum TrainWish {
+pub enum TrainCommand {
     /// Look which trials and models there are.
     Look,
     /// Train.
@@ -71,14 +71,14 @@ pub struct TrainerView {
 }
 
 /// A handle on the thread.
-pub type Trainer = Desk<TrainWish, TrainerView>;
+pub type Trainer = BackgroundJob<TrainCommand, TrainerView>;
 
 impl Trainer {
     /// Starts the thread; trials come from the store at `store`, models go into the folder `models`.
     pub fn start(store: PathBuf, models: PathBuf, wake: Wake) -> std::io::Result<Self> {
         let mut room = Room { store, models, view: TrainerView::default() };
-        Self::spawn("train", wake, move |wish, stop, outlet| {
-            room.grant(wish, stop, outlet);
+        Self::spawn("train", wake, move |command, stop, outlet| {
+            room.grant(command, stop, outlet);
             outlet.publish(room.view.clone());
         })
     }
@@ -92,21 +92,21 @@ struct Room {
 }
 
 impl Room {
-    fn grant(&mut self, wish: TrainWish, stop: &AtomicBool, outlet: &Outlet<TrainerView>) {
-        match wish {
-            TrainWish::Look => {
+    fn grant(&mut self, command: TrainCommand, stop: &AtomicBool, outlet: &Outlet<TrainerView>) {
+        match command {
+            TrainCommand::Look => {
                 let counted = Store::open(&self.store).and_then(|store| labelled_classes(&store));
                 self.view.classes = Some(counted.map(Arc::from).map_err(|error| error.to_string()));
                 self.view.models = saved_models(&self.models).into();
             }
-            TrainWish::Train(request) => {
+            TrainCommand::Train(request) => {
                 let finished = self.trained(&request, stop, outlet).map(Arc::new);
                 if !stop.load(Ordering::Relaxed) {
                     self.view.finished = Some(finished);
                 }
                 self.view.models = saved_models(&self.models).into();
             }
-            TrainWish::Load(path) => {
+            TrainCommand::Load(path) => {
                 let loaded = loaded(&path).map(Arc::new).map_err(|error| error.to_string());
                 self.view.loaded = (self.view.loaded.0 + 1, Some(loaded));
             }
@@ -146,7 +146,7 @@ fn loaded(path: &Path) -> Result<TrainedModel, ModelError> {
 
 /// Refuses a model that wants channels which the real gripper does not have.
 fn check_listens(model: &Model) -> Result<(), ModelError> {
-    let channels = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&Gripper::default()));
+    let channels = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&GripperModel::default()));
     let names: Vec<String> = channels.unwrap_or_default().iter().map(Channel::name).collect();
     if model.card.channels.iter().all(|channel| names.contains(channel)) {
         Ok(())

@@ -58,11 +58,11 @@ impl Side {
 
 /// A parallel two-finger pneumatic soft gripper (paper, section IV-B: SoftGripping, 0 to 1.5 bar).
 ///
-/// Gripper frame: origin midway between the fingers at the palm, z away from the fingertips, x the closing
+/// GripperModel frame: origin midway between the fingers at the palm, z away from the fingertips, x the closing
 /// direction, y across the fingers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Gripper {
+pub struct GripperModel {
     /// Distance between the two pads when open, and where the gripper is held.
     pub mount: Mount,
     /// Both fingers are alike.
@@ -73,7 +73,7 @@ pub struct Gripper {
     pub actuation: Actuation,
 }
 
-impl Gripper {
+impl GripperModel {
     /// Distance of each neutral axis from the middle of the gripper when open (m).
     pub fn half_gap(&self) -> f64 {
         0.5 * self.mount.opening + self.pad.thickness

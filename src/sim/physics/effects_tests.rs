@@ -10,7 +10,7 @@ use super::{PhysicsModel, Placement, Simulation};
 use crate::frame::Plan;
 use crate::gripper::PadLaw;
 use crate::objects::ObjectModel;
-use crate::scene::{Auto, Effect, Method, Scene, Setting, SupportKind};
+use crate::scene::{Auto, Effect, IntegrationMethod, Scene, Setting, SupportKind};
 use glam::DVec3;
 use palpate_geometry::Primitive;
 
@@ -195,7 +195,7 @@ fn steps_made_of_stages_keep_chambers_and_creep_on_their_course() {
         scene.effects.set(effect, Setting::On);
     }
     let drive = Drive { line_bar: 0.8, ..Drive::default() };
-    let bent = |method: Method, h: f64| -> f64 {
+    let bent = |method: IntegrationMethod, h: f64| -> f64 {
         let mut run = Run::new(&scene, None, h);
         let mut integrator = Integrator::new(method, &run.state);
         for _ in 0..(0.5 / h).round() as u32 {
@@ -206,9 +206,9 @@ fn steps_made_of_stages_keep_chambers_and_creep_on_their_course() {
         assert!((run.state.chamber_bar / bar - 1.0).abs() < 1e-9, "{method:?} h = {h}: {}", run.state.chamber_bar);
         run.state.q[4]
     };
-    let reference = bent(Method::Sdirk2, 1e-4);
+    let reference = bent(IntegrationMethod::Sdirk2, 1e-4);
     let errors = |method| [0.01, 0.005, 0.0025].map(|h| (bent(method, h) - reference).abs());
-    let (euler, stages) = (errors(Method::Euler), errors(Method::Sdirk2));
+    let (euler, stages) = (errors(IntegrationMethod::Euler), errors(IntegrationMethod::Sdirk2));
     for (one, two) in euler.iter().zip(&stages) {
         assert!(two < &(0.3 * one), "{euler:?} {stages:?}");
     }

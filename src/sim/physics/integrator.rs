@@ -25,7 +25,7 @@ use super::model::PhysicsModel;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
 use super::workspace::Workspace;
-use crate::scene::Method;
+use crate::scene::IntegrationMethod;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 const GAMMA: f64 = 1.0 - FRAC_1_SQRT_2;
@@ -46,12 +46,12 @@ impl Surroundings<'_> {
 /// A method with the memory it needs.
 #[derive(Clone, Debug)]
 pub(super) struct Integrator {
-    method: Method,
+    method: IntegrationMethod,
     start: State,
 }
 
 impl Integrator {
-    pub(super) fn new(method: Method, state: &State) -> Self {
+    pub(super) fn new(method: IntegrationMethod, state: &State) -> Self {
         Self { method, start: state.clone() }
     }
 
@@ -63,8 +63,8 @@ impl Integrator {
     /// Convex minimisations in a step.
     pub(super) fn solves(&self) -> u64 {
         match self.method {
-            Method::Euler => 1,
-            Method::Sdirk2 => 2,
+            IntegrationMethod::Euler => 1,
+            IntegrationMethod::Sdirk2 => 2,
         }
     }
 
@@ -76,8 +76,8 @@ impl Integrator {
         h: f64,
     ) -> Result<StepReport, NotFinite> {
         match self.method {
-            Method::Euler => within.step(state, h),
-            Method::Sdirk2 => {
+            IntegrationMethod::Euler => within.step(state, h),
+            IntegrationMethod::Sdirk2 => {
                 self.start.copy_from(state);
                 let first = within.step(state, GAMMA * h)?;
                 state.go_on_from(&self.start, 1.0 / GAMMA - 2.0, within.model);

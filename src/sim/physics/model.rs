@@ -7,7 +7,7 @@ use super::effects::{Chamber, FingerContact, Relaxation, plan};
 use super::environment::Environment;
 use super::placement::Placement;
 use crate::frame::Plan;
-use crate::gripper::{FingerPlane, Gripper, PadLaw, Side};
+use crate::gripper::{FingerPlane, GripperModel, PadLaw, Side};
 use crate::objects::{ObjectModel, Resting};
 use crate::scene::{Effect, Scene, Support, SupportKind};
 use glam::{DMat3, DVec3};
@@ -69,7 +69,7 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    fn new(gripper: &Gripper) -> Self {
+    fn new(gripper: &GripperModel) -> Self {
         let (finger, pad) = (&gripper.finger, &gripper.pad);
         let (rows, columns) = (pad.rows, pad.columns);
         let (thickness, crown_radius) = (pad.thickness, pad.crown_radius);

@@ -16,7 +16,7 @@ use crate::objects::ObjectModel;
 use crate::scene::{Accuracy, Scene};
 use glam::DVec3;
 
-/// Method of a step.
+/// IntegrationMethod of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stepping {
     /// The convex step that grasps are made of.
@@ -35,7 +35,7 @@ pub struct SteppedScene {
     pub(super) ws: Workspace,
     /// Length of a step (s).
     pub h: f64,
-    /// Method of integration.
+    /// IntegrationMethod of integration.
     pub stepping: Stepping,
     /// Steps taken.
     pub steps: u64,

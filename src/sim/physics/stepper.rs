@@ -19,7 +19,7 @@ use super::state::State;
 use super::step::{NotFinite, StepReport};
 use super::workspace::Workspace;
 use crate::gripper::SegmentPose;
-use crate::scene::Method;
+use crate::scene::IntegrationMethod;
 
 /// Takes steps and counts them.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ impl Stepper {
     pub(super) fn new(
         model: &PhysicsModel,
         state: &State,
-        method: Method,
+        method: IntegrationMethod,
         tolerance: Option<f64>,
         longest: f64,
     ) -> Self {

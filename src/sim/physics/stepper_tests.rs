@@ -6,7 +6,7 @@ use super::stepper::Stepper;
 use super::{PhysicsModel, Placement, Simulation, State, Workspace};
 use crate::gripper::Phase;
 use crate::objects::ObjectModel;
-use crate::scene::{Accuracy, Method, Scene, SupportKind};
+use crate::scene::{Accuracy, IntegrationMethod, Scene, SupportKind};
 use palpate_geometry::Primitive;
 use proptest::prelude::*;
 
@@ -32,7 +32,7 @@ fn set_up(scene: &Scene) -> (PhysicsModel, State, Workspace) {
 }
 
 /// The middle joint's angle (rad) after steps of `h` under stretches of (torque, duration).
-fn bent_after(scene: &Scene, method: Method, h: f64, stretches: &[(f64, f64)]) -> f64 {
+fn bent_after(scene: &Scene, method: IntegrationMethod, h: f64, stretches: &[(f64, f64)]) -> f64 {
     let (model, mut state, mut ws) = set_up(scene);
     let mut integrator = Integrator::new(method, &state);
     for (torque, duration) in stretches {
@@ -57,7 +57,7 @@ fn kelvin_voigt() -> (Scene, f64) {
 #[test]
 fn two_stages_creep_towards_a_bend_at_second_order() {
     let (scene, want) = kelvin_voigt();
-    let error = |h: f64| (bent_after(&scene, Method::Sdirk2, h, &[(0.05, 0.1)]) / want - 1.0).abs();
+    let error = |h: f64| (bent_after(&scene, IntegrationMethod::Sdirk2, h, &[(0.05, 0.1)]) / want - 1.0).abs();
     let errors: Vec<f64> = [0.02, 0.01, 0.005, 0.0025].map(error).into();
     assert!(errors[0] < 2e-3, "{errors:?}");
     for pair in errors.windows(2) {
@@ -70,10 +70,10 @@ fn two_stages_swing_back_far_closer_than_twice_as_many_of_euler() {
     // Inertia and Coriolis forces are those of a stage's start, which leaves a small error of first order.
     let scene = bare();
     let after = |method, h: f64| bent_after(&scene, method, h, &[(0.05, 0.2), (0.0, 0.05)]);
-    let reference = after(Method::Sdirk2, 2.5e-5);
+    let reference = after(IntegrationMethod::Sdirk2, 2.5e-5);
     for h in [0.01, 0.005, 0.0025] {
-        let two_stages = (after(Method::Sdirk2, h) - reference).abs();
-        let euler = (after(Method::Euler, 0.5 * h) - reference).abs();
+        let two_stages = (after(IntegrationMethod::Sdirk2, h) - reference).abs();
+        let euler = (after(IntegrationMethod::Euler, 0.5 * h) - reference).abs();
         assert!(two_stages < 0.1 * euler, "h = {h}: {two_stages} rad, Euler {euler} rad");
     }
 }
@@ -81,7 +81,7 @@ fn two_stages_swing_back_far_closer_than_twice_as_many_of_euler() {
 #[test]
 fn a_bend_follows_its_closed_form_as_closely_as_the_tolerance_asks() {
     let (scene, want) = kelvin_voigt();
-    for method in [Method::Euler, Method::Sdirk2] {
+    for method in [IntegrationMethod::Euler, IntegrationMethod::Sdirk2] {
         let mut before = (f64::INFINITY, 0);
         for tolerance in [1e-3, 1e-4, 1e-5, 1e-6] {
             let (model, mut state, mut ws) = set_up(&scene);
@@ -193,7 +193,7 @@ fn undamped_stiff_joints_and_passive_swings_stay_tame() {
             let mut scene = bare();
             scene.gripper.finger.bending_stiffness *= factor;
             scene.gripper.finger.damping_time = 0.0;
-            let q = bent_after(&scene, Method::Sdirk2, h, &[(0.05, 2000.0 * h)]);
+            let q = bent_after(&scene, IntegrationMethod::Sdirk2, h, &[(0.05, 2000.0 * h)]);
             let want = 0.05 / scene.gripper.finger.joint_stiffness();
             assert!((q / want - 1.0).abs() < 1e-3, "x {factor}, h = {h}: {q} instead of {want}");
         }

@@ -122,25 +122,25 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Method of integration at an accuracy.
-    pub fn method(self, accuracy: Accuracy) -> Method {
+    /// IntegrationMethod of integration at an accuracy.
+    pub fn method(self, accuracy: Accuracy) -> IntegrationMethod {
         match (self, accuracy.tolerance()) {
-            (Self::Euler, _) | (Self::Auto, None) => Method::Euler,
-            (Self::Sdirk2, _) | (Self::Auto, Some(_)) => Method::Sdirk2,
+            (Self::Euler, _) | (Self::Auto, None) => IntegrationMethod::Euler,
+            (Self::Sdirk2, _) | (Self::Auto, Some(_)) => IntegrationMethod::Sdirk2,
         }
     }
 }
 
 /// A method of integration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
+pub enum IntegrationMethod {
     /// Implicit Euler.
     Euler,
     /// Two implicit stages, after Alexander (1977).
     Sdirk2,
 }
 
-impl Method {
+impl IntegrationMethod {
     /// Order of convergence where motion is smooth.
     pub fn order(self) -> i32 {
         match self {
@@ -183,9 +183,9 @@ mod tests {
     #[test]
     fn a_tolerance_selects_the_second_order_method_by_default() {
         let tolerance = Accuracy::Tolerance(1e-4);
-        assert_eq!(Integrator::Auto.method(Accuracy::Standard), Method::Euler);
-        assert_eq!(Integrator::Auto.method(tolerance), Method::Sdirk2);
-        assert_eq!(Integrator::Euler.method(tolerance), Method::Euler);
-        assert_eq!(Integrator::Sdirk2.method(Accuracy::Draft), Method::Sdirk2);
+        assert_eq!(Integrator::Auto.method(Accuracy::Standard), IntegrationMethod::Euler);
+        assert_eq!(Integrator::Auto.method(tolerance), IntegrationMethod::Sdirk2);
+        assert_eq!(Integrator::Euler.method(tolerance), IntegrationMethod::Euler);
+        assert_eq!(Integrator::Sdirk2.method(Accuracy::Draft), IntegrationMethod::Sdirk2);
     }
 }

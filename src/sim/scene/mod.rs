@@ -12,7 +12,7 @@ mod file;
 mod poses;
 mod timing;
 
-pub use accuracy::{Accuracy, Integrator, Method, UnknownAccuracy};
+pub use accuracy::{Accuracy, IntegrationMethod, Integrator, UnknownAccuracy};
 pub use auto::Auto;
 pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
@@ -20,7 +20,7 @@ pub use file::{SceneError, SceneKey};
 pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
 pub use timing::{Clock, Timing};
 
-use crate::gripper::{Gripper, Programme};
+use crate::gripper::{GripperModel, Programme};
 use crate::objects::{CollisionShape, LoadOptions, ObjectError, ObjectModel, load};
 use palpate_geometry::units::STANDARD_GRAVITY;
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,7 @@ pub struct Scene {
     /// Support of the object.
     pub support: Support,
     /// The gripper and where it is held.
-    pub gripper: Gripper,
+    pub gripper: GripperModel,
     /// Variation of poses from grasp to grasp.
     pub pose: PoseSpread,
     /// Line pressure over time.
@@ -154,7 +154,7 @@ pub struct Solver {
     pub engine: EngineKind,
     /// A named time step, or a tolerance to which steps are chosen.
     pub accuracy: Accuracy,
-    /// Method of integration.
+    /// IntegrationMethod of integration.
     pub integrator: Integrator,
     /// Newton stops when the scaled gradient falls below this share of the forces at play.
     pub tolerance: f64,
@@ -205,7 +205,7 @@ impl Default for Support {
 
 impl Solver {
     /// The method that steps are taken by.
-    pub fn method(&self) -> Method {
+    pub fn method(&self) -> IntegrationMethod {
         self.integrator.method(self.accuracy)
     }
 

@@ -1,7 +1,7 @@
 //! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending
 //! does to it, over the curvature that its finger's strip reads.
 
-use super::Fault;
+use super::CalibrationFault;
 use super::pad_curve::BendingZero;
 use super::point::SensorKind;
 use super::readout::Readout;
@@ -34,16 +34,16 @@ impl EmptyClose {
         pad: (Sensor, Calibration),
         serving: &[(Sensor, Calibration)],
         seconds: f64,
-    ) -> Result<Self, Fault> {
+    ) -> Result<Self, CalibrationFault> {
         let sensor = pad.0;
         let side = match sensor {
             Sensor::PadLeft => Side::Left,
             Sensor::PadRight => Side::Right,
-            Sensor::FlexLeft | Sensor::FlexRight => return Err(Fault::NoBending),
+            Sensor::FlexLeft | Sensor::FlexRight => return Err(CalibrationFault::NoBending),
         };
         let strip = SensorKind::Flex.on(side);
         if board.channel_of(strip).is_none() || !serving.iter().any(|(own, _)| *own == strip) {
-            return Err(Fault::NoStrip { strip: strip.label() });
+            return Err(CalibrationFault::NoStrip { strip: strip.label() });
         }
         let mut calibrations: Vec<(Sensor, Calibration)> =
             serving.iter().filter(|(own, _)| *own != sensor).cloned().collect();
@@ -80,7 +80,7 @@ impl EmptyClose {
     }
 
     /// Bending zero from the recorded readings.
-    pub fn bending(&self) -> Result<BendingZero, Fault> {
+    pub fn bending(&self) -> Result<BendingZero, CalibrationFault> {
         BendingZero::from_empty_close(&self.readout.bending(self.side, &self.readings))
     }
 }
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bending_zero_is_found_from_an_empty_close() -> Result<(), Fault> {
+    fn the_bending_zero_is_found_from_an_empty_close() -> Result<(), CalibrationFault> {
         let [strip, pad] = parts();
         let board = Board::default();
         let mut close = EmptyClose::begin(&board, pad.clone(), std::slice::from_ref(&strip), 4.0)?;
@@ -135,7 +135,7 @@ mod tests {
         }
         assert!(over && close.left_s() == 0.0);
         let bending = close.bending()?;
-        let Curve::Pad(curve) = &pad.1.curve else { return Err(Fault::NoBending) };
+        let Curve::Pad(curve) = &pad.1.curve else { return Err(CalibrationFault::NoBending) };
         let kappa = 30f64.to_radians() / StripPart::ACTIVE_LENGTH;
         let load = bending.preload(curve, kappa);
         assert!((load - 0.6).abs() < 0.03, "{load}");
@@ -143,21 +143,21 @@ mod tests {
     }
 
     #[test]
-    fn an_unusable_empty_close_is_refused_with_the_reason() -> Result<(), Fault> {
+    fn an_unusable_empty_close_is_refused_with_the_reason() -> Result<(), CalibrationFault> {
         let [strip, pad] = parts();
         let board = Board::default();
         let begin = |sensor: &(Sensor, Calibration), serving: &[(Sensor, Calibration)]| {
             EmptyClose::begin(&board, sensor.clone(), serving, 1.0).map(|_| ())
         };
-        assert!(matches!(begin(&strip, &[]), Err(Fault::NoBending)));
-        assert!(matches!(begin(&pad, &[]), Err(Fault::NoStrip { strip: "left flex strip" })));
+        assert!(matches!(begin(&strip, &[]), Err(CalibrationFault::NoBending)));
+        assert!(matches!(begin(&pad, &[]), Err(CalibrationFault::NoStrip { strip: "left flex strip" })));
         let mut still = EmptyClose::begin(&board, pad, &[strip], 1.0)?;
         let counts = vec![Some(1424.0), None, Some(0.0), None];
         for k in 0..60u32 {
             let t_s = 0.02 * f64::from(k);
             still.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts: counts.clone(), line_bar: None });
         }
-        assert!(matches!(still.bending(), Err(Fault::BendingTooShort { .. })));
+        assert!(matches!(still.bending(), Err(CalibrationFault::BendingTooShort { .. })));
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use palpate_geometry::units::three_digits as digits;
 
 /// Error of a calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Fault {
+pub enum CalibrationFault {
     /// Impossible divider.
     #[error(
         "a divider of {ohm} ohm at {volt} V is not possible; give the fixed resistor in ohm, such as 47000 beside a flex \

@@ -9,7 +9,7 @@
 //! Plausible parts follow the data sheet of the FS-L-0055-253-ST: 25 kOhm flat, off by 30 % at most; distributors
 //! measure 2 to 2.5 times that at 90 degrees.
 
-use super::Fault;
+use super::CalibrationFault;
 use super::input::Input;
 use super::point::{Point, SensorKind, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
@@ -56,11 +56,11 @@ pub struct FlexCurve {
 
 impl FlexCurve {
     /// Fits a strip; two points at least, a right angle apart if possible. Also returns remarks.
-    pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
+    pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), CalibrationFault> {
         check(points, SensorKind::Flex, input, FRAC_PI_2)?;
         let distinct = merged(points, APART);
         if distinct.len() < 2 {
-            return Err(Fault::TooFew(format!(
+            return Err(CalibrationFault::TooFew(format!(
                 "{} of at least 2 different angles: take one with the finger straight and one bent by 90 degrees, better \
                  also 30 and 60",
                 distinct.len()
@@ -69,7 +69,7 @@ impl FlexCurve {
         let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
         if most - least < LEAST_SPAN {
             let [from, to] = [least, most].map(|angle| SensorKind::Flex.with_unit(angle));
-            return Err(Fault::TooFew(format!(
+            return Err(CalibrationFault::TooFew(format!(
                 "the flex strip has points from {from} to {to} only: angles at least 45 degrees apart are needed, best 0 \
                  and 90"
             )));
@@ -78,7 +78,8 @@ impl FlexCurve {
         let weighted = |p: &Point| WeightedPoint { x: p.stimulus, y: input.ohm(p.counts), weight: 1.0 };
         let line = StraightLine::through(&points.iter().map(weighted).collect::<Vec<_>>());
         // The points differ in angle, or else they would have been refused as too close: its numbers left the range.
-        let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
+        let line =
+            line.ok_or(CalibrationFault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
         let residuals = points.iter().map(|p| (input.ohm(p.counts) - line.at(p.stimulus)) / line.slope).collect();
         let curve = Self { flat_ohm: line.intercept, ohm_per_rad: line.slope, residuals, line };
         curve.is_such_a_part(input)?;
@@ -111,13 +112,13 @@ impl FlexCurve {
         self.ohm(FRAC_PI_2) / self.flat_ohm
     }
 
-    fn is_such_a_part(&self, input: &Input) -> Result<(), Fault> {
+    fn is_such_a_part(&self, input: &Input) -> Result<(), CalibrationFault> {
         let within = |[least, most]: [f64; 2], value: f64| value >= least && value <= most;
         if !within(FLAT_OHM, self.flat_ohm) {
             let resistor = input.divider.fixed_ohm;
             let [low, high] = FLAT_OHM.map(|flat| three_digits(1e-3 * resistor * flat / self.flat_ohm));
             let said = three_digits(1e-3 * resistor);
-            return Err(Fault::ImplausiblePart(format!(
+            return Err(CalibrationFault::ImplausiblePart(format!(
                 "the flat strip comes out at {} kOhm, but such parts have 17.5 to 32.5: the resistor beside it is not the \
                  {said} kOhm entered but {low} to {high}, or it is another part",
                 three_digits(self.flat_ohm * 1e-3)
@@ -130,7 +131,7 @@ impl FlexCurve {
             } else {
                 "the angles are smaller than what was bent, or the part is damaged"
             };
-            return Err(Fault::ImplausiblePart(format!(
+            return Err(CalibrationFault::ImplausiblePart(format!(
                 "bent by 90 degrees the strip comes out at {} times its flat resistance, but such parts rise to 1.5 to 3.5 \
                  times: {hint}",
                 three_digits(ratio)
@@ -139,7 +140,7 @@ impl FlexCurve {
         Ok(())
     }
 
-    fn remarks(&self, points: &[Point]) -> Result<Vec<String>, Fault> {
+    fn remarks(&self, points: &[Point]) -> Result<Vec<String>, CalibrationFault> {
         let mut words = Vec::new();
         if points.len() == 2 {
             words.push("two points fit any line: take a third one to check the fit".to_owned());
@@ -149,7 +150,9 @@ impl FlexCurve {
         let (at, off) =
             (SensorKind::Flex.with_unit(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
         if residual.abs() > TOO_FAR {
-            return Err(Fault::BadPoint(format!("{at} is {off} off the curve through the others: take it again")));
+            return Err(CalibrationFault::BadPoint(format!(
+                "{at} is {off} off the curve through the others: take it again"
+            )));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!("{at} is {off} off the line; take it again if the strip may have slipped"));
@@ -159,13 +162,13 @@ impl FlexCurve {
 }
 
 /// A strip that is bent further has more resistance.
-fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
+fn rises(distinct: &[Point], input: &Input) -> Result<(), CalibrationFault> {
     for pair in distinct.windows(2) {
         let (before, after) = (input.ohm(pair[0].counts), input.ohm(pair[1].counts));
         if after <= before {
             let kilo = |ohm: f64| format!("{} kOhm", three_digits(ohm * 1e-3));
             let [from, to] = [0, 1].map(|i| SensorKind::Flex.with_unit(pair[i].stimulus));
-            return Err(Fault::BadPoint(format!(
+            return Err(CalibrationFault::BadPoint(format!(
                 "between {from} and {to} the resistance falls from {} to {}, but it must rise: the strip bends towards its \
                  wrong side, its input is wired the other way round, or two angles were mixed up",
                 kilo(before),
@@ -203,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_strip_is_found_exactly() -> Result<(), Fault> {
+    fn a_straight_strip_is_found_exactly() -> Result<(), CalibrationFault> {
         for degrees in [&[0.0, 90.0][..], &[0.0, 30.0, 60.0, 90.0], &[10.0, 75.0]] {
             let (curve, _) = FlexCurve::fit(&points(22e3, 2.2, degrees, &input()), &input())?;
             assert!((curve.flat_ohm - 22e3).abs() < 1e-6 && (curve.bent_over_flat() - 2.2).abs() < 1e-9);
@@ -215,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_holds_the_truth_in_95_of_100_cases() -> Result<(), Fault> {
+    fn an_interval_holds_the_truth_in_95_of_100_cases() -> Result<(), CalibrationFault> {
         // Angles set wrong by a degree or so: the interval at 45 degrees should hold the truth in 95 of 100.
         let mut held = 0;
         let mut drawn = 0x9e37_79b9_7f4a_7c15_u64;

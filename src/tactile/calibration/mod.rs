@@ -11,7 +11,7 @@
 //! [`Readout`] derives [`super::Signals`] from stored readings with whatever calibrations it is given.
 //!
 //! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of
-//! these kinds from data sheets is used to refuse calibrations that cannot be; see [`Fault`].
+//! these kinds from data sheets is used to refuse calibrations that cannot be; see [`CalibrationFault`].
 
 mod empty_close;
 mod fault;
@@ -30,7 +30,7 @@ mod straight_line;
 mod zero;
 
 pub use empty_close::EmptyClose;
-pub use fault::Fault;
+pub use fault::CalibrationFault;
 pub use flex_curve::FlexCurve;
 pub use input::{Input, RangeEnd};
 pub use pad_curve::{ACTIVE_AREA, BendingZero, PadCurve};

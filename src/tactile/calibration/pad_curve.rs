@@ -7,7 +7,7 @@
 //! much where a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is
 //! subtracted, and what bending does to it, the [`BendingZero`].
 
-use super::Fault;
+use super::CalibrationFault;
 use super::input::Input;
 use super::point::{Point, SensorKind, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
@@ -67,7 +67,7 @@ pub struct PadCurve {
 
 impl PadCurve {
     /// Fits a pad; five weights at least that make it conduct. Also returns remarks.
-    pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), Fault> {
+    pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), CalibrationFault> {
         check(points, SensorKind::Pad, input, MOST)?;
         let idle = idle_counts(points);
         let conducts = |p: &&Point| p.stimulus > 0.0 && p.counts > idle + CONDUCTING_COUNTS.max(4.0 * p.spread);
@@ -84,7 +84,8 @@ impl PadCurve {
         };
         let line = StraightLine::through(&loaded.iter().map(weighted).collect::<Vec<_>>());
         // Five different weights are five different logarithms: its numbers left the range.
-        let line = line.ok_or(Fault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
+        let line =
+            line.ok_or(CalibrationFault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
         let silent = points.iter().filter(|p| !conducts(p)).map(|p| p.stimulus).fold(0.0, f64::max);
         let lightest = distinct[0].stimulus;
         let threshold = PadPart::LEAST_FORCE.max(silent.min(lightest)).min(lightest);
@@ -123,20 +124,20 @@ impl PadCurve {
         (siemens.max(0.0) / self.gain).powf(1.0 / self.exponent)
     }
 
-    fn is_such_a_part(&self, input: &Input) -> Result<(), Fault> {
+    fn is_such_a_part(&self, input: &Input) -> Result<(), CalibrationFault> {
         let within = |[least, most]: [f64; 2], value: f64| value >= least && value <= most;
         let ohm = 1.0 / self.gain;
         if !within(OHM_AT_1_N, ohm) {
             let [low, high] = OHM_AT_1_N.map(|wanted| three_digits(1e-3 * input.divider.fixed_ohm * wanted / ohm));
             let said = three_digits(1e-3 * input.divider.fixed_ohm);
-            return Err(Fault::ImplausiblePart(format!(
+            return Err(CalibrationFault::ImplausiblePart(format!(
                 "under 1 N the pad comes out at {} kOhm, but such parts have about 6 (1.5 to 25): the resistor beside it is \
                  not the {said} kOhm entered but {low} to {high}, or weights were given in another unit than kg",
                 three_digits(ohm * 1e-3)
             )));
         }
         if !within(EXPONENTS, self.exponent) {
-            return Err(Fault::ImplausiblePart(format!(
+            return Err(CalibrationFault::ImplausiblePart(format!(
                 "the pad's conductance grows with the power {} of the force, but such parts have 0.6 to 1.2: weights that \
                  rest partly beside the pad do this. Put a small stiff disc between, and the weight on its middle",
                 three_digits(self.exponent)
@@ -145,7 +146,7 @@ impl PadCurve {
         Ok(())
     }
 
-    fn remarks(&self, points: &[Point], silent: f64) -> Result<Vec<String>, Fault> {
+    fn remarks(&self, points: &[Point], silent: f64) -> Result<Vec<String>, CalibrationFault> {
         let mut words = Vec::new();
         let at = |p: &Point| SensorKind::Pad.with_unit(p.stimulus);
         let off = |p: &Point| p.stimulus > self.threshold * 1.5 && p.stimulus < silent;
@@ -163,7 +164,9 @@ impl PadCurve {
         let percent = format!("{:.0} %", 100.0 * residual.abs());
         if residual.abs() > TOO_FAR {
             let at = at(point);
-            return Err(Fault::BadPoint(format!("{at} is {percent} off the curve through the others: take it again")));
+            return Err(CalibrationFault::BadPoint(format!(
+                "{at} is {percent} off the curve through the others: take it again"
+            )));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!(
@@ -184,9 +187,9 @@ fn idle_counts(points: &[Point]) -> f64 {
     if bare.is_empty() { 0.0 } else { bare.iter().sum::<f64>() / bare.len() as f64 }
 }
 
-fn enough(distinct: &[Point]) -> Result<(), Fault> {
+fn enough(distinct: &[Point]) -> Result<(), CalibrationFault> {
     if distinct.len() < LEAST_WEIGHTS {
-        return Err(Fault::TooFew(format!(
+        return Err(CalibrationFault::TooFew(format!(
             "{} of at least {LEAST_WEIGHTS} different weights that make the pad conduct: take five or more between 0.03 and \
              0.5 kg, such as 0.03, 0.06, 0.1, 0.2, 0.35 and 0.5; such a pad does not respond below 0.015 kg",
             distinct.len()
@@ -195,7 +198,7 @@ fn enough(distinct: &[Point]) -> Result<(), Fault> {
     let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
     if most < LEAST_SPAN * least {
         let [from, to] = [least, most].map(|force| SensorKind::Pad.with_unit(force));
-        return Err(Fault::TooFew(format!(
+        return Err(CalibrationFault::TooFew(format!(
             "the pad has points from {from} to {to} only: the heaviest weight must be at least four times the lightest, best \
              0.05 to 0.5 kg"
         )));
@@ -204,13 +207,13 @@ fn enough(distinct: &[Point]) -> Result<(), Fault> {
 }
 
 /// A pad that is pressed harder conducts better.
-fn rises(distinct: &[Point], input: &Input) -> Result<(), Fault> {
+fn rises(distinct: &[Point], input: &Input) -> Result<(), CalibrationFault> {
     for pair in distinct.windows(2) {
         let (before, after) = (input.siemens(pair[0].counts), input.siemens(pair[1].counts));
         if after <= before {
             let micro = |siemens: f64| format!("{} µS", three_digits(siemens * 1e6));
             let [from, to] = [0, 1].map(|i| SensorKind::Pad.with_unit(pair[i].stimulus));
-            return Err(Fault::BadPoint(format!(
+            return Err(CalibrationFault::BadPoint(format!(
                 "between {from} and {to} the conductance falls from {} to {}, but it must rise: two weights were mixed up, \
                  one stood partly beside the pad, or the input is wired the other way round",
                 micro(before),
@@ -242,7 +245,7 @@ const LEAST_CURVATURE: f64 = 5.0;
 impl BendingZero {
     /// The zero from readings of an empty close, pairs of curvature (1/m) and conductance (S). The middle one of each
     /// bin counts, so that a few readings in which something was touched do no harm.
-    pub fn from_empty_close(readings: &[(f64, f64)]) -> Result<Self, Fault> {
+    pub fn from_empty_close(readings: &[(f64, f64)]) -> Result<Self, CalibrationFault> {
         let mut sorted: Vec<(f64, f64)> =
             readings.iter().copied().filter(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite()).collect();
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -255,7 +258,7 @@ impl BendingZero {
         let knots: Vec<(f64, f64)> = bins.filter(|bin| bin.len() >= LEAST_READINGS).map(middle).collect();
         let span = knots.last().map_or(0.0, |last| last.0) - knots.first().map_or(0.0, |first| first.0);
         if span < LEAST_CURVATURE - BIN {
-            return Err(Fault::BendingTooShort { have: sorted.len(), span });
+            return Err(CalibrationFault::BendingTooShort { have: sorted.len(), span });
         }
         Ok(Self { knots })
     }

@@ -29,7 +29,7 @@ fn fault(points: &[Point]) -> String {
 }
 
 #[test]
-fn a_power_law_is_found_exactly() -> Result<(), Fault> {
+fn a_power_law_is_found_exactly() -> Result<(), CalibrationFault> {
     for (ohm, exponent) in [(6e3, 0.9), (3e3, 1.0), (9e3, 0.8)] {
         let (curve, words) = PadCurve::fit(&points(ohm, exponent, &WEIGHTS, &input()), &input())?;
         assert!((curve.gain * ohm - 1.0).abs() < 1e-9 && (curve.exponent - exponent).abs() < 1e-9);
@@ -46,7 +46,7 @@ fn a_power_law_is_found_exactly() -> Result<(), Fault> {
 }
 
 #[test]
-fn the_reading_at_rest_is_subtracted() -> Result<(), Fault> {
+fn the_reading_at_rest_is_subtracted() -> Result<(), CalibrationFault> {
     let pinched = |point: &Point| {
         let siemens = input().siemens(point.counts) + 20e-6;
         Point { counts: input().counts(1.0 / siemens), ..*point }
@@ -87,7 +87,7 @@ fn wrong_resistors_wiring_units_and_weights_are_named() {
 }
 
 #[test]
-fn a_weight_beside_the_pad_is_named() -> Result<(), Fault> {
+fn a_weight_beside_the_pad_is_named() -> Result<(), CalibrationFault> {
     let shifted = |share: f64| {
         let mut points = points(6e3, 0.9, &WEIGHTS, &input());
         let force = points[4].stimulus * share;
@@ -101,7 +101,7 @@ fn a_weight_beside_the_pad_is_named() -> Result<(), Fault> {
 }
 
 #[test]
-fn the_zero_follows_the_bending() -> Result<(), Fault> {
+fn the_zero_follows_the_bending() -> Result<(), CalibrationFault> {
     let (curve, _) = PadCurve::fit(&points(6e3, 0.9, &WEIGHTS, &input()), &input())?;
     // Bending loads the pad with 0.03 N m of curvature, silent below 0.15 N; something is touched in the middle.
     let close: Vec<(f64, f64)> = (0..300)

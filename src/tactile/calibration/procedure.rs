@@ -13,7 +13,7 @@ use super::input::Input;
 use super::pad_curve::BendingZero;
 use super::point::{Point, SensorKind};
 use super::record::{Calibration, Record};
-use super::{Fault, RangeEnd};
+use super::{CalibrationFault, RangeEnd};
 use crate::board::{Board, Reading, Sensor};
 use crate::electronics::Divider;
 use std::collections::VecDeque;
@@ -282,7 +282,7 @@ impl Procedure {
     }
 
     /// Fits the points taken so far.
-    pub fn fit(&self) -> Result<Calibration, Fault> {
+    pub fn fit(&self) -> Result<Calibration, CalibrationFault> {
         Calibration::fit(self.record.clone())
     }
 }

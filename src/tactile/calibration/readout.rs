@@ -1,6 +1,6 @@
 //! Readings of a board through the calibrations of its parts, one by one or a whole trial.
 
-use super::Fault;
+use super::CalibrationFault;
 use super::input::{Input, RangeEnd, stated_resistor};
 use super::pad_curve::ACTIVE_AREA;
 use super::record::{Calibration, Curve};
@@ -85,7 +85,7 @@ const LEAST_READINGS: usize = 5;
 impl Readout {
     /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board
     /// does not have is left out with a warning.
-    pub fn new(board: &Board, calibrations: &[(Sensor, Calibration)]) -> Result<Self, Fault> {
+    pub fn new(board: &Board, calibrations: &[(Sensor, Calibration)]) -> Result<Self, CalibrationFault> {
         let mut wired = [const { None }; 4];
         let mut warnings = Vec::new();
         for (place, sensor) in wired.iter_mut().zip(Sensor::ALL) {

@@ -154,7 +154,7 @@ fn a_trial_has_the_channels_of_the_layout_and_its_own_zero() {
         readings.push(reading);
     }
     let derived = readout.derive(&readings, None);
-    let gripper = palpate_sim::gripper::Gripper::default();
+    let gripper = palpate_sim::gripper::GripperModel::default();
     let layout = SensorLayout::named("C1+F").unwrap();
     let names: Vec<String> =
         Sensors::new(&layout, &gripper, Default::default()).unwrap().channels().iter().map(|c| c.name()).collect();

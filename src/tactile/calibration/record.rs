@@ -4,7 +4,7 @@ use super::flex_curve::FlexCurve;
 use super::input::Input;
 use super::pad_curve::{BendingZero, PadCurve};
 use super::point::{Point, SensorKind};
-use super::{Fault, RangeEnd};
+use super::{CalibrationFault, RangeEnd};
 use crate::board::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -54,9 +54,9 @@ pub struct Calibration {
 
 impl Calibration {
     /// Fits the curve; refuses what such a part cannot be.
-    pub fn fit(record: Record) -> Result<Self, Fault> {
+    pub fn fit(record: Record) -> Result<Self, CalibrationFault> {
         if record.part.trim().is_empty() || record.part.chars().count() > LONGEST_NAME {
-            return Err(Fault::NoName);
+            return Err(CalibrationFault::NoName);
         }
         let (curve, warnings) = match record.kind {
             SensorKind::Flex => {
@@ -69,20 +69,20 @@ impl Calibration {
             }
         };
         match &record.bending {
-            Some(_) if record.kind == SensorKind::Flex => Err(Fault::NoBending),
-            Some(bending) if !bending.is_possible() => Err(Fault::BendingTooShort { have: 0, span: 0.0 }),
+            Some(_) if record.kind == SensorKind::Flex => Err(CalibrationFault::NoBending),
+            Some(bending) if !bending.is_possible() => Err(CalibrationFault::BendingTooShort { have: 0, span: 0.0 }),
             _ => Ok(Self { record, curve, warnings }),
         }
     }
 
     /// Refuses to be used for a sensor of the other kind.
-    pub fn check_fits(&self, sensor: Sensor) -> Result<(), Fault> {
+    pub fn check_fits(&self, sensor: Sensor) -> Result<(), CalibrationFault> {
         let wanted = SensorKind::of(sensor);
         if self.record.kind == wanted {
             return Ok(());
         }
         let (made, part) = (self.record.kind.label(), self.record.part.clone());
-        Err(Fault::WrongKind { part, made, place: sensor.label(), wanted: wanted.label() })
+        Err(CalibrationFault::WrongKind { part, made, place: sensor.label(), wanted: wanted.label() })
     }
 
     /// Angle (rad) or force (N) of a reading, without any zero. None where the reading

@@ -2,7 +2,7 @@
 
 use super::least_squares::Problem;
 use super::observation::{Observation, Track};
-use palpate_sim::gripper::{Gripper, Phase, TorquePoint};
+use palpate_sim::gripper::{GripperModel, Phase, TorquePoint};
 use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::{Effect, Scene, Setting, Timing};
 use palpate_tactile::{Sensors, Signals};
@@ -52,7 +52,7 @@ impl<'a> FittedModel<'a> {
 
     /// The gripper with these parameters: logarithms of stiffness and damping time, filling time, logarithms of torques
     /// over stiffness. Torque itself would go with stiffness along a narrow valley, which takes many steps.
-    pub(super) fn gripper(&self, gripper: &Gripper, x: &[f64]) -> Gripper {
+    pub(super) fn gripper(&self, gripper: &GripperModel, x: &[f64]) -> GripperModel {
         let mut gripper = gripper.clone();
         gripper.finger.bending_stiffness = x[STIFFNESS].exp();
         gripper.finger.damping_time = x[DAMPING].exp();
@@ -141,7 +141,7 @@ fn at(signals: &Signals, column: usize, t: f64) -> f64 {
 }
 
 /// Signals of the fitted model for an observation: curvature, pressure and force, left and right.
-fn shown(seen: &Observation, gripper: Gripper) -> Result<Signals, String> {
+fn shown(seen: &Observation, gripper: GripperModel) -> Result<Signals, String> {
     let lag = gripper.actuation.filling_time > 0.0;
     let mut scene = Scene { gripper, ..seen.scene.clone() };
     scene.timing = Timing { sample_hz: SAMPLE_HZ, actuation_hz: COMMAND_HZ, duration_s: seen.duration() + 0.1 };

@@ -32,7 +32,7 @@ use fitted_model::{
 };
 use least_squares::{Minimum, Prior, minimise};
 use palpate_geometry::units::three_digits;
-use palpate_sim::gripper::Gripper;
+use palpate_sim::gripper::GripperModel;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use watched::Watched;
@@ -99,7 +99,7 @@ pub struct Remainder {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FingerFit {
     /// The gripper of the first recording's scene, with the fitted finger.
-    pub gripper: Gripper,
+    pub gripper: GripperModel,
     /// Estimates, with intervals.
     pub estimates: Vec<Estimate>,
     /// Each recording against its fitted model.
@@ -232,7 +232,7 @@ fn usable(seen: &Observation) -> Result<(), FingerFitError> {
 }
 
 /// Start values and priors of the parameters.
-fn beginning(gripper: &Gripper, knots: &[f64], recordings: usize, trust: &Trust) -> (Vec<f64>, Vec<Prior>) {
+fn beginning(gripper: &GripperModel, knots: &[f64], recordings: usize, trust: &Trust) -> (Vec<f64>, Vec<Prior>) {
     let open = |value: f64| Prior { mean: value.max(1e-6).ln(), deviation: OPEN };
     let mut priors = vec![open(gripper.finger.bending_stiffness), open(gripper.finger.damping_time), USUAL_LAG];
     let stiffness = gripper.finger.bending_stiffness;

@@ -2,7 +2,7 @@
 //! gains can be relied on.
 
 use super::{Observation, Trust};
-use palpate_sim::gripper::Gripper;
+use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::scene::{Scene, SceneError};
 use palpate_store::{CalibrationId, Serving, Store, StoreError};
@@ -57,7 +57,7 @@ impl RecordedGrasps {
         &mut self,
         store: &Store,
         id: TrialId,
-        gripper: Option<&Gripper>,
+        gripper: Option<&GripperModel>,
         calibrations: &[CalibrationId],
     ) -> Result<(), RecordedGraspError> {
         let trial = store.load(id)?;

@@ -15,8 +15,8 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A gripper whose finger the fit does not know.
-fn hidden() -> Gripper {
-    let mut gripper = Gripper::default();
+fn hidden() -> GripperModel {
+    let mut gripper = GripperModel::default();
     gripper.finger.bending_stiffness *= 1.27;
     gripper.finger.damping_time = 0.028;
     gripper.actuation.filling_time = 0.07;
@@ -27,7 +27,7 @@ fn hidden() -> Gripper {
 }
 
 /// A close to 0.6 bar and back, quickly, so that the finger swings.
-fn scene(gripper: &Gripper) -> Scene {
+fn scene(gripper: &GripperModel) -> Scene {
     let mut scene = Scene { gripper: gripper.clone(), ..Scene::default() };
     scene.programme.peak_bar = 0.6;
     scene.programme.close_bar_per_tick = 0.2;
@@ -51,7 +51,7 @@ fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
 
 fn observed(name: &str, signals: Signals, scene: &Scene, object: Option<ObjectModel>) -> Observation {
     // The fit knows everything but the finger.
-    let scene = Scene { gripper: Gripper::default(), ..scene.clone() };
+    let scene = Scene { gripper: GripperModel::default(), ..scene.clone() };
     Observation { name: name.to_owned(), signals, line: Observation::line_of(&scene), scene, object }
 }
 
@@ -128,7 +128,7 @@ impl Box4 {
 
 /// Truth of each estimate, in their order.
 fn truths() -> [f64; 7] {
-    let Gripper { finger, actuation, .. } = hidden();
+    let GripperModel { finger, actuation, .. } = hidden();
     let torques = [0.2, 0.4, 0.6].map(|bar| actuation.torque(bar));
     let ratio = torques[2] / finger.bending_stiffness;
     [finger.bending_stiffness, finger.damping_time, actuation.filling_time, torques[0], torques[1], torques[2], ratio]

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// What the user wants of a calibration.
 #[derive(Clone, Debug, PartialEq)]
-pub enum CalibrationWish {
+pub enum CalibrationCommand {
     /// Begin with a part in its place.
     Begin(CalibrationPlan),
     /// Take the settled reading as that of an angle (rad) or force (N).
@@ -137,9 +137,9 @@ impl Calibrating {
     }
 
     /// Takes a point, leaves one out, or takes one back.
-    pub(super) fn grant(&mut self, wish: &CalibrationWish) {
+    pub(super) fn grant(&mut self, command: &CalibrationCommand) {
         let Some(procedure) = &mut self.procedure else { return };
-        if self.closing.is_some() && *wish == CalibrationWish::Undo {
+        if self.closing.is_some() && *command == CalibrationCommand::Undo {
             // The board may have fallen silent: what was measured before is kept.
             self.closing = None;
             return;
@@ -149,16 +149,18 @@ impl Calibrating {
             return;
         }
         self.not_taken = None;
-        match wish {
-            CalibrationWish::Take(stimulus) => {
+        match command {
+            CalibrationCommand::Take(stimulus) => {
                 self.not_taken = procedure.take(*stimulus).err().map(|why| format!("not taken: {why}"));
             }
-            CalibrationWish::Skip => procedure.skip(),
-            CalibrationWish::Undo => {
+            CalibrationCommand::Skip => procedure.skip(),
+            CalibrationCommand::Undo => {
                 procedure.undo();
             }
-            CalibrationWish::Begin(_) | CalibrationWish::EmptyClose | CalibrationWish::Keep | CalibrationWish::Stop => {
-            }
+            CalibrationCommand::Begin(_)
+            | CalibrationCommand::EmptyClose
+            | CalibrationCommand::Keep
+            | CalibrationCommand::Stop => {}
         }
     }
 

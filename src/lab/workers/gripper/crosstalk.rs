@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 /// What the user wants of the crosstalk test.
 #[derive(Clone, Debug, PartialEq)]
-pub enum CrosstalkWish {
+pub enum CrosstalkCommand {
     /// Begin, on the port that is open, else on this one, else on the only likely one.
     Begin(Option<PathBuf>),
     /// Leave out the sensor that is to be moved.

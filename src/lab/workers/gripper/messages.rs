@@ -1,7 +1,7 @@
-//! What travels between the gripper's thread and a window: wishes in, views out.
+//! What travels between the gripper's thread and a window: commands in, views out.
 
-use super::calibrating::{CalibrationView, CalibrationWish};
-use super::crosstalk::{CrosstalkView, CrosstalkWish};
+use super::calibrating::{CalibrationCommand, CalibrationView};
+use super::crosstalk::{CrosstalkCommand, CrosstalkView};
 use super::observing::ObserveRequest;
 use crate::grasping::{GraspStage, IdentificationView};
 use crate::gripper::NotOpened;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// What the gripper's thread can be told.
 #[derive(Clone)]
-pub enum GripperWish {
+pub enum GripperCommand {
     /// Look for ports anew.
     ListPorts,
     /// Listen to a port, a file of captured bytes, or without a name to the only likely port.
@@ -50,9 +50,9 @@ pub enum GripperWish {
     /// Let the doctor look at the board.
     Observe(ObserveRequest),
     /// Something about a calibration.
-    Calibrate(CalibrationWish),
+    Calibrate(CalibrationCommand),
     /// Something about the doctor's crosstalk test.
-    Crosstalk(CrosstalkWish),
+    Crosstalk(CrosstalkCommand),
     /// End the thread.
     Quit,
 }
@@ -116,8 +116,8 @@ pub struct EndedTrial {
 pub struct GripperView {
     /// Rises with every change.
     pub revision: u64,
-    /// Wishes that have been granted, of those that were asked for; what is shown here came after them.
-    pub granted: u64,
+    /// Commands that have been handled, of those that were asked for; what is shown here came after them.
+    pub handled: u64,
     /// The link; none while nothing is listened to.
     pub link: Option<LinkStatus>,
     /// Why the last port could not be opened.

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!  UI                          "gripper"                                        serial-read, serial-decode
-//!  GripperWish ------------>   connects, conducts the control box    <--events--   link
+//!  GripperCommand ------------>   connects, conducts the control box    <--events--   link
 //!  <--newest GripperView----   derives angle and force, recognises
 //!  <--every TraceRow--------   records: each reading, a second at a time
 //!  <--Notice----------------
@@ -11,14 +11,14 @@
 
 mod calibrating;
 mod crosstalk;
-mod desk;
 mod messages;
 mod observing;
 mod plotted;
+mod session;
 mod worker;
 
-pub use calibrating::{CalibrationPlan, CalibrationView, CalibrationWish, RunningCalibration};
-pub use crosstalk::{CrosstalkView, CrosstalkWish, RunningCrosstalk};
-pub use messages::{EndedTrial, GripperView, GripperWish, LatestReading, TrialView};
+pub use calibrating::{CalibrationCommand, CalibrationPlan, CalibrationView, RunningCalibration};
+pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
+pub use messages::{EndedTrial, GripperCommand, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;
 pub use worker::{GripperSetup, GripperWorker};

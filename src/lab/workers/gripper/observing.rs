@@ -1,7 +1,7 @@
 //! The doctor at the link that the gripper's thread holds already: a port cannot be opened twice.
 
-use super::messages::{GripperView, GripperWish};
-use crate::workers::examiner::{Examine, ExamineRequest};
+use super::messages::{GripperCommand, GripperView};
+use crate::workers::diagnostics_job::{Examine, ExamineRequest};
 use crate::workers::latest::Latest;
 use palpate_device::doctor::{ChannelTraces, Observations};
 use palpate_device::serial::{LinkStatus, is_running, list_ports};
@@ -59,16 +59,16 @@ impl Observing {
 }
 
 /// Looks at the link that the gripper's thread holds; while it holds none, looks as `alone` does.
-pub(super) fn shared(wishes: Sender<GripperWish>, view: Arc<Latest<GripperView>>, alone: Examine) -> Examine {
+pub(super) fn shared(commands: Sender<GripperCommand>, view: Arc<Latest<GripperView>>, alone: Examine) -> Examine {
     Arc::new(move |request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bool| {
         if !view.get().is_some_and(|view| view.is_connected()) {
             return alone(request, goes_on);
         }
         let (seen, observed) = channel();
         let stop = Arc::new(AtomicBool::new(false));
-        let wish = ObserveRequest { seconds: request.seconds, stop: Arc::clone(&stop), seen };
+        let command = ObserveRequest { seconds: request.seconds, stop: Arc::clone(&stop), seen };
         let began = Instant::now();
-        if wishes.send(GripperWish::Observe(wish)).is_err() {
+        if commands.send(GripperCommand::Observe(command)).is_err() {
             return alone(request, goes_on);
         }
         loop {

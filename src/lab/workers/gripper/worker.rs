@@ -1,8 +1,8 @@
-//! The handle on the gripper's thread: wishes go in, views, trace rows and notices come out.
+//! The handle on the gripper's thread: commands go in, views, trace rows and notices come out.
 
-use super::desk::{Desk, Outlets};
-use super::messages::{GripperView, GripperWish};
+use super::messages::{GripperCommand, GripperView};
 use super::observing;
+use super::session::{GripperSession, Outlets};
 use crate::gripper::Listen;
 use crate::workers::{Examine, Latest, Notice, TraceRow, Wake};
 use palpate_learn::Model;
@@ -36,8 +36,8 @@ const MOST_ROWS: usize = 9000;
 #[derive(Debug)]
 pub struct GripperWorker {
     /// Absent once the thread is being ended.
-    wishes: Option<Sender<GripperWish>>,
-    /// Wishes so far.
+    commands: Option<Sender<GripperCommand>>,
+    /// Commands so far.
     asked: AtomicU64,
     view: Arc<Latest<GripperView>>,
     rows: Receiver<TraceRow>,
@@ -49,7 +49,7 @@ pub struct GripperWorker {
 impl GripperWorker {
     /// Starts the thread. Nothing is connected to before that is wished for.
     pub fn start(setup: GripperSetup) -> std::io::Result<Self> {
-        let (wishes, inbox) = channel();
+        let (commands, inbox) = channel();
         let (row_sender, rows) = sync_channel(MOST_ROWS);
         let (notice_sender, notices) = channel();
         let view = Arc::new(Latest::default());
@@ -64,8 +64,9 @@ impl GripperWorker {
         let thread = std::thread::Builder::new().name("gripper".to_owned()).spawn(move || {
             let last_words = (outlets.notices.clone(), Arc::clone(&outlets.wake));
             // A panic becomes a message; the window stays, and the board vents by itself when it hears nothing more.
-            let outcome =
-                std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| Desk::new(setup, outlets).run(&inbox)));
+            let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                GripperSession::new(setup, outlets).run(&inbox)
+            }));
             if outcome.is_err() {
                 let text = "the gripper's thread stopped through a fault of the program; restart Palpate and report \
                             what you did";
@@ -75,7 +76,7 @@ impl GripperWorker {
             }
         })?;
         Ok(Self {
-            wishes: Some(wishes),
+            commands: Some(commands),
             asked: AtomicU64::new(0),
             view,
             rows,
@@ -85,19 +86,19 @@ impl GripperWorker {
         })
     }
 
-    /// Asks for something; how many wishes that makes. [`GripperView::granted`] tells how many have been granted.
-    pub fn wish(&self, wish: GripperWish) -> u64 {
-        if let Some(wishes) = &self.wishes {
+    /// Asks for something; how many commands that makes. [`GripperView::handled`] tells how many have been handled.
+    pub fn command(&self, command: GripperCommand) -> u64 {
+        if let Some(commands) = &self.commands {
             // A thread that has died has said so; the rest of the window works.
-            let _heard = wishes.send(wish);
+            let _heard = commands.send(command);
         }
         self.asked.fetch_add(1, Ordering::Relaxed) + 1
     }
 
     /// What looks at the board for the doctor: at the link that is held here or, while none is, as `alone` does.
     pub fn examine(&self, alone: Examine) -> Examine {
-        match &self.wishes {
-            Some(wishes) => observing::shared(wishes.clone(), Arc::clone(&self.view), alone),
+        match &self.commands {
+            Some(commands) => observing::shared(commands.clone(), Arc::clone(&self.view), alone),
             None => alone,
         }
     }
@@ -125,8 +126,8 @@ impl GripperWorker {
 
 impl Drop for GripperWorker {
     fn drop(&mut self) {
-        self.wish(GripperWish::Quit);
-        self.wishes = None;
+        self.command(GripperCommand::Quit);
+        self.commands = None;
         if let Some(thread) = self.thread.take() {
             let _ended = thread.join();
         }

@@ -1,6 +1,6 @@
 //! Inputs of the effect rules: scene, object, placement, and the few quantities that several effects need.
 
-use crate::gripper::{Finger, Gripper};
+use crate::gripper::{Finger, GripperModel};
 use crate::objects::ObjectModel;
 use crate::physics::placement::Placement;
 use crate::scene::Scene;
@@ -13,7 +13,7 @@ pub(super) struct Situation<'a> {
 }
 
 impl Situation<'_> {
-    pub(super) fn gripper(&self) -> &Gripper {
+    pub(super) fn gripper(&self) -> &GripperModel {
         &self.scene.gripper
     }
 

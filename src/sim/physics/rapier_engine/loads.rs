@@ -121,12 +121,12 @@ impl Skin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gripper::Gripper;
+    use crate::gripper::GripperModel;
     use glam::DVec2;
 
     /// A straight left finger with a level plate over segment 3, and one point of contact there.
     fn plate_loads(force: DVec3, tilt: f64, inward: f64) -> Vec<TaxelLoad> {
-        let gripper = Gripper::default();
+        let gripper = GripperModel::default();
         let plane = gripper.plane(Side::Left);
         let lengths: Vec<f64> = gripper.finger.segment_lengths().collect();
         let mut segments = vec![SegmentPose::default(); 11];

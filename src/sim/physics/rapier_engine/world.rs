@@ -4,7 +4,7 @@
 //! of about a metre, so that 50 mm are one unit of length here (like `length_unit` = 0.05, but for parry too).
 
 use crate::frame::Plan;
-use crate::gripper::{FingerPlane, Gripper, Side};
+use crate::gripper::{FingerPlane, GripperModel, Side};
 use crate::objects::ObjectModel;
 use crate::physics::chain::ChainModel;
 use crate::physics::placement::Placement;
@@ -128,7 +128,7 @@ impl Hand {
         hand
     }
 
-    fn add_finger(&mut self, gripper: &Gripper, chain: &ChainModel, side: Side, plan: &Plan) {
+    fn add_finger(&mut self, gripper: &GripperModel, chain: &ChainModel, side: Side, plan: &Plan) {
         // No friction where either surface has none.
         let friction = if plan.is_on(Effect::Friction.name()) { gripper.pad.friction } else { 0.0 };
         let gravity_scale = if plan.is_on(Effect::FingerGravity.name()) { 1.0 } else { 0.0 };
@@ -353,7 +353,7 @@ fn collider(shape: SharedShape, friction: f64, group: Group, meets: Group) -> Co
 
 /// The outline of a segment, pad and bellows, from its joint on: flat behind, and as high in front as the skin over the
 /// columns of taxels is. `chamfer` (m) is cut off the front edge of its far end.
-fn segment_shape(gripper: &Gripper, plane: &FingerPlane, reach: f64, chamfer: f64) -> Option<SharedShape> {
+fn segment_shape(gripper: &GripperModel, plane: &FingerPlane, reach: f64, chamfer: f64) -> Option<SharedShape> {
     let (grid, half_width) = (gripper.taxels(), 0.5 * gripper.finger.width);
     let edge = gripper.pad.height(half_width);
     let columns = (0..grid.columns).map(|column| (grid.across(column), grid.height(column)));

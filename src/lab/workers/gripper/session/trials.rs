@@ -1,6 +1,6 @@
-//! Trials at the desk: they are begun by wish or by what the fingers do, conducted, written, and ended.
+//! Trials at the desk: they are begun by command or by what the fingers do, conducted, written, and ended.
 
-use super::Desk;
+use super::GripperSession;
 use crate::gripper::Gripper;
 use crate::labelling::SegmentEvent;
 use crate::recording::{BoardTrialRecording, RecorderNotice, TrialRequest};
@@ -12,7 +12,7 @@ use palpate_store::labels::cadence_line;
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
 
-impl Desk {
+impl GripperSession {
     /// Begins and ends trials by what the fingers do, where that is wanted.
     pub(super) fn watch(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };

@@ -1,10 +1,10 @@
 //! What the sensors mean: calibrations of the parts, those that are being made, and zeros.
 
-use super::{Connection, Desk, open};
+use super::{Connection, GripperSession, open};
 use crate::gripper::Gripper;
 use crate::workers::Notice;
-use crate::workers::gripper::calibrating::{Calibrating, CalibrationPlan, CalibrationWish};
-use crate::workers::gripper::crosstalk::{Crossing, CrosstalkView, CrosstalkWish};
+use crate::workers::gripper::calibrating::{Calibrating, CalibrationCommand, CalibrationPlan};
+use crate::workers::gripper::crosstalk::{Crossing, CrosstalkCommand, CrosstalkView};
 use crate::workers::gripper::plotted::Plotted;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
@@ -15,7 +15,7 @@ const REST_S: f64 = 0.6;
 /// Readings older than this say nothing of now (s).
 const STALE_S: f64 = 2.0;
 
-impl Desk {
+impl GripperSession {
     /// Reads the board through the newest calibrations of its parts.
     pub(super) fn read_calibrations(&mut self) {
         let Some(connection) = &self.connection else { return };
@@ -99,7 +99,7 @@ impl Desk {
             .and_then(|store| store.calibrations().add_tare(&zero).map_err(|error| error.to_string()));
         match stored {
             Ok(_) => {
-                self.outlets.tell(Notice::Told("tared: the zeros of now serve until they are taken again".to_owned()));
+                self.outlets.tell(Notice::Info("tared: the zeros of now serve until they are taken again".to_owned()));
             }
             Err(cause) => {
                 self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")));
@@ -109,11 +109,11 @@ impl Desk {
 
     // Calibration.
 
-    pub(super) fn calibrate(&mut self, wish: &CalibrationWish) {
-        match wish {
-            CalibrationWish::Begin(plan) => self.begin_calibration(plan),
-            CalibrationWish::Stop => self.end_calibration(None),
-            CalibrationWish::Keep => {
+    pub(super) fn calibrate(&mut self, command: &CalibrationCommand) {
+        match command {
+            CalibrationCommand::Begin(plan) => self.begin_calibration(plan),
+            CalibrationCommand::Stop => self.end_calibration(None),
+            CalibrationCommand::Keep => {
                 let kept = match (&self.calibrating, open(&mut self.store, &self.path)) {
                     (None, _) => return,
                     (Some(calibrating), Ok(store)) => calibrating.keep(store),
@@ -124,16 +124,16 @@ impl Desk {
                     self.read_calibrations();
                 }
             }
-            CalibrationWish::EmptyClose => {
+            CalibrationCommand::EmptyClose => {
                 let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection) else { return };
                 match open(&mut self.store, &self.path) {
                     Ok(store) => calibrating.close_empty(&connection.board, store),
                     Err(cause) => self.outlets.tell(Notice::Warning(cause)),
                 }
             }
-            CalibrationWish::Take(_) | CalibrationWish::Skip | CalibrationWish::Undo => {
+            CalibrationCommand::Take(_) | CalibrationCommand::Skip | CalibrationCommand::Undo => {
                 if let Some(calibrating) = &mut self.calibrating {
-                    calibrating.grant(wish);
+                    calibrating.grant(command);
                 }
             }
         }
@@ -193,19 +193,19 @@ impl Desk {
 
     // The doctor's crosstalk test.
 
-    pub(super) fn look_for_crosstalk(&mut self, wish: CrosstalkWish) {
-        match wish {
-            CrosstalkWish::Begin(port) => match self.borrow_port(port.as_deref()) {
+    pub(super) fn look_for_crosstalk(&mut self, command: CrosstalkCommand) {
+        match command {
+            CrosstalkCommand::Begin(port) => match self.borrow_port(port.as_deref()) {
                 Err(cause) => self.crossed = CrosstalkView { ended: Some(Err(cause)), ..CrosstalkView::default() },
                 Ok(()) => self.crossing = Some(Crossing::default()),
             },
-            CrosstalkWish::Skip => {
+            CrosstalkCommand::Skip => {
                 self.crossing.iter_mut().for_each(Crossing::skip);
                 if self.crossing.as_ref().is_some_and(Crossing::is_over) {
                     self.end_crosstalk(None);
                 }
             }
-            CrosstalkWish::Stop => self.end_crosstalk(None),
+            CrosstalkCommand::Stop => self.end_crosstalk(None),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Recognition of the real gripper: the model listens to calibrated rows while the fingers close and hold.
 
-use super::Desk;
+use super::GripperSession;
 use crate::grasping::Row;
 use crate::workers::Notice;
 use crate::workers::listener::Listener;
@@ -8,7 +8,7 @@ use palpate_learn::Model;
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
 
-impl Desk {
+impl GripperSession {
     // Recognition.
 
     pub(super) fn set_model(&mut self, model: Option<Arc<Model>>) {

@@ -19,7 +19,7 @@ struct Job {
 
 /// A handle on the thread. Dropping it gives up what is being measured and ends it.
 #[derive(Debug)]
-pub(super) struct Gauge {
+pub(super) struct AccuracyJob {
     jobs: Option<Sender<Job>>,
     /// Number of the newest job; an older one gives up.
     newest: Arc<AtomicU64>,
@@ -27,7 +27,7 @@ pub(super) struct Gauge {
     thread: Option<JoinHandle<()>>,
 }
 
-impl Gauge {
+impl AccuracyJob {
     /// Starts the thread; results go to the slot.
     pub(super) fn start(results: Arc<Latest<MeasuredAccuracy>>, wake: Wake) -> std::io::Result<Self> {
         let (jobs, inbox) = channel();
@@ -52,7 +52,7 @@ impl Gauge {
     }
 }
 
-impl Drop for Gauge {
+impl Drop for AccuracyJob {
     fn drop(&mut self) {
         self.newest.fetch_add(1, Ordering::Relaxed);
         self.jobs = None;

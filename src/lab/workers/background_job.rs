@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
-/// A handle on the thread: wishes `W` in, the newest state of affairs `V` out. Dropping it gives up what is under way and
+/// A handle on the thread: commands `W` in, the newest state of affairs `V` out. Dropping it gives up what is under way and
 /// ends the thread.
 #[derive(Debug)]
-pub struct Desk<W, V> {
+pub struct BackgroundJob<W, V> {
     /// Absent once the thread is being ended.
-    wishes: Option<Sender<(W, Arc<AtomicBool>)>>,
+    commands: Option<Sender<(W, Arc<AtomicBool>)>>,
     /// Set to give up everything that was wished for with it.
     stop: Arc<AtomicBool>,
     view: Arc<Latest<V>>,
-    /// Wishes so far, and how many of them have been dealt with.
+    /// Commands so far, and how many of them have been dealt with.
     asked: AtomicU64,
     done: Arc<AtomicU64>,
     thread: Option<JoinHandle<()>>,
@@ -36,37 +36,37 @@ impl<V> Outlet<V> {
     }
 }
 
-impl<W: Send + 'static, V: Send + Sync + 'static> Desk<W, V> {
-    /// Starts the thread. `work` is called for each wish, in order; it looks at the flag as often as it can, and ends early
+impl<W: Send + 'static, V: Send + Sync + 'static> BackgroundJob<W, V> {
+    /// Starts the thread. `work` is called for each command, in order; it looks at the flag as often as it can, and ends early
     /// once that is set.
     pub(super) fn spawn(
         name: &str,
         wake: Wake,
         mut work: impl FnMut(W, &AtomicBool, &Outlet<V>) + Send + 'static,
     ) -> std::io::Result<Self> {
-        let (wishes, inbox) = channel::<(W, Arc<AtomicBool>)>();
+        let (commands, inbox) = channel::<(W, Arc<AtomicBool>)>();
         let view = Arc::new(Latest::default());
         let outlet = Outlet { view: Arc::clone(&view), wake };
         let (asked, done) = (AtomicU64::new(0), Arc::new(AtomicU64::new(0)));
         let dealt_with = Arc::clone(&done);
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            while let Ok((wish, stop)) = inbox.recv() {
-                work(wish, &stop, &outlet);
+            while let Ok((command, stop)) = inbox.recv() {
+                work(command, &stop, &outlet);
                 dealt_with.fetch_add(1, Ordering::Release);
                 (outlet.wake)();
             }
         })?;
-        Ok(Self { wishes: Some(wishes), stop: Arc::default(), view, asked, done, thread: Some(thread) })
+        Ok(Self { commands: Some(commands), stop: Arc::default(), view, asked, done, thread: Some(thread) })
     }
 }
 
-impl<W, V> Desk<W, V> {
+impl<W, V> BackgroundJob<W, V> {
     /// Asks for something; it is done after what was asked for before.
-    pub fn ask(&self, wish: W) {
+    pub fn ask(&self, command: W) {
         self.asked.fetch_add(1, Ordering::Relaxed);
-        if let Some(wishes) = &self.wishes {
+        if let Some(commands) = &self.commands {
             // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
-            let _heard = wishes.send((wish, Arc::clone(&self.stop)));
+            let _heard = commands.send((command, Arc::clone(&self.stop)));
         }
     }
 
@@ -86,10 +86,10 @@ impl<W, V> Desk<W, V> {
     }
 }
 
-impl<W, V> Drop for Desk<W, V> {
+impl<W, V> Drop for BackgroundJob<W, V> {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        self.wishes = None;
+        self.commands = None;
         if let Some(thread) = self.thread.take() {
             let _ended = thread.join();
         }
@@ -114,7 +114,7 @@ pub(super) mod watch {
     }
 
     /// Waits until the desk stands as wanted.
-    pub(crate) fn until<W, V>(desk: &Desk<W, V>, woken: &Receiver<()>, wanted: impl Fn(&V) -> bool) -> Arc<V> {
+    pub(crate) fn until<W, V>(desk: &BackgroundJob<W, V>, woken: &Receiver<()>, wanted: impl Fn(&V) -> bool) -> Arc<V> {
         loop {
             if let Some(view) = desk.view().filter(|view| wanted(view)) {
                 return view;
@@ -130,9 +130,9 @@ mod tests {
     use super::*;
 
     /// Counts up to a number, or until it is given up; then says how far it came.
-    fn counter() -> (Desk<u64, u64>, std::sync::mpsc::Receiver<()>) {
+    fn counter() -> (BackgroundJob<u64, u64>, std::sync::mpsc::Receiver<()>) {
         let (wake, woken) = waker();
-        let desk = Desk::spawn("count", wake, |most: u64, stop, outlet| {
+        let desk = BackgroundJob::spawn("count", wake, |most: u64, stop, outlet| {
             let reached = (0..most).take_while(|_| !stop.load(Ordering::Relaxed)).count();
             outlet.publish(reached as u64);
         });

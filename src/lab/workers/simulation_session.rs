@@ -1,8 +1,7 @@
 //! The simulation's thread: it owns the rig, keeps pace with the clock on the wall, and publishes what it sees.
 
-use super::companion::Companion;
+use super::accuracy_job::AccuracyJob;
 use super::current::Current;
-use super::gauge::Gauge;
 use super::ghost::{GhostGrasp, GhostMaker};
 use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
@@ -11,6 +10,7 @@ use super::messages::{
     Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
 };
 use super::pace::Pace;
+use super::refined_run::RefinedRun;
 use super::sim::SimWorkerSetup;
 use crate::grasping::{FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
@@ -56,7 +56,7 @@ pub(super) struct Session {
     outlets: Outlets,
     recorder: Option<Recorder>,
     /// Absent where its thread could not be started.
-    gauge: Option<Gauge>,
+    accuracy_job: Option<AccuracyJob>,
     listener: Option<Listener>,
     layout: SensorLayout,
     nominal: Scene,
@@ -102,11 +102,11 @@ impl Session {
                 None
             }
         };
-        let gauge = Gauge::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
+        let accuracy_job = AccuracyJob::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
         let grasps = setup.grasps.max(1);
         let mut session = Self {
             recorder,
-            gauge,
+            accuracy_job,
             listener: setup.model.map(|model| Listener::new(model, grasps)),
             layout: setup.layout,
             nominal: setup.scene,
@@ -134,14 +134,14 @@ impl Session {
             outlets,
         };
         session.begin_somehow();
-        while session.wait_and_obey(inbox) {
+        while session.wait_and_handle(inbox) {
             session.advance();
         }
         session.drop_recording();
     }
 
     /// Waits until something is due or a command comes; false at the end.
-    fn wait_and_obey(&mut self, inbox: &Receiver<Command>) -> bool {
+    fn wait_and_handle(&mut self, inbox: &Receiver<Command>) -> bool {
         let first = match self.time_to_wait() {
             Some(wait) => match inbox.recv_timeout(wait) {
                 Ok(command) => Some(command),
@@ -160,7 +160,7 @@ impl Session {
             match command {
                 Command::Quit => return false,
                 Command::SetScene(_) if Some(k) != last_scene => {}
-                other => self.obey(other),
+                other => self.handle(other),
             }
         }
         true
@@ -180,7 +180,7 @@ impl Session {
         Some(Duration::from_secs_f64((-late / self.status.target_speed).clamp(0.0, 0.1)))
     }
 
-    fn obey(&mut self, command: Command) {
+    fn handle(&mut self, command: Command) {
         match command {
             Command::SetScene(scene) => self.set_scene(*scene),
             Command::Play => {
@@ -321,8 +321,8 @@ impl Session {
             Ok(reader) => reader,
             Err(error) => return self.outlets.tell(Notice::Failed(error.to_string())),
         };
-        if let Some(gauge) = self.gauge.as_mut().filter(|_| !again) {
-            gauge.measure(&scene, model.clone());
+        if let Some(accuracy_job) = self.accuracy_job.as_mut().filter(|_| !again) {
+            accuracy_job.measure(&scene, model.clone());
         }
         let mut run = prepare(&scene, model.as_deref(), seed);
         if !again {
@@ -353,9 +353,9 @@ impl Session {
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
         let (told, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
         let channels = reader.channels().len();
-        let companion = self.status.error_band.then(|| Companion::new(&scene, model.as_deref(), seed, channels));
+        let refined_run = self.status.error_band.then(|| RefinedRun::new(&scene, model.as_deref(), seed, channels));
         self.current =
-            Some(Current { run, companion, plan, scene, stage, reader, frame, told, pulled: false, ended: false });
+            Some(Current { run, refined_run, plan, scene, stage, reader, frame, told, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
         self.begin_ghost();
         self.publish();
@@ -441,7 +441,7 @@ impl Session {
             listener.push(row.t_s, &row);
         }
         let plotted = self.channels.len();
-        let errors = current.companion.as_mut().map(|c| c.errors(frame.t, &read, current.reader.sensors()));
+        let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, current.reader.sensors()));
         let errors: Box<[f32]> = errors.unwrap_or_default().into_iter().take(plotted).collect();
         let row = TraceRow {
             grasp: self.grasp,

@@ -1,7 +1,7 @@
 //! The doctor beside a window: a thread "examine" that looks at the gripper's port when asked to, says how far it is, and
 //! hands over its findings.
 
-use super::desk::{Desk, Outlet};
+use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use palpate_device::doctor::{CheckFinding, Observations, examine, findings};
 use palpate_device::serial::LinkOptions;
@@ -32,16 +32,16 @@ pub fn examine_port(request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bo
 
 /// Where the doctor stands.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ExaminerView {
+pub struct DiagnosticsView {
     /// What is being examined, and for how long already (s).
     pub running: Option<(ExamineRequest, f64)>,
     /// What came out of the last examination.
-    pub last: Option<Arc<Examination>>,
+    pub last: Option<Arc<DiagnosticsReport>>,
 }
 
 /// What came out of an examination.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Examination {
+pub struct DiagnosticsReport {
     /// The port that was listened to, in words; none where none could be opened.
     pub port: Option<String>,
     /// For how long (s).
@@ -53,16 +53,16 @@ pub struct Examination {
 }
 
 /// A handle on the thread.
-pub type Examiner = Desk<ExamineRequest, ExaminerView>;
+pub type DiagnosticsJob = BackgroundJob<ExamineRequest, DiagnosticsView>;
 
-impl Examiner {
+impl DiagnosticsJob {
     /// Starts the thread.
     pub fn start(look: Examine, wake: Wake) -> std::io::Result<Self> {
         let mut last = None;
         Self::spawn("examine", wake, move |request, stop, outlet| {
             let examination = Arc::new(examined(&look, &request, stop, outlet, last.as_ref()));
             last = Some(Arc::clone(&examination));
-            outlet.publish(ExaminerView { running: None, last: Some(examination) });
+            outlet.publish(DiagnosticsView { running: None, last: Some(examination) });
         })
     }
 }
@@ -71,11 +71,11 @@ fn examined(
     look: &Examine,
     request: &ExamineRequest,
     stop: &AtomicBool,
-    outlet: &Outlet<ExaminerView>,
-    last: Option<&Arc<Examination>>,
-) -> Examination {
+    outlet: &Outlet<DiagnosticsView>,
+    last: Option<&Arc<DiagnosticsReport>>,
+) -> DiagnosticsReport {
     let tell = |listened_s: f64| {
-        outlet.publish(ExaminerView { running: Some((request.clone(), listened_s)), last: last.cloned() });
+        outlet.publish(DiagnosticsView { running: Some((request.clone(), listened_s)), last: last.cloned() });
     };
     tell(0.0);
     let seen = look(request, &mut |listened_s| {
@@ -83,7 +83,7 @@ fn examined(
         !stop.load(Ordering::Relaxed)
     });
     let port = seen.link.as_ref().map(|link| format!("{} ({})", link.port.path.display(), link.port.title));
-    Examination {
+    DiagnosticsReport {
         port,
         listened_s: seen.listened_s,
         cut_short: stop.load(Ordering::Relaxed),
@@ -93,7 +93,7 @@ fn examined(
 
 #[cfg(test)]
 mod tests {
-    use super::super::desk::watch::{until, waker};
+    use super::super::background_job::watch::{until, waker};
     use super::*;
     use palpate_device::doctor::{CheckStatus, is_sound};
     use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
@@ -113,7 +113,7 @@ mod tests {
         }
         std::fs::write(&bytes, file)?;
         let (wake, woken) = waker();
-        let doctor = Examiner::start(Arc::new(examine_port), wake)?;
+        let doctor = DiagnosticsJob::start(Arc::new(examine_port), wake)?;
         assert!(doctor.view().is_none(), "nobody asked");
         doctor.ask(request(bytes, 5.0));
         until(&doctor, &woken, |view| view.running.is_some() && view.last.is_none());
@@ -142,7 +142,7 @@ mod tests {
             Observations { listened_s, ..examine_port(&nothing, &mut |_| true) }
         });
         let (wake, woken) = waker();
-        let mut doctor = Examiner::start(look, wake)?;
+        let mut doctor = DiagnosticsJob::start(look, wake)?;
         doctor.ask(request(PathBuf::new(), 8.0));
         until(&doctor, &woken, |view| view.running.as_ref().is_some_and(|(_, listened_s)| *listened_s > 0.1));
         doctor.give_up();

@@ -6,7 +6,7 @@ mod trials;
 
 use super::calibrating::{Calibrating, CalibrationView};
 use super::crosstalk::{Crossing, CrosstalkView};
-use super::messages::{EndedTrial, GripperView, GripperWish, LatestReading};
+use super::messages::{EndedTrial, GripperCommand, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
 use super::worker::GripperSetup;
@@ -32,7 +32,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel};
 use std::time::{Duration, Instant};
 
-/// How long the thread waits for readings before it looks for wishes again: also how punctual the control box is told.
+/// How long the thread waits for readings before it looks for commands again: also how punctual the control box is told.
 const PATIENCE: Duration = Duration::from_millis(10);
 /// How often a port is tried that another program has.
 const RETRY: Duration = Duration::from_secs(1);
@@ -74,7 +74,7 @@ struct Connection {
 }
 
 /// Everything the thread owns.
-pub(super) struct Desk {
+pub(super) struct GripperSession {
     outlets: Outlets,
     listen: Listen,
     path: PathBuf,
@@ -109,11 +109,11 @@ pub(super) struct Desk {
     stretch: (u64, f64),
     channels: Arc<[Channel]>,
     revision: u64,
-    granted: u64,
+    handled: u64,
     published: Instant,
 }
 
-impl Desk {
+impl GripperSession {
     pub(super) fn new(setup: GripperSetup, outlets: Outlets) -> Self {
         let GripperSetup { scene, store, model, grasps, listen, wake: _ } = setup;
         let (sender, recorded) = channel();
@@ -157,7 +157,7 @@ impl Desk {
             stretch: (0, 0.0),
             channels: whole_fingers().into(),
             revision: 0,
-            granted: 0,
+            handled: 0,
             published: Instant::now(),
         };
         desk.set_model(model);
@@ -165,37 +165,37 @@ impl Desk {
     }
 
     /// Works until it is told to quit.
-    pub(super) fn run(mut self, inbox: &Receiver<GripperWish>) {
+    pub(super) fn run(mut self, inbox: &Receiver<GripperCommand>) {
         self.publish();
         loop {
-            let wish = match &self.connection {
+            let command = match &self.connection {
                 Some(_) => match inbox.try_recv() {
-                    Ok(wish) => Some(wish),
+                    Ok(command) => Some(command),
                     Err(TryRecvError::Empty) => None,
                     Err(TryRecvError::Disconnected) => break,
                 },
                 None if self.retried.is_some() => match inbox.recv_timeout(RETRY) {
-                    Ok(wish) => Some(wish),
+                    Ok(command) => Some(command),
                     Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => break,
                 },
                 // The recorder still has to report the end of a trial.
                 None if !self.ending.is_empty() => match inbox.recv_timeout(PATIENCE) {
-                    Ok(wish) => Some(wish),
+                    Ok(command) => Some(command),
                     Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => break,
                 },
                 None => match inbox.recv() {
-                    Ok(wish) => Some(wish),
+                    Ok(command) => Some(command),
                     Err(_closed) => break,
                 },
             };
-            match wish {
-                Some(GripperWish::Quit) => break,
-                Some(wish) => {
+            match command {
+                Some(GripperCommand::Quit) => break,
+                Some(command) => {
                     // The doctor asks by himself.
-                    self.granted += u64::from(!matches!(wish, GripperWish::Observe(_)));
-                    self.obey(wish);
+                    self.handled += u64::from(!matches!(command, GripperCommand::Observe(_)));
+                    self.handle(command);
                     self.publish();
                 }
                 None if self.connection.is_none() => {
@@ -211,42 +211,42 @@ impl Desk {
         self.take_recorded();
     }
 
-    fn obey(&mut self, wish: GripperWish) {
-        match wish {
-            GripperWish::ListPorts => self.ports = list_ports(),
-            GripperWish::Connect(port) => {
+    fn handle(&mut self, command: GripperCommand) {
+        match command {
+            GripperCommand::ListPorts => self.ports = list_ports(),
+            GripperCommand::Connect(port) => {
                 self.disconnect("another port was chosen");
                 self.connect(port.as_deref());
             }
-            GripperWish::Disconnect => self.disconnect("the port was given back"),
-            GripperWish::Vent => self.vent(),
-            GripperWish::Tare => self.tare(),
-            GripperWish::SetScene(scene) => self.scene = *scene,
-            GripperWish::SetModel(model) => self.set_model(model),
-            GripperWish::SetThreshold(threshold) => {
+            GripperCommand::Disconnect => self.disconnect("the port was given back"),
+            GripperCommand::Vent => self.vent(),
+            GripperCommand::Tare => self.tare(),
+            GripperCommand::SetScene(scene) => self.scene = *scene,
+            GripperCommand::SetModel(model) => self.set_model(model),
+            GripperCommand::SetThreshold(threshold) => {
                 if let Some(listener) = &mut self.listener {
                     listener.set_threshold(threshold);
                 }
             }
-            GripperWish::SetGrasps(grasps) => {
+            GripperCommand::SetGrasps(grasps) => {
                 self.grasps = grasps.max(1);
                 if let Some(listener) = &mut self.listener {
                     listener.set_most_grasps(self.grasps);
                 }
             }
-            GripperWish::AnotherObject => self.start_over(),
-            GripperWish::Begin(request) => self.begin(request, None),
-            GripperWish::Watch(request) => self.watching = request,
-            GripperWish::End => self.end(false, None),
-            GripperWish::Discard => self.end(true, None),
-            GripperWish::Observe(request) if self.connection.is_some() => {
+            GripperCommand::AnotherObject => self.start_over(),
+            GripperCommand::Begin(request) => self.begin(request, None),
+            GripperCommand::Watch(request) => self.watching = request,
+            GripperCommand::End => self.end(false, None),
+            GripperCommand::Discard => self.end(true, None),
+            GripperCommand::Observe(request) if self.connection.is_some() => {
                 self.observing.push(Observing::new(request));
             }
             // Whoever asked learns of it by the end of the request, and looks alone.
-            GripperWish::Observe(_) => {}
-            GripperWish::Calibrate(wish) => self.calibrate(&wish),
-            GripperWish::Crosstalk(wish) => self.look_for_crosstalk(wish),
-            GripperWish::Quit => {}
+            GripperCommand::Observe(_) => {}
+            GripperCommand::Calibrate(command) => self.calibrate(&command),
+            GripperCommand::Crosstalk(command) => self.look_for_crosstalk(command),
+            GripperCommand::Quit => {}
         }
     }
 
@@ -441,7 +441,7 @@ impl Desk {
             self.recording.as_ref().zip(connection).map(|(recording, c)| self.trial_view(recording, c.gripper.now_s()));
         self.outlets.view.publish(Arc::new(GripperView {
             revision: self.revision,
-            granted: self.granted,
+            handled: self.handled,
             link,
             refused: self.refused.clone(),
             ports: self.ports.clone(),

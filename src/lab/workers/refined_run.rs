@@ -8,12 +8,12 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::Sensors;
 
 /// A finer simulation that goes along, sample by sample.
-pub(super) struct Companion {
+pub(super) struct RefinedRun {
     run: GraspRun<SimulatedGripper>,
     band: ErrorBand,
 }
 
-impl Companion {
+impl RefinedRun {
     /// A companion at the start of a grasp.
     pub(super) fn new(scene: &Scene, object: Option<&ObjectModel>, seed: u64, channels: usize) -> Self {
         Self { run: prepare_refined(scene, object, seed), band: ErrorBand::new(scene, channels) }

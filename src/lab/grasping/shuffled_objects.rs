@@ -7,13 +7,13 @@ use rand_chacha::ChaCha8Rng;
 
 /// Deals built-in objects. The same seed deals the same sequence.
 #[derive(Clone, Debug)]
-pub struct ObjectDeck {
+pub struct ShuffledObjects {
     random: ChaCha8Rng,
     /// Indices into the catalogue that have not been dealt yet, the next one last.
     left: Vec<usize>,
 }
 
-impl ObjectDeck {
+impl ShuffledObjects {
     /// A shuffled deck.
     pub fn new(seed: u64) -> Self {
         Self { random: ChaCha8Rng::seed_from_u64(seed), left: Vec::new() }
@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn everyone_gets_a_turn_and_nobody_two_in_a_row() {
         let deal = |seed: u64| {
-            let mut deck = ObjectDeck::new(seed);
+            let mut deck = ShuffledObjects::new(seed);
             let mut dealt = vec!["lemon"];
             for _ in 0..100 {
                 dealt.push(deck.next(dealt[dealt.len() - 1]));
