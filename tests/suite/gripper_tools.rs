@@ -176,9 +176,9 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
             // The right strip takes a tenth of the left one; the left pad takes nothing.
             counts[bleeds] += if moved == 0 { 60.0 } else { 0.0 };
             *hand.lock().unwrap() = counts;
-            bench.until_shown(true, "Let go of the");
+            bench.until_shown(true, "Release the");
             *hand.lock().unwrap() = REST;
-            bench.until_shown(false, "Let go of the");
+            bench.until_shown(false, "Release the");
         }
         bench.until_shown(true, "Press the left pad firmly");
         bench.harness.run_steps(3);
@@ -188,7 +188,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         bench.until_shown(true, "sensor 4 of 4");
         bench.harness.get_by_label("Stop").click();
         bench.harness.step();
-        bench.until_shown(true, "The right flex strip shows 10.0 % of what the left flex strip does: +60 counts");
+        bench.until_shown(true, "The right flex strip follows the left flex strip by 10.0 %: +60 counts");
         bench.until_shown(true, "Skipped: left pad, right pad");
         assert!(bench.harness.query_by_label_contains("STOP").is_none());
         bench.harness.run_steps(3);
@@ -247,11 +247,11 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
         let mut counts = REST;
         counts[moved] += 600.0;
         *hand.lock().unwrap() = counts;
-        bench.until_shown(true, "Let go of the");
+        bench.until_shown(true, "Release the");
         *hand.lock().unwrap() = REST;
-        bench.until_shown(false, "Let go of the");
+        bench.until_shown(false, "Release the");
     }
-    bench.until_shown(true, "No sensor follows one of the other finger by 1 % or more");
+    bench.until_shown(true, "No crosstalk of 1 % or more");
     // Each opened the port anew, for the one before had given it back.
     assert_eq!(open.load(Ordering::Relaxed), 2);
     bench.tell(calibrate());
