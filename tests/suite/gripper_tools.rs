@@ -271,7 +271,7 @@ fn wiring_and_sketch_come_with_the_program() {
         assert!(told.code == Some(0) && told.out.contains("gripper_logic.h"), "{told:?}");
     }
     std::fs::write(at.join("due_gripper/due_gripper.ino"), "mine").unwrap();
-    refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "left as it is", "another folder"]);
+    refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "nothing was written", "another folder"]);
     let [dark, light] = Theme::ALL.map(|theme| {
         let setup = BenchSetup { size: [320.0, 680.0], ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
@@ -303,7 +303,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         });
         let setup = BenchSetup { size: [320.0, 820.0], examine, ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
-        assert!(bench.harness.query_by_label_contains("It checks that there is a board").is_some());
+        assert!(bench.harness.query_by_label_contains("It checks that a board is connected").is_some());
         bench.harness.get_by_label("Examine").click();
         bench.harness.step();
         bench.until_shown(true, "No faults found");
@@ -323,7 +323,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         assert!(bench.harness.query_by_label("crosstalk: ok").is_some());
         bench.harness.get_by_label("Stop").click();
         bench.harness.step();
-        bench.until_shown(true, "things are wrong");
+        bench.until_shown(true, "faults found");
         bench.until_shown(true, "then stopped");
         assert!(bench.harness.query_by_label("lines: FAILED").is_some());
         bench.harness.run_steps(3);
