@@ -175,9 +175,9 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
             // The right strip takes a tenth of the left one; the left pad takes nothing.
             counts[bleeds] += if moved == 0 { 60.0 } else { 0.0 };
             *hand.lock().unwrap() = counts;
-            bench.until_shown(true, "Let go of the");
+            bench.until_shown(true, "Release the");
             *hand.lock().unwrap() = REST;
-            bench.until_shown(false, "Let go of the");
+            bench.until_shown(false, "Release the");
         }
         bench.until_shown(true, "Press the left pad firmly");
         bench.harness.run_steps(3);
@@ -187,7 +187,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         bench.until_shown(true, "sensor 4 of 4");
         bench.harness.get_by_label("Stop").click();
         bench.harness.step();
-        bench.until_shown(true, "The right flex strip shows 10.0 % of what the left flex strip does: +60 counts");
+        bench.until_shown(true, "The right flex strip follows the left flex strip by 10.0 %: +60 counts");
         bench.until_shown(true, "Skipped: left pad, right pad");
         assert!(bench.harness.query_by_label_contains("STOP").is_none());
         bench.harness.run_steps(3);
@@ -246,11 +246,11 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
         let mut counts = REST;
         counts[moved] += 600.0;
         *hand.lock().unwrap() = counts;
-        bench.until_shown(true, "Let go of the");
+        bench.until_shown(true, "Release the");
         *hand.lock().unwrap() = REST;
-        bench.until_shown(false, "Let go of the");
+        bench.until_shown(false, "Release the");
     }
-    bench.until_shown(true, "No sensor follows one of the other finger by 1 % or more");
+    bench.until_shown(true, "No crosstalk of 1 % or more");
     // Each opened the port anew, for the one before had given it back.
     assert_eq!(open.load(Ordering::Relaxed), 2);
     bench.tell(calibrate());
@@ -270,7 +270,7 @@ fn wiring_and_sketch_come_with_the_program() {
         assert!(told.code == Some(0) && told.out.contains("gripper_logic.h"), "{told:?}");
     }
     std::fs::write(at.join("due_gripper/due_gripper.ino"), "mine").unwrap();
-    refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "left as it is", "another folder"]);
+    refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "nothing was written", "another folder"]);
     let [dark, light] = Theme::ALL.map(|theme| {
         let setup = BenchSetup { size: [320.0, 680.0], ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
@@ -322,7 +322,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         assert!(bench.harness.query_by_label("crosstalk: ok").is_some());
         bench.harness.get_by_label("Stop").click();
         bench.harness.step();
-        bench.until_shown(true, "things are wrong");
+        bench.until_shown(true, "faults found");
         bench.until_shown(true, "then stopped");
         assert!(bench.harness.query_by_label("lines: FAILED").is_some());
         bench.harness.run_steps(3);
