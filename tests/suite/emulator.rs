@@ -325,7 +325,7 @@ fn the_doctor_names_a_port_that_is_not_there_or_is_none() {
 fn the_link_replaces_no_file_and_goes_in_the_end() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("precious"), "data").unwrap();
-    refused(folder.path(), &["emulate", "--link", "precious"], &["precious", "left alone"]);
+    refused(folder.path(), &["emulate", "--link", "precious"], &["precious", "is not a link"]);
     assert_eq!(std::fs::read_to_string(folder.path().join("precious")).unwrap(), "data");
     refused(folder.path(), &["emulate", "--link", "no/such/folder/port"], &["no/such/folder/port", "folder"]);
     refused(folder.path(), &["emulate", "--link", "port", "--script", "angel=3"], &["angel", "step 1"]);

@@ -15,7 +15,7 @@ use palpate_tactile::trial::{Control, PhaseMark};
 /// Readings from before the start that belong to the trial (s).
 pub(super) const BEFORE_S: f64 = 0.3;
 /// A board that is silent at the end is not waited for longer than this (s).
-const LATE_S: f64 = 0.5;
+const LATE_S: f64 = 1.0;
 
 /// A trial that is wanted.
 #[derive(Clone, Debug, PartialEq)]
