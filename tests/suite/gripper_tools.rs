@@ -398,7 +398,7 @@ fn made_up_fit(trials: &[TrialId]) -> FittedFinger {
         widened: 1.4,
         steps: 7,
         remarks: vec![
-            "the recordings do not tell gripper.actuation.filling_time: anything from 0.018 to 0.102 s fits".to_owned(),
+            "gripper.actuation.filling_time cannot be identified from the recordings: any value from 0.018 to 0.102 s fits".to_owned(),
         ],
         courses: trials.iter().flat_map(|id| Side::BOTH.map(|side| course(id, side))).collect(),
     };

@@ -90,3 +90,90 @@ impl Drop for SerialGripper {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::{GraspController, GraspPlan};
+    use palpate_device::protocol::{ConsoleLine, DecodedEvent};
+    use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo};
+    use palpate_sim::scene::Scene;
+    use palpate_tactile::board::{Board, Reading};
+    use palpate_tactile::cadence::Cadence;
+    use palpate_tactile::trial::Control;
+    use std::sync::{Arc, Mutex};
+
+    /// A board that sends two readings with each look, which takes 10 ms of its clock, and keeps the lines that it gets.
+    struct FakeBoard {
+        t_s: f64,
+        lines: Arc<Mutex<Vec<(f64, String)>>>,
+    }
+
+    impl BoardStream for FakeBoard {
+        fn take(&mut self, _patience: Duration) -> Vec<LinkEvent> {
+            self.t_s += 0.01;
+            let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None };
+            [self.t_s - 0.005, self.t_s].map(|t_s| LinkEvent::Decoded(DecodedEvent::Reading(reading(t_s)))).into()
+        }
+
+        fn status(&self) -> LinkStatus {
+            LinkStatus {
+                state: LinkState::Listening,
+                port: PortInfo { path: "fake".into(), title: String::new(), usb: None, kind: BoardKind::default() },
+                baud: Some(115_200),
+                board: Board::default(),
+                detected: None,
+                cadence: Cadence::default(),
+                saturation: Vec::new(),
+                adc_range: palpate_device::protocol::AdcRange::default(),
+                reconnects: 0,
+                now_s: self.t_s,
+                dropped: [0; 2],
+            }
+        }
+
+        fn now_s(&self) -> f64 {
+            self.t_s
+        }
+
+        fn send(&mut self, line: &str) -> Result<(), SendError> {
+            self.lines.lock().expect("no panic").push((self.t_s, line.to_owned()));
+            Ok(())
+        }
+
+        fn console(&self) -> Vec<ConsoleLine> {
+            Vec::new()
+        }
+
+        fn is_over(&self) -> bool {
+            false
+        }
+    }
+
+    #[test]
+    fn a_driven_programme_is_sent_line_by_line_kept_alive_and_vented() {
+        let lines = Arc::new(Mutex::new(Vec::new()));
+        let mut gripper = SerialGripper::new(Box::new(FakeBoard { t_s: 0.0, lines: Arc::clone(&lines) }));
+        let mut controller = GraspController::new(GraspPlan::recorded(&Scene::default(), Control::Driven), 0.0);
+        let (mut readings, mut ticks) = (0, 0);
+        // Up to the middle of the hold: then the gripper is dropped under pressure.
+        while gripper.now_s() < 4.3 {
+            match gripper.next_event(Duration::ZERO).expect("an open port") {
+                GripperEvent::Board(_) => readings += 1,
+                GripperEvent::Tick => ticks += 1,
+                GripperEvent::Sampled(_) | GripperEvent::Finished => panic!("not of a board"),
+            }
+            if let Some(command) = controller.command(gripper.now_s()) {
+                gripper.set_pressure(command.bar, command.phase).expect("an open port");
+            }
+        }
+        drop(gripper);
+        assert!(readings > 800 && (2 * ticks as i32 - readings).abs() <= 2, "{readings} readings, {ticks} ticks");
+        let lines = lines.lock().expect("no panic").clone();
+        let texts: Vec<&str> = lines.iter().map(|(_, text)| text.as_str()).collect();
+        assert_eq!((texts[0], texts[19], texts.last().copied()), ("P 0.05", "P 1.00", Some("V")));
+        assert_eq!(texts.iter().filter(|text| **text == "K").count(), 2, "{texts:?}");
+        // The board vents after a second of silence.
+        assert!(lines.windows(2).all(|pair| pair[1].0 - pair[0].0 < 0.5), "{lines:?}");
+    }
+}
