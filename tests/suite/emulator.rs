@@ -103,7 +103,7 @@ fn among(sent: &[Vec<f32>], trial: &BoardTrial) -> Vec<usize> {
     trial.readings.iter().map(find).collect()
 }
 
-/// What a fault must come to in three seconds at 50 Hz, of which it takes seven tenths from 0.8 s on.
+/// What a fault must come to in four seconds at 50 Hz, of which it takes seven tenths from 1.6 s on.
 struct Case {
     faults: &'static str,
     /// More than so many readings are missing in the middle, and no more than so many.
@@ -120,23 +120,23 @@ const fn case(faults: &'static str, missing: [usize; 2], cause: &'static str) ->
 /// Everything is recorded through these; or what is missing is known to be.
 const CASES: [Case; 12] = [
     case("", [0, 0], ""),
-    case("burst=0.3@0.8/0.7", [0, 0], ""),
+    case("burst=0.3@1.6/0.7", [0, 0], ""),
     case("clock=200@0", [0, 0], ""),
-    case("stuck=0@0.8/0.7", [0, 0], ""),
-    case("rail=2@0.8", [0, 0], ""),
-    case("nan=3@0.8/0.7", [0, 0], ""),
-    case("loss=0.3@0.8/0.7", [2, 30], ""),
-    case("garbage@0.8/0.7", [30, 45], ""),
-    case("partial=0.3@0.8/0.7", [2, 40], ""),
-    case("byte=0.6@0.8/0.7", [10, 40], ""),
-    case("silent@0.8/0.7", [30, 40], ""),
-    Case { reconnects: 1, ..case("vanish@0.8/0.7", [30, 110], "unplugged") },
+    case("stuck=0@1.6/0.7", [0, 0], ""),
+    case("rail=2@1.6", [0, 0], ""),
+    case("nan=3@1.6/0.7", [0, 0], ""),
+    case("loss=0.3@1.6/0.7", [2, 30], ""),
+    case("garbage@1.6/0.7", [30, 45], ""),
+    case("partial=0.3@1.6/0.7", [2, 40], ""),
+    case("byte=0.6@1.6/0.7", [10, 40], ""),
+    case("silent@1.6/0.7", [30, 40], ""),
+    Case { reconnects: 1, ..case("vanish@1.6/0.7", [30, 110], "unplugged") },
 ];
 
 fn survives(case: &Case) {
     let folder = tempfile::tempdir().unwrap();
     let emulated = Emulated::new(folder.path(), &["--faults", case.faults]);
-    let (told, trial) = recorded(&emulated, "3.2");
+    let (told, trial) = recorded(&emulated, "4.0");
     let sent = emulated.sent();
     let kept = among(&sent, &trial);
     let whole: Vec<usize> = kept.windows(2).map(|pair| pair[1] - pair[0] - 1).collect();

@@ -35,8 +35,13 @@ impl RecentEvents {
         // The bytes of a reading stand before it.
         let bytes = |event: &LinkEvent| matches!(event, LinkEvent::Captured(_));
         let begins = self.events.iter().take(place).rposition(bytes).unwrap_or(place);
-        // Readings of the same piece from before the time stay out.
-        let early = |event: &LinkEvent| is_reading(event) && is_before(event, from_s);
+        // Readings of the same piece from before the time stay out, and so does a gap that ended with the first reading.
+        let first_s = self.readings().nth(first).map_or(from_s, |reading| reading.t_s);
+        let early = |event: &LinkEvent| match event {
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => reading.t_s < from_s,
+            LinkEvent::Decoded(DecodedEvent::Gap(gap)) => gap.to_s <= first_s,
+            LinkEvent::Decoded(_) | LinkEvent::Captured(_) => false,
+        };
         self.events.iter().skip(begins).filter(|event| !early(event)).cloned().collect()
     }
 
