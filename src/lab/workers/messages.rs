@@ -4,11 +4,13 @@ use crate::grasping::{GraspSummary, IdentificationView, Row};
 use crate::picture::Stage;
 use crate::study::AccuracyCost;
 use glam::DVec3;
+use palpate_learn::Model;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::Scene;
-use palpate_tactile::Channel;
 use palpate_tactile::trial::TrialId;
+use palpate_tactile::{Channel, SensorLayout};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Called whenever there is something new to show.
@@ -200,4 +202,24 @@ impl Snapshot {
     pub fn truth(&self) -> &str {
         self.object.as_ref().map_or(EMPTY, |object| &object.name)
     }
+}
+
+/// Initial state of a simulation worker.
+pub struct SimWorkerSetup {
+    /// First scene.
+    pub scene: Scene,
+    /// Sensor layout of the traces.
+    pub layout: SensorLayout,
+    /// Trial store.
+    pub store: PathBuf,
+    /// Whether trials are stored from the start.
+    pub recording: bool,
+    /// Grasps in a round. With a model this is the limit: a round ends once the object is recognised.
+    pub grasps: u32,
+    /// Recognition model; none turns recognition off.
+    pub model: Option<Arc<Model>>,
+    /// Whether the simulation runs from the start.
+    pub playing: bool,
+    /// Called when there is something new.
+    pub wake: Wake,
 }

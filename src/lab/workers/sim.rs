@@ -2,37 +2,13 @@
 
 use super::ghost::GhostGrasp;
 use super::latest::Latest;
-use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, Snapshot, TraceRow, Wake};
+use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, SimWorkerSetup, Snapshot, TraceRow};
 use super::simulation_session::{Outlets, Session};
-use palpate_learn::Model;
-use palpate_sim::scene::Scene;
-use palpate_tactile::SensorLayout;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
-
-/// What a simulation worker starts from.
-pub struct SimWorkerSetup {
-    /// The first scene.
-    pub scene: Scene,
-    /// Sensor layout of the traces.
-    pub layout: SensorLayout,
-    /// Where trials are stored.
-    pub store: PathBuf,
-    /// Whether trials are stored from the start.
-    pub recording: bool,
-    /// Grasps in a round; with a model the most, because a round ends once it is clear what is in the hand.
-    pub grasps: u32,
-    /// Recognises what is in the hand; without one nothing is recognised.
-    pub model: Option<Arc<Model>>,
-    /// Whether time passes from the start.
-    pub playing: bool,
-    /// Called when there is something new.
-    pub wake: Wake,
-}
 
 /// Commands that wait at most; more are refused rather than queued without end.
 const MOST_COMMANDS: usize = 256;

@@ -7,11 +7,11 @@ use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
 use super::listener::Listener;
 use super::messages::{
-    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
+    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status, TraceRow,
+    Wake,
 };
 use super::pace::Pace;
 use super::refined_run::RefinedRun;
-use super::sim::SimWorkerSetup;
 use crate::grasping::{FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
 use crate::recording::{Recorder, RecorderNotice};

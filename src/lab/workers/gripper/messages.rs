@@ -4,8 +4,9 @@ use super::calibrating::{CalibrationCommand, CalibrationView};
 use super::crosstalk::{CrosstalkCommand, CrosstalkView};
 use super::observing::ObserveRequest;
 use crate::grasping::{GraspStage, IdentificationView};
-use crate::gripper::NotOpened;
+use crate::gripper::{Listen, NotOpened};
 use crate::recording::TrialRequest;
+use crate::workers::messages::Wake;
 use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkStatus, PortInfo};
 use palpate_learn::Model;
@@ -15,6 +16,22 @@ use palpate_tactile::calibration::{Drift, SensorEstimate};
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// Initial state of the gripper thread.
+pub struct GripperSetup {
+    /// Model of the gripper, and the programme of its control box.
+    pub scene: Scene,
+    /// Store of trials and calibrations.
+    pub store: PathBuf,
+    /// Recognition model; none turns recognition off.
+    pub model: Option<Arc<Model>>,
+    /// Maximum number of grasps per object.
+    pub grasps: u32,
+    /// Opens ports.
+    pub listen: Listen,
+    /// Called when there is something new.
+    pub wake: Wake,
+}
 
 /// What the gripper's thread can be told.
 #[derive(Clone)]

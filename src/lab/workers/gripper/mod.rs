@@ -19,6 +19,6 @@ mod worker;
 
 pub use calibrating::{CalibrationCommand, CalibrationPlan, CalibrationView, RunningCalibration};
 pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
-pub use messages::{EndedTrial, GripperCommand, GripperView, LatestReading, TrialView};
+pub use messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;
-pub use worker::{GripperSetup, GripperWorker};
+pub use worker::GripperWorker;

@@ -6,10 +6,9 @@ mod trials;
 
 use super::calibrating::{Calibrating, CalibrationView};
 use super::crosstalk::{Crossing, CrosstalkView};
-use super::messages::{EndedTrial, GripperCommand, GripperView, LatestReading};
+use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
-use super::worker::GripperSetup;
 use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;

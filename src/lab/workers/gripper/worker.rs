@@ -1,36 +1,20 @@
 //! The handle on the gripper's thread: commands go in, views, trace rows and notices come out.
 
-use super::messages::{GripperCommand, GripperView};
-use super::observing;
+use super::messages::{GripperCommand, GripperSetup, GripperView};
+use super::observing::ObserveRequest;
 use super::session::{GripperSession, Outlets};
-use crate::gripper::Listen;
-use crate::workers::{Examine, Latest, Notice, TraceRow, Wake};
-use palpate_learn::Model;
-use palpate_sim::scene::Scene;
-use std::path::PathBuf;
+use crate::workers::{Examine, ExamineRequest, Latest, Notice, TraceRow};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::thread::JoinHandle;
-
-/// What the gripper's thread starts from.
-pub struct GripperSetup {
-    /// The gripper as it is modelled, and the programme of its control box.
-    pub scene: Scene,
-    /// Where trials and calibrations are stored.
-    pub store: PathBuf,
-    /// Recognises what is in the hand; without one nothing is recognised.
-    pub model: Option<Arc<Model>>,
-    /// Grasps that are made at most before it stops.
-    pub grasps: u32,
-    /// Opens ports.
-    pub listen: Listen,
-    /// Called when there is something new.
-    pub wake: Wake,
-}
+use std::time::{Duration, Instant};
 
 /// Trace rows that wait at most: a minute and a half of the fastest board. A reader that sleeps longer finds a gap.
 const MOST_ROWS: usize = 9000;
+
+/// Interval between progress reports of diagnostics.
+const REPORT_EVERY: Duration = Duration::from_millis(100);
 
 /// A handle on the gripper's thread. Dropping it vents, ends a trial that goes on, and gives the port back.
 #[derive(Debug)]
@@ -98,7 +82,7 @@ impl GripperWorker {
     /// What looks at the board for the doctor: at the link that is held here or, while none is, as `alone` does.
     pub fn examine(&self, alone: Examine) -> Examine {
         match &self.commands {
-            Some(commands) => observing::shared(commands.clone(), Arc::clone(&self.view), alone),
+            Some(commands) => observe_shared(commands.clone(), Arc::clone(&self.view), alone),
             None => alone,
         }
     }
@@ -132,4 +116,28 @@ impl Drop for GripperWorker {
             let _ended = thread.join();
         }
     }
+}
+
+/// Observes the board through the link that the gripper thread holds; without a link, runs `alone`.
+fn observe_shared(commands: Sender<GripperCommand>, view: Arc<Latest<GripperView>>, alone: Examine) -> Examine {
+    Arc::new(move |request: &ExamineRequest, proceed: &mut dyn FnMut(f64) -> bool| {
+        if !view.get().is_some_and(|view| view.is_connected()) {
+            return alone(request, proceed);
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let (command, observed) = ObserveRequest::new(request.seconds, Arc::clone(&stop));
+        let began = Instant::now();
+        if commands.send(GripperCommand::Observe(command)).is_err() {
+            return alone(request, proceed);
+        }
+        loop {
+            match observed.recv_timeout(REPORT_EVERY) {
+                Ok(seen) => return seen,
+                // The observation was dropped because the port was closed: open it directly.
+                Err(RecvTimeoutError::Disconnected) => return alone(request, proceed),
+                Err(RecvTimeoutError::Timeout) if proceed(began.elapsed().as_secs_f64()) => {}
+                Err(RecvTimeoutError::Timeout) => stop.store(true, Ordering::Relaxed),
+            }
+        }
+    })
 }
