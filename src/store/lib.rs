@@ -33,7 +33,7 @@
 //! let path = folder.path().join("trials.sqlite");
 //! let store = Store::open(&path)?;
 //! assert!(store.list(false)?.is_empty());
-//! check_space(&path)?; // a full disk is reported before a recording
+//! check_space(&path, 60.0)?; // reports a full disk before a recording of a minute
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -1,4 +1,4 @@
-//! The handle on the gripper's thread: commands go in, views, trace rows and notices come out.
+//! Handle of the gripper thread: commands in, views, trace rows and notices out.
 
 use super::messages::{GripperCommand, GripperSetup, GripperView};
 use super::observing::ObserveRequest;
@@ -10,13 +10,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel}
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Trace rows that wait at most: a minute and a half of the fastest board. A reader that sleeps longer finds a gap.
+/// Maximum number of queued trace rows: a minute and a half of the fastest board. A slower reader finds a gap.
 const MOST_ROWS: usize = 9000;
 
 /// Interval between progress reports of diagnostics.
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 
-/// A handle on the gripper's thread. Dropping it vents, ends a trial that goes on, and gives the port back.
+/// Handle of the gripper thread. Dropping it vents, ends a running trial and closes the port.
 #[derive(Debug)]
 pub struct GripperWorker {
     /// Absent once the thread is being ended.
@@ -31,7 +31,7 @@ pub struct GripperWorker {
 }
 
 impl GripperWorker {
-    /// Starts the thread. Nothing is connected to before that is wished for.
+    /// Starts the thread. It connects only on command.
     pub fn start(setup: GripperSetup) -> std::io::Result<Self> {
         let (commands, inbox) = channel();
         let (row_sender, rows) = sync_channel(MOST_ROWS);
@@ -47,15 +47,15 @@ impl GripperWorker {
         };
         let thread = std::thread::Builder::new().name("gripper".to_owned()).spawn(move || {
             let last_words = (outlets.notices.clone(), Arc::clone(&outlets.wake));
-            // A panic becomes a message; the window stays, and the board vents by itself when it hears nothing more.
+            // A panic becomes a message; the window stays, and the board vents when no more lines arrive.
             let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
                 GripperSession::new(setup, outlets).run(&inbox)
             }));
             if outcome.is_err() {
-                let text = "the gripper's thread stopped through a fault of the program; restart Palpate and report \
+                let text = "the gripper thread stopped because of a fault in the program; restart Palpate and report \
                             what you did";
-                // If nobody listens any more, nobody needs to know.
-                let _heard = last_words.0.send(Notice::Failed(text.to_owned()));
+                // The window may be closed.
+                let _sent = last_words.0.send(Notice::Failed(text.to_owned()));
                 last_words.1();
             }
         })?;
@@ -70,16 +70,16 @@ impl GripperWorker {
         })
     }
 
-    /// Asks for something; how many commands that makes. [`GripperView::handled`] tells how many have been handled.
+    /// Sends a command; returns the number of commands so far, to compare with [`GripperView::handled`].
     pub fn command(&self, command: GripperCommand) -> u64 {
         if let Some(commands) = &self.commands {
-            // A thread that has died has said so; the rest of the window works.
-            let _heard = commands.send(command);
+            // A thread that has failed has sent a notice; the rest of the window works.
+            let _sent = commands.send(command);
         }
         self.asked.fetch_add(1, Ordering::Relaxed) + 1
     }
 
-    /// What looks at the board for the doctor: at the link that is held here or, while none is, as `alone` does.
+    /// Examination of the board for the doctor: through the open link or, without one, by `alone`.
     pub fn examine(&self, alone: Examine) -> Examine {
         match &self.commands {
             Some(commands) => observe_shared(commands.clone(), Arc::clone(&self.view), alone),
@@ -87,7 +87,7 @@ impl GripperWorker {
         }
     }
 
-    /// Where everything stands; nothing before anything was wished for.
+    /// The newest view; none before the first one is published.
     pub fn view(&self) -> Option<Arc<GripperView>> {
         self.view.get()
     }
@@ -97,7 +97,7 @@ impl GripperWorker {
         self.rows.try_iter()
     }
 
-    /// True once after rows had to be dropped because nobody read them.
+    /// True once after rows had to be dropped because the queue was full.
     pub fn take_rows_lost(&self) -> bool {
         self.rows_lost.swap(false, Ordering::Relaxed)
     }
