@@ -49,7 +49,7 @@ impl GripperWorker {
             let last_words = (outlets.notices.clone(), Arc::clone(&outlets.wake));
             // A panic becomes a message; the window stays, and the board vents when no more lines arrive.
             let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                GripperSession::new(setup, outlets).run(&inbox)
+                GripperSession::new(setup, outlets).run(&inbox);
             }));
             if outcome.is_err() {
                 let text = "the gripper thread stopped because of a fault in the program; restart Palpate and report \
