@@ -1,59 +1,85 @@
-//! Palpate: a workbench for soft grippers that recognise what they hold.
+//! Palpate: a workbench for soft grippers that recognise objects by touch.
+//!
+//! # Packages, lowest first
+//!
+//! A package uses only those that its row names; the compiler and a test check it. Each package lists its own modules
+//! the same way.
+//!
+//! | package | folder | holds | uses |
+//! |---|---|---|---|
+//! | [`palpate-geometry`](palpate_geometry) | `src/geometry` | meshes, solids, distance grids, mass; draw list, camera, colours, units | |
+//! | [`palpate-sim`](palpate_sim) | `src/sim` | a scene in, frames out: objects, gripper, scene files, physics, poses | `geometry` |
+//! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | frames or counts in, channels out: trials, layouts, sensor models, calibration | `geometry` `sim` |
+//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, PMFs out: networks, baselines, training, metrics, model files | |
+//! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` |
+//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` |
+//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` |
+//! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file) | `geometry` |
+//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` |
+//! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `learn` `device` `store` `lab` `render` |
+//!
+//! # One path for every grasp
+//!
+//! ```text
+//! Gripper (sim | serial | replay) --events--> GraspController --rows--> plots, recogniser
+//!               ^------ line pressure -----------'    '--trial--> Recorder (own thread) --> store --> flags
+//! ```
+//!
+//! | question | the one place |
+//! |---|---|
+//! | Where are bytes of the board parsed? | [`palpate_device::protocol`] |
+//! | Where does a grasp run? | [`palpate_lab::grasping::GraspController`] |
+//! | Where is a trial recorded? | [`palpate_lab::recording`] |
 //!
 //! # The tour
 //!
-//! ```text
-//!  scene file, URDF / OBJ / STL
-//!        |
-//!   palpate_core   physics: state -> next state        (the convex step, written beside its equations)
-//!        |         rig -> grasping -> trial -> store   (raw frames, append-only)
-//!        |         trial + layout -> channels          (curvature, pressure, force; perfect sensors or real ones)
-//!        |         channels -> verdict -> belief       (stage one: size, shape; stage two: class; the next grasp?)
-//!        |         frame + view -> DrawList            (plain data, no graphics card)
-//!        |
-//!   palpate_render DrawList -> pixels                  (wgpu, the same in window, test and file)
-//!        |
-//!   palpate        app: the window;  cli: everything without it
-//! ```
+//! The [`manual`] has a chapter for each topic of `palpate help`, among them [`manual::contributing`]. To understand a
+//! grasp, read in this order:
 //!
-//! The [`manual`] has a chapter for each topic of `palpate help`, among them [`manual::contributing`].
-//!
-//! Read in this order to understand a grasp:
-//!
-//! 1. [`palpate_sim::scene::Scene`], everything that can be set, and [`palpate_sim::objects::load`].
-//! 2. [`palpate_sim::gripper`], what a finger and its pad are; [`palpate_sim::physics`], how they move.
-//! 3. [`palpate_lab::grasping::grasp`], which runs a programme on a [`palpate_lab::gripper::Rig`] and returns a
-//!    [`palpate_tactile::trial::Trial`].
-//! 4. [`palpate_tactile::Sensors`], which reads channels off its frames.
-//! 5. [`palpate_learn`], which answers them, and [`palpate_lab::grasping::Identification`], which adds up
-//!    grasp after grasp until it is clear what is in the hand.
-//! 6. [`palpate_lab::picture::Stage`], which turns a frame into a [`palpate_geometry::drawing::DrawList`], and
-//!    [`palpate_render::Renderer`], which draws that.
-//! 7. [`palpate_lab::workers::SimWorker`], the thread in which all this happens live,
-//!    [`palpate_lab::workers::GripperWorker`], its like for the real gripper, and [`app::Workbench`], which shows both.
+//! 1. [`palpate_sim::scene::Scene`]: every setting; [`palpate_sim::objects::load`]: the object.
+//! 2. [`palpate_sim::gripper`]: finger and pad; [`palpate_sim::physics`]: their motion, one file per effect.
+//! 3. [`palpate_lab::gripper::Gripper`]: events out, line pressure in; simulated, serial or replayed.
+//! 4. [`palpate_lab::grasping::GraspController`]: rest, close, hold, release; [`palpate_lab::grasping::grasp`] runs a
+//!    simulated grasp to its end and returns a [`palpate_tactile::trial::Trial`].
+//! 5. [`palpate_tactile::Sensors`]: channels of a frame; [`palpate_tactile::calibration`]: channels of a board's counts.
+//! 6. [`palpate_learn`]: a PMF over classes; [`palpate_lab::grasping::Identification`]: grasps until certain.
+//! 7. [`palpate_lab::recording`]: the recorder thread; [`palpate_store::Store`]: trials on disk;
+//!    [`palpate_lab::labelling`]: flags and segmentation.
+//! 8. [`palpate_lab::picture::Stage`]: scene and frame to a [`palpate_geometry::drawing::DrawList`], which
+//!    [`palpate_render::Renderer`] draws.
+//! 9. [`palpate_lab::workers::SimWorker`] and [`palpate_lab::workers::GripperWorker`]: the threads of the simulated and
+//!    the real gripper; [`app::Workbench`] shows both.
 //!
 //! # Where to add what
 //!
 //! | what | the one place |
 //! |---|---|
-//! | a built-in object | a function in `src/cli/workshop/sixteen.rs`; `palpate workshop` writes its folder |
-//! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`]; its place in `src/app/modes.rs` |
-//! | a mode of the window | a line and a layout in `src/app/modes.rs` |
-//! | a key | a line in `src/app/keys.rs` |
-//! | a headless command | a file in `src/cli/` and a line in its `Command` |
-//! | a topic of the manual | a file in `assets/help/` and a line in `src/manual.rs` |
-//! | a setting | a field of a struct below [`palpate_sim::scene::Scene`], and its range in `scene/check.rs` |
-//! | a sensor layout | a line in `src/core/sensing/layout.rs` |
+//! | a built-in object | a function in `src/workshop/sixteen.rs`; `cargo run -p palpate-workshop -- objects` writes its folder |
+//! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`]; its place in a layout of `src/app/modes/` |
+//! | a mode of the window | a file in `src/app/modes/` and its name in `src/app/modes/mode.rs` |
+//! | a key | a line in `src/app/keys/mod.rs`, or in the mode that it belongs to |
+//! | a feature of the window | a file in `src/app/features/` and its line in `src/app/actions.rs` |
+//! | a command | a file in `src/cli/` and a line in its `Command` |
+//! | a chapter of the manual | a file in `assets/help/` and a line in `src/manual.rs` |
+//! | a setting | a field of a struct below [`palpate_sim::scene::Scene`], and its range in `src/sim/scene/check.rs` |
+//! | a physical effect | a file in `src/sim/physics/effects/` and a line in its `mod.rs` |
+//! | a file format for objects | `src/sim/objects/load.rs` |
+//! | a sensor layout | a line in `src/tactile/layout.rs` |
+//! | a sensor model | a file in `src/tactile/model/` |
+//! | a recogniser | a file in `src/learn/` and a line in [`palpate_learn::METHODS`] |
+//! | a line format of boards | `src/device/protocol/fields.rs` |
+//! | a check of the doctor | a function in `src/device/doctor/checks.rs` |
+//! | a gripper | a file in `src/lab/gripper/` that implements [`palpate_lab::gripper::Gripper`] |
+//! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
+//! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
+//! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
-//! | a recogniser | a file in `src/core/recognition/` and a line in [`palpate_learn::METHODS`] |
-//! | a rig | a file in `src/core/rig/` that implements [`palpate_lab::gripper::Rig`] |
-//! | a file format for objects | `src/core/objects/load.rs` |
 //!
 //! # What is deliberately absent
 //!
 //! The window steps no physics and waits for no disk: it sends commands and draws the newest snapshot. The renderer
-//! knows no gripper: it draws meshes, soft fingers and arrows. Core knows no window and no graphics card. There is no
-//! global state.
+//! knows no gripper: it draws meshes, soft fingers and arrows. No package below `palpate-render` and `palpate` needs a
+//! window or a graphics card. There is no global state.
 
 pub mod app;
 pub mod cli;

@@ -1,4 +1,52 @@
-//! What people do with a gripper: grasp, record, recognise, label, study.
+//! Work with a gripper: grasp, record, recognise, label, study.
+//!
+//! # Terms
+//!
+//! A **gripper** (simulated, on a serial port, or replayed) emits events and takes a line pressure. The **grasp
+//! controller** steps it through rest, closing, hold and release. Each sample becomes a **row** for plots and the
+//! recogniser; the **recorder** thread stores the trial. After a trial, **flags** mark what to check. Grasps repeat
+//! until the **belief** is certain: an **identification**.
+//!
+//! ```text
+//! Gripper (sim | serial | replay) --events--> GraspController --rows--> plots, recogniser
+//!               ^------ line pressure -----------'    '--trial--> Recorder (own thread) --> store --> flags
+//! ```
+//!
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | [`gripper`] | the trait [`gripper::Gripper`]; simulated, serial and replayed grippers |
+//! | 0 | [`labelling`] | flags of a trial, begin and end of a grasp, trials to review |
+//! | 0 | [`datasets`] | trials of a store as a data set; saved models |
+//! | 0 | [`picture`] | scene and frame to a draw list |
+//! | 1 | [`grasping`] | the grasp controller, runs, collections, identification, error bands |
+//! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
+//! | 2 | [`study`] | measurements and comparisons as functions |
+//! | 3 | [`workers`] | threads for the window: commands in, snapshots and rows out |
+//!
+//! # A grasp in six lines
+//!
+//! ```
+//! use palpate_lab::grasping::{GraspSummary, grasp};
+//! use palpate_sim::scene::Scene;
+//!
+//! let mut scene = Scene::default();
+//! scene.object.source = "lemon".to_owned();
+//! let object = scene.load_object()?;
+//! let trial = grasp(&scene, object.as_ref(), 0);
+//! let summary = GraspSummary::new(&trial, &scene);
+//! assert!(summary.converged && summary.contact_onset_s.is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Conventions
+//!
+//! - Record raw, derive later: a trial keeps raw samples; layouts and calibrations are applied when it is read.
+//! - Time is counted in whole ticks ([`palpate_sim::scene::Clock`]); equal seeds give equal bytes, on any number of
+//!   threads.
 
 pub mod datasets;
 pub mod grasping;

@@ -4,20 +4,51 @@
 //! [`Dataset`] by a [`Method`] and answers a [`Sequence`] of readings with a [`Verdict`]. The verdicts on several
 //! grasps of one object accumulate in a [`Belief`]; [`StopRule`] decides when to stop grasping.
 //!
-//! | file or folder | contents |
-//! |---|---|
-//! | `data.rs` | sequences, labels, data sets and their splits |
-//! | `pmf.rs`, `belief.rs` | probabilities; belief after several grasps, rejection of unknown objects, stop rule |
-//! | `recogniser.rs`, `fitting.rs` | the interface of recognisers; options and errors of a fit |
-//! | `network/` | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
-//! | `baselines/` | methods for comparison: features with trees, SVM or KNN; DTW; convolution |
-//! | `forest/` | decision trees and their ensembles |
-//! | `features.rs` | a grasp as a row of features |
-//! | `methods.rs` | table of all methods |
-//! | `model.rs`, `arrays.rs`, `model_file.rs` | a trained model, its parameters, its safetensors file |
-//! | `evaluation.rs`, `metrics/` | test results of a model; confusion, calibration, intervals, tests |
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers. Most are private; their items stand at the root of the crate.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | `data` | sequences, labels, data sets and their splits |
+//! | 0 | `pmf`, `mirror`, `arrays` | probabilities; channels of the mirrored gripper; named parameters of a model |
+//! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
+//! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
+//! | 1 | `features` | a grasp as a row of features |
+//! | 2 | `recogniser` | the interface of recognisers |
+//! | 2 | `forest` | decision trees and their ensembles |
+//! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
+//! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
+//! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution |
+//! | 6 | `methods` | table of all methods |
+//! | 7 | `model_file` | safetensors files; the shipped model |
 //!
 //! To add a recogniser, write its file and add one line to [`METHODS`].
+//!
+//! # Example
+//!
+//! ```
+//! use palpate_learn::{Class, Dataset, Example, Fitting, Labels, Sequence, method};
+//! use std::sync::{Arc, atomic::AtomicBool};
+//!
+//! // Two classes that differ in the level of one channel.
+//! let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+//! let grasp = |level: f32| {
+//!     Arc::new(Sequence { t_s: (0..300).map(|k| k as f32 / 75.0).collect(), values: vec![level; 300] })
+//! };
+//! let data = Dataset {
+//!     channels: vec!["pressure_left".to_owned()],
+//!     labels: Labels { classes: vec![class("ball"), class("cube")], ..Labels::default() },
+//!     examples: (0..20).map(|k| Example { id: k, class: k as usize % 2, grasp: grasp((k % 2) as f32) }).collect(),
+//!     ..Dataset::default()
+//! };
+//! let (progress, stop) = (|_| {}, AtomicBool::new(false));
+//! let fitting = Fitting { seed: 1, quick: true, settings: Default::default(), progress: &progress, stop: &stop };
+//! let model = method("decision-tree").expect("in METHODS").train(&data, &fitting)?;
+//! let verdict = model.recogniser.recognise(&grasp(1.0), None);
+//! assert_eq!(verdict.pmf.top().0, 1);
+//! # Ok::<(), palpate_learn::LearnError>(())
+//! ```
 
 mod arrays;
 mod baselines;

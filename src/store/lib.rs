@@ -1,4 +1,41 @@
 //! Trials on disk: an SQLite store that survives kills and that several programs can share; CSV import and export.
+//!
+//! # Terms
+//!
+//! A **store** is one SQLite file of **trials**, raw and append-only. A trial of a real gripper may have **labels**:
+//! class, note, tags and **flags**; each change of them is an entry of the **journal**, and can be undone. The **plan**
+//! says what to record next. **Calibrations** and **tares** belong to the parts of a board.
+//!
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers. All but [`labels`] are private; their items stand at the root of the crate.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | `checksum`, `frame_blob`, `reading_blob` | checksums; frames and readings as bytes |
+//! | 0 | [`labels`] | class names, flags, plan, labelled trials, sparklines: plain values |
+//! | 0 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
+//! | 1 | `store_error` | errors, with cause and fix |
+//! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
+//! | 3 | `store` | open, begin, append, finish, list and load trials ([`Store`]) |
+//! | 4 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
+//! | 4 | `calibrations`, `journal`, `merge` | calibrations, undoable changes, merging of stores |
+//! | 5 | `label_repository`, `tares` | labels, notes and plan; zeros of parts |
+//! | 5 | `board_export`, `board_signals` | counts of a board trial as CSV; its signals by the calibrations |
+//! | 6 | `labelled_trials`, `labelled_export` | lists of trials with labels; export for training |
+//!
+//! # Example
+//!
+//! ```
+//! use palpate_store::{Store, check_space};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("trials.sqlite");
+//! let store = Store::open(&path)?;
+//! assert!(store.list(false)?.is_empty());
+//! check_space(&path, 60.0)?; // reports a full disk before a recording of a minute
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod board_export;
 mod board_signals;

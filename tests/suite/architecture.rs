@@ -1,241 +1,240 @@
-//! The map in `src/lib.rs` stays true by itself: modules import only from lower layers, third-party crates stay at home.
+//! The maps in the documentation hold: packages and modules import only from lower ones, third-party crates stay at home.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use crate::imports::{Sources, names_in, related, rows};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
-/// Layers of `src/core`, lowest first. A module may import from rows above its own, never from its own or below.
-const LAYERS: &[&[&str]] = &[
-    &["units", "palette"],
-    &["geometry"],
-    &["drawing", "objects", "gripper"],
-    &["trial", "board"],
-    &["scene", "wire"],
-    &["physics"],
-    &["sensing"],
-    &["rig", "labelling"],
-    &["recording"],
-    &["recognition"],
-    &["grasping"],
-    &["pretended", "doctor"],
-    &["study"],
-    &["picture"],
-    &["workers"],
-];
-
-/// What `src/render` may know of core.
-const SEEN_BY_RENDER: [&str; 3] = ["geometry", "palette", "drawing"];
-
-/// Files of tests that stand beside the code.
-const TEST_FILES: &[&str] = &[
-    "physics/closed_form.rs",
-    "physics/effects_tests.rs",
-    "workers/sim_tests.rs",
-    "recognition/conformance.rs",
-    "recognition/network/gradients.rs",
-    "recognition/forest/peers.rs",
-    "sensing/model/tests.rs",
-    "wire/decoder_tests.rs",
-    "recording/board_tests.rs",
-    "recording/journal_tests.rs",
-    "recording/store_tests.rs",
-    "labelling/segmentation_tests.rs",
-    "rig/serial/link_tests.rs",
-    "pretended/tests.rs",
-    "study/finger_fit/tests.rs",
-    "sensing/calibration/pad_curve_tests.rs",
-    "sensing/calibration/readout_tests.rs",
-    "doctor/tests.rs",
-];
+/// Folders of packages below `src`. The root package has the rest of `src`.
+const PACKAGES: [&str; 9] = ["geometry", "sim", "tactile", "learn", "device", "store", "lab", "render", "workshop"];
 
 /// Where each third-party crate may be named.
 const HOMES: &[(&str, &[&str])] = &[
     ("ab_glyph", &["src/render/text.rs"]),
-    ("candle_core", &["src/core/recognition", "src/core/study/network_cost.rs"]),
-    ("candle_nn", &["src/core/recognition/rivals/convolution.rs", "src/core/study/network_cost.rs"]),
-    ("bytemuck", &["src/render", "src/core/geometry", "src/core/recording"]),
-    ("clap", &["src/cli"]),
-    (
-        "cpu_time",
-        &["src/cli", "src/core/study", "src/core/recognition/evaluation.rs", "src/core/recognition/methods.rs"],
-    ),
-    ("csv", &["src/core/recording"]),
+    ("bytemuck", &["src/render", "src/geometry"]),
+    ("candle_core", &["src/learn/baselines/convolution.rs", "src/lab/study/network_cost.rs"]),
+    ("candle_nn", &["src/learn/baselines/convolution.rs", "src/lab/study/network_cost.rs"]),
+    ("cc", &["src/device/build.rs"]),
+    ("clap", &["src/cli", "src/workshop"]),
+    ("cpu_time", &["src/cli", "src/lab/study", "src/learn/evaluation.rs", "src/learn/methods.rs"]),
+    ("crc32fast", &["src/store/checksum.rs"]),
+    ("csv", &["src/store"]),
     ("ctrlc", &["src/cli/interrupt.rs"]),
-    ("directories", &["src/core/recording"]),
+    ("directories", &["src/store/store.rs"]),
     ("eframe", &["src/app"]),
     ("egui", &["src/app"]),
-    ("egui_notify", &["src/app"]),
+    ("egui_notify", &["src/app/notices.rs"]),
     ("egui_plot", &["src/app"]),
     ("egui_tiles", &["src/app"]),
     ("egui_wgpu", &["src/app"]),
     ("epaint_default_fonts", &["src/render/text.rs"]),
-    ("fs4", &["src/core/recording"]),
+    ("fs4", &["src/store"]),
     ("glam", &["src"]),
-    ("image", &["src/render"]),
-    ("include_dir", &["src/core/objects", "src/render/shaders.rs"]),
+    ("image", &["src/render/picture.rs"]),
+    ("include_dir", &["src/sim/objects"]),
     ("indicatif", &["src/cli"]),
     ("libloading", &["src/app/startup.rs"]),
-    ("matrixmultiply", &["src/core/recognition/network/gemm.rs"]),
-    ("parry3d", &["src/core/geometry"]),
-    ("pollster", &["src/render"]),
-    ("quick_xml", &["src/core/objects"]),
+    ("matrixmultiply", &["src/learn/network/gemm.rs"]),
+    ("parry3d", &["src/geometry"]),
+    ("pollster", &["src/render/gpu.rs"]),
+    ("quick_xml", &["src/sim/objects/xml.rs"]),
     ("rand", RANDOM),
     ("rand_chacha", RANDOM),
-    ("rapier3d", &["src/core/physics"]),
-    (
-        "rayon",
-        &[
-            "src/core/geometry",
-            "src/core/recognition/methods.rs",
-            "src/core/study/effects.rs",
-            "src/core/study/network_cost.rs",
-        ],
-    ),
+    ("rapier3d", &["src/sim/physics/rapier_engine", "src/sim/physics/resting.rs"]),
+    ("rayon", &["src/geometry", "src/learn/methods.rs", "src/lab/grasping/error_band.rs", "src/lab/study"]),
     ("rfd", &["src/app/files.rs"]),
-    ("rusqlite", &["src/core/recording"]),
-    ("safetensors", &["src/core/recognition/model_file.rs"]),
-    ("serialport", &["src/core/rig", "src/core/pretended"]),
+    ("rusqlite", &["src/store"]),
+    ("safetensors", &["src/learn/model_file.rs"]),
     ("serde", &["src"]),
     ("serde_json", &["src"]),
-    ("smartcore", &["src/core/recognition/rivals"]),
-    ("statrs", &["src/core/recognition/metrics", "src/core/sensing/calibration/straight_line.rs"]),
-    ("stl_io", &["src/core/geometry"]),
-    ("strsim", &["src/core/objects", "src/core/scene"]),
+    ("serialport", &["src/device/serial", "src/device/emulator/port.rs"]),
+    ("smartcore", &["src/learn/baselines"]),
+    ("statrs", &["src/learn/metrics", "src/tactile/calibration/straight_line.rs"]),
+    ("stl_io", &["src/geometry/mesh_files.rs"]),
+    ("strsim", &["src/sim/objects", "src/sim/scene"]),
     ("thiserror", &["src"]),
-    ("tobj", &["src/core/geometry"]),
-    ("toml", &["src/core/scene", "src/core/objects/catalogue.rs"]),
+    ("tobj", &["src/geometry/mesh_files.rs"]),
+    ("toml", &["src/sim/scene", "src/sim/objects/catalogue.rs"]),
     ("tracing", &["src"]),
     ("tracing_subscriber", &["src/cli/terminal.rs"]),
-    ("urdf_rs", &["src/core/objects"]),
     ("wgpu", &["src/render", "src/app"]),
     ("winit", &["src/app/startup.rs"]),
 ];
 
-/// Where things are drawn at random, always from a seed.
+/// Where random numbers are drawn, always from a seed.
 const RANDOM: &[&str] = &[
-    "src/core/grasping",
-    "src/core/physics/resting.rs",
-    "src/core/sensing/model/streams.rs",
-    "src/core/recognition",
-    "src/core/study/stability",
-    "src/core/study/network_cost.rs",
     "src/cli/demo.rs",
+    "src/lab/grasping/shuffled_objects.rs",
+    "src/lab/study/network_cost.rs",
+    "src/lab/study/stability",
+    "src/learn",
+    "src/sim/physics/placement.rs",
+    "src/sim/physics/resting.rs",
+    "src/sim/poses.rs",
+    "src/tactile/model/streams.rs",
 ];
+
+/// One row of the package table in `src/lib.rs`.
+struct Package {
+    /// Last word of `palpate-NAME`; `palpate` for the root package.
+    name: String,
+    uses: BTreeSet<String>,
+}
+
+fn packages() -> Vec<Package> {
+    let text = std::fs::read_to_string(root().join("src/lib.rs")).unwrap();
+    let rows = rows(&text, "| package |");
+    assert_eq!(rows.len(), PACKAGES.len() + 1, "packages in the table of src/lib.rs");
+    let short = |name: &str| name.strip_prefix("palpate-").unwrap_or(name).to_owned();
+    rows.iter()
+        .map(|row| Package { name: short(&names_in(&row[0])[0]), uses: names_in(&row[3]).into_iter().collect() })
+        .collect()
+}
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn sources_below(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(sources_below(&path));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
+/// Folder of a package, below the root of the repository.
+fn folder(package: &str) -> String {
+    if package == "palpate" { "src".to_owned() } else { format!("src/{package}") }
+}
+
+fn sources(package: &str) -> Sources {
+    let skipped: &[&str] = if package == "palpate" { &PACKAGES } else { &[] };
+    Sources::read(&folder(package), "crate", skipped)
+}
+
+/// All packages, with their sources.
+fn workspace() -> Vec<(&'static str, Sources)> {
+    PACKAGES.iter().chain(&["palpate"]).map(|package| (*package, sources(package))).collect()
+}
+
+/// Crates in a section of a package's manifest, spelt as in code.
+fn dependencies(package: &str, section: &str) -> BTreeSet<String> {
+    let manifest = if package == "palpate" { "Cargo.toml".to_owned() } else { format!("src/{package}/Cargo.toml") };
+    let text = std::fs::read_to_string(root().join(manifest)).unwrap();
+    let lines = text.split(&format!("\n[{section}]\n")).nth(1).unwrap_or_default();
+    let lines = lines.split("\n[").next().unwrap().lines().filter(|line| !line.starts_with('#'));
+    let names = lines.map(|line| line.split(['.', ' ', '=']).next().unwrap().replace('-', "_"));
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+/// True where code names a crate as the start of a path.
+fn names_crate(code: &str, name: &str) -> bool {
+    code.match_indices(&format!("{name}::")).any(|(at, _)| {
+        let before = code[..at].chars().next_back();
+        before.is_none_or(|c| !c.is_alphanumeric() && c != '_' && c != ':')
+    })
+}
+
+#[test]
+fn packages_use_what_the_table_says() {
+    let mut above = BTreeSet::new();
+    for package in packages() {
+        for used in &package.uses {
+            assert!(above.contains(used), "{used} must stand above {} in the table of src/lib.rs", package.name);
         }
+        let named = dependencies(&package.name, "dependencies");
+        let named = named.iter().filter_map(|name| name.strip_prefix("palpate_")).map(str::to_owned);
+        assert_eq!(named.collect::<BTreeSet<_>>(), package.uses, "packages that {} uses", package.name);
+        above.insert(package.name);
     }
-    found.sort();
-    found
-}
-
-/// Sources that ship: without comments, and without test modules, which stand at the end of a file.
-fn shipped(path: &Path) -> String {
-    let text = std::fs::read_to_string(path).unwrap();
-    let text = text.split("mod tests {").next().unwrap();
-    text.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
-}
-
-/// The names that follow `prefix` as a path, as in `crate::NAME` or `use crate::{NAME, ..`.
-fn names_after<'a>(text: &'a str, prefix: &str) -> BTreeSet<&'a str> {
-    let name = |rest: &'a str| {
-        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
-        &rest[..end]
-    };
-    text.match_indices(prefix).map(|(at, _)| name(&text[at + prefix.len()..])).filter(|n| !n.is_empty()).collect()
-}
-
-fn layer_of(module: &str) -> Option<usize> {
-    LAYERS.iter().position(|layer| layer.contains(&module))
 }
 
 #[test]
 fn modules_import_only_from_lower_layers() {
-    let core = root().join("src/core");
-    let mut seen = BTreeSet::new();
-    for path in sources_below(&core) {
-        let below_core = path.strip_prefix(&core).unwrap();
-        let first = below_core.iter().next().unwrap().to_str().unwrap();
-        let module = first.strip_suffix(".rs").unwrap_or(first);
-        // Tests of a folder may stand in a file of their own.
-        let only_tests = TEST_FILES.iter().any(|file| below_core.ends_with(file));
-        if ["lib", "build"].contains(&module) || only_tests {
-            continue;
+    for package in PACKAGES.into_iter().filter(|package| *package != "workshop") {
+        let sources = sources(package);
+        let mut layers: BTreeMap<String, usize> = BTreeMap::new();
+        for row in rows(&sources.text("lib.rs"), "| layer |") {
+            let layer = row[0].parse().unwrap();
+            layers.extend(names_in(&row[1]).into_iter().map(|module| (module, layer)));
         }
-        let own = layer_of(module).unwrap_or_else(|| panic!("src/core/{module} has no place in LAYERS"));
-        seen.insert(module.to_owned());
-        let text = shipped(&path);
-        assert!(!text.contains("crate::{"), "{}: import one module per line", path.display());
-        for name in names_after(&text, "crate::") {
-            let other = layer_of(name).unwrap_or_else(|| panic!("{}: crate::{name} is no module", path.display()));
-            assert!(name == module || other < own, "{} must not import from {name}", path.display());
-        }
-    }
-    assert!(seen.len() >= 15, "only {seen:?} were found");
-}
-
-#[test]
-fn the_renderer_knows_nothing_of_gripper_or_scene() {
-    for path in sources_below(&root().join("src/render")) {
-        for name in names_after(&shipped(&path), "palpate_core::") {
-            assert!(SEEN_BY_RENDER.contains(&name), "{} must not know {name}", path.display());
+        let module = |file: &str| file.split('/').next().unwrap().trim_end_matches(".rs").to_owned();
+        let exist: BTreeSet<String> =
+            sources.files.keys().map(|file| module(file)).filter(|name| name != "lib" && name != "build").collect();
+        assert_eq!(layers.keys().cloned().collect::<BTreeSet<_>>(), exist, "modules in the table of src/{package}");
+        for (file, others) in sources.imports() {
+            let Some(own) = layers.get(&module(file)) else { continue };
+            for other in others.iter().filter(|other| module(other) != module(file)) {
+                let below = layers.get(&module(other)).is_some_and(|below| below < own);
+                assert!(below, "src/{package}/{file} must not import from {other}");
+            }
         }
     }
 }
 
 #[test]
-fn the_window_does_not_know_the_command_line() {
-    for path in sources_below(&root().join("src/app")) {
-        let text = shipped(&path);
-        assert!(!names_after(&text, "crate::").contains("cli"), "{}", path.display());
-        assert!(!names_after(&text, "palpate_core::").contains("physics"), "{} must not step", path.display());
+fn files_do_not_import_each_other() {
+    for (_, sources) in workspace() {
+        sources.assert_no_cycles();
+    }
+}
+
+#[test]
+fn imports_are_found_through_re_exports() {
+    let sources = sources("geometry");
+    let imports = sources.imports();
+    assert!(imports["mesh_files.rs"].contains("mesh.rs"), "{imports:?}");
+    assert!(imports["drawing/overlay.rs"].contains("palette.rs"), "{imports:?}");
+    assert!(related("drawing/mod.rs", "drawing/camera.rs") && !related("mesh.rs", "mesh_files.rs"));
+}
+
+#[test]
+fn the_window_knows_neither_command_line_nor_physics() {
+    let sources = sources("palpate");
+    for (file, code) in sources.files.iter().filter(|(file, _)| file.starts_with("app/")) {
+        assert!(!code.contains("crate::cli"), "{file} must not know the command line");
+        assert!(!code.contains("palpate_sim::physics"), "{file} must not step the physics");
     }
 }
 
 #[test]
 fn third_party_crates_stay_at_home() {
-    let mut homeless = BTreeSet::new();
-    for manifest in ["Cargo.toml", "src/core/Cargo.toml", "src/render/Cargo.toml"] {
-        let text = std::fs::read_to_string(root().join(manifest)).unwrap();
-        let dependencies = text.split("\n[dependencies]\n").nth(1).unwrap().split("\n[").next().unwrap();
-        for line in dependencies.lines().filter(|l| !l.starts_with('#')) {
-            let name = line.split(['.', ' ', '=']).next().unwrap().replace('-', "_");
-            if !name.is_empty() && !name.starts_with("palpate") && !HOMES.iter().any(|(c, _)| *c == name) {
-                homeless.insert(name);
-            }
-        }
-    }
-    assert!(homeless.is_empty(), "give these a home in HOMES: {homeless:?}");
-
     let mut used = BTreeSet::new();
-    for path in sources_below(&root().join("src")) {
-        let text = shipped(&path);
-        let place = path.strip_prefix(root()).unwrap();
-        if TEST_FILES.iter().any(|file| place.ends_with(file)) {
-            continue;
-        }
-        for (name, homes) in HOMES {
-            let mentioned = text.match_indices(&format!("{name}::")).any(|(at, _)| {
-                let before = text[..at].chars().next_back();
-                before.is_none_or(|c| !c.is_alphanumeric() && c != '_' && c != ':')
-            });
-            if mentioned {
+    for (package, sources) in workspace() {
+        for (file, code) in &sources.files {
+            let place = format!("{}/{file}", folder(package));
+            for (name, homes) in HOMES.iter().filter(|(name, _)| names_crate(code, name)) {
                 used.insert(*name);
-                let at_home = homes.iter().any(|home| place.starts_with(home));
-                assert!(at_home, "{name} is named in {}; its home is {}", place.display(), homes.join(", "));
+                let at_home = homes.iter().any(|home| Path::new(&place).starts_with(home));
+                assert!(at_home, "{name} is named in {place}; its home is {}", homes.join(", "));
             }
         }
     }
-    let unused: Vec<&str> = HOMES.iter().map(|(n, _)| *n).filter(|n| !used.contains(n)).collect();
-    assert!(unused.is_empty(), "nobody names {unused:?}");
+    let unused: Vec<&str> = HOMES.iter().map(|(name, _)| *name).filter(|name| !used.contains(name)).collect();
+    assert!(unused.is_empty(), "no code names {unused:?}");
+}
+
+#[test]
+fn every_dependency_is_used() {
+    for (package, sources) in workspace() {
+        for name in dependencies(package, "dependencies").union(&dependencies(package, "build-dependencies")) {
+            let has_home = name.starts_with("palpate_") || HOMES.iter().any(|(known, _)| known == name);
+            assert!(has_home, "{name} of package {package} has no home in HOMES");
+            let used = sources.files.values().any(|code| names_crate(code, name));
+            assert!(used, "package {package} depends on {name} but does not use it");
+        }
+    }
+}
+
+#[test]
+fn no_two_public_types_share_a_name() {
+    let mut homes: BTreeMap<String, String> = BTreeMap::new();
+    for (package, sources) in workspace() {
+        for (file, code) in &sources.files {
+            let place = format!("{}/{file}", folder(package));
+            let public = code.lines().filter_map(|line| line.trim_start().strip_prefix("pub "));
+            for line in public {
+                let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_');
+                if words.next().is_some_and(|word| ["struct", "enum", "trait", "type"].contains(&word)) {
+                    let name = words.next().unwrap().to_owned();
+                    if let Some(other) = homes.insert(name.clone(), place.clone()) {
+                        panic!("{name} is public in {other} and in {place}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(homes.len() > 300, "only {} public types were found", homes.len());
 }

@@ -1,6 +1,6 @@
 //! Everything that takes more than one module to test, in one binary because linking is slow.
 //!
-//! - `architecture`: the layers and the homes of third-party crates, read off the sources.
+//! - `architecture`: packages, layers, import cycles and the homes of third-party crates, read from the sources.
 //! - `architecture_app`: the layers of the window's files.
 //! - `physics`: whole grasps of every object; no allocation in a step.
 //! - `determinism`: the same seed gives the same bytes.
@@ -42,6 +42,7 @@ mod fuzz;
 mod golden;
 mod gripper;
 mod gripper_tools;
+mod imports;
 mod labelling;
 mod learning;
 mod one_path;

@@ -5,7 +5,7 @@
 //!   \___________\_______________\________________\______________________/ abort: the cause is kept
 //! ```
 //!
-//! It knows no gripper: it is given the time on the gripper's clock and says which line pressure is due. An untimed grasp
+//! It knows no gripper: it takes the time on the gripper's clock and returns the line pressure that is due. An untimed grasp
 //! ([`Control::Free`]) has no programme; its phases, where known, are those that [`GraspController::observe_phase`]
 //! hands in.
 
@@ -17,17 +17,17 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{Control, PhaseMark};
 
-/// Rest before a real hand closes (s): the zeros are taken there, and whoever closes by hand gets ready.
+/// Rest before a real hand closes (s): the zeros are taken there, and an operator gets ready.
 pub const LEAD_S: f64 = 1.5;
-/// What is recorded of a real hand after the programme (s).
+/// Recording of a real hand after the programme (s).
 const SETTLE_S: f64 = 0.4;
 /// A programme that is later than this continues from where it was: the pressure never leaps (s).
 const LATE_S: f64 = 0.25;
 
-/// What a grasp is to do and when.
+/// Course of a grasp.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraspPlan {
-    /// Who moves the fingers.
+    /// Actuation: by board, by hand or untimed.
     pub control: Control,
     /// Line pressure over actuation ticks.
     pub programme: Programme,
@@ -42,7 +42,7 @@ pub struct GraspPlan {
 }
 
 impl GraspPlan {
-    /// A simulated grasp: the programme begins at once, and the simulation says when the trial ends.
+    /// A simulated grasp: the programme begins at once, and the trial ends with the simulation.
     pub fn simulated(scene: &Scene) -> Self {
         Self { lead_s: 0.0, settle_s: f64::INFINITY, ..Self::recorded(scene, Control::Driven) }
     }
@@ -130,7 +130,7 @@ impl GraspController {
     }
 
     /// The line pressure that is due at `now_s`, where it differs from before. A few ticks that were slept through are
-    /// skipped; after more than [`LATE_S`] the programme is that much later.
+    /// skipped; after more than 0.25 s the programme is that much later.
     pub fn command(&mut self, now_s: f64) -> Option<PressureCommand> {
         if self.plan.control == Control::Free || self.abort.is_some() || now_s < self.programme_s {
             return None;
@@ -170,7 +170,7 @@ impl GraspController {
         new.then_some(phase)
     }
 
-    /// Takes in an event of the gripper: a board that refuses, vents by itself or vanishes aborts a driven grasp, which
+    /// Handles an event of the gripper: a board that refuses, vents on its own or disconnects aborts a driven grasp, which
     /// must not continue later with a leap of pressure. The cause, where the event interrupts the grasp.
     pub fn observe(&mut self, event: &GripperEvent) -> Option<String> {
         let cause = match event {
@@ -190,7 +190,7 @@ impl GraspController {
         Some(cause)
     }
 
-    /// Aborts a driven grasp; others continue, because nobody here moves their fingers. The first cause is kept.
+    /// Aborts a driven grasp; others continue, because this program does not move their fingers. The first cause is kept.
     pub fn abort(&mut self, cause: String) {
         if self.plan.control == Control::Driven {
             self.abort.get_or_insert(cause);

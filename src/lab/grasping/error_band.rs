@@ -1,14 +1,14 @@
 //! How far a simulated grasp may be from the exact solution of its own equations: a band about every channel, estimated
-//! from a companion that computes the same grasp more finely.
+//! from a refined run that computes the same grasp more finely.
 //!
-//! A companion of named steps is close to the truth, see [`Solver::refined`](palpate_sim::scene::Solver::refined), so that
-//! the difference from it is the error. Where errors shrink by a factor r from a simulation to its companion, as under a
+//! A refined run of named steps is close to the truth, see [`Solver::refined`](palpate_sim::scene::Solver::refined), so that
+//! the difference from it is the error. Where errors shrink by a factor r from a simulation to its refined run, as under a
 //! tolerance, the simulation's error is the difference times 1 / (1 - r): r = 1/2 for Euler at half the step, 1/4 for
 //! SDIRK2 at a tenth of the tolerance. The difference passes through zero where the error need not, so that a band takes
 //! the largest estimate within a tenth of a second on either side, and a factor for what the theory leaves out. How often
 //! it covers the truth is measured by a test.
 //!
-//! Where a free object may as well slip one way as the other, simulation and companion may end in different grasps; the
+//! Where a free object may as well slip one way as the other, simulation and refined run may end in different grasps; the
 //! band then is as wide as these are apart, and does not shrink with the step.
 //!
 //! The band knows only the error of integration. How far the equations are from a real gripper is another question.
@@ -32,7 +32,7 @@ pub struct ErrorBand {
 
 /// Time on either side within which the largest estimate counts (s): from one change of pressure to the next.
 const REACH: f64 = 0.1;
-/// What estimates are multiplied by for what the theory leaves out, beside a companion that shares the method, and beside
+/// Factor of estimates for what the theory leaves out, beside a refined run that shares the method, and beside
 /// one that is close to the truth. Over eight objects in two poses each, fixed and free, bands then cover 0.99 (draft,
 /// standard) and 0.97 to 0.98 (1e-4) of all samples and are three to ten times as wide as the error, root mean squares
 /// over all; with one instead of 1.5 draft and standard have 0.95.
@@ -51,10 +51,10 @@ impl ErrorBand {
         Self { factor, t_s: Vec::new(), estimates: vec![Vec::new(); channels] }
     }
 
-    /// Adds what the channels read at one time (s), in the simulation and in its companion. Returns the estimates.
-    pub fn push(&mut self, t: f64, values: &[Option<f64>], companion: &[Option<f64>]) -> Vec<f32> {
+    /// Adds what the channels read at one time (s), in the simulation and in its refined run. Returns the estimates.
+    pub fn push(&mut self, t: f64, values: &[Option<f64>], refined: &[Option<f64>]) -> Vec<f32> {
         self.t_s.push(t);
-        let pairs = values.iter().zip(companion).zip(&mut self.estimates);
+        let pairs = values.iter().zip(refined).zip(&mut self.estimates);
         pairs
             .map(|((value, finer), row)| {
                 let difference = value.unwrap_or_default() - finer.unwrap_or_default();
@@ -142,7 +142,7 @@ pub fn band_half_width(t_s: &[f64], estimates: &[f32], sample: usize) -> Option<
     around.map(|k| f64::from(estimates[k])).reduce(f64::max)
 }
 
-/// Runs the companion of a grasp that was made from this scene, and gives the band about it.
+/// Runs the refined run of a grasp that was made from this scene, and gives the band about it.
 pub fn error_band(trial: &Trial, scene: &Scene, object: Option<&ObjectModel>, sensors: &Sensors) -> ErrorBand {
     let mut run = prepare_refined(scene, object, trial.info.seed);
     let mut band = ErrorBand::new(scene, sensors.channels().len());

@@ -1,5 +1,5 @@
-//! Recognising an object grasp by grasp: what the model says while the fingers close, what is believed after each
-//! grasp, and whether that is enough. The same for a window, a command and the real gripper.
+//! Identification of an object by successive grasps: live verdict, belief after each grasp, and the decision to stop.
+//! Shared by window, commands and both grippers.
 
 use super::row::Row;
 use palpate_learn::{Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, StopReason, StopRule, Verdict};
@@ -8,19 +8,19 @@ use palpate_tactile::{Channel, LayoutError, SensorLayout};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Why a model cannot recognise what a gripper feels.
+/// Reason why a model does not fit a gripper.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IdentifyError {
     /// The model was made for imported channels, or for a layout that does not exist.
     #[error("{cause}")]
     Layout {
-        /// What is wrong.
+        /// Cause.
         cause: LayoutError,
     },
     /// The model reads other channels than the gripper has.
     #[error("{cause}")]
     Channels {
-        /// Which differ.
+        /// The differing channels.
         cause: ModelError,
     },
 }
@@ -30,17 +30,17 @@ pub struct Identification {
     model: Arc<Model>,
     labels: Arc<Labels>,
     rule: StopRule,
-    /// Which column of a row each channel of the model is.
+    /// Column of each channel of the model in a row.
     columns: Vec<usize>,
     /// The newest row in the model's channels.
     columned: Vec<f32>,
     live: Option<Box<dyn LiveRecogniser>>,
-    /// Readings of the grasp that is going on, for the answer to it by itself.
+    /// Readings of the running grasp, for a verdict on this grasp alone.
     readings: Sequence,
     belief: Belief,
-    /// The newest answer to the grasp that is going on.
+    /// The newest verdict on the running grasp.
     verdict: Option<Verdict>,
-    /// The hold has ended; what comes after is not listened to.
+    /// The hold has ended; later rows are ignored.
     closed: bool,
     decision: Option<StopReason>,
 }
@@ -51,27 +51,27 @@ impl std::fmt::Debug for Identification {
     }
 }
 
-/// What can be shown of an identification at any moment.
+/// View of an identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentificationView {
-    /// What can be answered.
+    /// Classes, sizes and shapes.
     pub labels: Arc<Labels>,
-    /// Whether sizes and shapes are among it (stage one).
+    /// Whether the model estimates size and shape (stage one).
     pub has_stage_one: bool,
-    /// When it stops.
+    /// Stop rule.
     pub rule: StopRule,
-    /// The newest answer to the grasp that is going on, or to the last one; none before the first readings.
+    /// The newest verdict on the running or last grasp; none before the first readings.
     pub verdict: Option<Verdict>,
     /// True while the fingers close and hold, and the answer still changes.
     pub listening: bool,
-    /// What was believed after each grasp that is over.
+    /// Belief after each finished grasp.
     pub beliefs: Vec<Pmf>,
-    /// Why it stopped, once it has.
+    /// Reason to stop, once there is one.
     pub decision: Option<StopReason>,
 }
 
 impl IdentificationView {
-    /// The name that was decided on: a class, or `unknown`; none while it goes on.
+    /// Decided name: a class or `unknown`; none before the decision.
     pub fn decided(&self) -> Option<&str> {
         let belief = self.beliefs.last()?;
         Some(match self.decision? {
@@ -113,7 +113,7 @@ impl Identification {
         self.closed = true;
     }
 
-    /// When to stop from now on. A decision stands; between two grasps it may turn out that no other is needed.
+    /// Sets the stop rule. A decision stands; between two grasps it may turn out that no other is needed.
     pub fn set_rule(&mut self, rule: StopRule) {
         self.rule = rule;
         if self.closed && self.decision.is_none() {
@@ -174,7 +174,7 @@ impl Identification {
         new
     }
 
-    /// The grasp is over: what it says is added to the belief. Nothing happens where it has ended already.
+    /// Ends the grasp and adds its verdict to the belief; no effect on a grasp that has ended.
     pub fn end_grasp(&mut self) {
         if std::mem::replace(&mut self.closed, true) || self.readings.is_empty() {
             return;
@@ -191,22 +191,22 @@ impl Identification {
         self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
     }
 
-    /// Why it stopped, once it has.
+    /// Reason to stop, once there is one.
     pub fn decision(&self) -> Option<StopReason> {
         self.decision
     }
 
-    /// What is believed after the grasps so far.
+    /// Belief after the grasps so far.
     pub fn belief(&self) -> &Belief {
         &self.belief
     }
 
-    /// The newest answer to the grasp that is going on, or to the last one.
+    /// The newest verdict on the running or last grasp.
     pub fn verdict(&self) -> Option<&Verdict> {
         self.verdict.as_ref()
     }
 
-    /// Everything that can be shown.
+    /// The view.
     pub fn view(&self) -> IdentificationView {
         IdentificationView {
             labels: Arc::clone(&self.labels),

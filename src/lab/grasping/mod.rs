@@ -1,5 +1,5 @@
-//! One grasp on any rig: run the programme, keep the frames, say what happened; many grasps into a data set; grasp after
-//! grasp until it is clear what is in the hand.
+//! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, and
+//! identification of an object by successive grasps.
 
 mod collect;
 mod controller;

@@ -1,4 +1,4 @@
-//! What a grasp came to, in a few numbers: the object that `palpate grasp --json` prints.
+//! Summary of a grasp in a few numbers: the object that `palpate grasp --json` prints.
 
 use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, Side};
@@ -20,13 +20,13 @@ pub struct GraspSummary {
     pub finite: bool,
     /// False when any step missed the solver's tolerance.
     pub converged: bool,
-    /// What was guessed, mended or cut short.
+    /// Warnings: defaults used, repairs, early ends.
     pub warnings: Vec<String>,
     /// First sample at which either pad carried load (s); null when never.
     pub contact_onset_s: Option<f64>,
     /// The end of the hold; null when the trial has none.
     pub hold: Option<HoldSummary>,
-    /// How far the object's frame moved from start to hold (m); null for an empty hand.
+    /// Displacement of the object's frame from start to hold (m); null for an empty hand.
     pub object_moved_m: Option<f64>,
     /// Solver statistics.
     pub quality: Quality,

@@ -85,7 +85,7 @@ impl Drop for SerialGripper {
         if self.bar > 0.0
             && let Err(error) = self.vent()
         {
-            // The board vents by itself within a second.
+            // The board vents within a second.
             tracing::debug!("{error}");
         }
     }

@@ -1,4 +1,4 @@
-//! What is listened to: a port, a file of captured bytes, or what a test makes up.
+//! Stream of a board: a port, a file of captured bytes, or a test stream.
 
 use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
@@ -6,12 +6,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A board that is listened to.
+/// Stream of a board.
 pub trait BoardStream {
-    /// What has come since the last call; if nothing has, waits for it up to a time.
+    /// Events since the last call; waits up to a time for the first one.
     fn take(&mut self, patience: Duration) -> Vec<LinkEvent>;
 
-    /// Everything that can be shown of it.
+    /// Status of the link.
     fn status(&self) -> LinkStatus;
 
     /// The clock of its readings, now (s).
@@ -53,15 +53,15 @@ impl BoardStream for SerialLink {
     }
 }
 
-/// Why nothing can be listened to.
+/// Reason why a stream could not be opened.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text}")]
 pub struct NotOpened {
     /// Cause and fix, in a sentence.
     pub text: String,
-    /// A command that mends it, where there is one.
+    /// A command that fixes it, where there is one.
     pub command: Option<String>,
-    /// Another program has it, which may let it go.
+    /// Another program has it open and may close it.
     pub may_pass: bool,
 }
 
@@ -71,10 +71,10 @@ impl From<String> for NotOpened {
     }
 }
 
-/// Opens what is to be listened to: a port, a file of captured bytes, or the only likely port; or says why it cannot.
+/// Opens a stream: a port, a file of captured bytes, or the only likely port.
 pub type Listen = Arc<dyn Fn(Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> + Send + Sync>;
 
-/// Listens to a serial port.
+/// Opens a serial port.
 pub fn listen_to_port(port: Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> {
     let options = LinkOptions { path: port.map(Path::to_owned), ..LinkOptions::default() };
     let link = SerialLink::open(&options).map_err(|error| NotOpened {

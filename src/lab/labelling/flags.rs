@@ -1,9 +1,9 @@
-//! What is wrong with a trial of the real gripper, found from what was heard during it, when it ends. A flag is no verdict:
-//! the trial is kept and learned from unless somebody discards it.
+//! Flags of a trial of the real gripper, found from its readings when it ends. A flag is a hint: the trial is kept and
+//! used for training unless the user discards it.
 //!
 //! | flag | raised when |
 //! |---|---|
-//! | no contact | no pad felt anything while the hand closed and held |
+//! | no contact | no pad was loaded while the hand closed and held |
 //! | saturated | a channel was at an end of its range for more than 2 % of that time |
 //! | interrupted | the connection broke, readings are missing for longer than 0.1 s, or a sensor is in less than half of them |
 //! | cadence | readings were lost, the rate is off by more than 2 %, the jitter is above half a period |
@@ -29,24 +29,24 @@ const SATURATED_SHARE: f64 = 0.02;
 const LEAST_GAP_S: f64 = 0.1;
 /// How far the rate may be off, as a share of it.
 const RATE_SHARE: f64 = 0.02;
-/// Length of the window at rest where nobody says when the closing began (s).
+/// Length of the window at rest where the start of the closing is unknown (s).
 const REST_S: f64 = 0.3;
 
 /// A step of the control box (bar).
 const PRESSURE_STEP_BAR: f64 = 0.05;
 
-/// What a trial holds when it ends.
+/// Content of a trial at its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed<'a> {
     /// The board.
     pub board: &'a Board,
     /// Its readings; of a long trial a part of them, evenly spread.
     pub readings: &'a [Reading],
-    /// Where readings are missing.
+    /// Gaps: missing readings.
     pub gaps: &'a [Gap],
-    /// Why the connection broke, each time.
+    /// Cause of each broken connection.
     pub interruptions: &'a [String],
-    /// How well the board kept time.
+    /// Timing statistics of the board.
     pub cadence: &'a Cadence,
     /// The phases of the grasp, where they are known.
     pub phases: &'a [PhaseMark],
@@ -54,7 +54,7 @@ pub struct Observed<'a> {
     pub calibrations: &'a [(Sensor, Calibration)],
 }
 
-/// What is wrong with a trial, whatever it is of; see [`flaws`].
+/// Faults of a trial, as flags.
 pub fn flags_of(trial: &Observed<'_>) -> Vec<FlagRemark> {
     let raised = [
         (Flag::NoContact, trial.no_contact()),
@@ -87,19 +87,19 @@ impl Observed<'_> {
         (&self.readings[..from], &self.readings[from..to])
     }
 
-    /// None where a pad felt something, or where there is no pad to feel.
+    /// `None` where a pad was loaded, or without pads.
     fn no_contact(&self) -> Option<String> {
         let (rest, pressed) = self.split();
         if pressed.is_empty() {
             return (!self.readings.is_empty()).then(|| "it ended before the hand began to close".to_owned());
         }
         let pads = [Sensor::PadLeft, Sensor::PadRight];
-        let felt: Vec<PadRise> = pads.into_iter().filter_map(|pad| self.rise(pad, rest, pressed)).collect();
-        if felt.is_empty() || felt.iter().any(|pad| pad.rise > pad.least) {
+        let rises: Vec<PadRise> = pads.into_iter().filter_map(|pad| self.rise(pad, rest, pressed)).collect();
+        if rises.is_empty() || rises.iter().any(|pad| pad.rise > pad.least) {
             return None;
         }
-        let each: Vec<String> = felt.iter().map(PadRise::told).collect();
-        Some(format!("no pad felt anything: {}", each.join(", ")))
+        let each: Vec<String> = rises.iter().map(PadRise::summary).collect();
+        Some(format!("no load on any pad: {}", each.join(", ")))
     }
 
     /// How far a pad rose: in newtons where it is calibrated, else in counts.
@@ -203,7 +203,7 @@ struct PadRise {
 }
 
 impl PadRise {
-    fn told(&self) -> String {
+    fn summary(&self) -> String {
         let digits = if self.unit == "N" { 2 } else { 0 };
         let Self { pad, rise, least, unit } = self;
         format!("{rise:.digits$} {unit} on the {}, a touch is {least:.digits$} {unit}", pad.label())

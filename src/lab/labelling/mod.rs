@@ -6,7 +6,7 @@
 //! | `class_name` | what a label may be |
 //! | `plan` | how many trials of each object are wanted, which is next, and how it is to be held |
 //! | `labelled_trial` | a trial as lists of labels show it |
-//! | `flags` | what is wrong with a trial, from what was heard during it |
+//! | `flags` | faults of a trial, from its readings |
 //! | `decimated` | a trial of any length in bounded memory, and its small picture |
 //! | `segmentation` | beginning, phases and end of grasps in a stream |
 //! | `disagreement` | trials to look at again |

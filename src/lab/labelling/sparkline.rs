@@ -7,7 +7,7 @@ use palpate_tactile::board::{Board, Reading, Sensor};
 /// Readings that flags and pictures are made from, at most.
 const MOST: usize = 8192;
 
-/// Every reading of a short trial; of a longer one every second, fourth, .. so that at most [`MOST`] are left.
+/// Every reading of a short trial; of a longer one every second, fourth, .. so that at most `MOST` are left.
 pub fn decimated(readings: &[Reading]) -> Vec<Reading> {
     let mut step = 1;
     while readings.len().div_ceil(step) > MOST {

@@ -17,12 +17,12 @@ pub(super) const BEFORE_S: f64 = 0.3;
 /// A board that is silent at the end is not waited for longer than this (s).
 const LATE_S: f64 = 1.0;
 
-/// A trial that is wanted.
+/// Request of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialRequest {
     /// Class of the object, where it is known beforehand.
     pub object: Option<String>,
-    /// Who moves the fingers.
+    /// Actuation.
     pub control: Control,
     /// Length (s), where it differs from that of the programme.
     pub length_s: Option<f64>,
@@ -38,13 +38,13 @@ pub struct BoardTrialRecording {
     samples: u64,
     newest_s: f64,
     notes: Vec<String>,
-    /// The fingers began it, and end it.
+    /// Begun and ended automatically.
     automatic: bool,
     over: bool,
 }
 
 impl BoardTrialRecording {
-    /// Begins to record. Events from `from_s` on that were heard before belong to it; without it those of the last
+    /// Begins to record. Earlier events from `from_s` on belong to it; without it those of the last
     /// moments do.
     pub fn begin(
         recorder: &Recorder,
@@ -133,7 +133,7 @@ impl BoardTrialRecording {
         self.over || self.controller.is_over(now_s)
     }
 
-    /// Vents driven fingers and ends the recording; the recorder reports what came of it.
+    /// Vents driven fingers and ends the recording; the recorder reports the result.
     pub fn finish(
         mut self,
         recorder: &Recorder,
@@ -142,7 +142,7 @@ impl BoardTrialRecording {
         guess: Option<(String, Vec<(String, f64)>)>,
     ) {
         if self.is_driven() && gripper.vent().is_err() {
-            self.note("the last vent could not be sent; the board vents by itself within a second".to_owned());
+            self.note("the last vent could not be sent; the board vents within a second".to_owned());
         }
         if let Some(cause) = self.controller.abort_cause() {
             self.note(format!("ended early and vented: {cause}"));
@@ -175,7 +175,7 @@ impl BoardTrialRecording {
         self.samples
     }
 
-    /// Whether the fingers began it, and end it.
+    /// Whether it begins and ends automatically.
     pub fn is_automatic(&self) -> bool {
         self.automatic
     }

@@ -1,4 +1,4 @@
-//! The writing side of a trial of the real gripper: what waits to be written, and what its header needs at the end.
+//! Writer of a trial of the real gripper: pending data, and statistics for its header.
 
 use crate::labelling::{Observed, decimated, flags_of, sparkline};
 use palpate_device::protocol::DecodedEvent;
@@ -18,7 +18,7 @@ const SILENCE_S: f64 = 1.0;
 /// Length that is reserved for a trial of unknown length (s).
 const UNKNOWN_LENGTH_S: f64 = 600.0;
 
-/// What is known of a trial of the real gripper before it begins.
+/// Plan of a trial of the real gripper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardTrialPlan {
     /// Class of the object; empty where it is labelled later.
@@ -71,7 +71,7 @@ pub(super) struct BoardWriter {
     gaps: u64,
     interruptions: Vec<String>,
     newest_s: Option<f64>,
-    /// The newest reading's time (s), and why none followed, where that is known.
+    /// The newest reading's time (s), and the reason why none followed, where known.
     last: Option<(f64, Option<String>)>,
     /// Counts of the link when the trial began.
     before: (Cadence, u32),

@@ -33,10 +33,10 @@ pub fn accuracy_cost(
     }
     let cpu = start.elapsed().as_secs_f64();
     let trial = run.finish(scene);
-    let mut companion = prepare_refined(scene, object, 0);
+    let mut refined = prepare_refined(scene, object, 0);
     let mut band = ErrorBand::new(scene, sensors.channels().len());
     for frame in &trial.frames {
-        let finer = companion.next_frame().filter(|_| !cancelled())?;
+        let finer = refined.next_frame().filter(|_| !cancelled())?;
         band.push(frame.t, &sensors.read(frame), &sensors.read(finer));
     }
     let times_real_time = trial.frames.last()?.t / cpu.max(1e-9);

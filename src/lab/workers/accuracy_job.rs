@@ -1,4 +1,4 @@
-//! The gauge: a thread that measures what a scene's accuracy costs and leaves. It runs whole grasps of its own, so that the
+//! Accuracy job: a thread that measures cost and error of a scene's accuracy. It runs whole grasps of its own, so that the
 //! numbers stand there long before the watched grasp is over; another scene makes it start over.
 
 use super::latest::Latest;
@@ -57,7 +57,7 @@ impl Drop for AccuracyJob {
         self.newest.fetch_add(1, Ordering::Relaxed);
         self.jobs = None;
         if let Some(thread) = self.thread.take() {
-            // A panic there has cost nobody but the numbers.
+            // A panic there loses only the measurement.
             let _ended = thread.join();
         }
     }

@@ -1,5 +1,4 @@
-//! A thread behind a panel: it sleeps until something is wished for, does one thing after the other, and publishes how it
-//! stands. What is under way can be given up.
+//! Thread behind a panel: handles commands one after the other and publishes its state. Running work can be cancelled.
 
 use super::latest::Latest;
 use super::messages::Wake;
@@ -8,13 +7,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
-/// A handle on the thread: commands `W` in, the newest state of affairs `V` out. Dropping it gives up what is under way and
-/// ends the thread.
+/// Handle of the thread: commands `W` in, the newest view `V` out. Dropping it cancels running work and ends the thread.
 #[derive(Debug)]
 pub struct BackgroundJob<W, V> {
     /// Absent once the thread is being ended.
     commands: Option<Sender<(W, Arc<AtomicBool>)>>,
-    /// Set to give up everything that was wished for with it.
+    /// Set to cancel all commands sent with it.
     stop: Arc<AtomicBool>,
     view: Arc<Latest<V>>,
     /// Commands so far, and how many of them have been dealt with.
@@ -23,7 +21,7 @@ pub struct BackgroundJob<W, V> {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Where the thread says how it stands.
+/// Output of the thread.
 pub(super) struct Outlet<V> {
     view: Arc<Latest<V>>,
     wake: Wake,
@@ -96,27 +94,27 @@ impl<W, V> Drop for BackgroundJob<W, V> {
     }
 }
 
-/// Waiting for a desk in tests.
+/// Waiting for a job in tests.
 #[cfg(test)]
 pub(super) mod watch {
     use super::*;
     use std::sync::mpsc::Receiver;
     use std::time::Duration;
 
-    /// A `wake` and where it is heard.
+    /// A `wake` and the receiver of its calls.
     pub(crate) fn waker() -> (Wake, Receiver<()>) {
-        let (told, woken) = channel();
+        let (calls, woken) = channel();
         let wake: Wake = Arc::new(move || {
             // The test may have stopped listening.
-            let _heard = told.send(());
+            let _sent = calls.send(());
         });
         (wake, woken)
     }
 
-    /// Waits until the desk stands as wanted.
-    pub(crate) fn until<W, V>(desk: &BackgroundJob<W, V>, woken: &Receiver<()>, wanted: impl Fn(&V) -> bool) -> Arc<V> {
+    /// Waits for a view that meets a condition.
+    pub(crate) fn until<W, V>(job: &BackgroundJob<W, V>, woken: &Receiver<()>, wanted: impl Fn(&V) -> bool) -> Arc<V> {
         loop {
-            if let Some(view) = desk.view().filter(|view| wanted(view)) {
+            if let Some(view) = job.view().filter(|view| wanted(view)) {
                 return view;
             }
             woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
@@ -132,37 +130,37 @@ mod tests {
     /// Counts up to a number, or until it is given up; then says how far it came.
     fn counter() -> (BackgroundJob<u64, u64>, std::sync::mpsc::Receiver<()>) {
         let (wake, woken) = waker();
-        let desk = BackgroundJob::spawn("count", wake, |most: u64, stop, outlet| {
+        let job = BackgroundJob::spawn("count", wake, |most: u64, stop, outlet| {
             let reached = (0..most).take_while(|_| !stop.load(Ordering::Relaxed)).count();
             outlet.publish(reached as u64);
         });
-        (desk.expect("starts"), woken)
+        (job.expect("starts"), woken)
     }
 
     #[test]
-    fn wishes_are_granted_in_order_and_given_up_together() {
-        let (mut desk, woken) = counter();
-        assert_eq!(desk.view(), None);
-        assert!(desk.is_settled());
-        desk.ask(u64::MAX);
-        assert!(!desk.is_settled());
-        desk.give_up();
-        while !desk.is_settled() {
+    fn commands_run_in_order_and_are_cancelled_together() {
+        let (mut job, woken) = counter();
+        assert_eq!(job.view(), None);
+        assert!(job.is_settled());
+        job.ask(u64::MAX);
+        assert!(!job.is_settled());
+        job.give_up();
+        while !job.is_settled() {
             woken.recv_timeout(std::time::Duration::from_secs(60)).expect("the thread is alive");
         }
-        desk.ask(7);
-        until(&desk, &woken, |n| *n == 7);
-        desk.ask(u64::MAX);
-        desk.ask(u64::MAX);
-        desk.give_up();
-        desk.ask(5);
-        until(&desk, &woken, |n| *n == 5);
+        job.ask(7);
+        until(&job, &woken, |n| *n == 7);
+        job.ask(u64::MAX);
+        job.ask(u64::MAX);
+        job.give_up();
+        job.ask(5);
+        until(&job, &woken, |n| *n == 5);
     }
 
     #[test]
     fn a_handle_that_goes_takes_its_work_with_it() {
-        let (desk, _woken) = counter();
-        desk.ask(u64::MAX);
-        drop(desk);
+        let (job, _woken) = counter();
+        job.ask(u64::MAX);
+        drop(job);
     }
 }

@@ -19,8 +19,8 @@ pub(super) struct Current {
     pub(super) stage: Arc<Stage>,
     pub(super) reader: FrameReader,
     pub(super) frame: Arc<Frame>,
-    /// Warnings at its beginning; those that come later are told at its end.
-    pub(super) told: usize,
+    /// Warnings at its beginning; those that come later are warned at its end.
+    pub(super) warned: usize,
     /// The user has pulled at the object.
     pub(super) pulled: bool,
     pub(super) ended: bool,

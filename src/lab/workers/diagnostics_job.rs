@@ -74,12 +74,12 @@ fn examined(
     outlet: &Outlet<DiagnosticsView>,
     last: Option<&Arc<DiagnosticsReport>>,
 ) -> DiagnosticsReport {
-    let tell = |listened_s: f64| {
+    let report = |listened_s: f64| {
         outlet.publish(DiagnosticsView { running: Some((request.clone(), listened_s)), last: last.cloned() });
     };
-    tell(0.0);
+    report(0.0);
     let seen = look(request, &mut |listened_s| {
-        tell(listened_s);
+        report(listened_s);
         !stop.load(Ordering::Relaxed)
     });
     let port = seen.link.as_ref().map(|link| format!("{} ({})", link.port.path.display(), link.port.title));
@@ -118,15 +118,15 @@ mod tests {
         doctor.ask(request(bytes, 5.0));
         until(&doctor, &woken, |view| view.running.is_some() && view.last.is_none());
         let view = until(&doctor, &woken, |view| view.running.is_none());
-        let told = view.last.as_ref().ok_or("it has looked")?;
-        assert!(told.port.as_ref().is_some_and(|port| port.contains("board.bytes")), "{told:?}");
-        let verdict = |check: &str| told.findings.iter().find(|f| f.check == check).map(|f| f.verdict);
+        let examined = view.last.as_ref().ok_or("it has looked")?;
+        assert!(examined.port.as_ref().is_some_and(|port| port.contains("board.bytes")), "{examined:?}");
+        let verdict = |check: &str| examined.findings.iter().find(|f| f.check == check).map(|f| f.verdict);
         assert_eq!((verdict("lines"), verdict("firmware")), (Some(CheckStatus::Passed), Some(CheckStatus::Note)));
-        assert!(!told.cut_short && told.listened_s < 5.0, "a file ends when it ends");
+        assert!(!examined.cut_short && examined.listened_s < 5.0, "a file ends when it ends");
         doctor.ask(request(folder.path().join("gone"), 5.0));
-        let view = until(&doctor, &woken, |view| view.running.is_none() && view.last != Some(Arc::clone(told)));
-        let told = view.last.as_ref().ok_or("it has looked")?;
-        assert!(told.port.is_none() && !is_sound(&told.findings));
+        let view = until(&doctor, &woken, |view| view.running.is_none() && view.last != Some(Arc::clone(examined)));
+        let examined = view.last.as_ref().ok_or("it has looked")?;
+        assert!(examined.port.is_none() && !is_sound(&examined.findings));
         Ok(())
     }
 
@@ -147,8 +147,8 @@ mod tests {
         until(&doctor, &woken, |view| view.running.as_ref().is_some_and(|(_, listened_s)| *listened_s > 0.1));
         doctor.give_up();
         let view = until(&doctor, &woken, |view| view.running.is_none());
-        let told = view.last.as_ref().ok_or("it has looked")?;
-        assert!(told.cut_short && told.listened_s > 0.1, "{told:?}");
+        let examined = view.last.as_ref().ok_or("it has looked")?;
+        assert!(examined.cut_short && examined.listened_s > 0.1, "{examined:?}");
         Ok(())
     }
 }

@@ -91,9 +91,9 @@ fn fitted(
     outlet: &Outlet<FitterView>,
     view: &FitterView,
 ) -> Result<FittedFinger, String> {
-    let tell = |steps: f64| outlet.publish(FitterView { running: Some(steps), ..view.clone() });
-    tell(0.0);
-    fit(store, trials, &FitWatch { progress: &tell, stop })
+    let report = |steps: f64| outlet.publish(FitterView { running: Some(steps), ..view.clone() });
+    report(0.0);
+    fit(store, trials, &FitWatch { progress: &report, stop })
 }
 
 fn listed(store: &Path) -> Result<Arc<[TrialRow]>, String> {
@@ -138,30 +138,30 @@ mod tests {
             }
         }
         let (wake, woken) = waker();
-        let mut desk = Fitter::start(path, Arc::new(fit_trials), wake)?;
-        desk.ask(FitCommand::List);
-        let view = until(&desk, &woken, |view| view.trials.is_some());
+        let mut job = Fitter::start(path, Arc::new(fit_trials), wake)?;
+        job.ask(FitCommand::List);
+        let view = until(&job, &woken, |view| view.trials.is_some());
         let rows = view.trials.clone().ok_or("looked for")??;
         let listed: Vec<&str> = rows.iter().map(|row| row.object.as_str()).collect();
         assert_eq!(listed, ["empty", "lemon"], "whole trials of the board, newest first");
 
         // Any trial can be fitted; this one's finger is known.
-        desk.ask(FitCommand::Fit(vec![simulated]));
-        until(&desk, &woken, |view| view.running.is_some_and(|steps| steps > 1.0));
-        let view = until(&desk, &woken, |view| view.running.is_none() && view.ended.is_some());
+        job.ask(FitCommand::Fit(vec![simulated]));
+        until(&job, &woken, |view| view.running.is_some_and(|steps| steps > 1.0));
+        let view = until(&job, &woken, |view| view.running.is_none() && view.ended.is_some());
         let fitted = view.ended.clone().ok_or("it has ended")??;
         let truth = close().gripper.finger.bending_stiffness;
         let found = fitted.scene.gripper.finger.bending_stiffness;
         assert!((found / truth - 1.0).abs() < 0.03 && found != truth, "{found} instead of {truth}");
         assert_eq!(fitted.scene.object, close().object);
 
-        desk.ask(FitCommand::Fit(vec![simulated]));
-        until(&desk, &woken, |view| view.running.is_some_and(|steps| steps > 0.0));
-        desk.give_up();
-        let view = until(&desk, &woken, |view| view.running.is_none());
+        job.ask(FitCommand::Fit(vec![simulated]));
+        until(&job, &woken, |view| view.running.is_some_and(|steps| steps > 0.0));
+        job.give_up();
+        let view = until(&job, &woken, |view| view.running.is_none());
         assert!(matches!(&view.ended, Some(Ok(kept)) if Arc::ptr_eq(kept, &fitted)), "what was there stays");
-        desk.ask(FitCommand::Fit(vec![77]));
-        let view = until(&desk, &woken, |view| matches!(view.ended, Some(Err(_))));
+        job.ask(FitCommand::Fit(vec![77]));
+        let view = until(&job, &woken, |view| matches!(view.ended, Some(Err(_))));
         assert!(matches!(&view.ended, Some(Err(cause)) if cause.contains("77")), "{:?}", view.ended);
         Ok(())
     }

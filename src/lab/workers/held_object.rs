@@ -1,4 +1,4 @@
-//! The object in the hand, as the simulation's thread keeps it and as it is told.
+//! The held object: loaded model, and its description for display.
 
 use super::messages::ObjectCard;
 use palpate_sim::objects::{LoadOptions, ObjectModel, catalogue};
@@ -6,7 +6,7 @@ use palpate_sim::scene::Scene;
 use std::sync::Arc;
 use std::time::SystemTime;
 
-/// Which object is loaded, and from what: loading again is skipped when nothing about it changed.
+/// Identity and source of the loaded object: loading again is skipped when nothing about it changed.
 pub(super) struct LoadedObject {
     pub(super) source: String,
     pub(super) options: LoadOptions,
@@ -21,7 +21,7 @@ pub(super) fn stamp_of(source: &str) -> Option<(SystemTime, u64)> {
     Some((metadata.modified().ok()?, metadata.len()))
 }
 
-/// What can be told of an object in a scene.
+/// Description of an object in a scene.
 pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
     let built_in = catalogue().iter().find(|b| b.name == model.name);
     ObjectCard {

@@ -1,5 +1,5 @@
-//! Labels, plan and journal for a window: a thread "label" that holds the store, does what is asked, and publishes what
-//! there is. The window never waits for the disk.
+//! Label service: a thread "label" that owns the store, handles commands and publishes labels, plan and journal. The
+//! window never waits for the disk.
 
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
@@ -10,50 +10,50 @@ use palpate_tactile::trial::TrialId;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
-/// What can be asked for.
+/// Command to the label service.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LabelCommand {
-    /// Look at the store anew.
+    /// Read the store again.
     Refresh,
-    /// Say what a trial is of.
+    /// Label a trial.
     Label(TrialId, String),
-    /// Throw a trial away; it can be taken back.
+    /// Discard a trial; can be undone.
     Discard(TrialId),
-    /// Say something about a trial.
+    /// Set the note of a trial.
     Note(TrialId, String),
-    /// Give a trial these tags.
+    /// Set the tags of a trial.
     Tags(TrialId, Vec<String>),
-    /// Whether its label is a guess.
+    /// Mark the label as unsure.
     Unsure(TrialId, bool),
-    /// Its label has been looked at again and stays.
+    /// Mark the label as reviewed.
     Reviewed(TrialId),
-    /// Take the last change back.
+    /// Undo the last change.
     Undo,
-    /// Make the change again that was taken back last.
+    /// Redo the change undone last.
     Redo,
-    /// So many trials of an object are wanted.
+    /// Set the number of trials planned for an object.
     Want(String, u32),
-    /// An object leaves the plan; its trials stay.
+    /// Remove an object from the plan; its trials stay.
     Unplan(String),
     /// Write all labelled trials into a folder that does not exist or is empty.
     Export(PathBuf),
 }
 
-/// What there is.
+/// Contents of the store, for display.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelView {
     /// All trials of the real gripper, newest first; discarded ones too.
     pub trials: Vec<LabelledTrial>,
-    /// How far the plan is.
+    /// Progress of the plan.
     pub progress: Progress,
-    /// What to take next; none when all is done.
+    /// Next object to record; none when the plan is complete.
     pub next: Option<NextTrial>,
-    /// Trials whose label is not what the model saw, surest first.
+    /// Trials whose label differs from the prediction, most certain first.
     pub disagreements: Vec<Disagreement>,
-    /// What was changed last, newest first.
+    /// Last changes, newest first.
     pub journal: Vec<JournalEntry>,
-    /// What came of commands, oldest first, numbered: a sentence, or why it was not done.
-    pub told: Vec<(u64, Result<String, String>)>,
+    /// Outcomes of commands, oldest first, numbered: a sentence or an error.
+    pub outcomes: Vec<(u64, Result<String, String>)>,
 }
 
 impl LabelView {
@@ -68,9 +68,9 @@ impl LabelView {
     }
 }
 
-/// Entries of the journal that are shown.
+/// Number of journal entries shown.
 const ENTRIES: usize = 60;
-/// Outcomes that are kept for a window that looks seldom.
+/// Outcomes kept for a slow window.
 const OUTCOMES: usize = 16;
 
 /// The handle.
@@ -78,27 +78,27 @@ pub type Labeller = BackgroundJob<LabelCommand, LabelView>;
 
 /// Starts the thread on a store, which is opened when it is first needed.
 pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
-    let mut clerk = Clerk { path, store: None, told: VecDeque::new(), number: 0 };
+    let mut service = LabelService { path, store: None, outcomes: VecDeque::new(), number: 0 };
     BackgroundJob::spawn("label", wake, move |command: LabelCommand, _stop, outlet: &Outlet<LabelView>| {
-        let outcome = clerk.grant(&command);
-        clerk.tell(outcome);
-        let view = clerk.view().unwrap_or_else(|cause| {
-            clerk.tell(Some(Err(cause)));
-            LabelView { told: clerk.told.iter().cloned().collect(), ..LabelView::default() }
+        let outcome = service.handle(&command);
+        service.report(outcome);
+        let view = service.view().unwrap_or_else(|cause| {
+            service.report(Some(Err(cause)));
+            LabelView { outcomes: service.outcomes.iter().cloned().collect(), ..LabelView::default() }
         });
         outlet.publish(view);
     })
 }
 
-/// Whoever keeps the labels.
-struct Clerk {
+/// State of the thread.
+struct LabelService {
     path: PathBuf,
     store: Option<Store>,
-    told: VecDeque<(u64, Result<String, String>)>,
+    outcomes: VecDeque<(u64, Result<String, String>)>,
     number: u64,
 }
 
-impl Clerk {
+impl LabelService {
     fn store(&mut self) -> Result<&mut Store, String> {
         match &mut self.store {
             Some(store) => Ok(store),
@@ -106,24 +106,24 @@ impl Clerk {
         }
     }
 
-    fn tell(&mut self, outcome: Option<Result<String, String>>) {
+    fn report(&mut self, outcome: Option<Result<String, String>>) {
         let Some(outcome) = outcome else { return };
         self.number += 1;
-        self.told.push_back((self.number, outcome));
-        if self.told.len() > OUTCOMES {
-            self.told.pop_front();
+        self.outcomes.push_back((self.number, outcome));
+        if self.outcomes.len() > OUTCOMES {
+            self.outcomes.pop_front();
         }
     }
 
-    /// Does what is asked; what is worth saying of it.
-    fn grant(&mut self, command: &LabelCommand) -> Option<Result<String, String>> {
+    /// Handles a command; returns its outcome where it is worth a notice.
+    fn handle(&mut self, command: &LabelCommand) -> Option<Result<String, String>> {
         let store = match self.store() {
             Ok(store) => store,
             Err(cause) => return Some(Err(cause)),
         };
-        let undone = |entry: JournalEntry| format!("taken back: {}", entry.sentence());
-        let redone = |entry: JournalEntry| format!("made again: {}", entry.restored());
-        let told = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
+        let undone = |entry: JournalEntry| format!("undone: {}", entry.sentence());
+        let redone = |entry: JournalEntry| format!("redone: {}", entry.restored());
+        let outcome = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
         let done: Result<Option<String>, StoreError> = match command {
             LabelCommand::Refresh => Ok(None),
             LabelCommand::Label(id, object) => store.labels().set_label(*id, object).map(|()| None),
@@ -135,8 +135,8 @@ impl Clerk {
             LabelCommand::Tags(id, tags) => store.labels().set_tags(*id, tags).map(|()| None),
             LabelCommand::Unsure(id, unsure) => store.labels().set_unsure(*id, *unsure).map(|()| None),
             LabelCommand::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
-            LabelCommand::Undo => store.journal().undo().map(|entry| told(entry.map(undone), "nothing to take back")),
-            LabelCommand::Redo => store.journal().redo().map(|entry| told(entry.map(redone), "nothing to make again")),
+            LabelCommand::Undo => store.journal().undo().map(|entry| outcome(entry.map(undone), "nothing to undo")),
+            LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "nothing to redo")),
             LabelCommand::Want(name, wanted) => {
                 return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err);
             }
@@ -147,7 +147,7 @@ impl Clerk {
     }
 
     fn view(&mut self) -> Result<LabelView, String> {
-        let told = self.told.iter().cloned().collect();
+        let outcomes = self.outcomes.iter().cloned().collect();
         let store = self.store()?;
         let read = |store: &Store| -> Result<LabelView, StoreError> {
             let mut trials = store.labels().trials()?;
@@ -156,7 +156,7 @@ impl Clerk {
             let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
             let next = progress.next(last);
             let journal = store.journal().entries(ENTRIES)?;
-            Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, told })
+            Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, outcomes })
         };
         read(store).map_err(|error| error.to_string())
     }
@@ -196,43 +196,46 @@ mod tests {
     }
 
     #[test]
-    fn labels_are_given_taken_back_and_counted() {
+    fn labels_are_set_undone_and_counted() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("s.sqlite");
         let mut store = Store::open(&path).expect("opens");
         let ids = [recorded(&mut store), recorded(&mut store)];
         let (wake, woken) = waker();
-        let desk = start_labeller(path, wake).expect("starts");
-        desk.ask(LabelCommand::Refresh);
-        let first = until(&desk, &woken, |view| view.trials.len() == 2);
+        let labeller = start_labeller(path, wake).expect("starts");
+        labeller.ask(LabelCommand::Refresh);
+        let first = until(&labeller, &woken, |view| view.trials.len() == 2);
         assert_eq!((first.unlabelled().map(|trial| trial.id), first.progress.done()), (Some(ids[1]), 0));
         let next = first.next.clone().expect("all is to be done").object;
-        desk.ask(LabelCommand::Label(ids[1], next.clone()));
-        let labelled = until(&desk, &woken, |view| view.progress.done() == 1);
+        labeller.ask(LabelCommand::Label(ids[1], next.clone()));
+        let labelled = until(&labeller, &woken, |view| view.progress.done() == 1);
         assert_eq!(labelled.unlabelled().map(|trial| trial.id), Some(ids[0]));
         assert_ne!(labelled.next.as_ref().map(|n| n.object.clone()), Some(next.clone()), "never twice in a row");
-        desk.ask(LabelCommand::Discard(ids[0]));
-        until(&desk, &woken, |view| view.unlabelled().is_none());
+        labeller.ask(LabelCommand::Discard(ids[0]));
+        until(&labeller, &woken, |view| view.unlabelled().is_none());
         for _ in 0..2 {
-            desk.ask(LabelCommand::Undo);
+            labeller.ask(LabelCommand::Undo);
         }
-        desk.ask(LabelCommand::Redo);
-        until(&desk, &woken, |view| {
-            view.told.iter().any(|(_, told)| {
-                told.as_ref().is_ok_and(|text| {
-                    text.starts_with("made again: ") && text.ends_with(&format!("label unlabelled -> {next}"))
+        labeller.ask(LabelCommand::Redo);
+        until(&labeller, &woken, |view| {
+            view.outcomes.iter().any(|(_, outcome)| {
+                outcome.as_ref().is_ok_and(|text| {
+                    text.starts_with("redone: ") && text.ends_with(&format!("label unlabelled -> {next}"))
                 })
             })
         });
-        desk.ask(LabelCommand::Undo);
-        let back = until(&desk, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
-        assert!(back.told.iter().any(|(_, told)| told.as_ref().is_ok_and(|text| text.starts_with("taken back: "))));
-        desk.ask(LabelCommand::Want("mug".to_owned(), 3));
-        until(&desk, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
-        desk.ask(LabelCommand::Want("mug".to_owned(), 0));
-        until(&desk, &woken, |view| view.told.iter().any(|(_, told)| told.is_err()));
-        desk.ask(LabelCommand::Label(99, "mug".to_owned()));
-        let refused = until(&desk, &woken, |view| view.told.iter().filter(|(_, told)| told.is_err()).count() == 2);
-        assert!(format!("{:?}", refused.told).contains("99"), "{:?}", refused.told);
+        labeller.ask(LabelCommand::Undo);
+        let back = until(&labeller, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
+        assert!(
+            back.outcomes.iter().any(|(_, outcome)| outcome.as_ref().is_ok_and(|text| text.starts_with("undone: ")))
+        );
+        labeller.ask(LabelCommand::Want("mug".to_owned(), 3));
+        until(&labeller, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
+        labeller.ask(LabelCommand::Want("mug".to_owned(), 0));
+        until(&labeller, &woken, |view| view.outcomes.iter().any(|(_, outcome)| outcome.is_err()));
+        labeller.ask(LabelCommand::Label(99, "mug".to_owned()));
+        let refused =
+            until(&labeller, &woken, |view| view.outcomes.iter().filter(|(_, outcome)| outcome.is_err()).count() == 2);
+        assert!(format!("{:?}", refused.outcomes).contains("99"), "{:?}", refused.outcomes);
     }
 }

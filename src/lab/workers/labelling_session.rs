@@ -275,7 +275,7 @@ impl LabellingSession {
             self.recording = recording;
         }
         let before = self.reported;
-        for (number, outcome) in now.labels.iter().flat_map(|labels| &labels.told).filter(|(n, _)| *n > before) {
+        for (number, outcome) in now.labels.iter().flat_map(|labels| &labels.outcomes).filter(|(n, _)| *n > before) {
             self.reported = *number;
             effects.push(match outcome {
                 Ok(text) => LabellingEffect::Inform(text.clone()),
@@ -630,8 +630,8 @@ mod tests {
     #[test]
     fn outcomes_are_reported_once() {
         let mut session = LabellingSession::default();
-        let told = vec![(1, Ok("done".to_owned())), (2, Err("no".to_owned()))];
-        let (gripper, labels) = (GripperView::default(), LabelView { told, ..LabelView::default() });
+        let outcomes = vec![(1, Ok("done".to_owned())), (2, Err("no".to_owned()))];
+        let (gripper, labels) = (GripperView::default(), LabelView { outcomes, ..LabelView::default() });
         let effects = session.observe(&now(&gripper, &labels));
         assert_eq!(effects, [LabellingEffect::Inform("done".to_owned()), LabellingEffect::Fail("no".to_owned())]);
         assert!(session.observe(&now(&gripper, &labels)).is_empty());

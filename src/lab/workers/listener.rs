@@ -1,5 +1,4 @@
-//! Recognition beside the simulation: it listens to the frames that are sampled, changes nothing about them, and says
-//! when a round of grasps is enough.
+//! Live recognition: reads rows of successive grasps and decides when a round of grasps is complete.
 
 use crate::grasping::{Identification, IdentificationView, IdentifyError, Row};
 use palpate_learn::{Model, StopReason, StopRule};
@@ -8,18 +7,18 @@ use palpate_tactile::Channel;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// Thresholds that can be asked for: below a half two classes could both be certain, at one none ever would be.
+/// Range of the threshold: below a half two classes could both be certain, at one none could.
 pub const THRESHOLDS: RangeInclusive<f64> = 0.5..=0.999;
 
-/// A model that listens to grasp after grasp.
+/// Live recogniser of successive grasps.
 pub(super) struct Listener {
     identification: Identification,
     rule: StopRule,
-    /// Why it cannot listen in this scene.
+    /// Reason why it is off in this scene.
     off: Option<Arc<str>>,
-    /// The user has been told why, for this scene.
-    told: bool,
-    /// What can be shown, made anew when something has changed.
+    /// The reason was reported for this scene.
+    warned: bool,
+    /// View, updated with each change.
     view: Arc<IdentificationView>,
 }
 
@@ -29,12 +28,12 @@ impl Listener {
         let rule = StopRule { most_grasps: most_grasps as usize, ..model.card.stop };
         let identification = Identification::new(model, rule);
         let view = Arc::new(identification.view());
-        Self { identification, rule, off: None, told: false, view }
+        Self { identification, rule, off: None, warned: false, view }
     }
 
     /// Another scene is grasped.
     pub(super) fn another_scene(&mut self) {
-        self.told = false;
+        self.warned = false;
         self.start_over();
     }
 
@@ -49,8 +48,8 @@ impl Listener {
         self.identification.channels_on(gripper).unwrap_or_default()
     }
 
-    /// Begins a grasp whose rows have these channels in these columns. The text, which comes once for each scene, says why nothing will be
-    /// recognised; `place` says where.
+    /// Begins a grasp whose rows have these channels in these columns. Returns once per scene the
+    /// reason why nothing is recognised; `place` names the scene or gripper in it.
     pub(super) fn begin_grasp<'a>(
         &mut self,
         columns: impl IntoIterator<Item = (usize, &'a Channel)>,
@@ -66,12 +65,12 @@ impl Listener {
             self.off = None;
             return None;
         };
-        let text = format!("nothing is recognised {place}: {cause}");
+        let text = format!("no recognition {place}: {cause}");
         self.off = Some(Arc::from(text.as_str()));
-        (!std::mem::replace(&mut self.told, true)).then_some(text)
+        (!std::mem::replace(&mut self.warned, true)).then_some(text)
     }
 
-    /// Listens to a row, `t` seconds after the closing began.
+    /// Adds a row, `t` seconds after the closing began.
     pub(super) fn push(&mut self, t: f64, row: &Row) {
         if self.off.is_none() && self.identification.push(t, row) {
             self.refresh();
@@ -86,7 +85,7 @@ impl Listener {
         }
     }
 
-    /// Takes a class as certain from this probability on; what lies outside of [`THRESHOLDS`] is brought inside.
+    /// Sets the probability from which a class counts as certain, clamped to [`THRESHOLDS`].
     pub(super) fn set_threshold(&mut self, threshold: f64) {
         if threshold.is_finite() {
             self.rule.threshold = threshold.clamp(*THRESHOLDS.start(), *THRESHOLDS.end());
@@ -94,7 +93,7 @@ impl Listener {
         }
     }
 
-    /// Stops after so many grasps at the latest.
+    /// Sets the maximum number of grasps.
     pub(super) fn set_most_grasps(&mut self, grasps: u32) {
         self.rule.most_grasps = grasps as usize;
         self.apply_rule();
@@ -109,24 +108,24 @@ impl Listener {
         self.view = Arc::new(self.identification.view());
     }
 
-    /// Why no further grasp is needed, once it is so.
+    /// Reason to stop grasping, once there is one.
     pub(super) fn decision(&self) -> Option<StopReason> {
         self.identification.decision().filter(|_| self.off.is_none())
     }
 
-    /// What the newest grasp was taken for: classes and their probabilities; none where nothing was heard.
+    /// Prediction for the newest grasp: classes and their probabilities; none without readings.
     pub(super) fn guess(&self) -> Option<Vec<(String, f64)>> {
         let pmf = &self.identification.verdict().filter(|_| self.off.is_none())?.pmf;
         let names = self.identification.model().card.labels.classes.iter().map(|class| class.name.clone());
         Some(names.zip(pmf.probabilities().iter().copied()).collect())
     }
 
-    /// What can be shown; nothing where it cannot listen.
+    /// The view; none while off.
     pub(super) fn view(&self) -> Option<Arc<IdentificationView>> {
         self.off.is_none().then(|| Arc::clone(&self.view))
     }
 
-    /// Why it cannot listen in this scene.
+    /// Reason why it is off in this scene.
     pub(super) fn why_off(&self) -> Option<Arc<str>> {
         self.off.clone()
     }

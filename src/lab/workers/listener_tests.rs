@@ -105,7 +105,7 @@ impl LiveRecogniser for LiveParrot {
 
 fn watch(model: Option<Model>, folder: &tempfile::TempDir, grasps: u32) -> Watched {
     let watched = start_with(model, ball(), folder.path().join("trials.sqlite"), grasps);
-    watched.tell(Command::SetSpeed(64.0));
+    watched.send(Command::SetSpeed(64.0));
     watched
 }
 
@@ -125,7 +125,7 @@ fn a_round_ends_when_it_is_sure_and_the_next_one_starts_over() {
     let view = end.identification.as_ref().expect("there is a model");
     assert_eq!((end.grasp, decision(&end), view.decided()), (2, Some(StopReason::Sure), Some("ball")));
     assert_eq!((view.beliefs.len(), view.listening, end.truth()), (2, false, "ball"));
-    watched.tell(Command::Play);
+    watched.send(Command::Play);
     let again = watched.until(|s| s.grasp == 3);
     assert!(decision(&again).is_none() && again.identification.as_ref().is_some_and(|view| view.beliefs.is_empty()));
 }
@@ -136,8 +136,8 @@ fn a_round_ends_at_the_limit_of_grasps_which_can_be_changed() {
     let watched = watch(Some(Parrot::model(&[0.6]).0), &folder, 2);
     let end = watched.until(|s| s.status.finished);
     assert_eq!((end.grasp, decision(&end)), (2, Some(StopReason::GraspLimit)));
-    watched.tell(Command::SetGrasps(3));
-    watched.tell(Command::Play);
+    watched.send(Command::SetGrasps(3));
+    watched.send(Command::Play);
     let end = watched.until(|s| s.status.finished && s.grasp > 2);
     assert_eq!((end.grasp, end.identification.as_ref().map(|view| view.rule.most_grasps)), (5, Some(3)));
 }
@@ -147,12 +147,12 @@ fn the_threshold_can_be_changed_and_stays_within_reason() {
     let folder = folder();
     let watched = watch(Some(Parrot::model(&[0.6]).0), &folder, 4);
     for (asked, got) in [(0.1, 0.5), (2.0, 0.999), (0.55, 0.55)] {
-        watched.tell(Command::SetThreshold(asked));
+        watched.send(Command::SetThreshold(asked));
         watched.until(|s| s.identification.as_ref().is_some_and(|view| view.rule.threshold == got));
     }
-    watched.tell(Command::SetThreshold(f64::NAN));
-    watched.tell(Command::Reset);
-    watched.tell(Command::Play);
+    watched.send(Command::SetThreshold(f64::NAN));
+    watched.send(Command::Reset);
+    watched.send(Command::Play);
     let end = watched.until(|s| s.status.finished);
     assert_eq!(decision(&end), Some(StopReason::Sure), "0.6 reaches 0.55");
     assert_eq!(end.status.grasp_of_round, 1);
@@ -163,7 +163,7 @@ fn a_lower_threshold_between_two_grasps_ends_the_round() {
     let folder = folder();
     let watched = watch(Some(Parrot::model(&[0.6]).0), &folder, 4);
     watched.until(|s| s.last.is_some());
-    watched.tell(Command::SetThreshold(0.55));
+    watched.send(Command::SetThreshold(0.55));
     let end = watched.until(|s| s.status.finished);
     assert_eq!((end.grasp, decision(&end)), (1, Some(StopReason::Sure)));
 }
@@ -173,10 +173,10 @@ fn another_object_starts_over() {
     let folder = folder();
     let watched = watch(Some(Parrot::model(&[0.6]).0), &folder, 4);
     watched.until(|s| s.identification.as_ref().is_some_and(|view| view.beliefs.len() == 1));
-    watched.tell(Command::SetSpeed(1.0));
+    watched.send(Command::SetSpeed(1.0));
     let mut other = ball();
     "cube".clone_into(&mut other.object.source);
-    watched.tell(Command::SetScene(Box::new(other)));
+    watched.send(Command::SetScene(Box::new(other)));
     let begun = watched.until(|s| s.truth() == "cube");
     assert!(begun.identification.as_ref().is_some_and(|view| view.beliefs.is_empty() && view.decision.is_none()));
     assert_eq!(begun.status.grasp_of_round, 1);
@@ -207,7 +207,7 @@ fn a_model_that_reads_other_channels_says_so_once_for_each_scene() {
     assert_eq!(end.grasp, 2, "without recognition it makes as many grasps as were asked for");
     assert!(end.identification.is_none());
     assert!(end.recognition_off.as_ref().is_some_and(|why| why.contains("temperature")));
-    watched.tell(Command::SetScene(Box::new(ball())));
+    watched.send(Command::SetScene(Box::new(ball())));
     watched.until(|s| s.status.finished && s.grasp == 4);
     let told =
         watched.worker.notices().filter(|n| matches!(n, Notice::Warning(w) if w.contains("temperature"))).count();
@@ -218,11 +218,11 @@ fn a_model_that_reads_other_channels_says_so_once_for_each_scene() {
 fn the_model_that_comes_with_the_program_answers_while_the_first_grasp_goes_on() {
     let folder = folder();
     let watched = watch(palpate_learn::shipped_model().ok(), &folder, 1);
-    watched.tell(Command::Pause);
+    watched.send(Command::Pause);
     watched.until(|s| !s.status.playing);
-    watched.tell(Command::SetSpeed(1.0));
-    watched.tell(Command::Reset);
-    watched.tell(Command::Play);
+    watched.send(Command::SetSpeed(1.0));
+    watched.send(Command::Reset);
+    watched.send(Command::Play);
     let early = watched.until(|s| s.identification.as_ref().is_some_and(|view| view.verdict.is_some()));
     let verdict = early.identification.as_ref().and_then(|view| view.verdict.clone()).expect("just seen");
     assert!(verdict.properties.is_some() && early.frame.t < 0.5, "{} s", early.frame.t);

@@ -1,60 +1,62 @@
-//! What travels between the simulation's thread and whoever watches it: commands in, snapshots, rows and notices out.
+//! Messages of the simulation thread: commands in, snapshots, rows and notices out.
 
 use crate::grasping::{GraspSummary, IdentificationView, Row};
 use crate::picture::Stage;
 use crate::study::AccuracyCost;
 use glam::DVec3;
+use palpate_learn::Model;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::Scene;
-use palpate_tactile::Channel;
 use palpate_tactile::trial::TrialId;
+use palpate_tactile::{Channel, SensorLayout};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Called whenever there is something new to show.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// What the simulation can be told.
+/// Command to the simulation.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Grasp another scene, from its start.
     SetScene(Box<Scene>),
-    /// Go on.
+    /// Continue.
     Play,
-    /// Stand still.
+    /// Pause.
     Pause,
-    /// Advance by one sample, then stand still.
+    /// Advance by one sample, then pause.
     Step,
     /// Back to the start of this grasp.
     Reset,
-    /// Seconds of simulation per second on the wall.
+    /// Simulation speed as a multiple of real time.
     SetSpeed(f64),
-    /// How many grasps to make before stopping; with a model, at most.
+    /// Number of grasps in a round; with a model, the maximum.
     SetGrasps(u32),
-    /// From which probability on a class is taken as certain; brought inside of [`super::THRESHOLDS`].
+    /// Probability from which a class counts as certain; clamped to [`super::THRESHOLDS`].
     SetThreshold(f64),
     /// Whether trials are stored.
     SetRecording(bool),
-    /// Whether a companion runs along for the numerical error band; the grasp begins anew.
+    /// Whether a refined run accompanies each grasp for the numerical error band; restarts the grasp.
     SetErrorBand(bool),
     /// Whether the other engine computes each grasp too, for [`super::SimWorker::ghost`].
     SetGhost(bool),
-    /// Pull at the object with this force (N, world axes); zero lets go.
+    /// Pull the object with this force (N, world axes); zero releases it.
     Pull(DVec3),
     /// End the thread.
     Quit,
 }
 
-/// What the simulation tells besides pictures and traces.
+/// Notice of a thread to the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
-    /// Something that was asked for is done.
+    /// A command is done.
     Info(String),
-    /// Something about the grasp that the user should know.
+    /// Warning about the grasp.
     Warning(String),
-    /// Something failed; the sentence says what, and what to try.
+    /// Failure, with what to try.
     Failed(String),
-    /// A scene could not be set up; the one before goes on.
+    /// A scene could not be set up; the previous one stays.
     SceneRefused(Box<Refusal>),
     /// A trial is in the store.
     Stored(TrialId),
@@ -65,13 +67,13 @@ pub enum Notice {
 pub struct Refusal {
     /// The scene.
     pub refused: Scene,
-    /// The scene that goes on instead.
+    /// The scene that stays instead.
     pub kept: Scene,
-    /// Why, in a sentence for the user.
+    /// Cause, in a sentence for the user.
     pub cause: String,
 }
 
-/// Why a command was not taken.
+/// Reason why a command was not sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotSent {
     /// Too many are waiting.
@@ -82,12 +84,12 @@ pub enum NotSent {
     Gone,
 }
 
-/// One sample as plots need it.
+/// One sample for plots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TraceRow {
-    /// Which grasp it belongs to; rises by one with each.
+    /// Number of its grasp; rises by one with each.
     pub grasp: u64,
-    /// It belongs to no grasp: the gripper is watched, and what is long ago is of no interest.
+    /// True outside of grasps: live view, of which plots show only the last seconds.
     pub rolling: bool,
     /// Time in the grasp (s).
     pub t: f64,
@@ -95,18 +97,18 @@ pub struct TraceRow {
     pub line_bar: f64,
     /// One value per channel of the snapshot's list; NaN where undefined.
     pub values: Box<[f32]>,
-    /// Estimated numerical error of each value, in its unit; empty without a companion.
+    /// Estimated numerical error of each value, in its unit; empty without a refined run.
     pub errors: Box<[f32]>,
 }
 
 impl TraceRow {
-    /// A row of a board in its place: time counts from `from_s`.
+    /// Row of a board; time counts from `from_s`.
     pub(super) fn placed(row: Row, grasp: u64, from_s: f64, rolling: bool) -> Self {
         Self { grasp, rolling, t: row.t_s - from_s, line_bar: row.line_bar, values: row.values, errors: Box::default() }
     }
 }
 
-/// What the accuracy of a scene costs and leaves.
+/// Cost and error of the accuracy of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredAccuracy {
     /// The scene, in the pose it is written with.
@@ -115,12 +117,12 @@ pub struct MeasuredAccuracy {
     pub cost: AccuracyCost,
 }
 
-/// What is known of the object in the hand.
+/// Description of the held object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectCard {
     /// Short name.
     pub name: String,
-    /// What people call it.
+    /// Name for display.
     pub title: String,
     /// Size and shape class, where known.
     pub class: Option<ObjectClass>,
@@ -132,28 +134,28 @@ pub struct ObjectCard {
     pub size: DVec3,
 }
 
-/// Where the simulation stands.
+/// State of the simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Status {
-    /// An object that is being loaded.
+    /// Object being loaded.
     pub loading: Option<String>,
-    /// Time passes.
+    /// The simulation runs.
     pub playing: bool,
     /// The last grasp has ended.
     pub finished: bool,
-    /// Wanted speed, as a multiple of real time.
+    /// Target speed as a multiple of real time.
     pub target_speed: f64,
-    /// Speed over the last half second or so; zero while standing still.
+    /// Speed over the last half second or so; zero while paused.
     pub actual_speed: f64,
-    /// Which grasp of this round, from 1.
+    /// Number of the grasp in this round, from 1.
     pub grasp_of_round: u32,
-    /// Grasps in a round; with a model the most.
+    /// Grasps in a round; with a model, the maximum.
     pub grasps: u32,
     /// Length of a trial (s).
     pub duration: f64,
     /// Trials are being stored.
     pub recording: bool,
-    /// A companion runs along for the numerical error band.
+    /// A refined run computes the numerical error band.
     pub error_band: bool,
 }
 
@@ -162,7 +164,7 @@ pub struct Status {
 pub struct FinishedGrasp {
     /// Its number, as in [`TraceRow::grasp`].
     pub grasp: u64,
-    /// What it came to.
+    /// Summary.
     pub summary: GraspSummary,
 }
 
@@ -175,29 +177,49 @@ pub struct Snapshot {
     pub grasp: u64,
     /// The scene as it was set up, with this grasp's pose.
     pub scene: Arc<Scene>,
-    /// Which effects this grasp takes into account, and why.
+    /// Effects of this grasp, with the reason for each.
     pub plan: Arc<Plan>,
     /// Meshes for the picture.
     pub stage: Arc<Stage>,
-    /// What is in the hand; absent for an empty hand.
+    /// Held object; absent for an empty hand.
     pub object: Option<Arc<ObjectCard>>,
-    /// What the values of trace rows are.
+    /// Channels of trace rows.
     pub channels: Arc<[Channel]>,
     /// The newest frame.
     pub frame: Arc<Frame>,
-    /// Where the simulation stands.
+    /// State of the simulation.
     pub status: Status,
     /// The last grasp that ended.
     pub last: Option<Arc<FinishedGrasp>>,
-    /// What is recognised; absent without a model, and where it cannot read this gripper.
+    /// Recognition; absent without a model, and where the model does not fit this gripper.
     pub identification: Option<Arc<IdentificationView>>,
-    /// Why nothing is recognised in this scene, where there is a model.
+    /// Reason why the model recognises nothing in this scene.
     pub recognition_off: Option<Arc<str>>,
 }
 
 impl Snapshot {
-    /// What is in the hand in truth, by the name that classes have.
+    /// Class name of the held object.
     pub fn truth(&self) -> &str {
         self.object.as_ref().map_or(EMPTY, |object| &object.name)
     }
+}
+
+/// Initial state of a simulation worker.
+pub struct SimWorkerSetup {
+    /// First scene.
+    pub scene: Scene,
+    /// Sensor layout of the traces.
+    pub layout: SensorLayout,
+    /// Trial store.
+    pub store: PathBuf,
+    /// Whether trials are stored from the start.
+    pub recording: bool,
+    /// Grasps in a round. With a model this is the limit: a round ends once the object is recognised.
+    pub grasps: u32,
+    /// Recognition model; none turns recognition off.
+    pub model: Option<Arc<Model>>,
+    /// Whether the simulation runs from the start.
+    pub playing: bool,
+    /// Called when there is something new.
+    pub wake: Wake,
 }

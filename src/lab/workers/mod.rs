@@ -62,7 +62,8 @@ pub use labelling_session::{
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{
-    Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
+    Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status,
+    TraceRow, Wake,
 };
-pub use sim::{SimWorker, SimWorkerSetup};
+pub use sim::SimWorker;
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -1,45 +1,21 @@
-//! The handle on the simulation's thread: commands go in, snapshots, trace rows and notices come out.
+//! Handle of the simulation thread: commands in, snapshots, trace rows and notices out.
 
 use super::ghost::GhostGrasp;
 use super::latest::Latest;
-use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, Snapshot, TraceRow, Wake};
+use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, SimWorkerSetup, Snapshot, TraceRow};
 use super::simulation_session::{Outlets, Session};
-use palpate_learn::Model;
-use palpate_sim::scene::Scene;
-use palpate_tactile::SensorLayout;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// What a simulation worker starts from.
-pub struct SimWorkerSetup {
-    /// The first scene.
-    pub scene: Scene,
-    /// Sensor layout of the traces.
-    pub layout: SensorLayout,
-    /// Where trials are stored.
-    pub store: PathBuf,
-    /// Whether trials are stored from the start.
-    pub recording: bool,
-    /// Grasps in a round; with a model the most, because a round ends once it is clear what is in the hand.
-    pub grasps: u32,
-    /// Recognises what is in the hand; without one nothing is recognised.
-    pub model: Option<Arc<Model>>,
-    /// Whether time passes from the start.
-    pub playing: bool,
-    /// Called when there is something new.
-    pub wake: Wake,
-}
-
-/// Commands that wait at most; more are refused rather than queued without end.
+/// Maximum number of queued commands; further ones are refused.
 const MOST_COMMANDS: usize = 256;
-/// Trace rows that wait at most: two minutes at 75 Hz. A reader that sleeps longer finds a gap.
+/// Maximum number of queued trace rows: two minutes at 75 Hz. A slower reader finds a gap.
 const MOST_ROWS: usize = 9000;
 
-/// A handle on the simulation's thread. Dropping it ends the thread and waits for what it still has to store.
+/// Handle of the simulation thread. Dropping it ends the thread and waits for pending writes.
 #[derive(Debug)]
 pub struct SimWorker {
     commands: SyncSender<Command>,
@@ -80,9 +56,9 @@ impl SimWorker {
                 std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| Session::run(setup, outlets, &inbox)));
             if outcome.is_err() {
                 let text =
-                    "the simulation stopped through a fault of the program; restart Palpate and report what you did";
-                // If nobody listens any more, nobody needs to know.
-                let _heard = last_words.0.send(Notice::Failed(text.to_owned()));
+                    "the simulation stopped because of a fault in the program; restart Palpate and report what you did";
+                // The window may be closed.
+                let _sent = last_words.0.send(Notice::Failed(text.to_owned()));
                 last_words.1();
             }
         })?;
@@ -102,7 +78,7 @@ impl SimWorker {
         self.snapshots.get()
     }
 
-    /// What the accuracy of the last scene that was measured costs and leaves.
+    /// Cost and error of the accuracy of the last measured scene.
     pub fn accuracy(&self) -> Option<Arc<MeasuredAccuracy>> {
         self.accuracy.get()
     }
@@ -112,12 +88,12 @@ impl SimWorker {
         self.rows.try_iter()
     }
 
-    /// The newest grasp that the other engine has computed; compare its number with the snapshot's.
+    /// The newest grasp that the other engine has computed; compare its number with that of the snapshot.
     pub fn ghost(&self) -> Option<Arc<GhostGrasp>> {
         self.ghost.get()
     }
 
-    /// True once after rows had to be dropped because nobody read them.
+    /// True once after rows had to be dropped because the queue was full.
     pub fn take_rows_lost(&self) -> bool {
         self.rows_lost.swap(false, Ordering::Relaxed)
     }
@@ -141,7 +117,7 @@ impl Drop for SimWorker {
                 wait();
             }
             if thread.is_finished() {
-                // A panic in the thread has been told already.
+                // A panic in the thread has been reported already.
                 let _ended = thread.join();
             }
         }

@@ -35,7 +35,7 @@ pub(super) fn start_with(model: Option<Model>, scene: Scene, store: PathBuf, gra
 }
 
 impl Watched {
-    pub(super) fn tell(&self, command: Command) {
+    pub(super) fn send(&self, command: Command) {
         self.worker.send(command).expect("room");
     }
 
@@ -76,7 +76,7 @@ fn a_watched_grasp_is_the_same_as_a_headless_one_and_is_stored() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("trials.sqlite");
     let watched = start(ball(), path.clone(), 2);
-    watched.tell(Command::SetSpeed(64.0));
+    watched.send(Command::SetSpeed(64.0));
     watched.until(|s| s.status.finished);
     let rows: Vec<TraceRow> = watched.worker.rows().collect();
     assert_eq!(rows.len(), 240, "two grasps of 120 samples, none lost");
@@ -94,12 +94,12 @@ fn stepping_pausing_and_resetting() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("trials.sqlite");
     let watched = start(ball(), path.clone(), 1);
-    watched.tell(Command::Pause);
+    watched.send(Command::Pause);
     let paused = watched.until(|s| !s.status.playing);
-    watched.tell(Command::Step);
+    watched.send(Command::Step);
     let stepped = watched.until(|s| s.frame.t > paused.frame.t);
     assert!((stepped.frame.t - paused.frame.t - 1.0 / 75.0).abs() < 1e-9);
-    watched.tell(Command::Reset);
+    watched.send(Command::Reset);
     let reset = watched.until(|s| s.grasp > stepped.grasp);
     assert_eq!(reset.frame.t, 0.0);
     drop(watched);
@@ -115,15 +115,15 @@ fn a_scene_that_cannot_be_loaded_leaves_the_old_one() {
     watched.until(|s| s.object.is_some() && s.frame.t > 0.05);
     let mut missing = ball();
     "/nowhere/at/all.urdf".clone_into(&mut missing.object.source);
-    watched.tell(Command::SetScene(Box::new(missing.clone())));
+    watched.send(Command::SetScene(Box::new(missing.clone())));
     let refusal = watched.refusal();
     assert!(refusal.cause.contains("/nowhere/at/all.urdf"));
     assert!(refusal.refused == missing && refusal.kept == ball());
     // The grasp that was going on goes on, is stored, and the next one follows.
-    watched.tell(Command::SetSpeed(64.0));
+    watched.send(Command::SetSpeed(64.0));
     let last = watched.until(|s| s.status.finished);
     assert!(last.grasp == 2 && last.object.as_ref().is_some_and(|o| o.name == "ball"));
-    watched.tell(Command::Reset);
+    watched.send(Command::Reset);
     watched.until(|s| s.grasp == 3);
     drop(watched);
     let rows = Store::open(&path).expect("opens").list(false).expect("lists");
@@ -138,7 +138,7 @@ fn a_first_scene_that_cannot_be_loaded_leaves_an_empty_hand() {
     let watched = start(missing, folder.path().join("trials.sqlite"), 1);
     assert_eq!(watched.refusal().kept.object.source, EMPTY);
     assert!(watched.until(|s| s.frame.t > 0.0).object.is_none());
-    watched.tell(Command::SetScene(Box::new(ball())));
+    watched.send(Command::SetScene(Box::new(ball())));
     watched.until(|s| s.object.is_some() && s.frame.t > 0.0);
 }
 
@@ -147,11 +147,11 @@ fn more_grasps_come_from_new_poses_and_pulled_ones_say_so() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("trials.sqlite");
     let watched = start(ball(), path.clone(), 2);
-    watched.tell(Command::SetSpeed(64.0));
+    watched.send(Command::SetSpeed(64.0));
     watched.until(|s| s.status.finished);
-    watched.tell(Command::Play);
+    watched.send(Command::Play);
     watched.until(|s| s.grasp == 3);
-    watched.tell(Command::Pull(DVec3::new(0.0, 0.3, 0.0)));
+    watched.send(Command::Pull(DVec3::new(0.0, 0.3, 0.0)));
     watched.until(|s| s.status.finished && s.grasp == 4);
     drop(watched);
     let store = Store::open(&path).expect("opens");
@@ -170,7 +170,7 @@ fn scenes_that_are_passed_over_leave_nothing_in_the_store() {
     for k in 0..20 {
         let mut scene = ball();
         scene.gripper.mount.yaw_deg = f64::from(k);
-        watched.tell(Command::SetScene(Box::new(scene)));
+        watched.send(Command::SetScene(Box::new(scene)));
         watched.until(|s| s.scene.gripper.mount.yaw_deg == f64::from(k));
     }
     drop(watched);
@@ -182,8 +182,8 @@ fn a_companion_brings_errors_and_the_gauge_both_numbers() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("trials.sqlite");
     let watched = start(ball(), path.clone(), 1);
-    watched.tell(Command::SetErrorBand(true));
-    watched.tell(Command::SetSpeed(64.0));
+    watched.send(Command::SetErrorBand(true));
+    watched.send(Command::SetSpeed(64.0));
     watched.until(|s| s.status.error_band && s.status.finished);
     let rows: Vec<TraceRow> = watched.worker.rows().collect();
     let banded: Vec<&TraceRow> = rows.iter().filter(|row| row.grasp == rows[rows.len() - 1].grasp).collect();
@@ -194,17 +194,17 @@ fn a_companion_brings_errors_and_the_gauge_both_numbers() {
     let before = loop {
         match watched.worker.accuracy() {
             Some(measured) => break measured,
-            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the gauge is alive"),
+            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the accuracy job runs"),
         }
     };
     assert_eq!(before.scene, ball());
     let mut finer = ball();
     finer.solver.accuracy = Accuracy::Tolerance(1e-5);
-    watched.tell(Command::SetScene(Box::new(finer.clone())));
+    watched.send(Command::SetScene(Box::new(finer.clone())));
     let after = loop {
         match watched.worker.accuracy().filter(|measured| measured.scene == finer) {
             Some(measured) => break measured,
-            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the gauge is alive"),
+            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the accuracy job runs"),
         }
     };
     assert!(after.cost.error.curvature_per_m < 0.5 * before.cost.error.curvature_per_m);

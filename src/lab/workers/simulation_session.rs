@@ -1,4 +1,4 @@
-//! The simulation's thread: it owns the rig, keeps pace with the clock on the wall, and publishes what it sees.
+//! Session of the simulation thread: owns the simulated gripper, keeps pace with real time and publishes snapshots.
 
 use super::accuracy_job::AccuracyJob;
 use super::current::Current;
@@ -7,11 +7,11 @@ use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
 use super::listener::Listener;
 use super::messages::{
-    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, Snapshot, Status, TraceRow, Wake,
+    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status, TraceRow,
+    Wake,
 };
 use super::pace::Pace;
 use super::refined_run::RefinedRun;
-use super::sim::SimWorkerSetup;
 use crate::grasping::{FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
 use crate::recording::{Recorder, RecorderNotice};
@@ -31,7 +31,7 @@ const BUDGET: Duration = Duration::from_millis(12);
 /// Being later than this counts as unable to keep up: the clock is set anew instead of being chased.
 const LATEST: f64 = 0.25;
 
-/// Where results go.
+/// Channels to the window.
 pub(super) struct Outlets {
     pub(super) snapshots: Arc<Latest<Snapshot>>,
     pub(super) accuracy: Arc<Latest<MeasuredAccuracy>>,
@@ -44,14 +44,14 @@ pub(super) struct Outlets {
 }
 
 impl Outlets {
-    fn tell(&self, notice: Notice) {
-        // The window may have gone; then there is nobody to tell.
-        let _heard = self.notices.send(notice);
+    fn notify(&self, notice: Notice) {
+        // The window may be closed.
+        let _sent = self.notices.send(notice);
         (self.wake)();
     }
 }
 
-/// Everything the thread owns.
+/// State of the thread.
 pub(super) struct Session {
     outlets: Outlets,
     recorder: Option<Recorder>,
@@ -81,7 +81,7 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Runs until it is told to quit.
+    /// Runs until [`Command::Quit`].
     pub(super) fn run(setup: SimWorkerSetup, outlets: Outlets, inbox: &Receiver<Command>) {
         let recorder_outlets = (outlets.notices.clone(), Arc::clone(&outlets.wake));
         let recorder = Recorder::start(setup.store, move |notice| {
@@ -92,13 +92,13 @@ impl Session {
                 // Only the real gripper's trials say so.
                 RecorderNotice::Begun(_) | RecorderNotice::Recorded(_) | RecorderNotice::Discarded(_) => return,
             };
-            let _heard = recorder_outlets.0.send(notice);
+            let _sent = recorder_outlets.0.send(notice);
             (recorder_outlets.1)();
         });
         let recorder = match recorder {
             Ok(recorder) => Some(recorder),
             Err(error) => {
-                outlets.tell(Notice::Failed(format!("trials cannot be stored: {error}")));
+                outlets.notify(Notice::Failed(format!("trials cannot be stored: {error}")));
                 None
             }
         };
@@ -166,7 +166,7 @@ impl Session {
         true
     }
 
-    /// How long nothing is due; `None` for until a command comes.
+    /// Time until something is due; `None` until the next command.
     fn time_to_wait(&self) -> Option<Duration> {
         if !self.status.playing {
             return None;
@@ -262,7 +262,7 @@ impl Session {
         self.begin_round();
     }
 
-    /// Grasps another scene; where it cannot be had, the current grasp goes on as if nothing had been asked.
+    /// Grasps another scene; where it cannot be had, the current grasp continues.
     fn set_scene(&mut self, scene: Scene) {
         if let Err(cause) = self.load_object(&scene) {
             return self.refuse(scene, cause);
@@ -274,14 +274,14 @@ impl Session {
         self.sampler = None;
         self.own_pose_done = false;
         self.poses_drawn = 0;
-        // Whoever chooses an object after the last grasp wants to see it grasped.
+        // An object chosen after the last grasp is grasped at once.
         self.status.playing |= self.status.finished;
         self.begin_round();
     }
 
     fn refuse(&self, refused: Scene, cause: String) {
         let refusal = Refusal { refused, kept: self.nominal.clone(), cause };
-        self.outlets.tell(Notice::SceneRefused(Box::new(refusal)));
+        self.outlets.notify(Notice::SceneRefused(Box::new(refusal)));
     }
 
     /// The first grasp of a round.
@@ -298,7 +298,7 @@ impl Session {
         self.next_grasp_at = None;
         if let Err(cause) = self.load_object(&self.nominal.clone()) {
             // The file has changed for the worse since; the object as it was will do.
-            self.outlets.tell(Notice::Failed(cause));
+            self.outlets.notify(Notice::Failed(cause));
         }
         let model = self.object.as_ref().and_then(|object| object.model.clone());
         self.status.finished = false;
@@ -319,7 +319,7 @@ impl Session {
         let more = self.listener.as_ref().map(|listener| listener.channels_on(&scene.gripper)).unwrap_or_default();
         let reader = match FrameReader::new(&self.layout, &scene.gripper, &more) {
             Ok(reader) => reader,
-            Err(error) => return self.outlets.tell(Notice::Failed(error.to_string())),
+            Err(error) => return self.outlets.notify(Notice::Failed(error.to_string())),
         };
         if let Some(accuracy_job) = self.accuracy_job.as_mut().filter(|_| !again) {
             accuracy_job.measure(&scene, model.clone());
@@ -327,7 +327,7 @@ impl Session {
         let mut run = prepare(&scene, model.as_deref(), seed);
         if !again {
             for warning in &run.info().warnings {
-                self.outlets.tell(Notice::Warning(warning.clone()));
+                self.outlets.notify(Notice::Warning(warning.clone()));
             }
         }
         if self.status.recording
@@ -341,7 +341,7 @@ impl Session {
             .as_mut()
             .and_then(|listener| listener.begin_grasp(reader.channels().iter().enumerate(), "in this scene"))
         {
-            self.outlets.tell(Notice::Warning(warning));
+            self.outlets.notify(Notice::Warning(warning));
         }
         self.grasp += 1;
         self.status.duration = scene.timing.duration_s;
@@ -351,11 +351,11 @@ impl Session {
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
         let frame = Arc::new(run.gripper_mut().run_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
-        let (told, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
+        let (warned, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
         let channels = reader.channels().len();
         let refined_run = self.status.error_band.then(|| RefinedRun::new(&scene, model.as_deref(), seed, channels));
         self.current =
-            Some(Current { run, refined_run, plan, scene, stage, reader, frame, told, pulled: false, ended: false });
+            Some(Current { run, refined_run, plan, scene, stage, reader, frame, warned, pulled: false, ended: false });
         self.pace = Pace::starting_at(0.0);
         self.begin_ghost();
         self.publish();
@@ -426,7 +426,7 @@ impl Session {
         }
     }
 
-    /// Runs on to the next sample and hands it to everybody.
+    /// Runs to the next sample and passes it to plots, recogniser and recorder.
     fn take_frame(&mut self) {
         let Some(current) = self.current.as_mut().filter(|current| !current.ended) else { return };
         let Some(frame) = current.run.next_frame().cloned() else { return self.end_grasp() };
@@ -461,8 +461,8 @@ impl Session {
         let Some(current) = self.current.as_mut() else { return };
         current.ended = true;
         let trial = current.run.finish(&current.scene);
-        for warning in trial.info.warnings.iter().skip(current.told) {
-            self.outlets.tell(Notice::Warning(warning.clone()));
+        for warning in trial.info.warnings.iter().skip(current.warned) {
+            self.outlets.notify(Notice::Warning(warning.clone()));
         }
         if self.recorder_busy
             && let Some(recorder) = &self.recorder

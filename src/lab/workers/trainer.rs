@@ -78,7 +78,7 @@ impl Trainer {
     pub fn start(store: PathBuf, models: PathBuf, wake: Wake) -> std::io::Result<Self> {
         let mut room = Room { store, models, view: TrainerView::default() };
         Self::spawn("train", wake, move |command, stop, outlet| {
-            room.grant(command, stop, outlet);
+            room.handle(command, stop, outlet);
             outlet.publish(room.view.clone());
         })
     }
@@ -92,7 +92,7 @@ struct Room {
 }
 
 impl Room {
-    fn grant(&mut self, command: TrainCommand, stop: &AtomicBool, outlet: &Outlet<TrainerView>) {
+    fn handle(&mut self, command: TrainCommand, stop: &AtomicBool, outlet: &Outlet<TrainerView>) {
         match command {
             TrainCommand::Look => {
                 let counted = Store::open(&self.store).and_then(|store| labelled_classes(&store));

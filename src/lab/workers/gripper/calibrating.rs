@@ -1,4 +1,4 @@
-//! A calibration on the link that everybody shares: it listens to readings, is told what was set, and comes to a curve.
+//! Calibration on the shared link: readings and applied values in, a curve out.
 
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
@@ -6,30 +6,30 @@ use palpate_tactile::calibration::{Calibration, EmptyClose, Point, Procedure};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What the user wants of a calibration.
+/// Command to the calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CalibrationCommand {
     /// Begin with a part in its place.
     Begin(CalibrationPlan),
     /// Take the settled reading as that of an angle (rad) or force (N).
     Take(f64),
-    /// Leave out what is next.
+    /// Skip the next value.
     Skip,
-    /// Take the last point back.
+    /// Remove the last point.
     Undo,
     /// Watch the empty hand close, to learn how the zero of a pad moves with bending; calibrations of the other parts are
     /// read for it.
     EmptyClose,
-    /// Store what came out.
+    /// Store the calibration.
     Keep,
-    /// Forget it.
+    /// Stop without storing.
     Stop,
 }
 
-/// What is calibrated, and where it is read.
+/// Part to calibrate, and its port.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationPlan {
-    /// Where it sits.
+    /// Sensor position of the part.
     pub sensor: Sensor,
     /// Name of the part.
     pub part: String,
@@ -37,19 +37,19 @@ pub struct CalibrationPlan {
     pub port: Option<PathBuf>,
 }
 
-/// Where a calibration stands.
+/// State of the calibration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationView {
-    /// What is being calibrated; none while nothing is.
+    /// Running calibration.
     pub running: Option<RunningCalibration>,
-    /// How the last one ended, in a sentence.
+    /// Result of the last one, in a sentence.
     pub ended: Option<Result<String, String>>,
 }
 
-/// A calibration that goes on.
+/// Running calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningCalibration {
-    /// What is calibrated.
+    /// The plan.
     pub plan: CalibrationPlan,
     /// State of the link, in a sentence.
     pub link: String,
@@ -59,9 +59,9 @@ pub struct RunningCalibration {
     pub next: Option<f64>,
     /// The newest reading (counts).
     pub latest: Option<f64>,
-    /// The settled reading (counts), or why there is none yet.
+    /// The settled reading (counts), or the reason why there is none yet.
     pub settled: Result<f64, String>,
-    /// Why the point that was to be taken last was not taken.
+    /// Reason why the last point was not taken.
     pub not_taken: Option<String>,
     /// The points so far.
     pub points: Vec<Point>,
@@ -69,20 +69,20 @@ pub struct RunningCalibration {
     pub closing: bool,
     /// An empty close can be watched: a pad is calibrated, and none is being watched.
     pub can_close: bool,
-    /// What they come to, or why they come to nothing yet.
+    /// Fit of the points, or the reason why there is none yet.
     pub fit: Result<Arc<Calibration>, String>,
 }
 
-/// Why nothing else is done meanwhile.
+/// Reason why other commands are refused meanwhile.
 const WATCHED: &str = "the empty close is being watched";
 
-/// A calibration that goes on in the gripper's thread.
+/// Running calibration in the gripper thread.
 pub(super) struct Calibrating {
     plan: CalibrationPlan,
-    /// From the reading on after which the board is known.
+    /// Set once the board is known.
     procedure: Option<Procedure>,
-    heard: u32,
-    /// The board as it was known last.
+    readings: u32,
+    /// The newest description of the board.
     board: Option<Board>,
     closing: Option<EmptyClose>,
     not_taken: Option<String>,
@@ -90,20 +90,20 @@ pub(super) struct Calibrating {
 
 impl Calibrating {
     pub(super) fn new(plan: CalibrationPlan) -> Self {
-        Self { plan, procedure: None, heard: 0, closing: None, not_taken: None, board: None }
+        Self { plan, procedure: None, readings: 0, closing: None, not_taken: None, board: None }
     }
 
-    /// Takes in a reading; fails where the board has no such channel.
+    /// Adds a reading; fails where the board has no such channel.
     pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), String> {
-        self.heard = self.heard.saturating_add(1);
-        if self.heard < KNOWN_AFTER {
+        self.readings = self.readings.saturating_add(1);
+        if self.readings < KNOWN_AFTER {
             return Ok(());
         }
         let procedure = match &mut self.procedure {
             Some(procedure) => procedure,
             empty @ None => empty.insert(begin(&self.plan, board)?),
         };
-        // What the board says of itself, or shows, may come later than its first readings.
+        // The description of the board may change after its first readings.
         if self.board.as_ref() != Some(board) {
             procedure.see(board);
             self.board = Some(board.clone());
@@ -122,7 +122,7 @@ impl Calibrating {
         Ok(())
     }
 
-    /// Begins to watch an empty close, with the calibrations that serve now.
+    /// Begins to watch an empty close, with the present calibrations.
     pub(super) fn close_empty(&mut self, board: &Board, store: &Store) {
         let Some(procedure) = &self.procedure else { return };
         let begun = procedure.fit().map_err(|fault| fault.to_string()).and_then(|pad| {
@@ -136,8 +136,8 @@ impl Calibrating {
         }
     }
 
-    /// Takes a point, leaves one out, or takes one back.
-    pub(super) fn grant(&mut self, command: &CalibrationCommand) {
+    /// Takes, skips or removes a point.
+    pub(super) fn handle(&mut self, command: &CalibrationCommand) {
         let Some(procedure) = &mut self.procedure else { return };
         if self.closing.is_some() && *command == CalibrationCommand::Undo {
             // The board may have fallen silent: what was measured before is kept.
@@ -164,7 +164,7 @@ impl Calibrating {
         }
     }
 
-    /// Stores what came out, and that the part sits where it was calibrated; none before the first reading.
+    /// Stores the calibration and mounts the part at its sensor; none before the first reading.
     pub(super) fn keep(&self, store: &mut Store) -> Option<Result<String, String>> {
         let procedure = self.procedure.as_ref().filter(|_| self.closing.is_none())?;
         let stored = procedure.fit().map_err(|fault| fault.to_string()).and_then(|calibration| {

@@ -1,53 +1,53 @@
-//! The doctor's crosstalk test on the link that everybody shares.
+//! Crosstalk test on the shared link.
 
 use palpate_device::doctor::{Bleed, CrosstalkTest};
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading};
 use std::path::PathBuf;
 
-/// What the user wants of the crosstalk test.
+/// Command to the crosstalk test.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CrosstalkCommand {
     /// Begin, on the port that is open, else on this one, else on the only likely one.
     Begin(Option<PathBuf>),
-    /// Leave out the sensor that is to be moved.
+    /// Skip the present sensor.
     Skip,
-    /// Say what was seen so far.
+    /// Stop and report the results so far.
     Stop,
 }
 
-/// Where the crosstalk test stands.
+/// State of the crosstalk test.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CrosstalkView {
-    /// What to do next; none while no test goes on.
+    /// Running test.
     pub running: Option<RunningCrosstalk>,
-    /// What was found so far, or in the last test.
+    /// Crosstalk found so far, or in the last test.
     pub found: Vec<Bleed>,
-    /// What the last test came to, in sentences, or why there was none.
+    /// Result of the last test, in sentences, or the reason why it failed.
     pub ended: Option<Result<Vec<String>, String>>,
 }
 
-/// A crosstalk test that goes on.
+/// Running crosstalk test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningCrosstalk {
-    /// What to do next.
+    /// Instruction for the next step.
     pub instruction: String,
-    /// Number of the step, from 1, and how many there are; none before the first reading.
+    /// Number of the step, from 1, and number of steps; none before the first reading.
     pub step: Option<[usize; 2]>,
 }
 
-/// A crosstalk test in the gripper's thread.
+/// Crosstalk test in the gripper thread.
 #[derive(Default)]
 pub(super) struct Crossing {
-    /// From the reading on after which the board is known.
+    /// Set once the board is known.
     test: Option<CrosstalkTest>,
-    heard: u32,
+    readings: u32,
 }
 
 impl Crossing {
-    /// Takes in a reading; true when the test is over. Fails where the board has too few sensors.
+    /// Adds a reading; true when the test is over. Fails where the board has too few sensors.
     pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<bool, String> {
-        self.heard = self.heard.saturating_add(1);
-        if self.heard < KNOWN_AFTER {
+        self.readings = self.readings.saturating_add(1);
+        if self.readings < KNOWN_AFTER {
             return Ok(false);
         }
         let test = match &mut self.test {
@@ -65,7 +65,7 @@ impl Crossing {
         }
     }
 
-    /// True when every sensor was moved or left out.
+    /// True when every sensor was moved or skipped.
     pub(super) fn is_over(&self) -> bool {
         self.test.as_ref().is_some_and(|test| test.source().is_none())
     }
@@ -74,9 +74,9 @@ impl Crossing {
         self.test.as_ref().map(|test| test.found().to_vec()).unwrap_or_default()
     }
 
-    /// What it came to.
+    /// Result, in sentences.
     pub(super) fn summary(&self) -> Result<Vec<String>, String> {
-        self.test.as_ref().map(CrosstalkTest::summary).ok_or_else(|| "nothing was heard of the board".to_owned())
+        self.test.as_ref().map(CrosstalkTest::summary).ok_or_else(|| "no readings from the board".to_owned())
     }
 
     pub(super) fn view(&self, link: String) -> RunningCrosstalk {

@@ -1,11 +1,12 @@
-//! What travels between the gripper's thread and a window: commands in, views out.
+//! Messages of the gripper thread: commands in, views out.
 
 use super::calibrating::{CalibrationCommand, CalibrationView};
 use super::crosstalk::{CrosstalkCommand, CrosstalkView};
 use super::observing::ObserveRequest;
 use crate::grasping::{GraspStage, IdentificationView};
-use crate::gripper::NotOpened;
+use crate::gripper::{Listen, NotOpened};
 use crate::recording::TrialRequest;
+use crate::workers::messages::Wake;
 use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkStatus, PortInfo};
 use palpate_learn::Model;
@@ -16,61 +17,77 @@ use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What the gripper's thread can be told.
+/// Initial state of the gripper thread.
+pub struct GripperSetup {
+    /// Model of the gripper, and the programme of its control box.
+    pub scene: Scene,
+    /// Store of trials and calibrations.
+    pub store: PathBuf,
+    /// Recognition model; none turns recognition off.
+    pub model: Option<Arc<Model>>,
+    /// Maximum number of grasps per object.
+    pub grasps: u32,
+    /// Opens ports.
+    pub listen: Listen,
+    /// Called when there is something new.
+    pub wake: Wake,
+}
+
+/// Command to the gripper thread.
 #[derive(Clone)]
 pub enum GripperCommand {
-    /// Look for ports anew.
+    /// List the ports again.
     ListPorts,
-    /// Listen to a port, a file of captured bytes, or without a name to the only likely port.
+    /// Open a port or a file of captured bytes; without a name, the only likely port.
     Connect(Option<PathBuf>),
-    /// Give the port back. A trial ends there.
+    /// Close the port; ends a running trial.
     Disconnect,
-    /// Vent the fingers at once. A trial ends there.
+    /// Vent the fingers at once; ends a running trial.
     Vent,
-    /// Take what the sensors show now as zero: nothing may touch the fingers.
+    /// Tare: take the present readings as zero. Nothing may touch the fingers.
     Tare,
-    /// The gripper as it is modelled, and the programme of its control box.
+    /// Set the model of the gripper and the programme of its control box.
     SetScene(Box<Scene>),
-    /// What recognises.
+    /// Set the recognition model; none turns recognition off.
     SetModel(Option<Arc<Model>>),
-    /// From which probability on a class is taken as certain.
+    /// Probability from which a class counts as certain.
     SetThreshold(f64),
-    /// How many grasps are made at most before it stops.
+    /// Maximum number of grasps per object.
     SetGrasps(u32),
-    /// Another object is in the hand: the grasps so far count no more.
+    /// Start over with another object; earlier grasps no longer count.
     AnotherObject,
     /// Begin a trial.
     Begin(TrialRequest),
-    /// Begin and end trials by what the fingers do, from now on; or no more.
+    /// Begin and end trials automatically when the fingers move; none turns this off.
     Watch(Option<TrialRequest>),
-    /// End the trial that goes on, and keep it.
+    /// End the running trial and keep it.
     End,
-    /// Give up the trial that goes on: it counts as discarded.
+    /// End the running trial and discard it.
     Discard,
-    /// Let the doctor look at the board.
+    /// Observe the board for the doctor.
     Observe(ObserveRequest),
-    /// Something about a calibration.
+    /// Calibration.
     Calibrate(CalibrationCommand),
-    /// Something about the doctor's crosstalk test.
+    /// Crosstalk test.
     Crosstalk(CrosstalkCommand),
     /// End the thread.
     Quit,
 }
 
-/// The newest reading, and what it comes to.
+/// The newest reading, raw and converted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LatestReading {
     /// Counts by channel of the board.
     pub counts: Vec<Option<f32>>,
     /// Angle, curvature, force and pressure by the calibrations; nothing where there are none.
     pub felt: SensorEstimate,
-    /// Which sensors, in the order of `Sensor::ALL`, show more than they were calibrated with.
+    /// Sensors outside their calibrated range, in the order of `Sensor::ALL`.
     pub beyond: [bool; 4],
     /// Line pressure: as commanded, or as the board reports it (bar).
     pub line_bar: Option<f64>,
 }
 
-/// A trial that goes on.
+/// Running trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialView {
     /// Its number; none before the store has given one.
@@ -79,7 +96,7 @@ pub struct TrialView {
     pub request: TrialRequest,
     /// Stage of the grasp.
     pub stage: GraspStage,
-    /// How long this part will take from now (s), where it is known.
+    /// Time left in this stage (s), where known.
     pub left_s: Option<f64>,
     /// Time since the closing began; negative before it (s).
     pub t_s: f64,
@@ -96,55 +113,55 @@ impl TrialView {
     }
 }
 
-/// A trial that has ended.
+/// Finished trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EndedTrial {
     /// Its number.
     pub id: TrialId,
-    /// What was asked for.
+    /// The request.
     pub request: TrialRequest,
-    /// It was given up.
+    /// True where it was discarded.
     pub discarded: bool,
-    /// What should be known of it, in sentences.
+    /// Warnings, in sentences.
     pub warnings: Vec<String>,
-    /// How well the board kept time, in a line.
+    /// Timing statistics of the board, in a line.
     pub cadence: String,
 }
 
-/// The newest state of everything about the real gripper.
+/// State of the real gripper.
 #[derive(Clone, Debug, Default)]
 pub struct GripperView {
     /// Rises with every change.
     pub revision: u64,
-    /// Commands that have been handled, of those that were asked for; what is shown here came after them.
+    /// Number of commands handled before this view.
     pub handled: u64,
-    /// The link; none while nothing is listened to.
+    /// The link; none while disconnected.
     pub link: Option<LinkStatus>,
-    /// Why the last port could not be opened.
+    /// Reason why the last port could not be opened.
     pub refused: Option<NotOpened>,
-    /// The ports that were found last.
+    /// Ports found last.
     pub ports: Vec<PortInfo>,
     /// The newest reading.
     pub latest: Option<LatestReading>,
-    /// What the first values of trace rows are; counts by channel of the board follow.
+    /// Channels of the first values of trace rows; counts by channel of the board follow.
     pub channels: Arc<[Channel]>,
-    /// How far the zeros are from those of the calibrations.
+    /// Drift of the zeros since calibration.
     pub drift: Vec<Drift>,
-    /// What is missing of the calibrations, in sentences.
+    /// Remarks on missing calibrations, in sentences.
     pub remarks: Vec<String>,
-    /// The trial that goes on.
+    /// Running trial.
     pub trial: Option<TrialView>,
-    /// What a trial would be that begins by itself.
+    /// Request of automatic trials; none while they are off.
     pub watching: Option<TrialRequest>,
-    /// The last trial that ended.
+    /// Last finished trial.
     pub ended: Option<Arc<EndedTrial>>,
-    /// Which stretch of trace rows is the newest.
+    /// Number of the newest stretch of trace rows.
     pub grasp: u64,
-    /// What is recognised; absent without a model, and without the channels that it reads.
+    /// Recognition; absent without a model, and without the channels that it reads.
     pub identification: Option<Arc<IdentificationView>>,
-    /// Why nothing is recognised.
+    /// Reason why recognition is off.
     pub recognition_off: Option<Arc<str>>,
-    /// Name of what recognises.
+    /// Name of the recognition model.
     pub model: Option<String>,
     /// A calibration.
     pub calibration: Option<Arc<CalibrationView>>,
@@ -155,7 +172,7 @@ pub struct GripperView {
 }
 
 impl GripperView {
-    /// True while a board is listened to.
+    /// True while a board is connected.
     pub fn is_connected(&self) -> bool {
         self.link.is_some()
     }

@@ -1,9 +1,9 @@
-//! The real gripper for a window: a thread "gripper" that owns the link to the board and shares what it hears between all
-//! who want it: the live view, the trial that is being recorded, recognition, and a calibration.
+//! The real gripper for a window: a thread "gripper" that owns the link to the board and shares its readings between live view,
+//! recorded trial, recognition and calibration.
 //!
 //! ```text
 //!  UI                          "gripper"                                        serial-read, serial-decode
-//!  GripperCommand ------------>   connects, conducts the control box    <--events--   link
+//!  GripperCommand ------------>   connects, drives the control box      <--events--   link
 //!  <--newest GripperView----   derives angle and force, recognises
 //!  <--every TraceRow--------   records: each reading, a second at a time
 //!  <--Notice----------------
@@ -19,6 +19,6 @@ mod worker;
 
 pub use calibrating::{CalibrationCommand, CalibrationPlan, CalibrationView, RunningCalibration};
 pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
-pub use messages::{EndedTrial, GripperCommand, GripperView, LatestReading, TrialView};
+pub use messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;
-pub use worker::{GripperSetup, GripperWorker};
+pub use worker::GripperWorker;

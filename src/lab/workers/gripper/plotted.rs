@@ -1,13 +1,13 @@
-//! Readings as plots need them: at most a hundred rows a second, however fast the board is, without losing an extreme.
+//! Decimation of readings for plots: at most a hundred rows a second, with minima and maxima kept.
 
 use crate::grasping::Row;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::SensorEstimate;
 
-/// Above this rate readings are gathered (1/s).
+/// Rate above which readings are binned (1/s).
 const MOST_HZ: f64 = 110.0;
-/// Length of what is gathered (s): two rows of it are kept, the least and the largest values.
+/// Length of a bin (s); each gives two rows, minimum and maximum.
 const BIN_S: f64 = 0.02;
 
 /// Makes trace rows of readings.
@@ -19,7 +19,7 @@ pub(super) struct Plotted {
     last_s: Option<f64>,
 }
 
-/// What is gathered.
+/// Bin of readings.
 #[derive(Debug)]
 struct Bin {
     from_s: f64,
@@ -38,14 +38,14 @@ impl Plotted {
     }
 
     /// The row of a reading: derived channels, then counts of the board.
-    pub(super) fn row(&self, reading: &Reading, felt: &SensorEstimate, line_bar: Option<f64>) -> Row {
-        let derived = self.channels.iter().map(|channel| felt.of(channel).map_or(f32::NAN, |value| value as f32));
+    pub(super) fn row(&self, reading: &Reading, estimate: &SensorEstimate, line_bar: Option<f64>) -> Row {
+        let derived = self.channels.iter().map(|channel| estimate.of(channel).map_or(f32::NAN, |value| value as f32));
         let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
         let values = derived.chain((0..self.counts).map(count)).collect();
         Row { t_s: reading.t_s, line_bar: line_bar.unwrap_or(f64::NAN), phase: None, values }
     }
 
-    /// Takes in a row; the rows to plot.
+    /// Adds a row; returns the rows to plot.
     pub(super) fn push(&mut self, row: Row) -> Vec<Row> {
         let Row { t_s, line_bar, phase, values } = row;
         let fast = self.last_s.is_some_and(|last| t_s - last < 1.0 / MOST_HZ);
@@ -71,7 +71,7 @@ impl Plotted {
         rows
     }
 
-    /// What is gathered so far.
+    /// Ends the bin and returns its rows.
     pub(super) fn flush(&mut self) -> Vec<Row> {
         let Some(Bin { from_s, last_s, line_bar, least, largest, many }) = self.bin.take() else { return Vec::new() };
         let mut rows = vec![Row { t_s: from_s, line_bar, phase: None, values: least }];

@@ -1,4 +1,4 @@
-//! The gripper's thread: it owns the link, hands what it hears to everybody who wants it, and does what it is told.
+//! Session of the gripper thread: owns the link, distributes its readings and handles commands.
 
 mod recognising;
 mod sensors;
@@ -6,10 +6,9 @@ mod trials;
 
 use super::calibrating::{Calibrating, CalibrationView};
 use super::crosstalk::{Crossing, CrosstalkView};
-use super::messages::{EndedTrial, GripperCommand, GripperView, LatestReading};
+use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
-use super::worker::GripperSetup;
 use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
@@ -32,14 +31,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel};
 use std::time::{Duration, Instant};
 
-/// How long the thread waits for readings before it looks for commands again: also how punctual the control box is told.
+/// Longest wait for readings before commands are handled; also the timing error of line pressure.
 const PATIENCE: Duration = Duration::from_millis(10);
-/// How often a port is tried that another program has.
+/// Interval between attempts on a port that another program has open.
 const RETRY: Duration = Duration::from_secs(1);
-/// Views are published no more often than this.
+/// Shortest interval between two views.
 const CALM: Duration = Duration::from_millis(33);
 
-/// Where results go.
+/// Channels to the window.
 pub(super) struct Outlets {
     pub(super) view: Arc<Latest<GripperView>>,
     pub(super) rows: SyncSender<TraceRow>,
@@ -49,14 +48,14 @@ pub(super) struct Outlets {
 }
 
 impl Outlets {
-    fn tell(&self, notice: Notice) {
-        // The window may have gone; then there is nobody to tell.
-        let _heard = self.notices.send(notice);
+    fn notify(&self, notice: Notice) {
+        // The window may be closed.
+        let _sent = self.notices.send(notice);
         (self.wake)();
     }
 }
 
-/// What is known while something is listened to.
+/// Open connection to a board.
 struct Connection {
     gripper: SerialGripper,
     board: Board,
@@ -67,13 +66,13 @@ struct Connection {
     drift: Vec<Drift>,
     latest: Option<LatestReading>,
     plotted: Plotted,
-    /// It was opened for a calibration or a test, and is given back when the last of them is done.
+    /// Opened for a calibration or a test, and closed after the last of them.
     borrowed: bool,
-    /// Tells when a grasp begins and ends by itself.
+    /// Detects begin and end of grasps.
     segmenter: Segmenter,
 }
 
-/// Everything the thread owns.
+/// State of the thread.
 pub(super) struct GripperSession {
     outlets: Outlets,
     listen: Listen,
@@ -85,7 +84,7 @@ pub(super) struct GripperSession {
     grasps: u32,
     ports: Vec<PortInfo>,
     refused: Option<NotOpened>,
-    /// The port that another program has, where it is to be opened as soon as that lets it go.
+    /// Port that another program has open; opened as soon as it is free.
     retried: Option<Option<PathBuf>>,
     connection: Option<Connection>,
     /// Absent where its thread could not be started.
@@ -96,7 +95,7 @@ pub(super) struct GripperSession {
     recording_id: Option<TrialId>,
     /// Requests of trials whose end the recorder has not reported yet; whether they were discarded.
     ending: VecDeque<(TrialRequest, bool)>,
-    /// Trials that were begun so far.
+    /// Number of trials begun so far.
     begun: u64,
     watching: Option<TrialRequest>,
     ended: Option<Arc<EndedTrial>>,
@@ -119,16 +118,16 @@ impl GripperSession {
         let (sender, recorded) = channel();
         let recorder = Recorder::start(store.clone(), move |notice| {
             // The thread may have ended; the trial is safe.
-            let _heard = sender.send(notice);
+            let _sent = sender.send(notice);
         });
         let recorder = match recorder {
             Ok(recorder) => Some(recorder),
             Err(error) => {
-                outlets.tell(Notice::Failed(format!("trials cannot be stored: {error}")));
+                outlets.notify(Notice::Failed(format!("trials cannot be stored: {error}")));
                 None
             }
         };
-        let mut desk = Self {
+        let mut session = Self {
             outlets,
             listen,
             path: store,
@@ -160,11 +159,11 @@ impl GripperSession {
             handled: 0,
             published: Instant::now(),
         };
-        desk.set_model(model);
-        desk
+        session.set_model(model);
+        session
     }
 
-    /// Works until it is told to quit.
+    /// Runs until [`GripperCommand::Quit`].
     pub(super) fn run(mut self, inbox: &Receiver<GripperCommand>) {
         self.publish();
         loop {
@@ -193,7 +192,7 @@ impl GripperSession {
             match command {
                 Some(GripperCommand::Quit) => break,
                 Some(command) => {
-                    // The doctor asks by himself.
+                    // Observations are internal, not commands of the window.
                     self.handled += u64::from(!matches!(command, GripperCommand::Observe(_)));
                     self.handle(command);
                     self.publish();
@@ -202,7 +201,7 @@ impl GripperSession {
                     self.take_recorded();
                     self.try_again();
                 }
-                None => self.listen_on(),
+                None => self.take_events(),
             }
         }
         self.disconnect("the window was closed");
@@ -218,7 +217,7 @@ impl GripperSession {
                 self.disconnect("another port was chosen");
                 self.connect(port.as_deref());
             }
-            GripperCommand::Disconnect => self.disconnect("the port was given back"),
+            GripperCommand::Disconnect => self.disconnect("the port was closed"),
             GripperCommand::Vent => self.vent(),
             GripperCommand::Tare => self.tare(),
             GripperCommand::SetScene(scene) => self.scene = *scene,
@@ -242,7 +241,7 @@ impl GripperSession {
             GripperCommand::Observe(request) if self.connection.is_some() => {
                 self.observing.push(Observing::new(request));
             }
-            // Whoever asked learns of it by the end of the request, and looks alone.
+            // The requester notices that its channel closed and opens the port directly.
             GripperCommand::Observe(_) => {}
             GripperCommand::Calibrate(command) => self.calibrate(&command),
             GripperCommand::Crosstalk(command) => self.look_for_crosstalk(command),
@@ -255,15 +254,15 @@ impl GripperSession {
         if let Err(mut refused) = self.open_stream(port) {
             if refused.may_pass {
                 self.retried = Some(port.map(Path::to_owned));
-                refused.text.push_str("; until then it is tried each second");
+                refused.text.push_str("; retrying each second");
             }
-            self.outlets.tell(Notice::Failed(refused.text.clone()));
+            self.outlets.notify(Notice::Failed(refused.text.clone()));
             self.refused = Some(refused);
             self.ports = list_ports();
         }
     }
 
-    /// Whether the program that had the port has let it go. That it has not is no news.
+    /// Tries again to open a port that another program had open; reports only a new failure.
     fn try_again(&mut self) {
         let Some(port) = self.retried.take() else { return };
         match self.open_stream(port.as_deref()) {
@@ -276,8 +275,8 @@ impl GripperSession {
 
     fn open_stream(&mut self, port: Option<&Path>) -> Result<(), NotOpened> {
         let mut gripper = SerialGripper::new((self.listen)(port)?);
-        // A board that speaks our language says who it is; to others it is a line they do not know.
-        let _told = gripper.send("?");
+        // A board with our protocol answers with a handshake; others ignore the line.
+        let _sent = gripper.send("?");
         self.connection = Some(Connection {
             board: gripper.stream().status().board,
             gripper,
@@ -291,7 +290,7 @@ impl GripperSession {
             segmenter: Segmenter::new(&Board::default()),
         });
         self.read_calibrations();
-        self.another_stretch(0.0);
+        self.begin_stretch(0.0);
         self.start_over();
         Ok(())
     }
@@ -309,13 +308,13 @@ impl GripperSession {
         self.retried = None;
     }
 
-    /// Takes in what the link has heard, and does what is due.
-    fn listen_on(&mut self) {
-        // Everything that has come is taken in before the pressure is set.
+    /// Handles the events of the link, then sets the pressure that is due.
+    fn take_events(&mut self) {
+        // All waiting events come before the pressure.
         let mut patience = PATIENCE;
         while let Some(connection) = &mut self.connection {
             match connection.gripper.next_event(patience) {
-                Ok(GripperEvent::Board(event)) => self.hear(event),
+                Ok(GripperEvent::Board(event)) => self.take_event(event),
                 Ok(_) => break,
                 Err(error) => {
                     if let Some(recording) = &mut self.recording {
@@ -328,37 +327,37 @@ impl GripperSession {
         }
         self.drive();
         self.take_recorded();
-        self.end_looks();
+        self.end_observations();
         let over = self.connection.as_ref().is_some_and(|connection| connection.gripper.stream().is_over());
         if over {
             let why =
                 self.connection.as_ref().map(|c| c.gripper.stream().status().state.sentence()).unwrap_or_default();
             self.disconnect(&why);
-            self.outlets.tell(Notice::Warning(why.clone()));
+            self.outlets.notify(Notice::Warning(why.clone()));
             self.refused = Some(why.into());
             self.publish();
         } else if self.published.elapsed() >= CALM || self.connection.is_none() {
-            // Without a board nothing else comes that would be published with it.
+            // Without a board there are no later readings to publish with.
             self.publish();
         }
     }
 
-    /// Hands over what the doctor has seen enough of.
-    fn end_looks(&mut self) {
+    /// Finishes observations whose time is over.
+    fn end_observations(&mut self) {
         let Some(connection) = &self.connection else { return };
         for observing in self.observing.extract_if(.., |observing| observing.is_over()) {
             observing.finish(connection.gripper.stream().status());
         }
     }
 
-    fn hear(&mut self, event: LinkEvent) {
+    fn take_event(&mut self, event: LinkEvent) {
         let Some(connection) = &mut self.connection else { return };
         let begun = self.begun;
         connection.recent.push(&event);
         match &event {
             LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
                 let reading = reading.clone();
-                self.hear_reading(&reading);
+                self.take_reading(&reading);
             }
             LinkEvent::Decoded(DecodedEvent::Board(board)) if connection.board != *board => {
                 connection.board = board.clone();
@@ -370,7 +369,7 @@ impl GripperSession {
             }
             LinkEvent::Decoded(DecodedEvent::Board(_) | DecodedEvent::Reply(_)) | LinkEvent::Captured(_) => {}
         }
-        // What began a trial just now is among what it was begun with.
+        // An event that began a trial is already part of it.
         if begun == self.begun
             && let (Some(recording), Some(recorder)) = (&mut self.recording, &self.recorder)
         {
@@ -379,17 +378,17 @@ impl GripperSession {
         }
     }
 
-    fn hear_reading(&mut self, reading: &Reading) {
+    fn take_reading(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
-        let felt = connection.readout.estimate(reading);
+        let estimate = connection.readout.estimate(reading);
         let commanded = self.recording.as_ref().and_then(|recording| recording.controller().line_bar());
-        // A board that tells its pressure knows better than whoever commands it.
+        // The reported pressure is more accurate than the commanded one.
         let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
-        let row = connection.plotted.row(reading, &felt, line_bar);
+        let row = connection.plotted.row(reading, &estimate, line_bar);
         let rows = connection.plotted.push(row.clone());
-        let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&felt));
-        connection.latest = Some(LatestReading { counts, felt, beyond, line_bar });
+        let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&estimate));
+        connection.latest = Some(LatestReading { counts, felt: estimate, beyond, line_bar });
         self.plot(rows);
         self.watch(reading);
         self.recognise(&row);
@@ -413,8 +412,8 @@ impl GripperSession {
         }
     }
 
-    /// From now on rows belong to another stretch of time, which counts from `from_s`.
-    fn another_stretch(&mut self, from_s: f64) {
+    /// Starts a new stretch of rows, with time counted from `from_s`.
+    fn begin_stretch(&mut self, from_s: f64) {
         let rows = self.connection.as_mut().map(|connection| connection.plotted.flush()).unwrap_or_default();
         self.plot(rows);
         self.stretch = (self.stretch.0 + 1, from_s);

@@ -1,38 +1,22 @@
-//! The handle on the gripper's thread: commands go in, views, trace rows and notices come out.
+//! Handle of the gripper thread: commands in, views, trace rows and notices out.
 
-use super::messages::{GripperCommand, GripperView};
-use super::observing;
+use super::messages::{GripperCommand, GripperSetup, GripperView};
+use super::observing::ObserveRequest;
 use super::session::{GripperSession, Outlets};
-use crate::gripper::Listen;
-use crate::workers::{Examine, Latest, Notice, TraceRow, Wake};
-use palpate_learn::Model;
-use palpate_sim::scene::Scene;
-use std::path::PathBuf;
+use crate::workers::{Examine, ExamineRequest, Latest, Notice, TraceRow};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
-/// What the gripper's thread starts from.
-pub struct GripperSetup {
-    /// The gripper as it is modelled, and the programme of its control box.
-    pub scene: Scene,
-    /// Where trials and calibrations are stored.
-    pub store: PathBuf,
-    /// Recognises what is in the hand; without one nothing is recognised.
-    pub model: Option<Arc<Model>>,
-    /// Grasps that are made at most before it stops.
-    pub grasps: u32,
-    /// Opens ports.
-    pub listen: Listen,
-    /// Called when there is something new.
-    pub wake: Wake,
-}
-
-/// Trace rows that wait at most: a minute and a half of the fastest board. A reader that sleeps longer finds a gap.
+/// Maximum number of queued trace rows: a minute and a half of the fastest board. A slower reader finds a gap.
 const MOST_ROWS: usize = 9000;
 
-/// A handle on the gripper's thread. Dropping it vents, ends a trial that goes on, and gives the port back.
+/// Interval between progress reports of diagnostics.
+const REPORT_EVERY: Duration = Duration::from_millis(100);
+
+/// Handle of the gripper thread. Dropping it vents, ends a running trial and closes the port.
 #[derive(Debug)]
 pub struct GripperWorker {
     /// Absent once the thread is being ended.
@@ -47,7 +31,7 @@ pub struct GripperWorker {
 }
 
 impl GripperWorker {
-    /// Starts the thread. Nothing is connected to before that is wished for.
+    /// Starts the thread. It connects only on command.
     pub fn start(setup: GripperSetup) -> std::io::Result<Self> {
         let (commands, inbox) = channel();
         let (row_sender, rows) = sync_channel(MOST_ROWS);
@@ -63,15 +47,15 @@ impl GripperWorker {
         };
         let thread = std::thread::Builder::new().name("gripper".to_owned()).spawn(move || {
             let last_words = (outlets.notices.clone(), Arc::clone(&outlets.wake));
-            // A panic becomes a message; the window stays, and the board vents by itself when it hears nothing more.
+            // A panic becomes a message; the window stays, and the board vents when no more lines arrive.
             let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                GripperSession::new(setup, outlets).run(&inbox)
+                GripperSession::new(setup, outlets).run(&inbox);
             }));
             if outcome.is_err() {
-                let text = "the gripper's thread stopped through a fault of the program; restart Palpate and report \
+                let text = "the gripper thread stopped because of a fault in the program; restart Palpate and report \
                             what you did";
-                // If nobody listens any more, nobody needs to know.
-                let _heard = last_words.0.send(Notice::Failed(text.to_owned()));
+                // The window may be closed.
+                let _sent = last_words.0.send(Notice::Failed(text.to_owned()));
                 last_words.1();
             }
         })?;
@@ -86,24 +70,24 @@ impl GripperWorker {
         })
     }
 
-    /// Asks for something; how many commands that makes. [`GripperView::handled`] tells how many have been handled.
+    /// Sends a command; returns the number of commands so far, to compare with [`GripperView::handled`].
     pub fn command(&self, command: GripperCommand) -> u64 {
         if let Some(commands) = &self.commands {
-            // A thread that has died has said so; the rest of the window works.
-            let _heard = commands.send(command);
+            // A thread that has failed has sent a notice; the rest of the window works.
+            let _sent = commands.send(command);
         }
         self.asked.fetch_add(1, Ordering::Relaxed) + 1
     }
 
-    /// What looks at the board for the doctor: at the link that is held here or, while none is, as `alone` does.
+    /// Examination of the board for the doctor: through the open link or, without one, by `alone`.
     pub fn examine(&self, alone: Examine) -> Examine {
         match &self.commands {
-            Some(commands) => observing::shared(commands.clone(), Arc::clone(&self.view), alone),
+            Some(commands) => observe_shared(commands.clone(), Arc::clone(&self.view), alone),
             None => alone,
         }
     }
 
-    /// Where everything stands; nothing before anything was wished for.
+    /// The newest view; none before the first one is published.
     pub fn view(&self) -> Option<Arc<GripperView>> {
         self.view.get()
     }
@@ -113,7 +97,7 @@ impl GripperWorker {
         self.rows.try_iter()
     }
 
-    /// True once after rows had to be dropped because nobody read them.
+    /// True once after rows had to be dropped because the queue was full.
     pub fn take_rows_lost(&self) -> bool {
         self.rows_lost.swap(false, Ordering::Relaxed)
     }
@@ -132,4 +116,28 @@ impl Drop for GripperWorker {
             let _ended = thread.join();
         }
     }
+}
+
+/// Observes the board through the link that the gripper thread holds; without a link, runs `alone`.
+fn observe_shared(commands: Sender<GripperCommand>, view: Arc<Latest<GripperView>>, alone: Examine) -> Examine {
+    Arc::new(move |request: &ExamineRequest, proceed: &mut dyn FnMut(f64) -> bool| {
+        if !view.get().is_some_and(|view| view.is_connected()) {
+            return alone(request, proceed);
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let (command, observed) = ObserveRequest::new(request.seconds, Arc::clone(&stop));
+        let began = Instant::now();
+        if commands.send(GripperCommand::Observe(command)).is_err() {
+            return alone(request, proceed);
+        }
+        loop {
+            match observed.recv_timeout(REPORT_EVERY) {
+                Ok(seen) => return seen,
+                // The observation was dropped because the port was closed: open it directly.
+                Err(RecvTimeoutError::Disconnected) => return alone(request, proceed),
+                Err(RecvTimeoutError::Timeout) if proceed(began.elapsed().as_secs_f64()) => {}
+                Err(RecvTimeoutError::Timeout) => stop.store(true, Ordering::Relaxed),
+            }
+        }
+    })
 }

@@ -1,4 +1,4 @@
-//! Recognition of the real gripper: the model listens to calibrated rows while the fingers close and hold.
+//! Recognition of the real gripper: the model reads calibrated rows while the fingers close and hold.
 
 use super::GripperSession;
 use crate::grasping::Row;
@@ -24,15 +24,15 @@ impl GripperSession {
 
     pub(super) fn begin_recognition(&mut self) {
         let (Some(listener), Some(connection)) = (&mut self.listener, &self.connection) else { return };
-        let place = "on the gripper: the model reads more than is calibrated";
+        let place = "on the gripper: the model needs sensors that are not calibrated";
         let calibrated = connection.readout.channels();
         let columns = self.channels.iter().enumerate().filter(|(_, channel)| calibrated.contains(channel));
         if let Some(warning) = listener.begin_grasp(columns, place) {
-            self.outlets.tell(Notice::Warning(warning));
+            self.outlets.notify(Notice::Warning(warning));
         }
     }
 
-    /// Lets the model listen to a row, from the closing on.
+    /// Passes a row to the model, from the closing on.
     pub(super) fn recognise(&mut self, row: &Row) {
         let (Some(listener), Some(recording)) = (&mut self.listener, &self.recording) else { return };
         let since = recording.controller().closing_s().map(|closing_s| row.t_s - closing_s);

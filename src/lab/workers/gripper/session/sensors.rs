@@ -1,4 +1,4 @@
-//! What the sensors mean: calibrations of the parts, those that are being made, and zeros.
+//! Sensors of the session: calibrations of the parts, running calibrations, zeros and the crosstalk test.
 
 use super::{Connection, GripperSession, open};
 use crate::gripper::Gripper;
@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Readings before the closing from which the zeros are taken (s).
 const REST_S: f64 = 0.6;
-/// Readings older than this say nothing of now (s).
+/// Readings older than this are stale (s).
 const STALE_S: f64 = 2.0;
 
 impl GripperSession {
@@ -53,24 +53,24 @@ impl GripperSession {
 
     // Zeros.
 
-    /// The zeros of a trial are what the sensors show just before its closing.
+    /// Takes the zeros of a trial from the readings just before its closing.
     pub(super) fn zero_from_rest(&mut self, closing_s: f64) {
         let Some(connection) = &mut self.connection else { return };
         let zero = connection.readout.zero_from(&connection.recent.between(closing_s - REST_S, closing_s));
         connection.set_zero(zero);
     }
 
-    /// Takes the zeros of now, where the hand is open and left alone.
+    /// Tares: takes the zeros from the present readings of the open, untouched hand.
     pub(super) fn tare(&mut self) {
         if self.recording.is_some() {
-            let text = "nothing was tared: a trial goes on; its zeros are taken before it closes";
-            return self.outlets.tell(Notice::Warning(text.to_owned()));
+            let text = "not tared: a trial is running; its zeros are taken before it closes";
+            return self.outlets.notify(Notice::Warning(text.to_owned()));
         }
-        // The zero is kept for the parts that serve in the store now, so it is measured through them.
+        // The zero is stored for the present calibrations, so they are read first.
         self.read_calibrations();
         let Some(connection) = &mut self.connection else { return };
         let mut readings = connection.recent.last(2.0 * REST_S);
-        // What was heard before the board fell silent says nothing of now; captured bytes keep their own time.
+        // Readings from before the board fell silent are stale; captured bytes have a clock of their own.
         let since_s = if connection.gripper.stream().status().baud.is_some() {
             connection.gripper.now_s() - STALE_S
         } else {
@@ -80,10 +80,10 @@ impl GripperSession {
         let zero = match connection.readout.tare(&readings) {
             Ok(zero) if zero != Zero::default() => zero,
             Ok(_) => {
-                let text = "nothing was tared: no calibrated sensor has been read yet";
-                return self.outlets.tell(Notice::Warning(text.to_owned()));
+                let text = "not tared: no calibrated sensor has been read yet";
+                return self.outlets.notify(Notice::Warning(text.to_owned()));
             }
-            Err(unrest) => return self.outlets.tell(Notice::Warning(format!("nothing was tared: {unrest}"))),
+            Err(unrest) => return self.outlets.notify(Notice::Warning(format!("not tared: {unrest}"))),
         };
         connection.set_zero(zero);
         let far: Vec<String> = connection
@@ -93,16 +93,17 @@ impl GripperSession {
             .filter_map(Drift::remark)
             .collect();
         for text in far {
-            self.outlets.tell(Notice::Warning(text));
+            self.outlets.notify(Notice::Warning(text));
         }
         let stored = open(&mut self.store, &self.path)
             .and_then(|store| store.calibrations().add_tare(&zero).map_err(|error| error.to_string()));
         match stored {
             Ok(_) => {
-                self.outlets.tell(Notice::Info("tared: the zeros of now serve until they are taken again".to_owned()));
+                self.outlets.notify(Notice::Info("Tared.".to_owned()));
             }
             Err(cause) => {
-                self.outlets.tell(Notice::Failed(format!("the tare serves until the port is given back: {cause}")));
+                self.outlets
+                    .notify(Notice::Failed(format!("Tare not saved: it applies until you disconnect: {cause}")));
             }
         }
     }
@@ -128,12 +129,12 @@ impl GripperSession {
                 let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection) else { return };
                 match open(&mut self.store, &self.path) {
                     Ok(store) => calibrating.close_empty(&connection.board, store),
-                    Err(cause) => self.outlets.tell(Notice::Warning(cause)),
+                    Err(cause) => self.outlets.notify(Notice::Warning(cause)),
                 }
             }
             CalibrationCommand::Take(_) | CalibrationCommand::Skip | CalibrationCommand::Undo => {
                 if let Some(calibrating) = &mut self.calibrating {
-                    calibrating.grant(command);
+                    calibrating.handle(command);
                 }
             }
         }
@@ -167,17 +168,17 @@ impl GripperSession {
         self.refused = None;
         if let Err(refused) = self.open_stream(port) {
             let cause = refused.text.clone();
-            self.outlets.tell(Notice::Failed(cause.clone()));
+            self.outlets.notify(Notice::Failed(cause.clone()));
             self.refused = Some(refused);
             return Err(cause);
         }
-        // One that was waited for stays.
+        // A port that the user connected stays open.
         let borrowed = self.retried.take().is_none();
         self.connection.iter_mut().for_each(|connection| connection.borrowed = borrowed);
         Ok(())
     }
 
-    /// Gives a port back that was opened for what has ended now.
+    /// Closes a port that was opened only for a calibration or test that has ended.
     fn return_port(&mut self, why: &str) {
         let unused = self.occupied().is_none();
         if unused && self.connection.as_ref().is_some_and(|connection| connection.borrowed) {
@@ -209,7 +210,7 @@ impl GripperSession {
         }
     }
 
-    /// Takes a reading into the test that goes on, and ends it when it is over.
+    /// Passes a reading to the running test; ends the test when it is complete.
     pub(super) fn cross(&mut self, reading: &Reading) {
         let (Some(crossing), Some(connection)) = (&mut self.crossing, &self.connection) else { return };
         match crossing.feed(reading, &connection.board) {
@@ -228,7 +229,7 @@ impl GripperSession {
 }
 
 impl Connection {
-    /// Subtracts a zero from now on, and judges how far it is from the calibrations.
+    /// Sets the zero and its drift since calibration.
     fn set_zero(&mut self, zero: Zero) {
         self.drift = self.readout.drift(&zero);
         self.readout = self.readout.clone().with_zero(zero);

@@ -1,4 +1,4 @@
-//! Trials at the desk: they are begun by command or by what the fingers do, conducted, written, and ended.
+//! Trials of the session: begun by command or automatically, driven, recorded and ended.
 
 use super::GripperSession;
 use crate::gripper::Gripper;
@@ -13,14 +13,14 @@ use palpate_tactile::board::Reading;
 use std::sync::Arc;
 
 impl GripperSession {
-    /// Begins and ends trials by what the fingers do, where that is wanted.
+    /// Begins and ends automatic trials.
     pub(super) fn watch(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
         let events = connection.segmenter.push(reading);
-        // Hands that bend and press for a calibration or a test make no trials.
+        // Movements for a calibration or a test are no grasps.
         let free = self.calibrating.is_none() && self.crossing.is_none();
         let Some(request) = self.watching.clone().filter(|_| free) else { return };
-        // A trial that was asked for goes its own way.
+        // A trial begun by command is not ended automatically.
         if self.recording.as_ref().is_some_and(|recording| !recording.is_automatic()) {
             return;
         }
@@ -39,15 +39,15 @@ impl GripperSession {
 
     pub(super) fn vent(&mut self) {
         let Some(connection) = &mut self.connection else {
-            return self.outlets.tell(Notice::Warning("no board is connected: vent at the control box".to_owned()));
+            return self.outlets.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
         };
         let sent = connection.gripper.vent();
         match sent {
-            Err(error) => self.outlets.tell(Notice::Failed(format!("{error}: vent at the control box"))),
-            Ok(()) if connection.board.firmware.is_none() => self.outlets.tell(Notice::Warning(
+            Err(error) => self.outlets.notify(Notice::Failed(format!("{error}: vent at the control box"))),
+            Ok(()) if connection.board.firmware.is_none() => self.outlets.notify(Notice::Warning(
                 "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
-            Ok(()) => self.outlets.tell(Notice::Warning("Vent sent.".to_owned())),
+            Ok(()) => self.outlets.notify(Notice::Warning("Vent sent.".to_owned())),
         }
         if let (Some(_), Some(recorder)) = (&self.recording, &self.recorder) {
             recorder.interrupted("vented by the user");
@@ -77,11 +77,11 @@ impl GripperSession {
     pub(super) fn end_aborted(&mut self) {
         let cause = self.recording.as_ref().and_then(|recording| recording.controller().abort_cause());
         let Some(cause) = cause else { return };
-        self.outlets.tell(Notice::Warning(format!("trial ended and fingers vented: {cause}")));
+        self.outlets.notify(Notice::Warning(format!("trial ended and fingers vented: {cause}")));
         self.end(false, None);
     }
 
-    /// What was heard before `until_s` has been passed over.
+    /// Begins a phase; readings before `until_s` are passed to recognition afterwards.
     fn begin_phase(&mut self, phase: Phase, until_s: f64) {
         match phase {
             Phase::Close => {
@@ -105,27 +105,27 @@ impl GripperSession {
 
     // Trials.
 
-    /// Begins a trial; one that goes on ends before it.
+    /// Begins a trial; ends a running one first.
     pub(super) fn begin(&mut self, request: TrialRequest, from_s: Option<f64>) {
         self.end(false, None);
         if let Some(occupied) = self.occupied() {
-            return self.outlets.tell(Notice::Warning(format!("no trial was begun: {occupied}")));
+            return self.outlets.notify(Notice::Warning(format!("trial not started: {occupied}")));
         }
         let Some(connection) = &self.connection else {
             let text = "no board is connected: connect the gripper first";
-            return self.outlets.tell(Notice::Warning(text.to_owned()));
+            return self.outlets.notify(Notice::Warning(text.to_owned()));
         };
         if connection.latest.is_none() {
             let text = format!("nothing is recorded yet: {}", connection.gripper.stream().status().state.sentence());
-            return self.outlets.tell(Notice::Warning(text));
+            return self.outlets.notify(Notice::Warning(text));
         }
         let Some(recorder) = &self.recorder else {
-            return self.outlets.tell(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
+            return self.outlets.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
         let recording =
             BoardTrialRecording::begin(recorder, &connection.gripper, &connection.recent, &self.scene, request, from_s);
-        self.another_stretch(recording.controller().closing_s().unwrap_or(recording.began_s()));
+        self.begin_stretch(recording.controller().closing_s().unwrap_or(recording.began_s()));
         self.recording = Some(recording);
         self.recording_id = None;
         self.begun += 1;
@@ -135,7 +135,7 @@ impl GripperSession {
         }
     }
 
-    /// Takes in the reports of the recorder.
+    /// Handles the notices of the recorder.
     pub(super) fn take_recorded(&mut self) {
         for notice in self.recorded.try_iter().collect::<Vec<_>>() {
             match notice {
@@ -143,14 +143,14 @@ impl GripperSession {
                 RecorderNotice::Recorded(trial) => {
                     let Some((request, discarded)) = self.ending.pop_front() else { continue };
                     if !discarded {
-                        self.outlets.tell(Notice::Stored(trial.id));
+                        self.outlets.notify(Notice::Stored(trial.id));
                     }
                     let cadence = cadence_line(&trial.about.cadence);
                     let warnings = trial.warnings;
                     self.ended = Some(Arc::new(EndedTrial { id: trial.id, request, discarded, warnings, cadence }));
                     self.publish();
                 }
-                RecorderNotice::Warning(text) => self.outlets.tell(Notice::Warning(text)),
+                RecorderNotice::Warning(text) => self.outlets.notify(Notice::Warning(text)),
                 RecorderNotice::Failed(cause) => self.stop_recording(&cause),
                 RecorderNotice::Stored(_) | RecorderNotice::Discarded(_) => {}
             }
@@ -160,19 +160,19 @@ impl GripperSession {
     /// The trial cannot be recorded any further. Driven fingers are not left under pressure.
     fn stop_recording(&mut self, cause: &str) {
         if self.ending.pop_front().is_some() {
-            return self.outlets.tell(Notice::Failed(format!("the end of the trial was not stored: {cause}")));
+            return self.outlets.notify(Notice::Failed(format!("the end of the trial was not stored: {cause}")));
         }
         let driven = self.recording.take().is_some_and(|recording| recording.is_driven());
         let vented = self.connection.as_mut().filter(|_| driven).map(|connection| connection.gripper.vent());
         if let Some(Err(error)) = vented {
-            self.outlets.tell(Notice::Failed(format!("{error}; the board vents by itself within a second")));
+            self.outlets.notify(Notice::Failed(format!("{error}; the board vents within a second")));
         }
         self.start_over();
-        self.another_stretch(0.0);
-        self.outlets.tell(Notice::Failed(format!("recording stopped, what was written is safe: {cause}")));
+        self.begin_stretch(0.0);
+        self.outlets.notify(Notice::Failed(format!("recording stopped; readings so far are stored: {cause}")));
     }
 
-    /// Ends the trial that is recorded, if any. The recorder reports what came of it.
+    /// Ends the trial that is recorded, if any. The recorder reports the result.
     pub(super) fn end(&mut self, discarded: bool, note: Option<String>) {
         let Some(mut recording) = self.recording.take() else { return };
         if let Some(note) = note {
@@ -193,7 +193,7 @@ impl GripperSession {
         let guess = self.model.clone().zip(guess);
         self.ending.push_back((recording.request().clone(), discarded));
         recording.finish(recorder, &mut connection.gripper, discarded, guess);
-        self.another_stretch(0.0);
+        self.begin_stretch(0.0);
     }
 
     /// The view of a trial that is recorded.
