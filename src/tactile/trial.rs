@@ -8,7 +8,7 @@ use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// Names a trial within its store.
 pub type TrialId = i64;
@@ -25,16 +25,13 @@ pub struct PhaseMark {
 }
 
 /// Origin of a trial.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrialSource {
     /// A simulated gripper.
-    #[serde(rename = "sim")]
     Simulated,
     /// A real gripper.
-    #[serde(rename = "serial")]
     Recorded,
     /// A file of another program.
-    #[serde(rename = "import")]
     Imported,
 }
 
@@ -63,6 +60,12 @@ impl TrialSource {
 impl std::fmt::Display for TrialSource {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
+    }
+}
+
+impl Serialize for TrialSource {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 

@@ -65,7 +65,7 @@ impl GripperWorker {
             let last_words = (outlets.notices.clone(), Arc::clone(&outlets.wake));
             // A panic becomes a message; the window stays, and the board vents by itself when it hears nothing more.
             let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                GripperSession::new(setup, outlets).run(&inbox)
+                GripperSession::new(setup, outlets).run(&inbox);
             }));
             if outcome.is_err() {
                 let text = "the gripper's thread stopped through a fault of the program; restart Palpate and report \
