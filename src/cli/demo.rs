@@ -18,7 +18,7 @@ use palpate_sim::objects::{EMPTY, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::file_name_of;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::trial::TrialId;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
@@ -133,7 +133,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         let trial = grasp(&scene, object.as_ref(), pose_seed);
         let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
         identification.begin_grasp(reader.channels().iter().enumerate())?;
-        for row in trial.frames.iter().map(|frame| reader.row(frame)) {
+        for row in trial.frames().iter().map(|frame| reader.row(frame)) {
             identification.push(row.t_s, &row);
         }
         identification.end_grasp();
@@ -146,7 +146,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         let picture = match &mut painter {
             Some(painter) => {
                 let number = grasps.len() + 1;
-                let path = arguments.out.join(format!("{}_grasp_{number}.png", file_name_of(&trial.info.object)));
+                let path = arguments.out.join(format!("{}_grasp_{number}.png", file_name_of(&trial.header.object)));
                 painter.paint(&scene, object.as_ref(), &trial, &path)?;
                 Some(path)
             }
@@ -157,7 +157,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
             print_grasp(grasps.len() + 1, &report, object.as_ref().map_or(&[], |o| &o.warnings))?;
         }
         grasps.push(report);
-        released = trial.frames.last().cloned();
+        released = trial.frames().last().cloned();
         if let Some(reason) = identification.decision() {
             break reason;
         }
@@ -188,7 +188,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
 }
 
 /// The part of a report that does not depend on recognition.
-fn motion_report(trial: &Trial, scene: &Scene, seed: u64) -> GraspReport {
+fn motion_report(trial: &SimulatedTrial, scene: &Scene, seed: u64) -> GraspReport {
     let mount = &scene.gripper.mount;
     GraspReport {
         seed,
@@ -316,12 +316,12 @@ impl Painter {
         &mut self,
         scene: &Scene,
         object: Option<&ObjectModel>,
-        trial: &Trial,
+        trial: &SimulatedTrial,
         path: &Path,
     ) -> Result<(), Failure> {
-        let held = trial.frames.iter().rfind(|f| f.phase == Phase::Hold).or(trial.frames.last());
+        let held = trial.frames().iter().rfind(|f| f.phase == Phase::Hold).or(trial.frames().last());
         let Some(frame) = held else { return Ok(()) };
-        let stage = Stage::new(scene, object, trial.info.world_from_gripper);
+        let stage = Stage::new(scene, object, trial.data.world_from_gripper);
         let (centre, radius) = stage.bounds();
         let view = PictureView {
             camera: Camera::default().framing(centre, radius),

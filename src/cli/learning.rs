@@ -7,6 +7,7 @@ use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Dataset, METHODS, Method, method};
 use palpate_store::Store;
 use palpate_tactile::model::SensorModel;
+use palpate_tactile::trial::TrialSource;
 
 /// Selection of trials, and how simulated ones are sensed.
 #[derive(Debug, clap::Args)]
@@ -16,7 +17,7 @@ pub(super) struct DataArguments {
     pub(super) collection: Option<String>,
     /// Only trials of this gripper: sim (simulated) or serial (real).
     #[arg(long, value_name = "NAME")]
-    pub(super) rig: Option<String>,
+    pub(super) rig: Option<TrialSource>,
     /// Only these objects, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     pub(super) objects: Vec<String>,
@@ -50,8 +51,8 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        let (collection, rig, objects) = (self.collection.clone(), self.rig.clone(), self.objects.clone());
-        let source = DatasetQuery { collection, rig, objects, without_empty, most_of_each };
+        let (collection, objects) = (self.collection.clone(), self.objects.clone());
+        let source = DatasetQuery { collection, source: self.rig, objects, without_empty, most_of_each };
         let bar = progress_bar("reading trials")?;
         let data = source.read(store, &self.view(), &mut |done, of| {
             bar.set_length(of as u64);

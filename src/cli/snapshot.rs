@@ -10,7 +10,6 @@ use palpate_lab::grasping::prepare;
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::frame::Frame;
-use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 
@@ -122,7 +121,7 @@ fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Fr
     }
     let object = scene.load_object()?;
     let mut run = prepare(&scene, object.as_ref(), 0);
-    let stage = Stage::new(&scene, object.as_ref(), run.info().world_from_gripper);
+    let stage = Stage::new(&scene, object.as_ref(), run.begun().data.world_from_gripper);
     let mut frame = run.gripper_mut().run_mut().first_look();
     while frame.t < arguments.at {
         match run.next_frame() {
@@ -135,18 +134,18 @@ fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Fr
 
 fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> Result<(Stage, Frame, String), Failure> {
     let store = open_store(store)?;
-    if store.board_info(id)?.is_some() || store.readings(id)?.is_some() {
+    let Some(trial) = store.load(id)?.into_simulated() else {
         let text = format!(
             "trial {id} was not simulated, so there are no poses to draw. Use `palpate trials show {id}`, `palpate trials \
              export {id} --out FILE.csv` or `palpate recognise {id}`"
         );
         return Err(text.into());
-    }
-    let trial = store.load(id)?;
-    let scene = Scene::from_toml(&trial.info.scene)?;
+    };
+    let scene = &trial.header.scene;
     let object = scene.load_object()?;
-    let stage = Stage::new(&scene, object.as_ref(), trial.info.world_from_gripper);
-    let frame = trial.frames.iter().rfind(|f| f.t <= arguments.at).or(trial.frames.first());
+    let stage = Stage::new(scene, object.as_ref(), trial.data.world_from_gripper);
+    let frames = trial.frames();
+    let frame = frames.iter().rfind(|f| f.t <= arguments.at).or(frames.first());
     let frame = frame.cloned().ok_or_else(|| format!("trial {id} has no samples"))?;
-    Ok((stage, frame, format!("TRIAL {id}, {}", if trial.info.rig == "sim" { "SIMULATED" } else { "RECORDED" })))
+    Ok((stage, frame, format!("TRIAL {id}, SIMULATED")))
 }

@@ -7,14 +7,12 @@ use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table, warn};
 use labels::LabelCommand;
-use palpate_sim::scene::Scene;
 use palpate_store::labels::shown_name;
 use palpate_store::{
     Store, TrialRow, contacts_path, export_board_trial, file_name_of, read_trials_csv, write_contacts_csv,
     write_signals_csv, write_trial_csv,
 };
-use palpate_tactile::trial::Trial;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
 use palpate_tactile::{PressureArea, SensorLayout, Sensors};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -176,7 +174,7 @@ fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Resul
                 row.id.to_string(),
                 shown_name(&row.object).to_owned(),
                 row.created.chars().take(19).collect::<String>().replace('T', " "),
-                row.rig.clone(),
+                row.source.to_string(),
                 row.samples.to_string(),
                 row.seed.to_string(),
                 remark(row),
@@ -213,10 +211,6 @@ fn remark(row: &TrialRow) -> String {
     remarks.join(", ")
 }
 
-fn scene_of(trial: &Trial) -> Result<Scene, Failure> {
-    Ok(Scene::from_toml(&trial.info.scene)?)
-}
-
 /// Excludes unsound trials, whose flaws a CSV file would not show.
 fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
     let unsound: BTreeSet<TrialId> = store.list(false)?.iter().filter(|row| !row.sound).map(|row| row.id).collect();
@@ -249,21 +243,20 @@ fn export(
         let path = if as_file {
             out.to_owned()
         } else {
-            out.join(format!("trial_{id}_{}.csv", file_name_of(shown_name(&trial.info.object))))
+            out.join(format!("trial_{id}_{}.csv", file_name_of(shown_name(&trial.header.object))))
         };
-        if export_board_trial(store, *id, &path)? {
-            say(path.display())?;
-            continue;
+        let Trial { header, data } = trial;
+        match data {
+            TrialData::Recorded(_) => drop(export_board_trial(store, *id, &path)?),
+            TrialData::Imported(signals) => write_signals_csv(&path, &signals)?,
+            TrialData::Simulated(data) => {
+                let trial = SimulatedTrial { header, data };
+                let scene = &trial.header.scene;
+                let sensors = Sensors::new(layout, &scene.gripper, area)?;
+                write_trial_csv(&path, &trial, scene, &sensors)?;
+                write_contacts_csv(&contacts_path(&path), &trial, scene)?;
+            }
         }
-        if let Some(signals) = store.readings(*id)? {
-            write_signals_csv(&path, &signals)?;
-            say(path.display())?;
-            continue;
-        }
-        let scene = scene_of(&trial)?;
-        let sensors = Sensors::new(layout, &scene.gripper, area)?;
-        write_trial_csv(&path, &trial, &scene, &sensors)?;
-        write_contacts_csv(&contacts_path(&path), &trial, &scene)?;
         say(path.display())?;
     }
     Ok(())

@@ -5,15 +5,14 @@
 //! (bar)`, `phase`. A missing number is an empty field; `missing_before` is the number of readings missing before the
 //! row, `?` where unknown.
 
-use super::board_trials::BoardTrial;
 use super::csv_export::{CsvError, number, write_file};
 use palpate_tactile::board::Reading;
-use palpate_tactile::trial::PhaseMark;
+use palpate_tactile::trial::{BoardLog, PhaseMark};
 use std::path::Path;
 
 /// Writes one row per reading.
-pub fn write_board_csv(path: &Path, trial: &BoardTrial) -> Result<(), CsvError> {
-    let channels = &trial.about.board.channels;
+pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), CsvError> {
+    let channels = &trial.board.channels;
     write_file(path, |out| {
         let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();
         let after = ["line_pressure [bar]", "phase"].map(str::to_owned);
@@ -30,13 +29,13 @@ pub fn write_board_csv(path: &Path, trial: &BoardTrial) -> Result<(), CsvError> 
     })
 }
 
-fn row(reading: &Reading, missing: String, trial: &BoardTrial) -> Vec<String> {
-    let since = |t: f64| number(t - trial.about.began_s);
+fn row(reading: &Reading, missing: String, trial: &BoardLog) -> Vec<String> {
+    let since = |t: f64| number(t - trial.began_s);
     let mut fields = vec![since(reading.t_s), since(reading.arrived_s)];
     fields.push(reading.seq.map(|seq| seq.to_string()).unwrap_or_default());
     fields.push(missing);
     fields.extend(reading.counts.iter().map(|count| count.map(|count| count.to_string()).unwrap_or_default()));
-    let mark = trial.about.phases.iter().rev().find(|mark| mark.from_s <= reading.t_s);
+    let mark = trial.phases.iter().rev().find(|mark| mark.from_s <= reading.t_s);
     let bar = reading.line_bar.or_else(|| mark?.line_bar);
     fields.push(bar.map(number).unwrap_or_default());
     fields.push(mark.map(|PhaseMark { phase, .. }| phase.name().to_owned()).unwrap_or_default());

@@ -2,7 +2,7 @@
 
 use super::checksum::{checksum, is_intact};
 use super::reading_blob::{decode_readings, encode_readings};
-use super::store::{Store, insert_info, json, set_complete};
+use super::store::{Store, insert_recorded, json, set_complete};
 use super::store_error::{StoreError, fault};
 use crate::labels::{FlagRemark, Sparkline};
 use palpate_sim::frame::Quality;
@@ -10,13 +10,9 @@ use palpate_tactile::board::Detected;
 use palpate_tactile::board::{Board, Gap, Reading};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured, read_record};
-use palpate_tactile::trial::TrialId;
-use palpate_tactile::trial::{PhaseMark, TrialInfo};
+use palpate_tactile::trial::{BoardLog, PhaseMark, TrialHeader, TrialId};
 use rusqlite::{OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
-
-/// Rig of trials that were recorded from a board.
-pub const BOARD_RIG: &str = "serial";
 
 /// Description of a trial of a real gripper, besides its readings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -44,17 +40,6 @@ pub struct BoardInfo {
     pub sparkline: Sparkline,
 }
 
-/// A trial of a real gripper.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BoardTrial {
-    /// Description.
-    pub about: BoardInfo,
-    /// Readings, in order.
-    pub readings: Vec<Reading>,
-    /// Gaps: missing readings.
-    pub gaps: Vec<Gap>,
-}
-
 /// Data of a second or less.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardChunk {
@@ -75,11 +60,11 @@ impl BoardChunk {
 
 impl Store {
     /// Begins a trial of a real gripper; chunks follow with [`Store::append_board`].
-    pub fn begin_board(&mut self, info: &TrialInfo, about: &BoardInfo) -> Result<TrialId, StoreError> {
+    pub fn begin_board(&mut self, header: &TrialHeader, about: &BoardInfo) -> Result<TrialId, StoreError> {
         let path = self.path().to_owned();
         let fault = |e: rusqlite::Error| fault(&path, &e);
         let transaction = self.write()?;
-        let id = insert_info(&transaction, info).map_err(fault)?;
+        let id = insert_recorded(&transaction, header).map_err(fault)?;
         let sql = "INSERT INTO board_trials (trial, about) VALUES (?1, ?2)";
         transaction.execute(sql, params![id, json(about)]).map_err(fault)?;
         transaction.commit().map_err(fault)?;
@@ -127,8 +112,8 @@ impl Store {
         transaction.commit().map_err(fault)
     }
 
-    /// Loads a trial of a real gripper; none for a trial of another kind.
-    pub fn board_trial(&self, id: TrialId) -> Result<Option<BoardTrial>, StoreError> {
+    /// Data of a trial of a real gripper, without its header; none for a trial of another kind.
+    pub fn board_log(&self, id: TrialId) -> Result<Option<BoardLog>, StoreError> {
         let Some(about) = self.board_info(id)? else { return Ok(None) };
         let sql =
             "SELECT number, readings, CAST(gaps AS BLOB), checksum FROM board_chunks WHERE trial = ?1 ORDER BY number";
@@ -139,20 +124,22 @@ impl Store {
             .prepare(sql)
             .and_then(|mut statement| statement.query_map([id], columns)?.collect())
             .map_err(|e| fault(self.path(), &e))?;
-        let mut trial = BoardTrial { about, readings: Vec::new(), gaps: Vec::new() };
+        let BoardInfo { board, detected, began_s, cadence, reconnects, phases, .. } = about;
+        let (readings, gaps) = (Vec::new(), Vec::new());
+        let mut log = BoardLog { board, detected, began_s, cadence, reconnects, phases, readings, gaps };
         for (chunk, readings, gaps, stored) in chunks {
             if !is_intact(stored, &[&readings, &gaps]) {
                 return Err(StoreError::Checksum { id, what: "readings", chunk });
             }
             let damaged = |what: &str| StoreError::BadInfo { id, cause: format!("{what} of its part {chunk}") };
-            trial.readings.extend(decode_readings(&readings).ok_or_else(|| damaged("the readings"))?);
-            trial.gaps.extend(serde_json::from_slice::<Vec<Gap>>(&gaps).map_err(|_json| damaged("the gaps"))?);
+            log.readings.extend(decode_readings(&readings).ok_or_else(|| damaged("the readings"))?);
+            log.gaps.extend(serde_json::from_slice::<Vec<Gap>>(&gaps).map_err(|_json| damaged("the gaps"))?);
         }
         // Earlier readings have no count for channels that appeared later.
-        for reading in &mut trial.readings {
-            reading.counts.resize(trial.about.board.channels.len(), None);
+        for reading in &mut log.readings {
+            reading.counts.resize(log.board.channels.len(), None);
         }
-        Ok(Some(trial))
+        Ok(Some(log))
     }
 
     /// Description of a trial of a real gripper; none for a trial of another kind.

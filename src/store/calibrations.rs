@@ -337,15 +337,15 @@ pub(super) mod tests {
         let folder = folder();
         let mut store = store(&folder, "s");
         assert_eq!(store.calibrations().mounted()?, [const { None }; 4]);
-        let info = crate::test_trials::grasp(&palpate_sim::scene::Scene::default(), None, 0).info;
-        let untold = store.begin(&info)?;
+        let begun = crate::test_trials::without_frames("empty");
+        let untold = store.begin(&begun)?;
         // Times are stored to the millisecond.
         std::thread::sleep(std::time::Duration::from_millis(3));
         store.calibrations().mount(Sensor::FlexLeft, "A")?;
-        let first = store.begin(&info)?;
+        let first = store.begin(&begun)?;
         store.calibrations().note_parts(first)?;
         store.calibrations().mount(Sensor::FlexLeft, "B")?;
-        let second = store.begin(&info)?;
+        let second = store.begin(&begun)?;
         store.calibrations().note_parts(second)?;
         let left = |trial| store.calibrations().parts_of(trial).map(|parts| parts[0].clone());
         assert_eq!((left(first)?.as_deref(), left(second)?.as_deref()), (Some("A"), Some("B")));
@@ -359,8 +359,8 @@ pub(super) mod tests {
         let folder = folder();
         let mut store = store(&folder, "s");
         store.calibrations().mount(Sensor::FlexLeft, "A")?;
-        let info = crate::test_trials::grasp(&palpate_sim::scene::Scene::default(), None, 0).info;
-        let trial = store.begin(&info)?;
+        let begun = crate::test_trials::without_frames("empty");
+        let trial = store.begin(&begun)?;
         store.calibrations().note_parts(trial)?;
         assert!(store.calibrations().serving(Some(trial), &[])?.warnings[0].contains("has no calibration"));
         let reading = {

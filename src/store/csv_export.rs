@@ -7,7 +7,7 @@
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, Side};
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, Signals};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -31,10 +31,10 @@ pub fn contacts_path(path: &Path) -> PathBuf {
 }
 
 /// Writes one row per sample.
-pub fn write_trial_csv(path: &Path, trial: &Trial, scene: &Scene, sensors: &Sensors) -> Result<(), CsvError> {
+pub fn write_trial_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) -> Result<(), CsvError> {
     write_file(path, |out| {
         out.write_record(header(scene, sensors, trial))?;
-        for frame in &trial.frames {
+        for frame in trial.frames() {
             out.write_record(row(frame, trial, scene, sensors))?;
         }
         Ok(())
@@ -56,7 +56,7 @@ pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError>
 /// Writes one row per loaded taxel and sample: its position in the world and the force on it.
 ///
 /// Positions are those of the undeformed skin, which is indented by at most the pad's thickness.
-pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(), CsvError> {
+pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) -> Result<(), CsvError> {
     let header = [
         "t_s",
         "finger",
@@ -72,14 +72,14 @@ pub fn write_contacts_csv(path: &Path, trial: &Trial, scene: &Scene) -> Result<(
     let grid = scene.gripper.taxels();
     write_file(path, |out| {
         out.write_record(header)?;
-        for frame in &trial.frames {
+        for frame in trial.frames() {
             for side in Side::BOTH {
                 let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
                 for (taxel, load) in frame.loads(side, grid.count()) {
                     let (segment, along) = grid.place(taxel, &scene.gripper.finger);
                     let in_plane = bent.segments[segment].point(along, grid.height(taxel));
                     let in_gripper = scene.gripper.plane(side).point(in_plane, grid.across(taxel));
-                    let place = trial.info.world_from_gripper.point(in_gripper);
+                    let place = trial.data.world_from_gripper.point(in_gripper);
                     let mut record = vec![number(frame.t), side.name().to_owned()];
                     record.extend([segment, taxel].map(|n| n.to_string()));
                     record.extend(place.to_array().map(number));
@@ -121,7 +121,7 @@ pub(super) fn number(x: f64) -> String {
     x.to_string()
 }
 
-fn header(scene: &Scene, sensors: &Sensors, trial: &Trial) -> Vec<String> {
+fn header(scene: &Scene, sensors: &Sensors, trial: &SimulatedTrial) -> Vec<String> {
     let mut names = vec!["t_s".to_owned(), "line_pressure [bar]".to_owned(), "phase".to_owned()];
     names.extend(sensors.channels().iter().map(|c| format!("{} [{}]", c.name(), c.quantity.unit())));
     let joints = || Side::BOTH.into_iter().flat_map(|side| (1..=scene.gripper.finger.joints).map(move |j| (side, j)));
@@ -129,14 +129,14 @@ fn header(scene: &Scene, sensors: &Sensors, trial: &Trial) -> Vec<String> {
     for (side, j) in joints() {
         names.extend(["x", "y", "z"].map(|axis| format!("joint_{}_{j}_{axis} [m]", side.name())));
     }
-    if trial.frames.first().is_some_and(|f| f.world_from_object.is_some()) {
+    if trial.frames().first().is_some_and(|f| f.world_from_object.is_some()) {
         names.extend(["x", "y", "z"].map(|axis| format!("object_{axis} [m]")));
         names.extend(["qx", "qy", "qz", "qw"].map(|part| format!("object_{part}")));
     }
     names
 }
 
-fn row(frame: &Frame, trial: &Trial, scene: &Scene, sensors: &Sensors) -> Vec<String> {
+fn row(frame: &Frame, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) -> Vec<String> {
     let mut fields = vec![number(frame.t), number(frame.line_bar), frame.phase.name().to_owned()];
     // An undefined pressure is an empty field.
     fields.extend(sensors.read(frame).into_iter().map(|v| v.map(number).unwrap_or_default()));
@@ -144,7 +144,7 @@ fn row(frame: &Frame, trial: &Trial, scene: &Scene, sensors: &Sensors) -> Vec<St
     for side in Side::BOTH {
         let plane = scene.gripper.plane(side);
         let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
-        let places = bent.joints().map(|p| trial.info.world_from_gripper.point(plane.point(p, 0.0)));
+        let places = bent.joints().map(|p| trial.data.world_from_gripper.point(plane.point(p, 0.0)));
         fields.extend(places.flat_map(|p| p.to_array().map(number)));
     }
     if let Some(pose) = frame.world_from_object {
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(rows.len(), 150);
         // The first joint of the left finger never moves: 5 mm below the palm, half the opening and the pad away.
         let at = |name: &str| rows[100][column(name)].parse::<f64>().expect("a number");
-        let palm = trial.info.world_from_gripper.position.z;
+        let palm = trial.data.world_from_gripper.position.z;
         assert!((at("joint_left_1_x [m]") + scene.gripper.half_gap()).abs() < 1e-12);
         assert!((at("joint_left_1_z [m]") - (palm - 0.005)).abs() < 1e-12);
         assert!(at("curvature_left_distal [1/m]") > 0.0);

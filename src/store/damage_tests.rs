@@ -1,7 +1,7 @@
 //! Damaged blobs: whichever byte of a stored trial is flipped, loading the trial names it.
 
 use super::*;
-use crate::test_trials::{board_info, grasp};
+use crate::test_trials::{grasp, header};
 use palpate_sim::scene::Scene;
 use palpate_tactile::Signals;
 use palpate_tactile::board::{Gap, Reading};
@@ -59,11 +59,11 @@ fn a_flipped_byte_is_found_in_frames_readings_bytes_and_channels() -> Outcome {
         gaps: vec![Gap { from_s: 0.02, to_s: 0.06, lost: Some(1), cause: String::new() }],
         bytes: vec![Captured::Bytes { arrived_s: 0.0, bytes: b"0,1200,0.5\n".to_vec() }],
     };
-    let board = store.begin_board(&board_info("lemon"), &BoardInfo::default())?;
+    let board = store.begin_board(&header("lemon"), &BoardInfo::default())?;
     store.append_board(board, &BoardInfo::default(), &chunk)?;
-    every_flip_is_found(&store, ["board_chunks", "readings"], board, |store| store.board_trial(board))?;
+    every_flip_is_found(&store, ["board_chunks", "readings"], board, |store| store.board_log(board))?;
     every_flip_is_found(&store, ["board_chunks", "bytes"], board, |store| store.board_bytes(board))?;
-    every_flip_is_found(&store, ["board_chunks", "gaps"], board, |store| store.board_trial(board))?;
+    every_flip_is_found(&store, ["board_chunks", "gaps"], board, |store| store.board_log(board))?;
 
     let signals = Signals { channels: vec!["p".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
     let (name, label) = ("1".to_owned(), "mug".to_owned());

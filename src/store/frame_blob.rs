@@ -188,7 +188,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.timing.duration_s = 2.0;
         let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
-        grasp(&scene, Some(&ball), 0).frames
+        grasp(&scene, Some(&ball), 0).data.frames
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::csv_import::ImportedTrial;
 use super::store::Store;
 use super::store_error::{StoreError, fault};
 use palpate_tactile::Signals;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{OptionalExtension, params};
 
 const MAGIC: &[u8; 4] = b"PPS1";
@@ -62,7 +62,7 @@ impl Store {
                 .execute(
                     "INSERT OR IGNORE INTO trials (state, rig, object, seed, scene, world_from_gripper, quality,
                          warnings, version, samples, collection, size, shape)
-                     VALUES ('complete', 'import', ?1, ?2, '', ?3, ?4, '[]', ?5, ?6, ?7, ?8, ?9)",
+                     VALUES ('complete', ?10, ?1, ?2, '', ?3, ?4, '[]', ?5, ?6, ?7, ?8, ?9)",
                     params![
                         trial.label,
                         number as i64 + 1,
@@ -73,6 +73,7 @@ impl Store {
                         collection,
                         trial.size,
                         trial.shape,
+                        TrialSource::Imported.name(),
                     ],
                 )
                 .map_err(fault)?;
@@ -132,7 +133,7 @@ mod tests {
         assert_eq!(store.insert_imported("mine", &trials)?, 2);
         assert_eq!(store.insert_imported("mine", &trials)?, 0, "twice is once");
         let rows = store.list(false)?;
-        assert_eq!((rows[0].object.as_str(), rows[0].rig.as_str(), rows[0].samples), ("mug", "import", 3));
+        assert_eq!((rows[0].object.as_str(), rows[0].source, rows[0].samples), ("mug", TrialSource::Imported, 3));
         assert_eq!(rows[0].properties, Some(("tiny".to_owned(), "cubic".to_owned())));
         let mut other = Store::open(&there)?;
         other.merge_from(&here)?;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::labels::{LabelPlan, LabelledTrial};
-use crate::test_trials::{board_info, info};
+use crate::test_trials::{header, without_frames};
 use palpate_tactile::trial::TrialId;
 use proptest::prelude::*;
 use std::path::Path;
@@ -12,7 +12,7 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Adds a finished trial of the real gripper.
 fn add(store: &mut Store, object: &str) -> Result<TrialId, StoreError> {
     let about = BoardInfo::default();
-    let id = store.begin_board(&board_info(object), &about)?;
+    let id = store.begin_board(&header(object), &about)?;
     store.finish_board(id, &about, &[])?;
     Ok(id)
 }
@@ -137,7 +137,7 @@ fn programs_share_one_history() -> Outcome {
 fn nonsense_is_refused_and_changes_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
-    let simulated = store.begin(&info("cube"))?;
+    let simulated = store.begin(&without_frames("cube"))?;
     let message = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
     assert!(message(store.labels().set_label(1, "  ")).contains("cannot be empty"));
     assert!(message(store.labels().set_label(simulated, "ball")).contains("only trials of the real gripper"));

@@ -1,12 +1,11 @@
 //! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an
 //! entry to the journal in the same transaction.
 
-use super::board_trials::BOARD_RIG;
 use super::journal::{Change, append, change};
-use super::store::{Store, json};
+use super::store::{Store, json, source_named};
 use super::store_error::StoreError;
 use crate::labels::{Guess, LabelPlan, class_name};
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
 /// Most characters of a note.
@@ -50,8 +49,9 @@ impl LabelRepository<'_> {
         let label = class_name(object)?;
         self.change_trial(id, |LabelState { rig, object, .. }| {
             // The object of simulated and imported trials is known.
-            if rig != BOARD_RIG {
-                return Err(StoreError::NotOfBoard { id, object, rig });
+            let origin = source_named(id, &rig)?;
+            if origin != TrialSource::Recorded {
+                return Err(StoreError::NotOfBoard { id, object, origin });
             }
             let from = Some(object).filter(|name| !name.is_empty());
             Ok(Some(Change::Label { from, to: Some(label) }))

@@ -66,7 +66,7 @@ pub fn file_name_of(object: &str) -> String {
 
 /// Writes a trial of the real gripper: counts as CSV, and its bytes beside it. False for a trial of another kind.
 pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<bool, ExportError> {
-    let Some(trial) = store.board_trial(id)? else { return Ok(false) };
+    let Some(trial) = store.board_log(id)? else { return Ok(false) };
     write_board_csv(path, &trial)?;
     let bytes = path.with_extension("bytes");
     std::fs::write(&bytes, store.board_bytes(id)?.unwrap_or_default()).map_err(|e| cannot(&bytes, &e))?;

@@ -1,11 +1,11 @@
 //! Lists of the real gripper's trials with their labels. Everything that a list shows is stored with the trial, so that
 //! hundreds of them are read without decoding one.
 
-use super::board_trials::BOARD_RIG;
 use super::label_repository::LabelRepository;
 use super::store_error::StoreError;
 use crate::labels::{FlagRemark, Guess, GuessTop, LabelledTrial, Sparkline, cadence_line, flaws};
 use palpate_tactile::cadence::Cadence;
+use palpate_tactile::trial::TrialSource;
 use rusqlite::Row;
 use serde::Deserialize;
 
@@ -57,7 +57,11 @@ impl LabelRepository<'_> {
                    samples, about, guesses.model, guesses.pmf
                    FROM trials JOIN board_trials ON board_trials.trial = trials.id
                    LEFT JOIN guesses ON guesses.trial = trials.id WHERE rig = ?1 ORDER BY trials.id";
-        let rows = self.store.connection.prepare(sql).and_then(|mut s| s.query_map([BOARD_RIG], of_row)?.collect());
+        let rows = self
+            .store
+            .connection
+            .prepare(sql)
+            .and_then(|mut s| s.query_map([TrialSource::Recorded.name()], of_row)?.collect());
         rows.map_err(|e| self.store.fault(&e))
     }
 }

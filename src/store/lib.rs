@@ -72,7 +72,7 @@ mod test_trials;
 
 pub use board_export::write_board_csv;
 pub use board_signals::BoardSignals;
-pub use board_trials::{BOARD_RIG, BoardChunk, BoardInfo, BoardTrial};
+pub use board_trials::{BoardChunk, BoardInfo};
 pub use calibrations::{CalibrationId, CalibrationRepository, Serving, StoredCalibration};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};

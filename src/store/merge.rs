@@ -106,8 +106,8 @@ mod tests {
         let (mut all, mut shard) = (Store::open(&path("all.sqlite"))?, Store::open(&path("shard.sqlite"))?);
         let mut trial = grasp(&Scene::default(), None, 0);
         for seed in 1..=3 {
-            trial.info.seed = seed;
-            trial.info.collection = Some("set".to_owned());
+            trial.header.seed = seed;
+            trial.header.collection = Some("set".to_owned());
             assert_eq!(shard.insert_collected([&trial].into_iter())?, 1);
             assert_eq!(shard.insert_collected([&trial].into_iter())?, 0, "twice is once");
         }
@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 0, known: 3 });
         assert_eq!(all.collected("set")?.len(), 3);
         for id in 1..=3 {
-            assert!(all.load(id)?.frames == trial.frames);
+            assert!(all.load(id)?.frames() == trial.frames());
         }
         assert!(matches!(all.merge_from(&path("gone.sqlite")), Err(StoreError::Open { .. })));
         assert!(!path("gone.sqlite").exists());

@@ -3,7 +3,6 @@
 
 use super::*;
 use crate::labels::Flag;
-use palpate_sim::scene::Scene;
 use palpate_tactile::{PressureArea, SensorLayout, Sensors};
 use std::path::{Path, PathBuf};
 
@@ -30,7 +29,7 @@ fn it_is_updated_listed_and_loaded() -> Outcome {
     assert!(copy.len() > 100_000 && Store::open(&path)?.warnings().is_empty());
 
     let rows = store.list(true)?;
-    let listed: Vec<_> = rows.iter().map(|row| (row.object.as_str(), row.rig.as_str(), row.samples)).collect();
+    let listed: Vec<_> = rows.iter().map(|row| (row.object.as_str(), row.source.name(), row.samples)).collect();
     let expected = [
         ("lemon", "sim", 90),
         ("mug", "import", 3),
@@ -46,22 +45,22 @@ fn it_is_updated_listed_and_loaded() -> Outcome {
     assert_eq!((rows[3].note.as_str(), rows[3].tags.join(" ")), ("slipped a little", "wet late".to_owned()));
 
     let simulated = store.load(1)?;
-    assert_eq!((simulated.frames.len(), simulated.info.version.as_str()), (90, "0.1.0"));
-    let third_joint: f64 = simulated.frames.iter().map(|frame| frame.q[2]).sum();
+    assert_eq!((simulated.frames().len(), simulated.header.version.as_str()), (90, "0.1.0"));
+    let third_joint: f64 = simulated.frames().iter().map(|frame| frame.q[2]).sum();
     assert!(near(third_joint, 2.968_052_614_650_289), "{third_joint}");
     let stored: Vec<u8> = store.connection.query_row("SELECT frames FROM chunks", [], |row| row.get(0))?;
-    assert_eq!(encode_frames(&simulated.frames[..75]), stored, "to the bit");
+    assert_eq!(encode_frames(&simulated.frames()[..75]), stored, "to the bit");
 
     let imported = store.readings(2)?.ok_or("imported")?;
     assert_eq!(imported.channels, ["pressure_left", "pressure_right"]);
     assert_eq!(imported.values, [102.5, 99.1, 103.0, 99.4, 103.0, 100.25]);
 
     for (id, readings, bytes) in [(4, 161, 17_083), (5, 50, 4995)] {
-        let trial = store.board_trial(id)?.ok_or("of the board")?;
-        assert_eq!((trial.readings.len(), trial.gaps.len(), trial.about.board.channels.len()), (readings, 0, 4));
+        let trial = store.board_log(id)?.ok_or("of the board")?;
+        assert_eq!((trial.readings.len(), trial.gaps.len(), trial.board.channels.len()), (readings, 0, 4));
         assert_eq!(store.board_bytes(id)?.map(|bytes| bytes.len()), Some(bytes));
     }
-    let reading = &store.board_trial(4)?.ok_or("of the board")?.readings[58];
+    let reading = &store.board_log(4)?.ok_or("of the board")?.readings[58];
     assert_eq!((reading.counts[0], reading.counts[3], reading.line_bar), (Some(1687.8), Some(946.1), Some(0.6)));
     Ok(())
 }
@@ -115,12 +114,12 @@ fn it_is_exported_with_the_same_numbers() -> Outcome {
         assert!((mean - expected).abs() < 1e-3 * expected, "column {column}: {mean}, not {expected}");
     }
 
-    let trial = store.load(1)?;
-    let scene = Scene::from_toml(&trial.info.scene)?;
+    let trial = store.load(1)?.into_simulated().ok_or("simulated")?;
+    let scene = &trial.header.scene;
     let layout = SensorLayout::named("C1+F")?;
     let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation)?;
     let path = folder.path().join("trial_1.csv");
-    write_trial_csv(&path, &trial, &scene, &sensors)?;
+    write_trial_csv(&path, &trial, scene, &sensors)?;
     let mut reader = csv::Reader::from_path(&path)?;
     let row = reader.records().nth(60).ok_or("90 rows")??;
     let number = |column: usize| row[column].parse::<f64>();

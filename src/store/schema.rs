@@ -225,7 +225,7 @@ mod tests {
             let folder = tempfile::tempdir()?;
             let path = old_store(folder.path(), version)?;
             let store = Store::open(&path)?;
-            assert_eq!(store.load(1)?.info.seed, 3);
+            assert_eq!(store.load(1)?.header.seed, 3);
             let copy = folder.path().join(format!("trials.before-v{SCHEMA_VERSION}.sqlite"));
             assert!(store.warnings()[0].contains(&*copy.to_string_lossy()), "{:?}", store.warnings());
             assert_eq!((version_of(&copy)?, version_of(&path)?), (version as i32, SCHEMA_VERSION));

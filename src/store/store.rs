@@ -12,9 +12,11 @@ use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
 use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain};
 use crate::labels::{FlagRemark, flaws};
 use palpate_geometry::Pose;
-use palpate_sim::frame::{Frame, Quality};
-use palpate_tactile::trial::TrialId;
-use palpate_tactile::trial::{Trial, TrialInfo};
+use palpate_sim::frame::{Frame, Plan, Quality};
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::{
+    SimulatedData, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource, UnknownSource,
+};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -33,8 +35,9 @@ pub struct TrialRow {
     pub created: String,
     /// `recording`, or `complete`.
     pub state: String,
-    /// Origin: `sim`, `serial` or `import`.
-    pub rig: String,
+    /// Origin.
+    #[serde(rename = "rig")]
+    pub source: TrialSource,
     /// Name of the object; empty while unlabelled.
     pub object: String,
     /// Seed of the pose.
@@ -193,11 +196,11 @@ impl Store {
         self.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| fault(&self.path, &e))
     }
 
-    /// Begins a trial; frames follow with [`Store::append`].
-    pub fn begin(&mut self, info: &TrialInfo) -> Result<TrialId, StoreError> {
+    /// Begins a simulated trial, without its frames: they follow with [`Store::append`].
+    pub fn begin(&mut self, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
-        let id = insert_info(&transaction, info).map_err(|e| fault(&path, &e))?;
+        let id = insert_simulated(&transaction, trial).map_err(|e| fault(&path, &e))?;
         transaction.commit().map_err(|e| fault(&path, &e))?;
         Ok(id)
     }
@@ -221,8 +224,8 @@ impl Store {
         transaction.commit().map_err(|e| fault(&path, &e))
     }
 
-    /// Stores a whole trial, all or nothing.
-    pub fn insert(&mut self, trial: &Trial) -> Result<TrialId, StoreError> {
+    /// Stores a whole simulated trial, all or nothing.
+    pub fn insert(&mut self, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
         let id = insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
@@ -231,12 +234,15 @@ impl Store {
     }
 
     /// Stores the trials of a collection that are not in the store yet, all or nothing; returns how many.
-    pub fn insert_collected<'a>(&mut self, trials: impl Iterator<Item = &'a Trial>) -> Result<u32, StoreError> {
+    pub fn insert_collected<'a>(
+        &mut self,
+        trials: impl Iterator<Item = &'a SimulatedTrial>,
+    ) -> Result<u32, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
         let mut stored = 0;
         for trial in trials {
-            if !is_collected(&transaction, &trial.info).map_err(|e| fault(&path, &e))? {
+            if !is_collected(&transaction, &trial.header).map_err(|e| fault(&path, &e))? {
                 insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
                 stored += 1;
             }
@@ -260,70 +266,90 @@ impl Store {
                    collection, size, shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END
                    FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id
                    WHERE ?1 OR deleted IS NULL ORDER BY id";
-        let rows = self.connection.prepare(sql).and_then(|mut statement| {
-            statement
-                .query_map([with_deleted], |row| {
-                    let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
-                    let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
-                    let object: String = row.get(4)?;
-                    let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
-                    Ok(TrialRow {
-                        note: row.get(13)?,
-                        tags: json_or_default(&row.get::<_, String>(14)?),
-                        unsure: row.get(15)?,
-                        flags: flaws(flags, Some(&object)),
-                        id: row.get(0)?,
-                        created: row.get(1)?,
-                        state: row.get(2)?,
-                        rig: row.get(3)?,
-                        object,
-                        seed: row.get::<_, i64>(5)?.cast_unsigned(),
-                        collection: row.get(10)?,
-                        properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
-                        samples: row.get(6)?,
-                        sound: quality.is_some_and(|quality| quality.is_sound()),
-                        warnings: warnings.len(),
-                        deleted: row.get(9)?,
-                    })
-                })?
-                .collect()
-        });
-        rows.map_err(|e| self.fault(&e))
+        let rows: rusqlite::Result<Vec<Result<TrialRow, StoreError>>> =
+            self.connection.prepare(sql).and_then(|mut statement| {
+                statement
+                    .query_map([with_deleted], |row| {
+                        let source = match source_named(row.get(0)?, &row.get::<_, String>(3)?) {
+                            Ok(source) => source,
+                            Err(error) => return Ok(Err(error)),
+                        };
+                        let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
+                        let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
+                        let object: String = row.get(4)?;
+                        let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
+                        Ok(Ok(TrialRow {
+                            note: row.get(13)?,
+                            tags: json_or_default(&row.get::<_, String>(14)?),
+                            unsure: row.get(15)?,
+                            flags: flaws(flags, Some(&object)),
+                            id: row.get(0)?,
+                            created: row.get(1)?,
+                            state: row.get(2)?,
+                            source,
+                            object,
+                            seed: row.get::<_, i64>(5)?.cast_unsigned(),
+                            collection: row.get(10)?,
+                            properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
+                            samples: row.get(6)?,
+                            sound: quality.is_some_and(|quality| quality.is_sound()),
+                            warnings: warnings.len(),
+                            deleted: row.get(9)?,
+                        }))
+                    })?
+                    .collect()
+            });
+        rows.map_err(|e| self.fault(&e))?.into_iter().collect()
     }
 
-    /// One trial with its frames.
+    /// One trial with its data.
     pub fn load(&self, id: TrialId) -> Result<Trial, StoreError> {
-        Ok(Trial { info: self.load_info(id)?, frames: self.load_frames(id)? })
+        let StoredHeader { source, header, simulation } = self.load_header(id)?;
+        let missing = |what: &str| StoreError::BadInfo { id, cause: format!("it has no {what}") };
+        let data = match source {
+            TrialSource::Simulated => {
+                let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
+                let [pose, quality, plan] = simulation;
+                TrialData::Simulated(SimulatedData {
+                    world_from_gripper: serde_json::from_str(&pose).map_err(bad)?,
+                    plan: serde_json::from_str(&plan).map_err(bad)?,
+                    quality: serde_json::from_str(&quality).map_err(bad)?,
+                    frames: self.load_frames(id)?,
+                })
+            }
+            TrialSource::Recorded => TrialData::Recorded(self.board_log(id)?.ok_or_else(|| missing("board"))?),
+            TrialSource::Imported => TrialData::Imported(self.readings(id)?.ok_or_else(|| missing("channels"))?),
+        };
+        Ok(Trial { header, data })
     }
 
-    fn load_info(&self, id: TrialId) -> Result<TrialInfo, StoreError> {
+    /// Header of a trial, with its source and the columns that only simulated trials use.
+    fn load_header(&self, id: TrialId) -> Result<StoredHeader, StoreError> {
         let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
                    collection, plan FROM trials WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 4], String, Option<String>);
+        type Columns = (String, String, i64, String, [String; 3], String, String, Option<String>);
         let found: Option<Columns> = self
             .connection
             .query_row(sql, [id], |row| {
-                let texts = [row.get(4)?, row.get(5)?, row.get(6)?, row.get(9)?];
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, texts, row.get(7)?, row.get(8)?))
+                let simulation = [row.get(4)?, row.get(5)?, row.get(9)?];
+                let scene = row.get(3)?;
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, scene, simulation, row.get(6)?, row.get(7)?, row.get(8)?))
             })
             .optional()
             .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, [pose, quality, warnings, plan], version, collection)) = found else {
+        let Some((rig, object, seed, scene, simulation, warnings, version, collection)) = found else {
             return Err(self.no_trial(id));
         };
-        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
-        Ok(TrialInfo {
-            rig,
+        let header = TrialHeader {
             object,
             seed: seed.cast_unsigned(),
             collection,
-            scene,
-            world_from_gripper: serde_json::from_str::<Pose>(&pose).map_err(bad)?,
-            plan: serde_json::from_str(&plan).map_err(bad)?,
-            quality: serde_json::from_str(&quality).map_err(bad)?,
-            warnings: serde_json::from_str(&warnings).map_err(bad)?,
+            // An empty text, as imported trials have, is the default scene.
+            scene: Scene::from_toml(&scene).map_err(|cause| StoreError::Scene { id, cause })?,
+            warnings: serde_json::from_str(&warnings).map_err(|e| StoreError::BadInfo { id, cause: e.to_string() })?,
             version,
-        })
+        };
+        Ok(StoredHeader { source: source_named(id, &rig)?, header, simulation })
     }
 
     fn load_frames(&self, id: TrialId) -> Result<Vec<Frame>, StoreError> {
@@ -363,36 +389,65 @@ impl Store {
     }
 }
 
-fn insert_whole(transaction: &Transaction<'_>, trial: &Trial) -> rusqlite::Result<TrialId> {
-    let id = insert_info(transaction, &trial.info)?;
-    for frames in trial.frames.chunks(FRAMES_PER_CHUNK) {
+fn insert_whole(transaction: &Transaction<'_>, trial: &SimulatedTrial) -> rusqlite::Result<TrialId> {
+    let id = insert_simulated(transaction, trial)?;
+    for frames in trial.frames().chunks(FRAMES_PER_CHUNK) {
         insert_chunk(transaction, id, frames)?;
     }
-    set_complete(transaction, id, &trial.info.quality, &trial.info.warnings)?;
+    set_complete(transaction, id, &trial.data.quality, &trial.header.warnings)?;
     Ok(id)
 }
 
 /// True when another program has collected this trial in the meantime.
-fn is_collected(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<bool> {
+fn is_collected(transaction: &Transaction<'_>, header: &TrialHeader) -> rusqlite::Result<bool> {
     let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE collection = ?1 AND object = ?2 AND seed = ?3)";
-    transaction.query_row(sql, params![info.collection, info.object, info.seed.cast_signed()], |row| row.get(0))
+    transaction.query_row(sql, params![header.collection, header.object, header.seed.cast_signed()], |row| row.get(0))
 }
 
-pub(super) fn insert_info(transaction: &Transaction<'_>, info: &TrialInfo) -> rusqlite::Result<TrialId> {
+/// Header of a stored trial.
+struct StoredHeader {
+    source: TrialSource,
+    header: TrialHeader,
+    /// JSON of pose, quality and plan.
+    simulation: [String; 3],
+}
+
+/// Source of a trial by its stored name.
+pub(super) fn source_named(id: TrialId, name: &str) -> Result<TrialSource, StoreError> {
+    name.parse().map_err(|UnknownSource(name)| StoreError::UnknownSource { id, name })
+}
+
+fn insert_simulated(transaction: &Transaction<'_>, trial: &SimulatedTrial) -> rusqlite::Result<TrialId> {
+    let SimulatedData { world_from_gripper, plan, quality, frames: _ } = &trial.data;
+    insert_header(transaction, TrialSource::Simulated, &trial.header, (world_from_gripper, quality, plan))
+}
+
+/// Begins a recorded trial. Columns that only simulated trials use get neutral values.
+pub(super) fn insert_recorded(transaction: &Transaction<'_>, header: &TrialHeader) -> rusqlite::Result<TrialId> {
+    let unused = (&Pose::IDENTITY, &Quality::default(), &Plan::default());
+    insert_header(transaction, TrialSource::Recorded, header, unused)
+}
+
+fn insert_header(
+    transaction: &Transaction<'_>,
+    source: TrialSource,
+    header: &TrialHeader,
+    (world_from_gripper, quality, plan): (&Pose, &Quality, &Plan),
+) -> rusqlite::Result<TrialId> {
     transaction.execute(
         "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection, \
          plan) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
         params![
-            info.rig,
-            info.object,
-            info.seed.cast_signed(),
-            info.scene,
-            json(&info.world_from_gripper),
-            json(&info.quality),
-            json(&info.warnings),
-            info.version,
-            info.collection,
-            json(&info.plan),
+            source.name(),
+            header.object,
+            header.seed.cast_signed(),
+            header.scene.to_toml(),
+            json(world_from_gripper),
+            json(quality),
+            json(&header.warnings),
+            header.version,
+            header.collection,
+            json(plan),
         ],
     )?;
     Ok(transaction.last_insert_rowid())

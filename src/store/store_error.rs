@@ -2,7 +2,8 @@
 
 use super::frame_blob::BlobError;
 use crate::labels::{ClassNameError, PlanError, shown_name};
-use palpate_tactile::trial::TrialId;
+use palpate_sim::scene::SceneError;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::ErrorCode;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -132,6 +133,22 @@ pub enum StoreError {
         /// What is wrong with it.
         cause: String,
     },
+    /// A trial whose scene this version cannot read.
+    #[error("the scene stored with trial {id} cannot be read: {cause}")]
+    Scene {
+        /// Number of the trial.
+        id: TrialId,
+        /// Cause.
+        cause: SceneError,
+    },
+    /// A trial of a source that only a newer program knows.
+    #[error("trial {id} comes from \"{name}\", which this version does not know; update Palpate")]
+    UnknownSource {
+        /// Number of the trial.
+        id: TrialId,
+        /// Name of its source.
+        name: String,
+    },
     /// No such calibration.
     #[error("no calibration {id} in the store; `palpate calibrate list` shows all")]
     NoCalibration {
@@ -154,8 +171,9 @@ pub enum StoreError {
     Plan(#[from] PlanError),
     /// A trial whose label cannot be changed.
     #[error(
-        "trial {id} is of \"{object}\" and comes from \"{rig}\": only trials of the real gripper can be labelled",
-        object = shown_name(object)
+        "trial {id} is of \"{object}\" and comes from \"{from}\": only trials of the real gripper can be labelled",
+        object = shown_name(object),
+        from = origin
     )]
     NotOfBoard {
         /// Number of the trial.
@@ -163,7 +181,7 @@ pub enum StoreError {
         /// Its object.
         object: String,
         /// Its origin.
-        rig: String,
+        origin: TrialSource,
     },
     /// A note that is too long.
     #[error("the note has {length} characters, {most} are allowed; keep longer texts in a file")]

@@ -6,10 +6,10 @@ use crate::test_trials::grasp;
 use palpate_geometry::Primitive;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use rusqlite::Connection;
 
-fn trial(seed: u64) -> Trial {
+fn trial(seed: u64) -> SimulatedTrial {
     let mut scene = Scene::default();
     scene.timing.duration_s = 1.2;
     let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
@@ -26,7 +26,7 @@ fn a_trial_survives_storing() -> Result<(), StoreError> {
     let mut store = Store::open(&folder.path().join("new/trials.sqlite"))?;
     let trial = trial(u64::MAX);
     let id = store.insert(&trial)?;
-    assert!(store.load(id)? == trial);
+    assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
     let rows = store.list(false)?;
     assert_eq!((rows.len(), rows[0].samples, rows[0].state.as_str()), (1, 90, "complete"));
     Ok(())
@@ -37,13 +37,13 @@ fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
     let folder = folder();
     let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
     let trial = trial(1);
-    let id = store.begin(&trial.info)?;
-    for frames in trial.frames.chunks(7) {
+    let id = store.begin(&trial)?;
+    for frames in trial.frames().chunks(7) {
         store.append(id, frames)?;
     }
     assert_eq!(store.list(false)?[0].state, "recording");
-    store.finish(id, &trial.info.quality, &trial.info.warnings)?;
-    assert!(store.load(id)? == trial);
+    store.finish(id, &trial.data.quality, &trial.header.warnings)?;
+    assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
     Ok(())
 }
 
@@ -64,7 +64,7 @@ fn two_programs_share_a_store() -> Result<(), StoreError> {
         }
     });
     assert_eq!(first.list(false)?.len(), 40);
-    assert!(second.load(40)? == trial);
+    assert!(second.load(40)? == trial.into());
     Ok(())
 }
 
@@ -80,7 +80,7 @@ fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
     let message = store.load(a).expect_err("deleted").to_string();
     assert!(message.contains("restore"), "{message}");
     store.restore(&[a])?;
-    assert_eq!(store.load(a)?.info.seed, 3);
+    assert_eq!(store.load(a)?.header.seed, 3);
     store.delete(&[b])?;
     assert_eq!(store.purge()?, 1);
     assert_eq!(store.list(true)?.len(), 1);
@@ -108,5 +108,25 @@ fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::erro
     Connection::open(&damaged)?.execute("UPDATE chunks SET frames = x'00', checksum = NULL WHERE number = 1", [])?;
     let error = Store::open(&damaged)?.load(id).expect_err("damaged");
     assert!(matches!(error, StoreError::Damaged { chunk: 1, .. }), "also in an old row without a checksum");
+    Ok(())
+}
+
+#[test]
+fn sources_and_scenes_of_newer_programs_are_named_only_when_they_are_needed() -> Result<(), StoreError> {
+    let folder = folder();
+    let path = folder.path().join("trials.sqlite");
+    let mut store = Store::open(&path)?;
+    let scene = store.insert(&trial(6))?;
+    let source = store.insert(&trial(7))?;
+    let write = |sql: &str| Connection::open(&path).and_then(|connection| connection.execute(sql, [])).expect("writes");
+    write("UPDATE trials SET scene = '[gripper]\ntentacles = 8\n' WHERE id = 1");
+    assert_eq!(store.list(false)?.len(), 2, "a list needs no scene");
+    let message = store.load(scene).expect_err("newer").to_string();
+    assert!(message.contains("trial 1") && message.contains("tentacles"), "{message}");
+    write("UPDATE trials SET rig = 'octopus' WHERE id = 2");
+    for error in [store.load(source).expect_err("newer"), store.list(false).expect_err("newer")] {
+        let message = error.to_string();
+        assert!(message.contains("trial 2") && message.contains("\"octopus\""), "{message}");
+    }
     Ok(())
 }

@@ -57,7 +57,6 @@ pub use layout::{
 pub use pressure::{ContactPatch, PressureArea};
 pub use signals::Signals;
 
-use crate::trial::Trial;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, GripperModel, Side, TaxelGrid};
 
@@ -117,11 +116,11 @@ impl Sensors {
             .collect()
     }
 
-    /// Reads a whole trial. Where a pressure is undefined it counts as none.
-    pub fn signals(&self, trial: &Trial) -> Signals {
+    /// Reads the frames of a trial. Where a pressure is undefined it counts as none.
+    pub fn signals(&self, frames: &[Frame]) -> Signals {
         let channels = self.channels.iter().map(Channel::name).collect();
         let mut signals = Signals { channels, ..Signals::default() };
-        for frame in &trial.frames {
+        for frame in frames {
             let row: Vec<f32> = self.read(frame).into_iter().map(|v| v.unwrap_or_default() as f32).collect();
             signals.push(frame.t, &row);
         }

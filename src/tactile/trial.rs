@@ -1,10 +1,14 @@
 //! Trials: recorded grasps. Raw quantities only; curvature, pressure and every sensor layout are derived from them
 //! later.
 
+use crate::Signals;
+use crate::board::{Board, Detected, Gap, Reading};
+use crate::cadence::Cadence;
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::Phase;
-use serde::{Deserialize, Serialize};
+use palpate_sim::scene::Scene;
+use serde::{Deserialize, Serialize, Serializer};
 
 /// Names a trial within its store.
 pub type TrialId = i64;
@@ -20,40 +24,190 @@ pub struct PhaseMark {
     pub line_bar: Option<f64>,
 }
 
-/// Facts of a trial besides its frames.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TrialInfo {
-    /// Source: `sim` for a simulated gripper.
-    pub rig: String,
-    /// Name of the object.
+/// Origin of a trial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrialSource {
+    /// A simulated gripper.
+    Simulated,
+    /// A real gripper.
+    Recorded,
+    /// A file of another program.
+    Imported,
+}
+
+/// A text that names no [`TrialSource`] of this version.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown source \"{0}\"; choose sim, serial or import")]
+pub struct UnknownSource(
+    /// The text.
+    pub String,
+);
+
+impl TrialSource {
+    /// All sources.
+    pub const ALL: [Self; 3] = [Self::Simulated, Self::Recorded, Self::Imported];
+
+    /// Name in stores, in JSON and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Simulated => "sim",
+            Self::Recorded => "serial",
+            Self::Imported => "import",
+        }
+    }
+}
+
+impl std::fmt::Display for TrialSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Serialize for TrialSource {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl std::str::FromStr for TrialSource {
+    type Err = UnknownSource;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSource> {
+        Self::ALL.into_iter().find(|source| source.name() == name).ok_or_else(|| UnknownSource(name.to_owned()))
+    }
+}
+
+/// Facts that trials of all sources have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialHeader {
+    /// Name of the object; empty while unlabelled.
     pub object: String,
     /// Seed from which the pose was drawn; 0 where the scene's own pose was used.
     pub seed: u64,
     /// The data set it was made for, if any; within one, object and seed name a trial.
-    #[serde(default)]
     pub collection: Option<String>,
-    /// The whole scene as TOML, every key written out.
-    pub scene: String,
-    /// Pose of the gripper in the world.
-    pub world_from_gripper: Pose,
-    /// Effects simulated; empty for real grippers and old trials.
-    #[serde(default)]
-    pub plan: Plan,
-    /// Numerical quality.
-    pub quality: Quality,
+    /// Scene: the default one where none was stored.
+    pub scene: Scene,
     /// Warnings: values guessed, meshes repaired, recording cut short.
     pub warnings: Vec<String>,
     /// Version of the program that made it.
     pub version: String,
 }
 
-/// One recorded grasp.
+impl TrialHeader {
+    /// Header of a trial made by this version, without seed, collection and warnings.
+    pub fn new(object: &str, scene: Scene) -> Self {
+        Self {
+            object: object.to_owned(),
+            seed: 0,
+            collection: None,
+            scene,
+            warnings: Vec::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+}
+
+/// Data of a simulated trial.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
-    /// Facts.
-    pub info: TrialInfo,
-    /// Its samples, in order.
+pub struct SimulatedData {
+    /// Pose of the gripper in the world.
+    pub world_from_gripper: Pose,
+    /// Effects simulated; empty for trials of early versions.
+    pub plan: Plan,
+    /// Numerical quality.
+    pub quality: Quality,
+    /// Samples, in order.
     pub frames: Vec<Frame>,
+}
+
+/// Data of a trial of a real gripper, as its board sent them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoardLog {
+    /// Board.
+    pub board: Board,
+    /// Detected format of its lines.
+    pub detected: Option<Detected>,
+    /// Beginning of the trial, on the clock of the readings (s).
+    pub began_s: f64,
+    /// Timing of the board; all zero while recording.
+    pub cadence: Cadence,
+    /// Number of reconnections during the trial.
+    pub reconnects: u32,
+    /// Phases of the grasp, where known.
+    pub phases: Vec<PhaseMark>,
+    /// Readings, in order.
+    pub readings: Vec<Reading>,
+    /// Gaps: missing readings.
+    pub gaps: Vec<Gap>,
+}
+
+/// Data of a trial, by source.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TrialData {
+    /// Simulated frames.
+    Simulated(SimulatedData),
+    /// Readings of a board.
+    Recorded(BoardLog),
+    /// Channels of a file.
+    Imported(Signals),
+}
+
+/// One grasp: a header and its data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial<D = TrialData> {
+    /// Facts that trials of all sources have.
+    pub header: TrialHeader,
+    /// Data.
+    pub data: D,
+}
+
+/// A trial known to be simulated.
+pub type SimulatedTrial = Trial<SimulatedData>;
+
+impl Trial {
+    /// Origin.
+    pub fn source(&self) -> TrialSource {
+        match self.data {
+            TrialData::Simulated(_) => TrialSource::Simulated,
+            TrialData::Recorded(_) => TrialSource::Recorded,
+            TrialData::Imported(_) => TrialSource::Imported,
+        }
+    }
+
+    /// Simulated samples; empty for other sources.
+    pub fn frames(&self) -> &[Frame] {
+        self.simulated().map_or(&[], |data| &data.frames)
+    }
+
+    /// Data of a simulated trial.
+    pub fn simulated(&self) -> Option<&SimulatedData> {
+        match &self.data {
+            TrialData::Simulated(data) => Some(data),
+            TrialData::Recorded(_) | TrialData::Imported(_) => None,
+        }
+    }
+
+    /// The trial, where it is simulated.
+    pub fn into_simulated(self) -> Option<SimulatedTrial> {
+        match self.data {
+            TrialData::Simulated(data) => Some(Trial { header: self.header, data }),
+            TrialData::Recorded(_) | TrialData::Imported(_) => None,
+        }
+    }
+}
+
+impl SimulatedTrial {
+    /// Samples, in order.
+    pub fn frames(&self) -> &[Frame] {
+        &self.data.frames
+    }
+}
+
+impl From<SimulatedTrial> for Trial {
+    fn from(trial: SimulatedTrial) -> Self {
+        Self { header: trial.header, data: TrialData::Simulated(trial.data) }
+    }
 }
 
 /// Actuation of the fingers.

@@ -23,6 +23,7 @@ use palpate_tactile::calibration::{BendingZero, Calibration, Curve, Procedure, R
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use palpate_tactile::electronics::StripPart;
 use palpate_tactile::trial::PhaseMark;
+use palpate_tactile::trial::TrialHeader;
 use palpate_tactile::trial::TrialId;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -374,11 +375,10 @@ pub(crate) fn stored(
     object: &str,
     closing_s: f64,
 ) -> TrialId {
-    let mut info = palpate_lab::grasping::prepare(scene, None, 0).info().clone();
-    (info.rig, info.object) = ("serial".to_owned(), object.to_owned());
+    let header = TrialHeader::new(object, scene.clone());
     let phases = vec![PhaseMark { from_s: closing_s, phase: Phase::Close, line_bar: None }];
     let about = BoardInfo { board: board.clone(), phases, ..BoardInfo::default() };
-    let id = store.begin_board(&info, &about).unwrap();
+    let id = store.begin_board(&header, &about).unwrap();
     store.append_board(id, &about, &BoardChunk { readings, ..BoardChunk::default() }).unwrap();
     store.finish_board(id, &about, &[]).unwrap();
     id

@@ -6,7 +6,7 @@ use palpate_lab::grasping::grasp;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_store::{Store, encode_frames, write_contacts_csv, write_trial_csv};
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::{SimulatedData, SimulatedTrial};
 use palpate_tactile::{PressureArea, SensorLayout, Sensors};
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use std::path::Path;
 const OBJECTS: [&str; 3] = ["lemon", "case", "cube"];
 const SEED: u64 = 7;
 
-fn jittered_grasp(name: &str, seed: u64) -> (Scene, Trial) {
+fn jittered_grasp(name: &str, seed: u64) -> (Scene, SimulatedTrial) {
     let mut scene = Scene::default();
     name.clone_into(&mut scene.object.source);
     let object = scene.load_object().unwrap();
@@ -41,10 +41,13 @@ fn bytes_of(name: &str, seed: u64) -> Bytes {
     write_trial_csv(&csv, &trial, &scene, &sensors).unwrap();
     write_contacts_csv(&contacts, &trial, &scene).unwrap();
     Bytes {
-        blob: encode_frames(&trial.frames),
+        blob: encode_frames(trial.frames()),
         csv: std::fs::read(csv).unwrap(),
         contacts: std::fs::read(contacts).unwrap(),
-        info: serde_json::to_string(&trial.info).unwrap(),
+        info: {
+            let SimulatedData { world_from_gripper, plan, quality, .. } = &trial.data;
+            format!("{:?}", (&trial.header, world_from_gripper, plan, quality))
+        },
     }
 }
 
@@ -76,8 +79,8 @@ fn bytes_of_the_program(folder: &Path, name: &str, threads: u32) -> Vec<Vec<u8>>
     vec![
         std::fs::read(&csv).unwrap(),
         std::fs::read(csv.with_extension("contacts.csv")).unwrap(),
-        encode_frames(&stored.frames),
-        stored.info.scene.into_bytes(),
+        encode_frames(stored.frames()),
+        stored.header.scene.to_toml().into_bytes(),
     ]
 }
 

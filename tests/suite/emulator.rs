@@ -6,7 +6,8 @@
 use crate::program::{palpate, ran, refused};
 use crate::serial::start;
 use palpate_device::serial::{LinkOptions, SerialLink};
-use palpate_store::{BoardTrial, Store};
+use palpate_store::Store;
+use palpate_tactile::trial::BoardLog;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -78,7 +79,7 @@ fn interrupt(child: &Child) {
 }
 
 /// What `palpate record` says and stores of a gripper that is recorded for some seconds.
-fn recorded(emulated: &Emulated, seconds: &str) -> (Value, BoardTrial) {
+fn recorded(emulated: &Emulated, seconds: &str) -> (Value, BoardLog) {
     let store = emulated.folder.join("trials.sqlite");
     let mut command = palpate(&store);
     command.arg("record").arg("--port").arg(emulated.port()).args(["--seconds", seconds, "--json"]);
@@ -87,11 +88,11 @@ fn recorded(emulated: &Emulated, seconds: &str) -> (Value, BoardTrial) {
     assert!(output.status.success(), "{output:?}");
     let told: Value = serde_json::from_slice(&output.stdout).unwrap();
     let id = told["trial_id"].as_i64().unwrap();
-    (told, Store::open(&store).unwrap().board_trial(id).unwrap().unwrap())
+    (told, Store::open(&store).unwrap().board_log(id).unwrap().unwrap())
 }
 
 /// Finds every recorded reading among what was sent, in its order: which of the sent ones they are.
-fn among(sent: &[Vec<f32>], trial: &BoardTrial) -> Vec<usize> {
+fn among(sent: &[Vec<f32>], trial: &BoardLog) -> Vec<usize> {
     let mut from = 0;
     let find = |reading: &palpate_tactile::board::Reading| {
         let same =
@@ -244,7 +245,7 @@ fn a_host_drives_the_fingers_through_a_programme() {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let output = start(command).wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    let trial = Store::open(&store).unwrap().board_trial(1).unwrap().unwrap();
+    let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     let most = |of: &dyn Fn(&palpate_tactile::board::Reading) -> Option<f64>| {
         trial.readings.iter().filter_map(of).fold(0.0, f64::max)
     };

@@ -8,7 +8,7 @@
 use palpate_lab::grasping::grasp;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Scene, SceneError, SceneKey};
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -218,8 +218,8 @@ fn dented_ball(random: &mut ChaCha8Rng) -> String {
 }
 
 /// True when every number of every frame is one.
-fn is_finite(trial: &Trial) -> bool {
-    trial.frames.iter().all(|frame| {
+fn is_finite(trial: &SimulatedTrial) -> bool {
+    trial.frames().iter().all(|frame| {
         frame.q.iter().all(|q| q.is_finite())
             && frame.world_from_object.is_none_or(|pose| pose.is_finite())
             && frame.taxels.iter().all(|load| [load.normal, load.along, load.across].iter().all(|f| f.is_finite()))
@@ -239,8 +239,8 @@ fn outcome(seed: u64) -> Outcome {
         }
     };
     let trial = grasp(&scene, object.as_ref(), seed);
-    assert!(is_finite(&trial), "a frame holds a number that is none: {:?}", trial.info.quality);
-    let quality = &trial.info.quality;
+    assert!(is_finite(&trial), "a frame holds a number that is none: {:?}", trial.data.quality);
+    let quality = &trial.data.quality;
     assert!(quality.friction_residual.is_finite() && quality.static_residual.is_finite(), "{quality:?}");
     if quality.is_sound() { Outcome::Sound } else { Outcome::Flagged }
 }

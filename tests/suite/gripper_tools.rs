@@ -20,10 +20,10 @@ use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, Examine, FitTrials, FittedFinger, GripperCommand};
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
-use palpate_store::{BOARD_RIG, BoardInfo, Store};
+use palpate_store::{BoardInfo, Store};
 use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialHeader, TrialId};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -340,9 +340,8 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
 /// Two empty closes and two grasps of the real gripper, without a reading.
 fn recorded(store: &mut Store) {
     for object in ["empty", "bigball", "bigball", "empty"] {
-        let mut info = palpate_lab::grasping::prepare(&Scene::default(), None, 0).info().clone();
-        (info.rig, info.object) = (BOARD_RIG.to_owned(), object.to_owned());
-        let id = store.begin_board(&info, &BoardInfo::default()).unwrap();
+        let header = TrialHeader::new(object, Scene::default());
+        let id = store.begin_board(&header, &BoardInfo::default()).unwrap();
         store.finish_board(id, &BoardInfo::default(), &[]).unwrap();
     }
 }

@@ -12,10 +12,10 @@ use palpate_lab::recording::{TrialRequest, record};
 use palpate_lab::workers::GripperCommand;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
+use palpate_store::Store;
 use palpate_store::labels::Flag;
-use palpate_store::{BoardTrial, Store};
 use palpate_tactile::capture::Captured;
-use palpate_tactile::trial::Control;
+use palpate_tactile::trial::{Control, TrialId};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -116,15 +116,17 @@ struct Essence {
 }
 
 impl Essence {
-    fn new(trial: &BoardTrial, warnings: &[String]) -> Self {
+    fn new(store: &Store, id: TrialId, warnings: &[String]) -> Self {
+        let info = store.board_info(id).unwrap().unwrap();
+        let trial = store.board_log(id).unwrap().unwrap();
         let [first, last] = [trial.readings.first(), trial.readings.last()].map(|reading| reading.unwrap().t_s);
-        let closing = trial.about.phases.first().unwrap().from_s;
+        let closing = trial.phases.first().unwrap().from_s;
         let steps = |seconds: f64| (seconds / 0.05).round() as i64;
         Self {
-            flags: trial.about.flags.iter().map(|found| found.flag).collect(),
+            flags: info.flags.iter().map(|found| found.flag).collect(),
             warnings: warnings.to_vec(),
-            channels: trial.about.board.channels.clone(),
-            phases: trial.about.phases.iter().map(|mark| (mark.phase, mark.line_bar)).collect(),
+            channels: trial.board.channels.clone(),
+            phases: trial.phases.iter().map(|mark| (mark.phase, mark.line_bar)).collect(),
             lead: steps(closing - first),
             span: steps(last - first),
         }
@@ -142,8 +144,7 @@ fn by_command(fault: BoardFault) -> Essence {
     let stop = AtomicBool::new(false);
     let recording = record(&mut gripper, &scene(), request(), path.clone(), &stop, &mut |_| ()).unwrap();
     assert_eq!(recording.aborted.is_some(), fault != BoardFault::None);
-    let trial = Store::open(&path).unwrap().board_trial(recording.trial.id).unwrap().unwrap();
-    Essence::new(&trial, &recording.trial.warnings)
+    Essence::new(&Store::open(&path).unwrap(), recording.trial.id, &recording.trial.warnings)
 }
 
 fn by_window(fault: BoardFault) -> Essence {
@@ -151,8 +152,7 @@ fn by_window(fault: BoardFault) -> Essence {
     desk.connect();
     desk.command(GripperCommand::Begin(request()));
     let ended = desk.until(|view| view.ended.is_some()).ended.clone().unwrap();
-    let trial = desk.store().board_trial(ended.id).unwrap().unwrap();
-    Essence::new(&trial, &ended.warnings)
+    Essence::new(&desk.store(), ended.id, &ended.warnings)
 }
 
 #[test]

@@ -5,7 +5,7 @@ use palpate_lab::grasping::grasp;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, Side};
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use std::path::{Path, PathBuf};
 
 fn folder() -> PathBuf {
@@ -26,12 +26,12 @@ fn stored(name: &str) -> Vec<Row> {
     rows.map(|row| Row { t: row[0], q: row[1..11].to_vec(), force: row[11] }).collect()
 }
 
-fn palpate(scene: &str) -> (Scene, Trial) {
+fn palpate(scene: &str) -> (Scene, SimulatedTrial) {
     let mut scene = Scene::from_file(&folder().join(format!("scenes/{scene}.toml"))).unwrap();
     scene.solver.accuracy = "1e-4".parse().unwrap();
     let object = scene.load_object().unwrap();
     let trial = grasp(&scene, object.as_ref(), 0);
-    assert!(trial.info.quality.finite && trial.info.quality.converged);
+    assert!(trial.data.quality.finite && trial.data.quality.converged);
     (scene, trial)
 }
 
@@ -53,11 +53,11 @@ fn between(one: &[Row], other: &[Row]) -> f64 {
 }
 
 /// Root mean square over joints and rows (degrees); `later` is by how much the peer's clock is late (s).
-fn apart(trial: &Trial, peer: &[Row], later: f64) -> f64 {
+fn apart(trial: &SimulatedTrial, peer: &[Row], later: f64) -> f64 {
     let mut squares = Vec::new();
     for row in peer.iter().filter(|row| row.t - later > 0.02) {
         let near = |frame: &&Frame| (frame.t - (row.t - later)).abs() < 0.5 / 75.0;
-        let Some(frame) = trial.frames.iter().find(near) else { continue };
+        let Some(frame) = trial.frames().iter().find(near) else { continue };
         squares.extend(frame.joints(Side::Left).iter().zip(&row.q).map(|(a, b)| (a - b).powi(2)));
     }
     assert!(squares.len() > 500);
@@ -68,8 +68,8 @@ fn row_at(rows: &[Row], t: f64) -> &Row {
     rows.iter().find(|row| (row.t - t).abs() < 0.01).unwrap()
 }
 
-fn frame_at(trial: &Trial, t: f64) -> &Frame {
-    trial.frames.iter().find(|frame| (frame.t - t).abs() < 0.5 / 75.0).unwrap()
+fn frame_at(trial: &SimulatedTrial, t: f64) -> &Frame {
+    trial.frames().iter().find(|frame| (frame.t - t).abs() < 0.5 / 75.0).unwrap()
 }
 
 /// A time at which the grasp has long been at rest and a row is stored (s).

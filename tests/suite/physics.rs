@@ -125,14 +125,14 @@ fn the_second_engine_grasps_alike() {
         let ours = grasp(&scene, object.as_ref(), 0);
         scene.solver.engine = EngineKind::Rapier;
         let theirs = grasp(&scene, object.as_ref(), 0);
-        assert!(theirs.info.quality.finite && theirs.info.warnings == ours.info.warnings, "{name}");
-        assert_eq!(ours.frames.len(), theirs.frames.len());
+        assert!(theirs.data.quality.finite && theirs.header.warnings == ours.header.warnings, "{name}");
+        assert_eq!(ours.frames().len(), theirs.frames().len());
         let mut squares = 0.0;
-        for (a, b) in ours.frames.iter().zip(&theirs.frames) {
+        for (a, b) in ours.frames().iter().zip(theirs.frames()) {
             assert_eq!((a.sample, a.t, a.line_bar, a.phase), (b.sample, b.t, b.line_bar, b.phase));
             squares += a.q.iter().zip(&b.q).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.q.len() as f64;
         }
-        let apart = (squares / ours.frames.len() as f64).sqrt().to_degrees();
+        let apart = (squares / ours.frames().len() as f64).sqrt().to_degrees();
         assert!(apart < 0.25, "{name}: joints are {apart} degrees apart");
         let [ours, theirs] = [ours, theirs].map(|trial| GraspSummary::new(&trial, &scene));
         let onset = |summary: &GraspSummary| summary.contact_onset_s.expect("touched");

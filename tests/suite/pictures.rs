@@ -49,8 +49,8 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     shot.object.clone_into(&mut scene.object.source);
     let object = scene.load_object().unwrap();
     let trial = grasp(&scene, object.as_ref(), 0);
-    let frame = trial.frames.iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
-    let stage = Stage::new(&scene, object.as_ref(), trial.info.world_from_gripper);
+    let frame = trial.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
+    let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
     let (centre, radius) = stage.bounds();
     let view = PictureView {
         camera: Camera::default().turned_to(shot.view).framing(centre, radius),
@@ -65,7 +65,7 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     if shot.ghost {
         scene.solver.engine = scene.solver.engine.other();
         let other = grasp(&scene, object.as_ref(), 0);
-        let frame = other.frames.iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
+        let frame = other.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
         list.ghosts = stage.ghosts(frame, shot.theme);
     }
     let picture = Picture::draw(gpu, renderer, &list, shot.size, 1.0).unwrap();

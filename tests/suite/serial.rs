@@ -126,7 +126,7 @@ fn a_second_of_a_board_is_a_trial_and_says_so() {
     assert!(told["trial_id"] == 1 && (97..=103).contains(&samples), "{told}");
     assert!((told["rate_hz"].as_f64().unwrap() - 100.0).abs() < 1.0 && told["jitter_p95_ms"].is_f64(), "{told}");
     let store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
-    let trial = store.board_trial(1).unwrap().unwrap();
+    let trial = store.board_log(1).unwrap().unwrap();
     for pair in trial.readings.windows(2) {
         assert_eq!(pair[1].seq.unwrap(), pair[0].seq.unwrap() + 1);
         assert!(pair[1].t_s > pair[0].t_s);
@@ -158,7 +158,7 @@ fn a_board_that_vanishes_while_it_is_recorded_leaves_a_gap_and_comes_back() {
     let told = told(child);
     board.unplug();
     assert_eq!(told["reconnects"], 1, "{told}");
-    let trial = Store::open(&store).unwrap().board_trial(1).unwrap().unwrap();
+    let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     assert_eq!(trial.gaps.len(), 1, "{:?}", trial.gaps);
     assert!(trial.gaps[0].cause.contains("unplugged") && trial.gaps[0].lost >= Some(50), "{:?}", trial.gaps);
     let numbers: Vec<u64> = trial.readings.iter().map(|reading| reading.seq.unwrap()).collect();
@@ -178,9 +178,9 @@ fn a_board_that_does_not_come_back_leaves_a_gap_to_the_end() {
     wait_for_samples(&store, 0, 50);
     board.unplug();
     let told = told(child);
-    let trial = Store::open(&store).unwrap().board_trial(1).unwrap().unwrap();
+    let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     let [gap] = &trial.gaps[..] else { panic!("{:?}", trial.gaps) };
-    assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.about.began_s >= 2.5, "{gap:?}");
+    assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.began_s >= 2.5, "{gap:?}");
     assert_eq!(gap.from_s, trial.readings.last().unwrap().t_s);
     assert!(told["warnings"].to_string().contains("interrupted"), "{told}");
 }
@@ -199,8 +199,8 @@ fn a_kill_loses_no_more_than_the_last_second_and_no_other_trial() {
     child.wait().unwrap();
     board.unplug();
     let found = Store::open(&store).unwrap();
-    assert!((27..=33).contains(&found.board_trial(1).unwrap().unwrap().readings.len()));
-    let kept = found.board_trial(2).unwrap().unwrap().readings.last().unwrap().seq.unwrap();
+    assert!((27..=33).contains(&found.board_log(1).unwrap().unwrap().readings.len()));
+    let kept = found.board_log(2).unwrap().unwrap().readings.last().unwrap().seq.unwrap();
     assert!(u64::from(newest) - kept <= 110, "{newest} was sent, {kept} was kept");
     assert!(found.board_bytes(2).unwrap().is_some());
     let states: Vec<String> = found.list(false).unwrap().into_iter().map(|row| row.state).collect();
@@ -233,7 +233,7 @@ fn two_programs_record_two_boards_into_one_store() {
     boards.into_iter().for_each(|board| drop(board.unplug()));
     let store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
     for told in told {
-        let trial = store.board_trial(told["trial_id"].as_i64().unwrap()).unwrap().unwrap();
+        let trial = store.board_log(told["trial_id"].as_i64().unwrap()).unwrap().unwrap();
         assert_eq!((told["samples"].as_u64(), &told["lost"]), (Some(trial.readings.len() as u64), &0.into()), "{told}");
         // How many come within a second is up to the machine; none of them may be missing in between.
         let counted = |pair: &[Reading]| pair[0].seq.zip(pair[1].seq).is_none_or(|(a, b)| b == a + 1);
@@ -257,8 +257,8 @@ fn a_driven_grasp_tells_the_board_each_pressure_and_vents() {
     let pressures: Vec<&str> = said.iter().copied().filter(|line| line.starts_with('P')).collect();
     assert!(pressures.ends_with(&["P 0.30", "P 0.00"]) || pressures.contains(&"P 0.30"), "{said:?}");
     assert!(said.contains(&"K") && said.last() == Some(&"V"), "{said:?}");
-    let trial = Store::open(&folder.path().join("trials.sqlite")).unwrap().board_trial(1).unwrap().unwrap();
-    let phases: Vec<&str> = trial.about.phases.iter().map(|mark| mark.phase.name()).collect();
+    let trial = Store::open(&folder.path().join("trials.sqlite")).unwrap().board_log(1).unwrap().unwrap();
+    let phases: Vec<&str> = trial.phases.iter().map(|mark| mark.phase.name()).collect();
     assert!(phases.contains(&"close") && phases.contains(&"hold"), "{phases:?}");
 }
 

@@ -55,7 +55,7 @@ fn a_kill_at_any_moment_leaves_whole_trials() {
         assert!(!rows.is_empty(), "it was killed before its first trial");
         for row in &rows {
             let trial = store.load(row.id).unwrap();
-            assert_eq!((row.state.as_str(), trial.frames.len()), ("complete", 300));
+            assert_eq!((row.state.as_str(), trial.frames().len()), ("complete", 300));
             assert!(trial == regrasped(&trial, ball.as_ref()), "trial {} is not what was grasped", row.id);
         }
         // The store goes on working for the next program.
@@ -66,7 +66,7 @@ fn a_kill_at_any_moment_leaves_whole_trials() {
 
 /// The same grasp once more, from what the trial says of itself.
 fn regrasped(trial: &Trial, object: Option<&ObjectModel>) -> Trial {
-    grasp(&Scene::from_toml(&trial.info.scene).unwrap(), object, trial.info.seed)
+    grasp(&trial.header.scene, object, trial.header.seed).into()
 }
 
 #[test]
@@ -78,8 +78,8 @@ fn a_recording_cut_short_keeps_its_chunks_and_harms_no_other_trial() {
     let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
     let mut store = Store::open(&path).unwrap();
     store.insert(&trial).unwrap();
-    let cut = store.begin(&trial.info).unwrap();
-    for chunk in trial.frames.chunks(75).take(3) {
+    let cut = store.begin(&trial).unwrap();
+    for chunk in trial.frames().chunks(75).take(3) {
         store.append(cut, chunk).unwrap();
     }
     // What a power cut would leave: the files as they are, while they are in use.
@@ -89,8 +89,8 @@ fn a_recording_cut_short_keeps_its_chunks_and_harms_no_other_trial() {
         std::fs::copy(with(&path), with(&left)).unwrap();
     }
     let found = Store::open(&left).unwrap();
-    assert!(found.load(1).unwrap() == trial);
-    assert!(found.load(cut).unwrap().frames == trial.frames[..225]);
+    assert!(*found.load(cut).unwrap().frames() == trial.frames()[..225]);
+    assert!(found.load(1).unwrap() == trial.into());
     let states: Vec<String> = found.list(false).unwrap().into_iter().map(|row| row.state).collect();
     assert_eq!(states, ["complete", "recording"]);
 }
@@ -122,7 +122,7 @@ fn two_programs_record_into_one_store() {
     let rows = store.list(false).unwrap();
     let of = |object: &str| rows.iter().filter(|row| row.object == object && row.state == "complete").count();
     assert_eq!((of("ball"), of("cube")), (6, 6));
-    assert!(rows.iter().all(|row| store.load(row.id).is_ok_and(|trial| trial.frames.len() == 300)));
+    assert!(rows.iter().all(|row| store.load(row.id).is_ok_and(|trial| trial.frames().len() == 300)));
 }
 
 #[test]

@@ -12,10 +12,10 @@ use palpate_lab::workers::{TrainCommand, TrainRequest, Trainer, TrainerView};
 use palpate_learn::Model;
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
-use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Store};
+use palpate_store::{BoardChunk, BoardInfo, Store};
 use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::calibration::{Input, Point, Record, SensorKind, plan};
-use palpate_tactile::trial::PhaseMark;
+use palpate_tactile::trial::{PhaseMark, TrialHeader};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -53,8 +53,7 @@ const OBJECTS: [(&str, f64, f64); 4] =
 
 /// A trial: the fingers close for a second and hold for one.
 fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32) {
-    let mut info = palpate_lab::grasping::prepare(&Scene::default(), None, 0).info().clone();
-    (info.rig, info.object) = (BOARD_RIG.to_owned(), object.to_owned());
+    let header = TrialHeader::new(object, Scene::default());
     let mark = |from_s, phase| PhaseMark { from_s, phase, line_bar: None };
     let phases = vec![mark(0.0, Phase::Close), mark(2.0, Phase::Release)];
     let about = BoardInfo { phases, ..BoardInfo::default() };
@@ -70,7 +69,7 @@ fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32
         let counts = Sensor::ALL.map(|sensor| Some(counts(sensor, felt(sensor)) as f32)).to_vec();
         Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
     };
-    let id = store.begin_board(&info, &about).unwrap();
+    let id = store.begin_board(&header, &about).unwrap();
     let chunk = BoardChunk { readings: (0..125).map(reading).collect(), ..BoardChunk::default() };
     store.append_board(id, &about, &chunk).unwrap();
     store.finish_board(id, &about, &[]).unwrap();

@@ -8,7 +8,7 @@ use palpate_lab::grasping::{grasp, prepare};
 use palpate_sim::frame::Quality;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use std::path::Path;
 
 fn scene() -> Scene {
@@ -18,14 +18,14 @@ fn scene() -> Scene {
 }
 
 /// One Newton iteration is not enough for a touch.
-fn not_converged() -> Trial {
+fn not_converged() -> SimulatedTrial {
     let mut scene = scene();
     scene.solver.max_iterations = 1;
     grasp(&scene, scene.load_object().unwrap().as_ref(), 2)
 }
 
 /// A pull that is no number, after a second.
-fn not_finite() -> Trial {
+fn not_finite() -> SimulatedTrial {
     let scene = scene();
     let mut run = prepare(&scene, scene.load_object().unwrap().as_ref(), 3);
     while run.next_frame().is_some() {
@@ -36,7 +36,7 @@ fn not_finite() -> Trial {
     run.finish(&scene)
 }
 
-fn sound() -> Trial {
+fn sound() -> SimulatedTrial {
     let scene = scene();
     grasp(&scene, scene.load_object().unwrap().as_ref(), 1)
 }
@@ -53,28 +53,28 @@ fn filled(folder: &Path) -> Store {
 #[test]
 fn a_trial_that_misses_its_tolerance_says_where_and_when() {
     let trial = not_converged();
-    let quality = &trial.info.quality;
+    let quality = &trial.data.quality;
     let imbalance = quality.imbalance.clone().unwrap();
     assert!(quality.finite && !quality.converged && quality.unconverged_steps > 0, "{quality:?}");
     assert!(imbalance.worst_excess > 1.0, "{imbalance:?}");
     assert!((imbalance.first_tick as f64 / 300.0 - imbalance.first_s).abs() < 1e-9, "{imbalance:?}");
-    let told = trial.info.warnings.iter().find(|w| w.contains("missed the solver's tolerance")).unwrap();
+    let told = trial.header.warnings.iter().find(|w| w.contains("missed the solver's tolerance")).unwrap();
     let steps = format!("{} of 1200 steps", quality.unconverged_steps);
     let tick = format!("(tick {})", imbalance.first_tick);
     for part in [&steps, &tick, &imbalance.worst_at] {
         assert!(told.contains(part.as_str()), "{told}");
     }
     assert!(imbalance.worst_at == "the object" || imbalance.worst_at.contains("finger"), "{imbalance:?}");
-    assert_eq!(sound().info.quality.imbalance, None);
+    assert_eq!(sound().data.quality.imbalance, None);
 }
 
 #[test]
 fn a_trial_that_leaves_the_range_keeps_what_came_before_and_says_what_left() {
     let trial = not_finite();
-    assert!(!trial.info.quality.finite && trial.frames.len() == 75, "{:?}", trial.info.quality);
-    let told = trial.info.warnings.iter().find(|w| w.contains("left the range of numbers")).unwrap();
+    assert!(!trial.data.quality.finite && trial.frames().len() == 75, "{:?}", trial.data.quality);
+    let told = trial.header.warnings.iter().find(|w| w.contains("left the range of numbers")).unwrap();
     assert!(told.contains("1.000 s (step 300)") && told.contains("the object"), "{told}");
-    assert!(trial.frames.iter().all(|f| f.q.iter().all(|q| q.is_finite())));
+    assert!(trial.frames().iter().all(|f| f.q.iter().all(|q| q.is_finite())));
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn no_data_set_takes_what_cannot_be_trusted() {
     let (kept, marked): (Vec<_>, Vec<_>) = store.list(false).unwrap().into_iter().partition(|row| row.sound);
     assert_eq!((kept.len(), marked.len()), (1, 2));
     for row in &marked {
-        assert!(!store.load(row.id).unwrap().info.quality.is_sound());
+        assert!(!store.load(row.id).unwrap().simulated().unwrap().quality.is_sound());
     }
     let data = DatasetQuery::default().read(&store, &SensorView::default(), &mut |_, _| ()).unwrap();
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();

@@ -3,10 +3,10 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
 use super::guided;
-use palpate_store::{BOARD_RIG, Store, StoredTare};
+use palpate_store::{Store, StoredTare};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout};
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -106,7 +106,9 @@ pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Fai
     let rows: Vec<DriftRow> = store
         .list(false)?
         .into_iter()
-        .filter(|row| row.rig == BOARD_RIG && (arguments.trials.is_empty() || arguments.trials.contains(&row.id)))
+        .filter(|row| {
+            row.source == TrialSource::Recorded && (arguments.trials.is_empty() || arguments.trials.contains(&row.id))
+        })
         .map(|row| -> Result<DriftRow, Failure> {
             let read = store.board_signals(row.id, &[])?;
             let drift = read.map_or_else(Vec::new, |read| read.derived.drift);

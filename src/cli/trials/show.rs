@@ -2,21 +2,20 @@
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, warn};
-use super::scene_of;
 use palpate_lab::grasping::GraspSummary;
 use palpate_sim::frame::Plan;
 use palpate_store::labels::{LabelledTrial, cadence_line, shown_name};
-use palpate_store::{BoardInfo, BoardTrial, Store};
+use palpate_store::{BoardInfo, Store};
 use palpate_tactile::Signals;
 use palpate_tactile::board::Gap;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{BoardLog, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
 use serde::Serialize;
 
 /// Output of `trials show --json` for a simulated trial.
 #[derive(Serialize)]
 struct SimulatedReport {
     id: TrialId,
-    rig: String,
+    rig: TrialSource,
     seed: u64,
     version: String,
     samples: usize,
@@ -30,7 +29,7 @@ struct SimulatedReport {
 #[derive(Serialize)]
 struct ImportReport {
     id: TrialId,
-    rig: String,
+    rig: TrialSource,
     object: String,
     collection: Option<String>,
     samples: usize,
@@ -38,13 +37,12 @@ struct ImportReport {
     channels: Vec<String>,
 }
 
-fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Result<(), Failure> {
-    let info = store.load(id)?.info;
+fn show_import(id: TrialId, header: TrialHeader, signals: Signals, json: bool) -> Result<(), Failure> {
     let report = ImportReport {
         id,
-        rig: info.rig,
-        object: info.object,
-        collection: info.collection,
+        rig: TrialSource::Imported,
+        object: header.object,
+        collection: header.collection,
         samples: signals.len(),
         duration_s: signals.t_s.last().copied().unwrap_or(0.0) - signals.t_s.first().copied().unwrap_or(0.0),
         channels: signals.channels,
@@ -62,7 +60,7 @@ fn show_import(store: &Store, id: TrialId, signals: Signals, json: bool) -> Resu
 #[derive(Serialize)]
 struct BoardReport {
     id: TrialId,
-    rig: String,
+    rig: TrialSource,
     object: String,
     version: String,
     samples: usize,
@@ -75,18 +73,17 @@ struct BoardReport {
     labels: LabelledTrial,
 }
 
-fn show_board(store: &Store, id: TrialId, trial: BoardTrial, json: bool) -> Result<(), Failure> {
-    let info = store.load(id)?.info;
+fn show_board(store: &Store, id: TrialId, header: TrialHeader, log: BoardLog, json: bool) -> Result<(), Failure> {
     let report = BoardReport {
         id,
-        rig: info.rig,
-        object: info.object,
-        version: info.version,
-        samples: trial.readings.len(),
-        duration_s: trial.readings.last().map_or(0.0, |last| last.t_s - trial.about.began_s),
-        about: trial.about,
-        gaps: trial.gaps,
-        warnings: info.warnings,
+        rig: TrialSource::Recorded,
+        object: header.object,
+        version: header.version,
+        samples: log.readings.len(),
+        duration_s: log.readings.last().map_or(0.0, |last| last.t_s - log.began_s),
+        about: store.board_info(id)?.unwrap_or_default(),
+        gaps: log.gaps,
+        warnings: header.warnings,
         labels: store.labels().trials()?.into_iter().find(|row| row.id == id).unwrap_or_default(),
     };
     if json {
@@ -133,27 +130,25 @@ fn print_labels(labels: &LabelledTrial) -> Result<(), Failure> {
 }
 
 pub(super) fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
-    if let Some(trial) = store.board_trial(id)? {
-        return show_board(store, id, trial, json);
+    let Trial { header, data } = store.load(id)?;
+    match data {
+        TrialData::Recorded(log) => show_board(store, id, header, log, json),
+        TrialData::Imported(signals) => show_import(id, header, signals, json),
+        TrialData::Simulated(data) => show_simulated(id, SimulatedTrial { header, data }, json),
     }
-    if let Some(signals) = store.readings(id)? {
-        return show_import(store, id, signals, json);
-    }
-    show_simulated(store, id, json)
 }
 
-fn show_simulated(store: &Store, id: TrialId, json: bool) -> Result<(), Failure> {
-    let trial = store.load(id)?;
-    let summary = GraspSummary::new(&trial, &scene_of(&trial)?);
+fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), Failure> {
+    let summary = GraspSummary::new(&trial, &trial.header.scene);
     let report = SimulatedReport {
         id,
-        rig: trial.info.rig,
-        seed: trial.info.seed,
-        version: trial.info.version,
-        samples: trial.frames.len(),
+        rig: TrialSource::Simulated,
+        seed: trial.header.seed,
+        samples: trial.frames().len(),
+        version: trial.header.version,
         summary,
-        plan: trial.info.plan,
-        scene: trial.info.scene,
+        plan: trial.data.plan,
+        scene: trial.header.scene.to_toml(),
     };
     if json {
         return say_json(&report);

@@ -3,11 +3,10 @@
 use palpate_learn::{Class, DataCard, Dataset, Example, Labels, Sequence};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
-use palpate_store::{BOARD_RIG, Store, StoreError, TrialRow};
+use palpate_sim::scene::{Between, PRESETS, PoseSpread};
+use palpate_store::{Store, StoreError, TrialRow};
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::trial::Trial;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,8 +32,8 @@ impl Default for SensorView {
 pub struct DatasetQuery {
     /// Only trials of collections whose name starts with this.
     pub collection: Option<String>,
-    /// Only trials of this rig: [`BOARD_RIG`] for those of the real gripper.
-    pub rig: Option<String>,
+    /// Only trials of this source.
+    pub source: Option<TrialSource>,
     /// Only these objects; all where the list is empty.
     pub objects: Vec<String>,
     /// True to leave out the empty hand, which is never confused with an object and would raise mean scores.
@@ -57,14 +56,6 @@ pub enum DatasetError {
     Layout {
         /// Error of the layout.
         cause: LayoutError,
-    },
-    /// A trial's scene that cannot be read.
-    #[error("the scene stored with trial {id} cannot be read: {cause}")]
-    Scene {
-        /// The trial.
-        id: TrialId,
-        /// Error of the parser.
-        cause: String,
     },
     /// No trial matches.
     #[error("no trial in the store matches{about}; `palpate collect` makes trials, `palpate trials list` lists them")]
@@ -164,7 +155,7 @@ impl DatasetQuery {
             |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
         row.state == "complete"
             && self.collection.as_ref().is_none_or(in_collection)
-            && self.rig.as_ref().is_none_or(|rig| *rig == row.rig)
+            && self.source.is_none_or(|source| source == row.source)
             && (self.objects.is_empty() || self.objects.contains(&row.object))
             && !(self.without_empty && row.object == EMPTY)
     }
@@ -174,8 +165,8 @@ impl DatasetQuery {
         if let Some(collection) = &self.collection {
             about += &format!(" collection {collection}");
         }
-        if let Some(rig) = &self.rig {
-            about += &format!(" rig {rig}");
+        if let Some(source) = self.source {
+            about += &format!(" rig {source}");
         }
         if !self.objects.is_empty() {
             about += &format!(" the objects {}", self.objects.join(", "));
@@ -325,18 +316,19 @@ fn known_properties(row: &TrialRow) -> Option<(String, String)> {
 
 /// Reads the signals of a trial: its own channels if imported, calibrated ones if recorded, those of the view if simulated.
 fn signals_of(store: &Store, row: &TrialRow, view: &SensorView) -> Result<(Signals, Origin), DatasetError> {
-    if let Some(signals) = store.readings(row.id).map_err(|cause| DatasetError::Store { cause })? {
-        return Ok((signals, Origin::Recorded));
-    }
-    if row.rig == BOARD_RIG {
+    if row.source == TrialSource::Recorded {
         return Ok((board_signals(store, row.id, view)?, Origin::Recorded));
     }
-    let trial = store.load(row.id).map_err(|cause| DatasetError::Store { cause })?;
-    let scene = Scene::from_toml(&trial.info.scene)
-        .map_err(|error| DatasetError::Scene { id: row.id, cause: error.to_string() })?;
+    let Trial { header, data } = store.load(row.id).map_err(|cause| DatasetError::Store { cause })?;
+    let trial = match data {
+        TrialData::Simulated(data) => SimulatedTrial { header, data },
+        TrialData::Imported(signals) => return Ok((signals, Origin::Recorded)),
+        TrialData::Recorded(_) => return Ok((board_signals(store, row.id, view)?, Origin::Recorded)),
+    };
+    let scene = &trial.header.scene;
     let drawn_as = PoseSpread { between: Between::default(), ..scene.pose.clone() };
     let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
-    let signals = view.signals(&trial, &scene).map_err(|cause| DatasetError::Layout { cause })?;
+    let signals = view.signals(&trial).map_err(|cause| DatasetError::Layout { cause })?;
     Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
 }
 
@@ -357,18 +349,18 @@ fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<Signal
 impl SensorView {
     /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it differs
     /// between classes only by residues of integrators and dampers.
-    pub fn signals(&self, trial: &Trial, scene: &Scene) -> Result<Signals, LayoutError> {
+    pub fn signals(&self, trial: &SimulatedTrial) -> Result<Signals, LayoutError> {
         let layout = SensorLayout::named(&self.layout)?;
-        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation)?;
-        let clean = sensors.signals(trial);
-        let end = trial.frames.iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
+        let sensors = Sensors::new(&layout, &trial.header.scene.gripper, PressureArea::Participation)?;
+        let clean = sensors.signals(trial.frames());
+        let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         // Poses of different objects may share a seed; their noise must not. FNV-1a of the name: changing it would change
         // every data set with noisy sensors.
         let seed = trial
-            .info
+            .header
             .object
             .bytes()
-            .fold(trial.info.seed, |seed, byte| (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+            .fold(trial.header.seed, |seed, byte| (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
         Ok(self.sensors.apply(&clean, seed).until(end))
     }
 }

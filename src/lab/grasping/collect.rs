@@ -10,7 +10,7 @@ use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::{Store, StoreError};
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -175,7 +175,7 @@ pub fn collect(
 }
 
 /// A trial that has been made, and how often its pose was drawn again; or why its object cannot be loaded.
-type Made = Result<(Trial, u32), String>;
+type Made = Result<(SimulatedTrial, u32), String>;
 
 /// The tasks in order, shared by all threads.
 struct Line<'a> {
@@ -238,11 +238,11 @@ fn store_in_order(
                 None => continue,
             }
         };
-        let object = newest.info.object.clone();
+        let object = newest.header.object.clone();
         report.stored +=
             store.insert_collected(ready.iter().map(|(trial, _)| trial)).map_err(CollectionError::Store)?;
         report.redrawn += ready.iter().map(|(_, redrawn)| redrawn).sum::<u32>();
-        let unsound = |(trial, _): &&(Trial, u32)| !trial.info.quality.is_sound();
+        let unsound = |(trial, _): &&(SimulatedTrial, u32)| !trial.data.quality.is_sound();
         report.unsound += ready.iter().filter(unsound).count() as u32;
         line.stored.store(due, Ordering::Relaxed);
         tell(report.known + due as u32, object);
@@ -299,11 +299,11 @@ impl<'a> Bench<'a> {
         for number in first..task.number {
             let seed = self.plan.seed_of(&self.plan.objects[task.object], number);
             let (scene, _) = on_bench.sampler.draw_after(model, seed, released.as_ref());
-            released = grasp(&scene, model, seed).frames.pop();
+            released = grasp(&scene, model, seed).data.frames.pop();
         }
         let (scene, redrawn) = on_bench.sampler.draw_after(model, task.seed, released.as_ref());
         let mut trial = grasp(&scene, model, task.seed);
-        trial.info.collection = Some(self.collection.to_owned());
+        trial.header.collection = Some(self.collection.to_owned());
         Ok((trial, redrawn))
     }
 }
@@ -329,7 +329,7 @@ mod tests {
         let rows = store.list(true).expect("lists");
         let of = |row: &palpate_store::TrialRow| {
             let trial = store.load(row.id).expect("whole");
-            (row.object.clone(), row.seed, encode_frames(&trial.frames), trial.info.scene)
+            (row.object.clone(), row.seed, encode_frames(trial.frames()), trial.header.scene.to_toml())
         };
         rows.iter().map(of).collect()
     }

@@ -182,7 +182,11 @@ impl GraspController {
                 format!("the board vented by itself ({cause})")
             }
             GripperEvent::Board(LinkEvent::Captured(Captured::Interrupted { cause, .. })) => cause.clone(),
-            GripperEvent::Board(_) | GripperEvent::Sampled(_) | GripperEvent::Tick | GripperEvent::Finished => {
+            GripperEvent::Board(_)
+            | GripperEvent::Sampled(_)
+            | GripperEvent::Signals { .. }
+            | GripperEvent::Tick
+            | GripperEvent::Finished => {
                 return None;
             }
         };

@@ -16,7 +16,7 @@
 use super::run::prepare_refined;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, IntegrationMethod, Scene};
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Channel, Quantity, Sensors};
 use serde::Serialize;
 
@@ -71,8 +71,8 @@ impl ErrorBand {
     }
 
     /// The band in a few numbers, beside what the channels read.
-    pub fn norms(&self, trial: &Trial, sensors: &Sensors) -> ErrorNorms {
-        let readings: Vec<Vec<Option<f64>>> = trial.frames.iter().map(|frame| sensors.read(frame)).collect();
+    pub fn norms(&self, trial: &SimulatedTrial, sensors: &Sensors) -> ErrorNorms {
+        let readings: Vec<Vec<Option<f64>>> = trial.frames().iter().map(|frame| sensors.read(frame)).collect();
         ErrorNorms::new(sensors.channels(), &readings, |channel, sample| self.half_width(channel, sample))
     }
 }
@@ -118,8 +118,10 @@ impl ErrorNorms {
     }
 
     /// How far one trial is from another, sampled at the same times; the range is that of both.
-    pub fn between(trial: &Trial, other: &Trial, sensors: &Sensors) -> Self {
-        let read = |trial: &Trial| -> Vec<Vec<Option<f64>>> { trial.frames.iter().map(|f| sensors.read(f)).collect() };
+    pub fn between(trial: &SimulatedTrial, other: &SimulatedTrial, sensors: &Sensors) -> Self {
+        let read = |trial: &SimulatedTrial| -> Vec<Vec<Option<f64>>> {
+            trial.frames().iter().map(|f| sensors.read(f)).collect()
+        };
         let (mut rows, others) = (read(trial), read(other));
         let (own, common) = (rows.len(), rows.len().min(others.len()));
         rows.extend(others);
@@ -143,10 +145,10 @@ pub fn band_half_width(t_s: &[f64], estimates: &[f32], sample: usize) -> Option<
 }
 
 /// Runs the refined run of a grasp that was made from this scene, and gives the band about it.
-pub fn error_band(trial: &Trial, scene: &Scene, object: Option<&ObjectModel>, sensors: &Sensors) -> ErrorBand {
-    let mut run = prepare_refined(scene, object, trial.info.seed);
+pub fn error_band(trial: &SimulatedTrial, scene: &Scene, object: Option<&ObjectModel>, sensors: &Sensors) -> ErrorBand {
+    let mut run = prepare_refined(scene, object, trial.header.seed);
     let mut band = ErrorBand::new(scene, sensors.channels().len());
-    for frame in &trial.frames {
+    for frame in trial.frames() {
         let Some(finer) = run.next_frame() else { break };
         band.push(frame.t, &sensors.read(frame), &sensors.read(finer));
     }
@@ -203,14 +205,14 @@ mod tests {
 
     /// How a band stands to the truth, a grasp at a tolerance of 1e-6: samples that it covers, all of them, and the sums
     /// of the squares of half-widths and errors, as shares of the largest reading of their channel.
-    fn covered(scene: &Scene, object: &ObjectModel, truth: &Trial) -> [f64; 4] {
+    fn covered(scene: &Scene, object: &ObjectModel, truth: &SimulatedTrial) -> [f64; 4] {
         let sensors = sensors(scene);
         let trial = grasp(scene, Some(object), 0);
         let band = error_band(&trial, scene, Some(object), &sensors);
         let rows: Vec<Vec<f64>> =
-            truth.frames.iter().map(|f| sensors.read(f).iter().map(|v| v.unwrap_or_default()).collect()).collect();
+            truth.frames().iter().map(|f| sensors.read(f).iter().map(|v| v.unwrap_or_default()).collect()).collect();
         let mut sums = [0.0; 4];
-        for (k, (frame, exact)) in trial.frames.iter().zip(&rows).enumerate() {
+        for (k, (frame, exact)) in trial.frames().iter().zip(&rows).enumerate() {
             for (channel, (value, want)) in sensors.read(frame).iter().zip(exact).enumerate() {
                 let largest = rows.iter().map(|row| row[channel].abs()).fold(1e-9, f64::max);
                 let error = (value.unwrap_or_default() - want).abs();
@@ -266,7 +268,7 @@ mod tests {
         scene.solver.integrator = Integrator::Sdirk2;
         let trial = grasp(&scene, Some(&ball), 0);
         let band = error_band(&trial, &scene, Some(&ball), &sensors(&scene));
-        assert!(band.half_width(0, trial.frames.len() - 1).is_some());
+        assert!(band.half_width(0, trial.frames().len() - 1).is_some());
         assert!(trial == grasp(&scene, Some(&ball), 0));
     }
 }

@@ -2,13 +2,13 @@
 
 use super::controller::{GraspController, GraspPlan, PressureCommand};
 use crate::gripper::{Gripper, GripperError, GripperEvent, SimulatedGripper};
-use palpate_sim::frame::{Frame, Quality};
+use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, Side};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::Refinement;
 use palpate_sim::run::SimRun;
 use palpate_sim::scene::{Effect, Scene, Setting};
-use palpate_tactile::trial::{Trial, TrialInfo};
+use palpate_tactile::trial::{SimulatedData, SimulatedTrial, Trial, TrialHeader};
 use std::time::Duration;
 
 /// A simulated or replayed grasp in progress, sample by sample.
@@ -16,9 +16,11 @@ use std::time::Duration;
 pub struct GraspRun<G> {
     gripper: G,
     controller: GraspController,
-    info: TrialInfo,
+    header: TrialHeader,
     frames: Vec<Frame>,
     finished: bool,
+    /// The gripper has failed.
+    failed: bool,
 }
 
 /// Sets up a simulated grasp. `seed` is recorded; it does not change the scene.
@@ -42,24 +44,14 @@ fn prepare_with(
     warnings.extend(placement.warnings);
     warnings.extend(programme_warnings(scene));
     warnings.extend(overlap_warning(&mut simulation));
-    let info = TrialInfo {
-        rig: "sim".to_owned(),
-        object: object.map_or("empty", |o| &o.name).to_owned(),
-        seed,
-        collection: None,
-        scene: scene.to_toml(),
-        world_from_gripper: placement.world_from_gripper,
-        plan: simulation.plan().clone(),
-        quality: simulation.quality(),
-        warnings,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-    };
-    let gripper = SimulatedGripper::new(simulation, f64::from(scene.timing.actuation_hz));
-    GraspRun::new(gripper, GraspPlan::simulated(scene), info)
+    let header = TrialHeader { seed, warnings, ..TrialHeader::new(object.map_or("empty", |o| &o.name), scene.clone()) };
+    let actuation_hz = f64::from(scene.timing.actuation_hz);
+    let gripper = SimulatedGripper::new(simulation, placement.world_from_gripper, actuation_hz);
+    GraspRun::new(gripper, GraspPlan::simulated(scene), header)
 }
 
 /// Sets up and runs a simulated grasp to its end.
-pub fn grasp(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> Trial {
+pub fn grasp(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> SimulatedTrial {
     let mut run = prepare(scene, object, seed);
     while run.next_frame().is_some() {}
     run.finish(scene)
@@ -90,14 +82,14 @@ fn programme_warnings(scene: &Scene) -> Vec<String> {
 
 impl<G: Gripper> GraspRun<G> {
     /// A grasp about to begin.
-    pub fn new(gripper: G, plan: GraspPlan, info: TrialInfo) -> Self {
+    pub fn new(gripper: G, plan: GraspPlan, header: TrialHeader) -> Self {
         let controller = GraspController::new(plan, gripper.now_s());
-        Self { gripper, controller, info, frames: Vec::new(), finished: false }
+        Self { gripper, controller, header, frames: Vec::new(), finished: false, failed: false }
     }
 
     /// Header of the trial so far.
-    pub fn info(&self) -> &TrialInfo {
-        &self.info
+    pub fn header(&self) -> &TrialHeader {
+        &self.header
     }
 
     /// The gripper.
@@ -107,7 +99,7 @@ impl<G: Gripper> GraspRun<G> {
 
     /// Adds a warning to the trial.
     pub fn warn(&mut self, text: String) {
-        self.info.warnings.push(text);
+        self.header.warnings.push(text);
     }
 
     /// Samples so far.
@@ -126,9 +118,8 @@ impl<G: Gripper> GraspRun<G> {
                 }
                 Ok(None) => {}
                 Err(error) => {
-                    self.info.warnings.push(error.to_string());
-                    self.info.quality.finite = false;
-                    self.finished = true;
+                    self.header.warnings.push(error.to_string());
+                    (self.finished, self.failed) = (true, true);
                 }
             }
         }
@@ -143,7 +134,7 @@ impl<G: Gripper> GraspRun<G> {
                 }
             }
             GripperEvent::Sampled(frame) => return Ok(Some(frame)),
-            GripperEvent::Board(_) => {}
+            GripperEvent::Board(_) | GripperEvent::Signals { .. } => {}
             GripperEvent::Finished => self.finished = true,
         }
         Ok(None)
@@ -151,30 +142,40 @@ impl<G: Gripper> GraspRun<G> {
 }
 
 impl GraspRun<SimulatedGripper> {
-    /// The trial, with its quality and warnings. The samples leave the run.
-    pub fn finish(&mut self, scene: &Scene) -> Trial {
+    /// The trial so far, without its samples.
+    pub fn begun(&self) -> SimulatedTrial {
         let simulation = self.gripper.run();
-        let mut info = self.info.clone();
-        let quality = simulation.quality();
-        info.quality = Quality { finite: quality.finite && info.quality.finite, ..quality };
-        info.warnings.extend(info.quality.misses());
-        if info.quality.missed_steps > 0 {
+        let data = SimulatedData {
+            world_from_gripper: self.gripper.world_from_gripper(),
+            plan: simulation.plan().clone(),
+            quality: simulation.quality(),
+            frames: Vec::new(),
+        };
+        Trial { header: self.header.clone(), data }
+    }
+
+    /// The trial, with its quality and warnings. The samples leave the run.
+    pub fn finish(&mut self, scene: &Scene) -> SimulatedTrial {
+        let Trial { mut header, mut data } = self.begun();
+        let warnings = &mut header.warnings;
+        data.quality.finite &= !self.failed;
+        warnings.extend(data.quality.misses());
+        if data.quality.missed_steps > 0 {
             let (missed, steps, least) =
-                (info.quality.missed_steps, info.quality.steps, info.quality.least_step_s * 1e6);
+                (data.quality.missed_steps, data.quality.steps, data.quality.least_step_s * 1e6);
             let tolerance = scene.solver.accuracy;
-            info.warnings.push(format!(
+            warnings.push(format!(
                 "{missed} of {steps} steps missed the accuracy {tolerance}, though they were as short as steps get ({least:.1} \
                  µs): try a larger tolerance"
             ));
         }
-        info.warnings.extend(simulation.notes());
-        let frames = std::mem::take(&mut self.frames);
+        warnings.extend(self.gripper.run().notes());
+        data.frames = std::mem::take(&mut self.frames);
         let passable = scene.effects.get(Effect::FingerContact) == Setting::Off;
-        if let Some(t) = fingers_cross(scene, &frames).filter(|_| passable) {
-            info.warnings
-                .push(format!("the fingers pass through each other from {t:.2} s: effects.finger-contact is off"));
+        if let Some(t) = fingers_cross(scene, &data.frames).filter(|_| passable) {
+            warnings.push(format!("the fingers pass through each other from {t:.2} s: effects.finger-contact is off"));
         }
-        Trial { info, frames }
+        Trial { header, data }
     }
 }
 
@@ -212,6 +213,7 @@ fn fingers_cross(scene: &Scene, frames: &[Frame]) -> Option<f64> {
 mod tests {
     use super::*;
     use palpate_geometry::Primitive;
+    use palpate_sim::frame::Quality;
 
     fn ball() -> ObjectModel {
         ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6)
@@ -220,9 +222,9 @@ mod tests {
     #[test]
     fn a_grasp_of_a_ball_is_sound() {
         let trial = grasp(&Scene::default(), Some(&ball()), 0);
-        assert_eq!(trial.frames.len(), 300);
-        assert!(trial.info.warnings.is_empty(), "{:?}", trial.info.warnings);
-        let Quality { finite, converged, steps, static_residual, .. } = trial.info.quality;
+        assert_eq!(trial.frames().len(), 300);
+        assert!(trial.header.warnings.is_empty(), "{:?}", trial.header.warnings);
+        let Quality { finite, converged, steps, static_residual, .. } = trial.data.quality;
         assert!(finite && converged && steps == 1200);
         assert!(static_residual < 1e-3, "{static_residual}");
     }
@@ -231,11 +233,11 @@ mod tests {
     fn an_empty_hand_closes_on_itself_unless_it_is_told_not_to() {
         let mut scene = Scene::default();
         let trial = grasp(&scene, None, 0);
-        assert_eq!(trial.info.object, "empty");
-        assert!(trial.info.warnings.is_empty() && trial.info.plan.is_on("finger-contact"), "{:?}", trial.info);
+        assert_eq!(trial.header.object, "empty");
+        assert!(trial.header.warnings.is_empty() && trial.data.plan.is_on("finger-contact"), "{:?}", trial.header);
         scene.effects.set(Effect::FingerContact, Setting::Off);
         let trial = grasp(&scene, None, 0);
-        assert!(trial.info.warnings.iter().any(|w| w.contains("pass through")), "{:?}", trial.info.warnings);
+        assert!(trial.header.warnings.iter().any(|w| w.contains("pass through")), "{:?}", trial.header.warnings);
     }
 
     #[test]
@@ -246,9 +248,9 @@ mod tests {
         scene.gripper.mount.offset = [0.0, 0.08, 0.0];
         let block = ObjectModel::from_primitive("block", Primitive::Sphere { radius: 0.03 }, 400.0, 0.6);
         let trial = grasp(&scene, Some(&block), 0);
-        assert!(!trial.info.plan.is_on("finger-contact") && trial.info.quality.converged);
+        assert!(!trial.data.plan.is_on("finger-contact") && trial.data.quality.converged);
         let noted = |w: &String| w.contains("finger-contact was turned on at");
-        assert_eq!(trial.info.warnings.iter().filter(|w| noted(w)).count(), 1, "{:?}", trial.info.warnings);
+        assert_eq!(trial.header.warnings.iter().filter(|w| noted(w)).count(), 1, "{:?}", trial.header.warnings);
     }
 
     #[test]
@@ -256,7 +258,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.gripper.mount.offset = [0.03, 0.0, 0.0];
         let run = prepare(&scene, Some(&ball()), 0);
-        assert!(run.info().warnings.iter().any(|w| w.contains("start")), "{:?}", run.info().warnings);
+        assert!(run.header().warnings.iter().any(|w| w.contains("start")), "{:?}", run.header().warnings);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, Side};
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{ContactPatch, PressureArea, Span, curvature};
 use serde::Serialize;
 
@@ -45,21 +45,21 @@ pub struct HoldSummary {
 
 impl GraspSummary {
     /// Reads a trial that was made from `scene`.
-    pub fn new(trial: &Trial, scene: &Scene) -> Self {
+    pub fn new(trial: &SimulatedTrial, scene: &Scene) -> Self {
         let count = scene.gripper.taxels().count();
         let touches = |frame: &&Frame| Side::BOTH.iter().any(|s| frame.normal_force(*s, count) > CONTACT_FORCE);
-        let held: Vec<&Frame> = trial.frames.iter().filter(|f| f.phase == Phase::Hold).collect();
+        let held: Vec<&Frame> = trial.frames().iter().filter(|f| f.phase == Phase::Hold).collect();
         let place = |frame: &Frame| frame.world_from_object.map(|pose| pose.position);
-        let moved = || Some((place(held.last()?)? - place(trial.frames.first()?)?).length());
+        let moved = || Some((place(held.last()?)? - place(trial.frames().first()?)?).length());
         Self {
-            object: trial.info.object.clone(),
-            finite: trial.info.quality.finite,
-            converged: trial.info.quality.converged,
-            warnings: trial.info.warnings.clone(),
-            contact_onset_s: trial.frames.iter().find(touches).map(|frame| frame.t),
+            object: trial.header.object.clone(),
+            finite: trial.data.quality.finite,
+            converged: trial.data.quality.converged,
+            warnings: trial.header.warnings.clone(),
+            contact_onset_s: trial.frames().iter().find(touches).map(|frame| frame.t),
             hold: HoldSummary::new(&held[held.len() - held.len().div_ceil(4)..], scene),
             object_moved_m: moved(),
-            quality: trial.info.quality.clone(),
+            quality: trial.data.quality.clone(),
         }
     }
 }

@@ -26,6 +26,13 @@ pub enum GripperEvent {
     Sampled(Frame),
     /// Bytes, a reading, a gap or a reply of a board.
     Board(LinkEvent),
+    /// A sample of an imported trial.
+    Signals {
+        /// Its time (s).
+        t_s: f64,
+        /// A value per channel.
+        values: Vec<f32>,
+    },
     /// The end: no event follows.
     Finished,
 }

@@ -5,8 +5,7 @@ use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::LinkEvent;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
-use palpate_store::BoardTrial;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::{BoardLog, Trial, TrialData};
 use std::time::Duration;
 
 /// The events of a trial, in order. Captured bytes in a file are replayed by [`super::listen_to_port`].
@@ -17,23 +16,27 @@ pub struct ReplayedGripper {
 }
 
 impl ReplayedGripper {
-    /// Replays the frames of a simulated trial.
-    pub fn of_frames(trial: Trial) -> Self {
-        Self::new(trial.frames.into_iter().map(GripperEvent::Sampled).collect())
-    }
-
-    /// Replays the readings and gaps of a recorded trial, in order of time.
-    pub fn of_readings(trial: BoardTrial) -> Self {
-        let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(trial.about.board))];
-        timed.extend(trial.gaps.into_iter().map(|gap| (gap.from_s.next_up(), DecodedEvent::Gap(gap))));
-        timed.extend(trial.readings.into_iter().map(|reading| (reading.t_s, DecodedEvent::Reading(reading))));
-        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Self::new(timed.into_iter().map(|(_, event)| GripperEvent::Board(LinkEvent::Decoded(event))).collect())
-    }
-
-    fn new(events: Vec<GripperEvent>) -> Self {
+    /// Replays frames, readings with their gaps, or samples of channels, in order of time.
+    pub fn new(trial: Trial) -> Self {
+        let events: Vec<GripperEvent> = match trial.data {
+            TrialData::Simulated(data) => data.frames.into_iter().map(GripperEvent::Sampled).collect(),
+            TrialData::Recorded(log) => events_of(log),
+            TrialData::Imported(signals) => {
+                let sample = |(k, t_s): (usize, &f64)| (*t_s, signals.row(k).to_vec());
+                let samples = signals.t_s.iter().enumerate().map(sample);
+                samples.map(|(t_s, values)| GripperEvent::Signals { t_s, values }).collect()
+            }
+        };
         Self { events: events.into_iter(), now_s: 0.0 }
     }
+}
+
+fn events_of(log: BoardLog) -> Vec<GripperEvent> {
+    let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(log.board))];
+    timed.extend(log.gaps.into_iter().map(|gap| (gap.from_s.next_up(), DecodedEvent::Gap(gap))));
+    timed.extend(log.readings.into_iter().map(|reading| (reading.t_s, DecodedEvent::Reading(reading))));
+    timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    timed.into_iter().map(|(_, event)| GripperEvent::Board(LinkEvent::Decoded(event))).collect()
 }
 
 impl Gripper for ReplayedGripper {
@@ -44,7 +47,7 @@ impl Gripper for ReplayedGripper {
     fn next_event(&mut self, _patience: Duration) -> Result<GripperEvent, GripperError> {
         let event = self.events.next().unwrap_or(GripperEvent::Finished);
         match &event {
-            GripperEvent::Sampled(Frame { t, .. }) => self.now_s = *t,
+            GripperEvent::Sampled(Frame { t: t_s, .. }) | GripperEvent::Signals { t_s, .. } => self.now_s = *t_s,
             GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reading(reading))) => self.now_s = reading.t_s,
             GripperEvent::Board(_) | GripperEvent::Tick | GripperEvent::Finished => {}
         }
@@ -56,6 +59,65 @@ impl Gripper for ReplayedGripper {
     }
 
     fn vent(&mut self) -> Result<(), GripperError> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::{GraspPlan, GraspRun, grasp};
+    use palpate_sim::scene::Scene;
+    use palpate_store::{BoardChunk, BoardInfo, ImportedTrial, Store};
+    use palpate_tactile::Signals;
+    use palpate_tactile::board::{Board, Gap, Reading};
+    use palpate_tactile::trial::TrialHeader;
+
+    fn events(trial: Trial) -> Vec<(f64, GripperEvent)> {
+        let mut gripper = ReplayedGripper::new(trial);
+        let next = || match gripper.next_event(Duration::ZERO).expect("never fails") {
+            GripperEvent::Finished => None,
+            event => Some((gripper.now_s(), event)),
+        };
+        std::iter::from_fn(next).collect()
+    }
+
+    #[test]
+    fn stored_trials_of_each_source_replay_in_order() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+
+        let mut scene = Scene::default();
+        scene.timing.duration_s = 0.5;
+        let simulated = grasp(&scene, None, 0);
+        let id = store.insert(&simulated)?;
+        let stored = store.load(id)?;
+        let plan = GraspPlan::simulated(&stored.header.scene);
+        let mut run = GraspRun::new(ReplayedGripper::new(stored.clone()), plan, stored.header.clone());
+        while run.next_frame().is_some() {}
+        assert!(run.frames() == simulated.frames() && !run.frames().is_empty());
+
+        let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: vec![Some(7.0)], line_bar: None };
+        let gap = Gap { from_s: 0.02, to_s: 0.06, lost: Some(1), cause: String::new() };
+        let board = Board { channels: vec!["flexL".to_owned()], ..Board::default() };
+        let readings = [0.0, 0.02, 0.06].map(reading);
+        let info = BoardInfo { board: board.clone(), ..BoardInfo::default() };
+        let id = store.begin_board(&TrialHeader::new("lemon", Scene::default()), &info)?;
+        let chunk = BoardChunk { readings: readings.to_vec(), gaps: vec![gap.clone()], ..BoardChunk::default() };
+        store.append_board(id, &info, &chunk)?;
+        let [first, second, third] = readings.map(DecodedEvent::Reading);
+        let expected = [DecodedEvent::Board(board), first, second, DecodedEvent::Gap(gap), third];
+        let replayed = events(store.load(id)?);
+        let times: Vec<f64> = replayed.iter().map(|(now_s, _)| *now_s).collect();
+        assert_eq!(times, [0.0, 0.0, 0.02, 0.02, 0.06]);
+        let replayed: Vec<GripperEvent> = replayed.into_iter().map(|(_, event)| event).collect();
+        assert_eq!(replayed, expected.map(|event| GripperEvent::Board(LinkEvent::Decoded(event))));
+
+        let signals = Signals { channels: vec!["p".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
+        let (name, label) = ("1".to_owned(), "mug".to_owned());
+        store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+        let sample = |t_s: f64, value: f32| (t_s, GripperEvent::Signals { t_s, values: vec![value] });
+        assert_eq!(events(store.load(id + 1)?), [sample(0.0, 1.0), sample(0.1, 2.0)]);
         Ok(())
     }
 }

@@ -161,7 +161,9 @@ mod tests {
             match gripper.next_event(Duration::ZERO).expect("an open port") {
                 GripperEvent::Board(_) => readings += 1,
                 GripperEvent::Tick => ticks += 1,
-                GripperEvent::Sampled(_) | GripperEvent::Finished => panic!("not of a board"),
+                GripperEvent::Sampled(_) | GripperEvent::Signals { .. } | GripperEvent::Finished => {
+                    panic!("not of a board")
+                }
             }
             if let Some(command) = controller.command(gripper.now_s()) {
                 gripper.set_pressure(command.bar, command.phase).expect("an open port");

@@ -1,6 +1,7 @@
 //! The simulated gripper.
 
 use super::{Gripper, GripperError, GripperEvent};
+use palpate_geometry::Pose;
 use palpate_sim::gripper::Phase;
 use palpate_sim::run::{SimEvent, SimRun};
 use std::time::Duration;
@@ -9,19 +10,25 @@ use std::time::Duration;
 #[derive(Clone, Debug)]
 pub struct SimulatedGripper {
     run: SimRun,
+    world_from_gripper: Pose,
     actuation_hz: f64,
     now_s: f64,
 }
 
 impl SimulatedGripper {
-    /// Wraps a simulation whose line pressure may change `actuation_hz` times a second.
-    pub fn new(run: SimRun, actuation_hz: f64) -> Self {
-        Self { run, actuation_hz, now_s: 0.0 }
+    /// Wraps a simulation of a gripper in this pose, whose line pressure may change `actuation_hz` times a second.
+    pub fn new(run: SimRun, world_from_gripper: Pose, actuation_hz: f64) -> Self {
+        Self { run, world_from_gripper, actuation_hz, now_s: 0.0 }
     }
 
     /// The simulation.
     pub fn run(&self) -> &SimRun {
         &self.run
+    }
+
+    /// Pose in the world.
+    pub fn world_from_gripper(&self) -> Pose {
+        self.world_from_gripper
     }
 
     /// The simulation, for what only it can do: pull the object, measure the starting overlap.

@@ -61,7 +61,7 @@ impl BoardTrialRecording {
         let start_s = if request.control == Control::Free { began_s } else { now_s };
         recorder.begin_board(BoardTrialPlan {
             object: request.object.clone().unwrap_or_default(),
-            scene: scene.to_toml(),
+            scene: scene.clone(),
             seconds: plan.total_s(),
             status: gripper.stream().status(),
             began_s,

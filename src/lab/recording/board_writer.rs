@@ -3,13 +3,12 @@
 use crate::labelling::{Observed, decimated, flags_of, sparkline};
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkStatus};
-use palpate_geometry::Pose;
-use palpate_sim::frame::{Plan, Quality};
-use palpate_store::{BOARD_RIG, BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
+use palpate_sim::scene::Scene;
+use palpate_store::{BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
 use palpate_tactile::board::{Gap, Sensor};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
-use palpate_tactile::trial::{PhaseMark, TrialId, TrialInfo};
+use palpate_tactile::trial::{PhaseMark, TrialHeader, TrialId};
 
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
 const BYTES_PER_S: f64 = 400e3;
@@ -23,30 +22,14 @@ const UNKNOWN_LENGTH_S: f64 = 600.0;
 pub struct BoardTrialPlan {
     /// Class of the object; empty where it is labelled later.
     pub object: String,
-    /// The scene as TOML: the gripper as modelled, and its programme.
-    pub scene: String,
+    /// Scene: the gripper as modelled, and its programme.
+    pub scene: Scene,
     /// Length (s), where known.
     pub seconds: Option<f64>,
     /// Link at the beginning.
     pub status: LinkStatus,
     /// First reading (s, on the clock of the readings).
     pub began_s: f64,
-}
-
-/// Header of a trial of the real gripper.
-pub fn board_trial_info(object: &str, scene: &str) -> TrialInfo {
-    TrialInfo {
-        rig: BOARD_RIG.to_owned(),
-        object: object.to_owned(),
-        seed: 0,
-        collection: None,
-        scene: scene.to_owned(),
-        world_from_gripper: Pose::IDENTITY,
-        plan: Plan::default(),
-        quality: Quality::default(),
-        warnings: Vec::new(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-    }
 }
 
 /// A recorded trial of the real gripper.
@@ -90,7 +73,7 @@ impl BoardWriter {
             ..BoardInfo::default()
         };
         Ok(Self {
-            id: store.begin_board(&board_trial_info(&plan.object, &plan.scene), &about)?,
+            id: store.begin_board(&TrialHeader::new(&plan.object, plan.scene.clone()), &about)?,
             about,
             chunk: BoardChunk::default(),
             samples: 0,
@@ -194,7 +177,7 @@ impl BoardWriter {
 
     /// Flags and sparkline of the stored trial. Without calibrations raw counts are judged.
     fn judge(&mut self, store: &Store) -> Result<(), StoreError> {
-        let Some(trial) = store.board_trial(self.id)? else { return Ok(()) };
+        let Some(trial) = store.board_log(self.id)? else { return Ok(()) };
         let serving = store.calibrations().serving(Some(self.id), &[]).unwrap_or_else(|error| {
             tracing::warn!("trial {} is flagged without calibrations: {error}", self.id);
             Serving::default()

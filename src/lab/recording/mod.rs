@@ -10,7 +10,7 @@ mod recorder;
 mod tests;
 
 pub use board_trial::{BoardTrialRecording, TrialRequest};
-pub use board_writer::{BoardTrialPlan, RecordedTrial, board_trial_info};
+pub use board_writer::{BoardTrialPlan, RecordedTrial};
 pub use recent::RecentEvents;
 pub use record::{RecordError, RecordProgress, Recording, record};
 pub use recorder::{BoardTrialEnd, Recorder, RecorderNotice};

@@ -103,7 +103,7 @@ pub fn record(
         match gripper.next_event(PATIENCE) {
             Ok(GripperEvent::Board(event)) => recording.take(&recorder, event),
             Ok(GripperEvent::Finished) => break,
-            Ok(GripperEvent::Tick | GripperEvent::Sampled(_)) => {}
+            Ok(GripperEvent::Tick | GripperEvent::Sampled(_) | GripperEvent::Signals { .. }) => {}
             Err(error) => recording.controller_mut().abort(error.to_string()),
         }
         recording.drive(&recorder, gripper);

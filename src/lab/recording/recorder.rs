@@ -6,7 +6,7 @@ use super::board_writer::{BoardTrialPlan, BoardWriter, RecordedTrial};
 use palpate_device::serial::{LinkEvent, LinkStatus};
 use palpate_sim::frame::{Frame, Quality};
 use palpate_store::{Store, StoreError};
-use palpate_tactile::trial::{PhaseMark, TrialId, TrialInfo};
+use palpate_tactile::trial::{PhaseMark, SimulatedTrial, TrialId};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -50,7 +50,7 @@ pub struct BoardTrialEnd {
 }
 
 enum Message {
-    Begin(Box<TrialInfo>),
+    Begin(Box<SimulatedTrial>),
     Frame(Box<Frame>),
     Finish(Box<Quality>, Vec<String>),
     Discard,
@@ -86,9 +86,9 @@ impl Recorder {
         }
     }
 
-    /// Begins a simulated trial.
-    pub fn begin(&self, info: &TrialInfo) {
-        self.send(Message::Begin(Box::new(info.clone())));
+    /// Begins a simulated trial, without its frames.
+    pub fn begin(&self, trial: SimulatedTrial) {
+        self.send(Message::Begin(Box::new(trial)));
     }
 
     /// Records the next frame of a simulated trial.
@@ -153,7 +153,7 @@ struct Writer {
 enum OpenTrial {
     None,
     /// Nothing of it is in the store yet: scenes that are skipped within a second leave no trace.
-    Announced(Box<TrialInfo>, Vec<Frame>),
+    Announced(Box<SimulatedTrial>, Vec<Frame>),
     Simulated(TrialId, Vec<Frame>),
     Board(Box<BoardWriter>, Instant),
 }
@@ -175,7 +175,7 @@ impl Writer {
 
     fn take(&mut self, message: Message) -> Result<(), StoreError> {
         match message {
-            Message::Begin(info) => self.trial = OpenTrial::Announced(info, Vec::new()),
+            Message::Begin(trial) => self.trial = OpenTrial::Announced(trial, Vec::new()),
             Message::Frame(frame) => {
                 if let OpenTrial::Announced(_, waiting) | OpenTrial::Simulated(_, waiting) = &mut self.trial {
                     waiting.push(*frame);
@@ -251,7 +251,7 @@ impl Writer {
     /// Writes the frames that wait, beginning the trial where it has not begun; its number, where there is one.
     fn write_frames(&mut self) -> Result<Option<TrialId>, StoreError> {
         let (id, waiting) = match std::mem::replace(&mut self.trial, OpenTrial::None) {
-            OpenTrial::Announced(info, waiting) => (self.with_store(|store| store.begin(&info))?, waiting),
+            OpenTrial::Announced(trial, waiting) => (self.with_store(|store| store.begin(&trial))?, waiting),
             OpenTrial::Simulated(id, waiting) => (id, waiting),
             other @ (OpenTrial::None | OpenTrial::Board(..)) => {
                 self.trial = other;
@@ -299,10 +299,10 @@ mod tests {
             Recorder::start(path.clone(), move |notice| sender.send(notice).expect("heard")).expect("starts");
         let trial = grasp(&Scene::default(), None, 3);
         for keep in [true, false] {
-            recorder.begin(&trial.info);
-            trial.frames.iter().for_each(|frame| recorder.frame(frame));
+            recorder.begin(trial.clone());
+            trial.frames().iter().for_each(|frame| recorder.frame(frame));
             if keep {
-                recorder.finish(&trial.info.quality, &trial.info.warnings);
+                recorder.finish(&trial.data.quality, &trial.header.warnings);
             } else {
                 recorder.discard();
             }
@@ -310,7 +310,7 @@ mod tests {
         drop(recorder);
         let RecorderNotice::Stored(id) = notices.recv().expect("a notice") else { panic!("stored") };
         let store = Store::open(&path).expect("opens");
-        assert!(store.load(id).expect("whole") == trial);
+        assert!(store.load(id).expect("whole") == trial.into());
         assert_eq!((store.list(false).expect("lists").len(), store.list(true).expect("lists").len()), (1, 2));
     }
 
@@ -322,9 +322,9 @@ mod tests {
         let (sender, notices) = channel();
         let recorder = Recorder::start(path, move |notice| sender.send(notice).expect("heard")).expect("starts");
         let trial = grasp(&Scene::default(), None, 0);
-        recorder.begin(&trial.info);
-        trial.frames.iter().for_each(|frame| recorder.frame(frame));
-        recorder.finish(&trial.info.quality, &[]);
+        recorder.begin(trial.clone());
+        trial.frames().iter().for_each(|frame| recorder.frame(frame));
+        recorder.finish(&trial.data.quality, &[]);
         drop(recorder);
         let all: Vec<RecorderNotice> = notices.try_iter().collect();
         assert!(matches!(&all[..], [RecorderNotice::Failed(text)] if text.contains("not a store")), "{all:?}");

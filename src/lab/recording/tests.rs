@@ -6,9 +6,9 @@ use palpate_device::protocol::CaptureReader;
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, PortError, SerialLink};
 use palpate_sim::scene::Scene;
-use palpate_store::{BOARD_RIG, Store, write_board_csv};
+use palpate_store::{Store, write_board_csv};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
-use palpate_tactile::trial::PhaseMark;
+use palpate_tactile::trial::{PhaseMark, TrialSource};
 use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::Duration;
@@ -42,7 +42,7 @@ fn replayed(path: &Path) -> Result<SerialLink, PortError> {
 }
 
 fn plan(link: &SerialLink, object: &str) -> BoardTrialPlan {
-    let scene = Scene::default().to_toml();
+    let scene = Scene::default();
     BoardTrialPlan { object: object.to_owned(), scene, seconds: Some(8.0), status: link.status(), began_s: 0.0 }
 }
 
@@ -64,8 +64,8 @@ fn a_trial_keeps_every_reading_every_gap_and_every_byte() -> Result<(), Box<dyn 
     capture(&bytes)?;
     let mut store = Store::open(&path)?;
     let recorded = record(&mut store, &bytes)?;
-    let trial = store.board_trial(recorded.id)?.ok_or("it is one of a board")?;
-    assert_eq!((trial.readings.len(), trial.about.cadence.samples, trial.about.cadence.lost), (299, 299, 101));
+    let trial = store.board_log(recorded.id)?.ok_or("it is one of a board")?;
+    assert_eq!((trial.readings.len(), trial.cadence.samples, trial.cadence.lost), (299, 299, 101));
     let lost: Vec<Option<u64>> = trial.gaps.iter().map(|gap| gap.lost).collect();
     assert_eq!(lost, [Some(1), Some(100)]);
     assert!(trial.gaps[1].cause.contains("unplugged"));
@@ -77,8 +77,8 @@ fn a_trial_keeps_every_reading_every_gap_and_every_byte() -> Result<(), Box<dyn 
     }
     assert!(recorded.warnings.iter().any(|warning| warning.starts_with("interrupted")), "{:?}", recorded.warnings);
     let row = &store.list(false)?[0];
-    let told = (row.rig.as_str(), row.object.as_str(), row.state.as_str(), row.samples, row.sound);
-    assert_eq!(told, (BOARD_RIG, "lemon", "complete", 299, true));
+    let told = (row.source, row.object.as_str(), row.state.as_str(), row.samples, row.sound);
+    assert_eq!(told, (TrialSource::Recorded, "lemon", "complete", 299, true));
     // The bytes are those that came, mark by mark.
     let stored = store.board_bytes(recorded.id)?.ok_or("it has bytes")?;
     let pieces = |bytes: &[u8]| CaptureReader::new(bytes)?.collect::<std::io::Result<Vec<Captured>>>();
@@ -96,12 +96,12 @@ fn trials_of_a_board_are_merged_and_exported() -> Result<(), Box<dyn std::error:
     let mut all = Store::open(&at("all.sqlite"))?;
     record(&mut all, &at("grasp.bytes"))?;
     assert_eq!(all.merge_from(&at("here.sqlite"))?.added, 1);
-    assert_eq!(all.board_trial(2)?, here.board_trial(id)?);
+    assert_eq!(all.board_log(2)?, here.board_log(id)?);
     assert_eq!(all.board_bytes(2)?, here.board_bytes(id)?);
-    let mut trial = all.board_trial(2)?.ok_or("it is one of a board")?;
-    trial.about.began_s = 1.0;
+    let mut trial = all.board_log(2)?.ok_or("it is one of a board")?;
+    trial.began_s = 1.0;
     let phase = palpate_sim::gripper::Phase::Close;
-    trial.about.phases.push(PhaseMark { from_s: 2.0, phase, line_bar: Some(0.05) });
+    trial.phases.push(PhaseMark { from_s: 2.0, phase, line_bar: Some(0.05) });
     write_board_csv(&at("trial.csv"), &trial)?;
     let text = std::fs::read_to_string(at("trial.csv"))?;
     let rows: Vec<&str> = text.lines().collect();
@@ -113,7 +113,7 @@ fn trials_of_a_board_are_merged_and_exported() -> Result<(), Box<dyn std::error:
     assert_eq!(fields(200)[3], "100");
     // Deleting and purging take everything along.
     all.delete(&[2])?;
-    assert!(all.board_trial(2)?.is_none());
+    assert!(all.board_log(2)?.is_none());
     all.purge()?;
     let left: i64 = rusqlite::Connection::open(at("all.sqlite"))?.query_row(
         "SELECT count(DISTINCT trial) FROM board_chunks",
@@ -149,8 +149,8 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     drop(writer);
     drop(store);
     let store = Store::open(&path)?;
-    assert_eq!(store.board_trial(2)?.map(|trial| trial.readings.len()), Some(250));
-    assert_eq!(store.board_trial(whole)?.map(|trial| trial.readings.len()), Some(299));
+    assert_eq!(store.board_log(2)?.map(|trial| trial.readings.len()), Some(250));
+    assert_eq!(store.board_log(whole)?.map(|trial| trial.readings.len()), Some(299));
     assert!(store.board_bytes(2)?.is_some());
     let states: Vec<String> = store.list(false)?.into_iter().map(|row| row.state).collect();
     assert_eq!(states, ["complete", "recording"]);
@@ -181,6 +181,6 @@ fn a_store_that_another_program_writes_to_holds_up_no_board_and_loses_nothing() 
     drop(recorder);
     let Some(RecorderNotice::Recorded(trial)) = notices.try_iter().last() else { panic!("recorded") };
     let store = Store::open(&path)?;
-    assert_eq!(store.board_trial(trial.id)?.map(|trial| trial.readings.len()), Some(299));
+    assert_eq!(store.board_log(trial.id)?.map(|trial| trial.readings.len()), Some(299));
     Ok(())
 }

@@ -35,11 +35,11 @@ pub fn accuracy_cost(
     let trial = run.finish(scene);
     let mut refined = prepare_refined(scene, object, 0);
     let mut band = ErrorBand::new(scene, sensors.channels().len());
-    for frame in &trial.frames {
+    for frame in trial.frames() {
         let finer = refined.next_frame().filter(|_| !cancelled())?;
         band.push(frame.t, &sensors.read(frame), &sensors.read(finer));
     }
-    let times_real_time = trial.frames.last()?.t / cpu.max(1e-9);
+    let times_real_time = trial.frames().last()?.t / cpu.max(1e-9);
     Some(AccuracyCost { cpu_ms: cpu * 1e3, times_real_time, error: band.norms(&trial, &sensors) })
 }
 

@@ -12,7 +12,7 @@ use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::effects::rule_of;
 use palpate_sim::scene::{Effect, Scene, Setting};
 use palpate_tactile::Sensors;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -133,10 +133,10 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
         Err(_none) => all(),
     }?;
     Some(Explanation {
-        object: base.trial.info.object.clone(),
+        object: base.trial.header.object.clone(),
         cpu_ms: cpu_s * 1e3,
         contact_onset_s: base.onset_s,
-        warnings: base.trial.info.warnings.clone(),
+        warnings: base.trial.header.warnings.clone(),
         effects,
     })
 }
@@ -148,7 +148,7 @@ fn explain_one(
     effect: Effect,
     cancelled: &AtomicBool,
 ) -> Option<ExplainedEffect> {
-    let plan = &base.trial.info.plan;
+    let plan = &base.trial.data.plan;
     let planned = plan.effects.iter().find(|planned| planned.name == effect.name())?.clone();
     let other_scene = flipped(scene, plan, effect);
     let pairs = if scene.timing.duration_s > LONG { 1 } else { PAIRS };
@@ -179,7 +179,7 @@ fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
 }
 
 /// A whole trial and its CPU time (s); `None` when cancelled.
-fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> Option<(Trial, f64)> {
+fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> Option<(SimulatedTrial, f64)> {
     let start = cpu_time::ThreadTime::now();
     let mut run = prepare(scene, object, 0);
     while run.next_frame().is_some() {
@@ -193,12 +193,12 @@ fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> O
 
 /// A trial, and when its first contact was (s).
 struct GraspOutcome {
-    trial: Trial,
+    trial: SimulatedTrial,
     onset_s: Option<f64>,
 }
 
 impl GraspOutcome {
-    fn new(scene: &Scene, trial: Trial) -> Self {
+    fn new(scene: &Scene, trial: SimulatedTrial) -> Self {
         Self { onset_s: GraspSummary::new(&trial, scene).contact_onset_s, trial }
     }
 

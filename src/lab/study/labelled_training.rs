@@ -5,7 +5,8 @@ use super::comparison::{Comparison, ComparisonError};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_learn::evaluation::Evaluation;
 use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, StopRule};
-use palpate_store::{BOARD_RIG, Store, StoreError};
+use palpate_store::{Store, StoreError};
+use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -36,7 +37,7 @@ impl LabelledClass {
 pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError> {
     let mut counts = BTreeMap::<String, usize>::new();
     let labelled = |row: &palpate_store::TrialRow| {
-        row.rig == BOARD_RIG && row.state == "complete" && row.sound && !row.object.is_empty()
+        row.source == TrialSource::Recorded && row.state == "complete" && row.sound && !row.object.is_empty()
     };
     for row in store.list(false)?.into_iter().filter(labelled) {
         *counts.entry(row.object).or_default() += 1;
@@ -132,7 +133,7 @@ impl LabelledTraining<'_> {
             return Err(TrainingError::TooFew { found: enough.len() });
         }
         let objects = enough.iter().map(|class| class.name.clone()).collect();
-        let source = DatasetQuery { rig: Some(BOARD_RIG.to_owned()), objects, ..DatasetQuery::default() };
+        let source = DatasetQuery { source: Some(TrialSource::Recorded), objects, ..DatasetQuery::default() };
         let data = source.read(store, &SensorView::default(), &mut |done, of| {
             (self.tell)(TrainingStage::Reading(done, of));
         })?;

@@ -10,7 +10,7 @@ use palpate_geometry::Primitive;
 use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_tactile::Sensors;
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 use serde::Serialize;
 
 /// One of the scenes that are timed.
@@ -54,7 +54,7 @@ pub struct CostRow {
 const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
 
 /// The grasp of a scene that errors are measured against.
-pub fn physics_truth(bench: &BenchScene) -> Trial {
+pub fn physics_truth(bench: &BenchScene) -> SimulatedTrial {
     let mut scene = bench.scene();
     scene.solver.accuracy = TRUTH;
     grasp(&scene, Some(&bench.object), 0)
@@ -93,7 +93,7 @@ pub fn bench_scenes() -> Result<Vec<BenchScene>, ObjectError> {
 }
 
 /// Times `runs` trials of a scene, and holds the last against the truth where that is given.
-pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: Option<&Trial>) -> CostRow {
+pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: Option<&SimulatedTrial>) -> CostRow {
     let mut scene = bench.scene();
     scene.solver.accuracy = accuracy;
     let mut times = Vec::new();
@@ -107,7 +107,7 @@ pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: 
     }
     times.sort_by(f64::total_cmp);
     let median = times[times.len() / 2];
-    let quality = last.as_ref().map(|trial| trial.info.quality.clone()).unwrap_or_default();
+    let quality = last.as_ref().map(|trial| trial.data.quality.clone()).unwrap_or_default();
     let sensors = Sensors::whole_fingers(&scene.gripper);
     let error = last.zip(truth).map(|(trial, truth)| ErrorNorms::between(&trial, truth, &sensors));
     let steps = quality.steps.max(1) as f64;

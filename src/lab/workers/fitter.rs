@@ -5,8 +5,8 @@ use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::study::{FingerFit, FitWatch, RecordedGrasps, fit_finger_watched};
 use palpate_sim::scene::Scene;
-use palpate_store::{BOARD_RIG, Store, TrialRow};
-use palpate_tactile::trial::TrialId;
+use palpate_store::{Store, TrialRow};
+use palpate_tactile::trial::{TrialId, TrialSource};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -98,7 +98,7 @@ fn fitted(
 
 fn listed(store: &Path) -> Result<Arc<[TrialRow]>, String> {
     let mut rows = Store::open(store).and_then(|store| store.list(false)).map_err(|error| error.to_string())?;
-    rows.retain(|row| row.rig == BOARD_RIG && row.state == "complete");
+    rows.retain(|row| row.source == TrialSource::Recorded && row.state == "complete");
     rows.reverse();
     Ok(rows.into())
 }
@@ -107,8 +107,9 @@ fn listed(store: &Path) -> Result<Arc<[TrialRow]>, String> {
 mod tests {
     use super::super::background_job::watch::{until, waker};
     use super::*;
-    use crate::grasping::{grasp, prepare};
+    use crate::grasping::grasp;
     use palpate_store::BoardInfo;
+    use palpate_tactile::trial::TrialHeader;
 
     /// A quick close of an empty hand.
     fn close() -> Scene {
@@ -128,11 +129,8 @@ mod tests {
         let path = folder.path().join("trials.sqlite");
         let mut store = Store::open(&path)?;
         let simulated = store.insert(&grasp(&close(), None, 0))?;
-        let mut info = prepare(&close(), None, 0).info().clone();
-        info.rig = BOARD_RIG.to_owned();
         for object in ["lemon", "empty", "ball"] {
-            object.clone_into(&mut info.object);
-            let id = store.begin_board(&info, &BoardInfo::default())?;
+            let id = store.begin_board(&TrialHeader::new(object, close()), &BoardInfo::default())?;
             if object != "ball" {
                 store.finish_board(id, &BoardInfo::default(), &[])?;
             }

@@ -185,12 +185,13 @@ fn change_plan<E: std::fmt::Display>(
 mod tests {
     use super::super::background_job::watch::{until, waker};
     use super::*;
-    use crate::recording::board_trial_info;
+    use palpate_sim::scene::Scene;
     use palpate_store::BoardInfo;
+    use palpate_tactile::trial::TrialHeader;
 
     fn recorded(store: &mut Store) -> TrialId {
-        let info = board_trial_info("", "");
-        let id = store.begin_board(&info, &BoardInfo::default()).expect("begins");
+        let header = TrialHeader::new("", Scene::default());
+        let id = store.begin_board(&header, &BoardInfo::default()).expect("begins");
         store.finish_board(id, &BoardInfo::default(), &[]).expect("ends");
         id
     }

@@ -86,7 +86,7 @@ fn a_watched_grasp_is_the_same_as_a_headless_one_and_is_stored() {
     let store = Store::open(&path).expect("opens");
     assert_eq!(store.list(false).expect("lists").len(), 2);
     let object = ball().load_object().expect("loads");
-    assert!(store.load(1).expect("whole") == grasp(&ball(), object.as_ref(), 0));
+    assert!(store.load(1).expect("whole") == grasp(&ball(), object.as_ref(), 0).into());
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn more_grasps_come_from_new_poses_and_pulled_ones_say_so() {
     let store = Store::open(&path).expect("opens");
     let rows = store.list(false).expect("lists");
     assert_eq!(rows.iter().map(|row| row.seed).collect::<Vec<_>>(), [0, 1, 2, 3]);
-    let warnings: Vec<Vec<String>> = (1..=4).map(|id| store.load(id).expect("whole").info.warnings).collect();
+    let warnings: Vec<Vec<String>> = (1..=4).map(|id| store.load(id).expect("whole").header.warnings).collect();
     let pulled = |k: usize| warnings[k].iter().any(|w: &String| w.contains("pulled by hand"));
     assert!(!pulled(0) && !pulled(1) && pulled(2) && !pulled(3), "{warnings:?}");
 }
@@ -212,5 +212,5 @@ fn a_companion_brings_errors_and_the_gauge_both_numbers() {
     drop(watched);
     let store = Store::open(&path).expect("opens");
     let object = ball().load_object().expect("loads");
-    assert!(store.load(1).expect("whole") == grasp(&ball(), object.as_ref(), 0), "the trial is the same");
+    assert!(store.load(1).expect("whole") == grasp(&ball(), object.as_ref(), 0).into(), "the trial is the same");
 }

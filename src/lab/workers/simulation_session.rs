@@ -325,15 +325,16 @@ impl Session {
             accuracy_job.measure(&scene, model.clone());
         }
         let mut run = prepare(&scene, model.as_deref(), seed);
+        let begun = run.begun();
         if !again {
-            for warning in &run.info().warnings {
+            for warning in &begun.header.warnings {
                 self.outlets.notify(Notice::Warning(warning.clone()));
             }
         }
         if self.status.recording
             && let Some(recorder) = &self.recorder
         {
-            recorder.begin(run.info());
+            recorder.begin(begun.clone());
             self.recorder_busy = true;
         }
         if let Some(warning) = self
@@ -348,10 +349,10 @@ impl Session {
         // What the recogniser reads beyond the layout is not plotted.
         let plotted = self.layout.channels(&scene.gripper).map_or(0, |channels| channels.len());
         self.channels = reader.channels()[..plotted].into();
-        let stage = Arc::new(Stage::new(&scene, model.as_deref(), run.info().world_from_gripper));
+        let stage = Arc::new(Stage::new(&scene, model.as_deref(), begun.data.world_from_gripper));
         let frame = Arc::new(run.gripper_mut().run_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
-        let (warned, scene, plan) = (run.info().warnings.len(), Arc::new(scene), Arc::new(run.info().plan.clone()));
+        let (warned, scene, plan) = (begun.header.warnings.len(), Arc::new(scene), Arc::new(begun.data.plan));
         let channels = reader.channels().len();
         let refined_run = self.status.error_band.then(|| RefinedRun::new(&scene, model.as_deref(), seed, channels));
         self.current =
@@ -461,19 +462,19 @@ impl Session {
         let Some(current) = self.current.as_mut() else { return };
         current.ended = true;
         let trial = current.run.finish(&current.scene);
-        for warning in trial.info.warnings.iter().skip(current.warned) {
+        for warning in trial.header.warnings.iter().skip(current.warned) {
             self.outlets.notify(Notice::Warning(warning.clone()));
         }
         if self.recorder_busy
             && let Some(recorder) = &self.recorder
         {
-            recorder.finish(&trial.info.quality, &trial.info.warnings);
+            recorder.finish(&trial.data.quality, &trial.header.warnings);
             self.recorder_busy = false;
         }
         let summary = GraspSummary::new(&trial, &current.scene);
         self.last = Some(Arc::new(FinishedGrasp { grasp: self.grasp, summary }));
         self.status.actual_speed = 0.0;
-        if trial.info.quality.finite {
+        if trial.data.quality.finite {
             if let Some(listener) = &mut self.listener {
                 listener.end_grasp();
             }

@@ -244,8 +244,8 @@ proptest! {
         prop_assert!(scene.is_ok(), "{settings:?}: {scene:?}");
         let scene = scene.unwrap();
         let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
-        prop_assert!(trial.info.quality.finite, "{settings:?}");
-        prop_assert!(trial.frames.iter().all(|f| f.q.iter().all(|q| q.abs() < 10.0)), "{settings:?}");
+        prop_assert!(trial.data.quality.finite, "{settings:?}");
+        prop_assert!(trial.frames().iter().all(|f| f.q.iter().all(|q| q.abs() < 10.0)), "{settings:?}");
     }
 }
 

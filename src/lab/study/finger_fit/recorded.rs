@@ -4,10 +4,9 @@
 use super::{Observation, Trust};
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::{EMPTY, ObjectError};
-use palpate_sim::scene::{Scene, SceneError};
 use palpate_store::{CalibrationId, Serving, Store, StoreError};
 use palpate_tactile::Sensors;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialData, TrialId};
 
 /// Repeatability of a calibrated strip's gain, as a share. Assumed: half a degree in 90.
 const STRIP_REPEATS: f64 = 0.005;
@@ -32,14 +31,6 @@ pub enum RecordedGraspError {
     /// The store.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// Its scene cannot be read.
-    #[error("the scene stored with trial {id} cannot be read: {cause}")]
-    Scene {
-        /// The trial.
-        id: TrialId,
-        /// Cause.
-        cause: SceneError,
-    },
     /// Its object cannot be loaded.
     #[error("the object of trial {id} cannot be loaded: {cause}")]
     Object {
@@ -61,17 +52,13 @@ impl RecordedGrasps {
         calibrations: &[CalibrationId],
     ) -> Result<(), RecordedGraspError> {
         let trial = store.load(id)?;
-        // Imported trials have no scene of their own.
-        let own = match trial.info.scene.is_empty() {
-            true => Scene::default(),
-            false => Scene::from_toml(&trial.info.scene).map_err(|cause| RecordedGraspError::Scene { id, cause })?,
-        };
+        let own = trial.header.scene;
         let mut scene = own.clone();
         if let Some(gripper) = gripper {
             // Object and pose are the trial's.
             scene.gripper = gripper.clone();
         }
-        let empty = trial.info.object == EMPTY;
+        let empty = trial.header.object == EMPTY;
         let object =
             if empty { None } else { own.load_object().map_err(|cause| RecordedGraspError::Object { id, cause })? };
         if object.is_some() && !own.holds_object() {
@@ -80,14 +67,17 @@ impl RecordedGrasps {
             ));
         }
         let programme = Observation::line_of(&own);
-        let (signals, line) = if let Some(read) = store.board_signals(id, calibrations)? {
-            self.warnings.extend(read.derived.warnings.iter().map(|warning| format!("trial {id}: {warning}")));
-            self.trust.take(&read.serving);
-            (read.derived.signals, read.line)
-        } else if let Some(signals) = store.readings(id)? {
-            (signals, programme.clone())
-        } else {
-            (Sensors::whole_fingers(&own.gripper).signals(&trial), programme.clone())
+        let (signals, line) = match trial.data {
+            TrialData::Recorded(_) => {
+                let read = store.board_signals(id, calibrations)?.unwrap_or_default();
+                self.warnings.extend(read.derived.warnings.iter().map(|warning| format!("trial {id}: {warning}")));
+                self.trust.take(&read.serving);
+                (read.derived.signals, read.line)
+            }
+            TrialData::Imported(signals) => (signals, programme.clone()),
+            TrialData::Simulated(data) => {
+                (Sensors::whole_fingers(&own.gripper).signals(&data.frames), programme.clone())
+            }
         };
         let line = if line.is_empty() { programme } else { line };
         self.observations.push(Observation { name: format!("trial {id}"), signals, line, scene, object });

@@ -46,7 +46,7 @@ fn block() -> ObjectModel {
 fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
     let layout = SensorLayout::named("C1+F").expect("in the catalogue");
     let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
-    sensors.signals(&grasp(scene, object, 0))
+    sensors.signals(grasp(scene, object, 0).frames())
 }
 
 fn observed(name: &str, signals: Signals, scene: &Scene, object: Option<ObjectModel>) -> Observation {

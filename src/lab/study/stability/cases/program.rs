@@ -6,7 +6,7 @@ use glam::DVec3;
 use palpate_geometry::Primitive;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Accuracy, Scene};
-use palpate_tactile::trial::Trial;
+use palpate_tactile::trial::SimulatedTrial;
 
 pub(super) fn same_bytes(conditions: &Conditions) -> Findings {
     let mut scene = Scene::default();
@@ -19,22 +19,22 @@ pub(super) fn same_bytes(conditions: &Conditions) -> Findings {
         [Primitive::Cuboid { half: DVec3::splat(0.0225) }, Primitive::Cylinder { radius: 0.0175, half_length: 0.03 }];
     let objects = shapes.map(|shape| ObjectModel::from_primitive("it", shape, 400.0, 0.6));
     let grasped = |object: &ObjectModel| grasp(&scene, Some(object), 0);
-    let once: Vec<Trial> = objects.iter().map(grasped).collect();
+    let once: Vec<SimulatedTrial> = objects.iter().map(grasped).collect();
     let (forth, mut back) = std::thread::scope(|scope| {
         let forth = scope.spawn(|| objects.iter().map(grasped).collect::<Vec<_>>());
-        let back: Vec<Trial> = objects.iter().rev().map(grasped).collect();
+        let back: Vec<SimulatedTrial> = objects.iter().rev().map(grasped).collect();
         (forth.join().unwrap_or_default(), back)
     });
     back.reverse();
-    let differing = |other: &[Trial]| {
-        let pairs = once.iter().zip(other).flat_map(|(a, b)| a.frames.iter().zip(&b.frames));
-        let lost = once.iter().map(|t| t.frames.len()).sum::<usize>() - pairs.clone().count();
+    let differing = |other: &[SimulatedTrial]| {
+        let pairs = once.iter().zip(other).flat_map(|(a, b)| a.frames().iter().zip(b.frames()));
+        let lost = once.iter().map(|t| t.frames().len()).sum::<usize>() - pairs.clone().count();
         lost + pairs.filter(|(a, b)| a != b).count()
     };
     Ok(vec![
         Measurement::at_most("frames that differ in another thread", differing(&forth) as f64, 0.0),
         Measurement::at_most("frames that differ in another order", differing(&back) as f64, 0.0),
-        Measurement::at_least("frames", once.iter().map(|t| t.frames.len()).sum::<usize>() as f64, 100.0),
+        Measurement::at_least("frames", once.iter().map(|t| t.frames().len()).sum::<usize>() as f64, 100.0),
     ])
 }
 
