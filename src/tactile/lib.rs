@@ -18,7 +18,7 @@
 //! | 0 | [`electronics`] | strip, pad, divider and converter |
 //! | 0 | `layout` | sensor layouts and their channels |
 //! | 0 | `signals` | channels over time |
-//! | 0 | [`trial`] | recorded grasps |
+//! | 1 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
 //! | 1 | `curvature`, `pressure` | circle fit along a finger, contact patch of a pad |
 //! | 1 | [`model`] | sensor models: clean signals to those of real sensors |
 //! | 1 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |

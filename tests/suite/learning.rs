@@ -147,7 +147,7 @@ fn anybodys_grasps_are_taken_in_and_learned() {
     // Without sizes and shapes there is no first stage to learn.
     csv(at, "bare.csv", 12, &["nut", "bolt", "washer"], false);
     assert_eq!(run(at, &["trials", "import", "bare.csv"]).code, Some(0));
-    refused(at, &["train", "ds-lstm", "--collection", "bare"], &["no class of these data has any"]);
+    refused(at, &["train", "ds-lstm", "--collection", "bare"], &["no class in these data has them"]);
     let model = ["train", "macro-layer", "--collection", "bare", "--quick", "--out", "bare.safetensors"];
     assert_eq!(run(at, &model).code, Some(0));
 }
