@@ -155,7 +155,7 @@ mod tests {
         let lines = Arc::new(Mutex::new(Vec::new()));
         let mut gripper = SerialGripper::new(Box::new(FakeBoard { t_s: 0.0, lines: Arc::clone(&lines) }));
         let mut controller = GraspController::new(GraspPlan::recorded(&Scene::default(), Control::Driven), 0.0);
-        let (mut readings, mut ticks) = (0, 0);
+        let (mut readings, mut ticks) = (0i32, 0i32);
         // Up to the middle of the hold: then the gripper is dropped under pressure.
         while gripper.now_s() < 4.3 {
             match gripper.next_event(Duration::ZERO).expect("an open port") {
@@ -170,7 +170,7 @@ mod tests {
             }
         }
         drop(gripper);
-        assert!(readings > 800 && (2 * ticks as i32 - readings).abs() <= 2, "{readings} readings, {ticks} ticks");
+        assert!(readings > 800 && (2 * ticks - readings).abs() <= 2, "{readings} readings, {ticks} ticks");
         let lines = lines.lock().expect("no panic").clone();
         let texts: Vec<&str> = lines.iter().map(|(_, text)| text.as_str()).collect();
         assert_eq!((texts[0], texts[19], texts.last().copied()), ("P 0.05", "P 1.00", Some("V")));
