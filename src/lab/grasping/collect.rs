@@ -1,8 +1,8 @@
 //! Collecting a data set: many objects, many random poses each, in parallel, into a store.
 //!
-//! What is collected depends on the plan alone: not on the number of threads, not on how the work is split into shards,
-//! not on how often it was interrupted. Every task has a seed of its own, derived from the plan's seed, the object's name
-//! and the task's number, and trials are stored in the order of the plan.
+//! The plan alone determines the data; the number of threads, the split into shards and interruptions do not change
+//! them. Every task has its own seed, derived from the plan's seed, the object's name and the task's number, and trials
+//! are stored in the order of the plan.
 
 use super::run::grasp;
 use palpate_sim::frame::Frame;
@@ -18,18 +18,18 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// What to collect.
+/// Scene, objects and amount of a collection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CollectionPlan {
-    /// Everything but the object: poses, gripper, accuracy.
+    /// Scene without the object: poses, gripper, accuracy.
     pub scene: Scene,
-    /// Built-in names or files.
+    /// Names of built-in objects, or paths of object files.
     pub objects: Vec<String>,
     /// Trials of each object.
     pub trials: u32,
-    /// Other seeds give other poses.
+    /// Seed of the poses.
     pub seed: u64,
-    /// Which part of the work is done here.
+    /// Part of the work to do.
     pub shard: Shard,
 }
 
@@ -41,62 +41,62 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All of the work.
+    /// The whole work.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
-    /// Part `number`, from 1, of `of` parts; `None` where there is no such part.
+    /// Part `number`, from 1, of `of` parts; `None` if there is no such part.
     pub fn new(number: u32, of: u32) -> Option<Self> {
         (1..=of).contains(&number).then_some(Self { number, of })
     }
 }
 
-/// What a collection came to.
+/// Result of a collection.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CollectionReport {
     /// Its name in the store.
     pub collection: String,
-    /// Trials stored now.
+    /// Trials stored by this run.
     pub stored: u32,
-    /// Trials of this part that were in the store already.
+    /// Trials of this part that the store already held.
     pub known: u32,
-    /// Poses drawn again because the open fingers would have stood inside the object.
+    /// Poses redrawn because the open fingers would have intersected the object.
     pub redrawn: u32,
-    /// Trials that did not stay finite or did not converge; they are stored and marked, and no data set takes them.
+    /// Trials with non-finite values or without convergence: stored and marked, but excluded from data sets.
     pub unsound: u32,
 }
 
-/// How far a collection has come.
+/// Progress of a collection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CollectionProgress {
-    /// Trials of this part that are in the store.
+    /// Trials of this part in the store so far.
     pub done: u32,
-    /// Trials of this part.
+    /// All trials of this part.
     pub of: u32,
-    /// The object of the newest one.
+    /// Object of the newest trial.
     pub object: String,
 }
 
-/// Why a collection cannot go on. What has been stored stays, and is not made again.
+/// Error that ends a collection. Stored trials stay, and a new run skips them.
 #[derive(Debug, thiserror::Error)]
 pub enum CollectionError {
-    /// An object that cannot be loaded.
+    /// An object failed to load.
     #[error("{0}")]
     Object(String),
-    /// A store that cannot be written.
+    /// The store failed.
     #[error("{0}")]
     Store(StoreError),
 }
 
-/// One trial to be made.
+/// Trial to simulate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Task {
     object: usize,
-    /// Which of the object's trials, from 0.
+    /// Index among the object's trials, from 0.
     number: u64,
     seed: u64,
 }
 
-/// Where objects stay as they were released, so many grasps follow each other before the object is put down anew.
+/// Grasps in a row before the object is placed again, if objects stay as released.
 const SUCCESSION: u64 = 5;
 
 /// The sixteen and the empty hand.
@@ -105,7 +105,7 @@ pub fn all_objects() -> Vec<String> {
 }
 
 impl CollectionPlan {
-    /// Names what is collected: plans that differ in scene or seed have different names, parts of one plan the same.
+    /// Name of the collection: plans that differ in scene or seed have different names, parts of one plan the same.
     pub fn name(&self) -> String {
         let mut scene = self.scene.clone();
         scene.object.source.clear();
@@ -120,18 +120,18 @@ impl CollectionPlan {
         all.enumerate().filter(ours).map(|(_, task)| task).collect()
     }
 
-    /// Seeds are positive and fit SQLite's integers; zero stands for the scene's own pose.
+    /// Seed of a trial: positive and within SQLite's integers, because zero means the scene's own pose.
     fn seed_of(&self, object: &str, number: u64) -> u64 {
         (mixed(mixed(mixed(self.seed) ^ hash(object)) ^ number) >> 1).max(1)
     }
 }
 
-/// FNV-1a.
+/// FNV-1a hash.
 fn hash(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The finaliser of splitmix64: neighbouring numbers become unrelated ones.
+/// Finaliser of splitmix64: maps neighbouring numbers to unrelated ones.
 fn mixed(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -139,7 +139,8 @@ fn mixed(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Makes and stores what of the plan is not in the store yet, on `threads` threads. `tell` hears of every step.
+/// Simulates and stores the trials of the plan that the store lacks, on `threads` threads. `tell` receives the
+/// progress.
 pub fn collect(
     plan: &CollectionPlan,
     store: &mut Store,
@@ -166,7 +167,7 @@ pub fn collect(
         let outcome = store_in_order(&line, &made, store, &mut report, &mut |done, object| {
             tell(CollectionProgress { done, of: all.len() as u32, object });
         });
-        // Whoever still waits for room in the channel finds it closed.
+        // Threads that wait for room in the channel find it closed.
         line.stop.store(true, Ordering::Relaxed);
         drop(made);
         outcome
@@ -174,10 +175,10 @@ pub fn collect(
     Ok(report)
 }
 
-/// A trial that has been made, and how often its pose was drawn again; or why its object cannot be loaded.
+/// A finished trial and how often its pose was redrawn, or the reason for a failure.
 type Made = Result<(SimulatedTrial, u32), String>;
 
-/// The tasks in order, shared by all threads.
+/// Queue of the tasks in order, shared by all threads.
 struct Line<'a> {
     tasks: &'a [Task],
     taken: AtomicUsize,
@@ -185,7 +186,7 @@ struct Line<'a> {
     stop: AtomicBool,
 }
 
-/// How far threads may run ahead of the slowest one: finished trials wait in memory, a quarter of a megabyte each.
+/// Largest lead of a thread over the slowest, in trials: finished trials wait in memory, a quarter of a megabyte each.
 const MOST_AHEAD: usize = 256;
 
 impl Line<'_> {
@@ -199,7 +200,7 @@ impl Line<'_> {
             if self.stop.load(Ordering::Relaxed) {
                 return;
             }
-            // Others would wait for this task for ever if a fault ended the thread.
+            // If a panic ended the thread, the other threads would wait for this task forever.
             let make = std::panic::AssertUnwindSafe(|| bench.make(*task));
             let outcome = std::panic::catch_unwind(make)
                 .unwrap_or_else(|_| Err(format!("grasping with seed {} met a fault of the program", task.seed)));
@@ -210,7 +211,7 @@ impl Line<'_> {
     }
 }
 
-/// Stores trials as they become due, several at a time where they are ready.
+/// Stores trials in the order of the plan, several at a time if they are ready.
 fn store_in_order(
     line: &Line<'_>,
     made: &Receiver<(usize, Made)>,
@@ -223,7 +224,7 @@ fn store_in_order(
     for (k, outcome) in made {
         waiting.insert(k, outcome);
         let mut ready = Vec::new();
-        // A failure has its turn too: what comes before it in the plan is stored first.
+        // A failure waits its turn too: trials before it in the plan are stored first.
         let mut failure = None;
         while let Some(next) = waiting.remove(&due).filter(|_| failure.is_none()) {
             match next {
@@ -253,7 +254,7 @@ fn store_in_order(
     Ok(())
 }
 
-/// An object on the bench: loaded when its first trial is due.
+/// Loaded object with its pose sampler; loaded for its first trial.
 struct OnBench {
     model: Option<ObjectModel>,
     sampler: PoseSampler,
@@ -270,7 +271,7 @@ impl<'a> Bench<'a> {
         Self { plan, collection, objects: plan.objects.iter().map(|_| OnceLock::new()).collect() }
     }
 
-    /// The name under which trials of an object are stored: files go by their name without folder and extension.
+    /// Name of an object in the store: for a file, its name without folder and extension.
     fn stored_name(&self, object: usize) -> String {
         let source = std::path::Path::new(&self.plan.objects[object]);
         source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
@@ -289,8 +290,8 @@ impl<'a> Bench<'a> {
         let loaded = slot.get_or_init(|| self.load(task.object).map_err(|error| error.to_string()));
         let on_bench = loaded.as_ref().map_err(Clone::clone)?;
         let model = on_bench.model.as_ref();
-        // What a trial finds depends on those before it in its succession. They are grasped again rather than looked
-        // up, so that every trial can be made by itself, in any order.
+        // The object's pose depends on the earlier grasps of the same succession. They are simulated again instead of
+        // read from the store, so that trials can be simulated independently and in any order.
         let first = match self.plan.scene.pose.between {
             Between::Reposed => task.number,
             Between::AsReleased => task.number - task.number % SUCCESSION,
@@ -324,7 +325,7 @@ mod tests {
         Store::open(&folder.path().join(name)).expect("opens")
     }
 
-    /// Everything of a store but dates and identities.
+    /// Content of a store without dates and identities.
     fn contents(store: &Store) -> Vec<(String, u64, Vec<u8>, String)> {
         let rows = store.list(true).expect("lists");
         let of = |row: &palpate_store::TrialRow| {
@@ -361,7 +362,7 @@ mod tests {
         parts.sort();
         assert!(parts == sorted, "three parts");
 
-        // Begun with fewer trials, taken up again with more: those that are there are not made again.
+        // Started with fewer trials, resumed with more: stored trials are skipped.
         let (_, first) = run("resumed", &CollectionPlan { trials: 2, ..plan() }, 2);
         let (resumed, second) = run("resumed", &plan(), 2);
         assert_eq!((first.stored, second.stored, second.known), (6, 9, 6));

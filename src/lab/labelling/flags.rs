@@ -1,12 +1,12 @@
-//! Flags of a trial of the real gripper, found from its readings when it ends. A flag is a hint: the trial is kept and
-//! used for training unless the user discards it.
+//! Flags of a trial of the real gripper, derived from its readings when it ends. A flag is a hint: the trial is kept
+//! and used for training unless the user discards it.
 //!
 //! | flag | raised when |
 //! |---|---|
 //! | no contact | no pad was loaded while the hand closed and held |
 //! | saturated | a channel was at an end of its range for more than 2 % of that time |
-//! | interrupted | the connection broke, readings are missing for longer than 0.1 s, or a sensor is in less than half of them |
-//! | cadence | readings were lost, the rate is off by more than 2 %, the jitter is above half a period |
+//! | interrupted | the connection broke, readings are missing for over 0.1 s, or a sensor is missing in most readings |
+//! | cadence | readings were lost, the rate is off by more than 2 %, or the jitter is above half a period |
 
 use palpate_sim::gripper::Phase;
 use palpate_store::labels::{Flag, FlagRemark};
@@ -16,41 +16,41 @@ use palpate_tactile::calibration::{Calibration, Input, RangeEnd, Readout};
 use palpate_tactile::electronics::PadPart;
 use palpate_tactile::trial::PhaseMark;
 
-/// Readings in a row that make a contact: one alone may be a knock.
+/// Consecutive readings that count as contact: a single one may be a knock.
 const IN_A_ROW: usize = 3;
-/// How far beyond its noise at rest a pad without a calibration must rise, in deviations.
+/// Smallest rise of an uncalibrated pad that counts as contact, in standard deviations of its noise at rest.
 const DEVIATIONS: f64 = 6.0;
-/// A pad on a bent finger may feel up to 0.3 N without any touch; where its calibration does not know of that, a touch is
-/// more (N).
+/// Smallest contact force of a pad whose calibration has no bending correction (N): bending alone may read as up to
+/// 0.3 N.
 const BENT_FORCE: f64 = 0.4;
-/// Share of the pressed time at an end of the range that is worth a flag.
+/// Share of the closed time at an end of the range above which the flag is raised.
 const SATURATED_SHARE: f64 = 0.02;
-/// A shorter time without readings is no interruption (s), or fewer than three missing readings.
+/// Shortest gap that counts as an interruption (s); at low rates, at least three missing readings.
 const LEAST_GAP_S: f64 = 0.1;
-/// How far the rate may be off, as a share of it.
+/// Largest deviation of the rate, as a share of it.
 const RATE_SHARE: f64 = 0.02;
-/// Length of the window at rest where the start of the closing is unknown (s).
+/// Length of the rest window if the start of the closing is unknown (s).
 const REST_S: f64 = 0.3;
 
-/// A step of the control box (bar).
+/// Pressure step of the control box (bar).
 const PRESSURE_STEP_BAR: f64 = 0.05;
 
-/// Content of a trial at its end.
+/// Content of a finished trial.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed<'a> {
     /// The board.
     pub board: &'a Board,
-    /// Its readings; of a long trial a part of them, evenly spread.
+    /// Its readings; for a long trial, an evenly spaced subset.
     pub readings: &'a [Reading],
-    /// Gaps: missing readings.
+    /// Gaps in the readings.
     pub gaps: &'a [Gap],
     /// Cause of each broken connection.
     pub interruptions: &'a [String],
     /// Timing statistics of the board.
     pub cadence: &'a Cadence,
-    /// The phases of the grasp, where they are known.
+    /// Phases of the grasp, if known.
     pub phases: &'a [PhaseMark],
-    /// The calibrations of its parts, where there are any.
+    /// Calibrations of its parts, if any.
     pub calibrations: &'a [(Sensor, Calibration)],
 }
 
@@ -66,8 +66,8 @@ pub fn flags_of(trial: &Observed<'_>) -> Vec<FlagRemark> {
 }
 
 impl Observed<'_> {
-    /// Readings before the closing, and those of closing and hold: by the phases where they are known, else by the pressure
-    /// that the board reports; else all after the first tenths of a second.
+    /// Splits off the readings before the closing, and those of closing and hold: by the phases if known, otherwise by
+    /// the reported pressure, otherwise at [`REST_S`] after the first reading.
     fn split(&self) -> (&[Reading], &[Reading]) {
         let start = |phase: Phase| self.phases.iter().find(|mark| mark.phase == phase).map(|mark| mark.from_s);
         let pressures = || self.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?)));
@@ -87,7 +87,7 @@ impl Observed<'_> {
         (&self.readings[..from], &self.readings[from..to])
     }
 
-    /// `None` where a pad was loaded, or without pads.
+    /// Remark for a trial without contact; `None` if a pad was loaded or there are no pads.
     fn no_contact(&self) -> Option<String> {
         let (rest, pressed) = self.split();
         if pressed.is_empty() {
@@ -102,7 +102,7 @@ impl Observed<'_> {
         Some(format!("no load on any pad: {}", each.join(", ")))
     }
 
-    /// How far a pad rose: in newtons where it is calibrated, else in counts.
+    /// Rise of a pad: in newtons if it is calibrated, otherwise in counts.
     fn rise(&self, pad: Sensor, rest: &[Reading], pressed: &[Reading]) -> Option<PadRise> {
         let column = self.board.channel_of(pad)?;
         if let Some((_, calibration)) = self.calibrations.iter().find(|(sensor, _)| *sensor == pad) {
@@ -130,7 +130,7 @@ impl Observed<'_> {
             let input = made_with.map_or(usual, |input| input.seen_by(self.board, sensor));
             let counts = pressed.iter().filter_map(|reading| reading.counts.get(column).copied().flatten());
             let at_its_end = |count: &f32| match input.range_end(f64::from(*count)) {
-                // A pad that nothing presses conducts nothing.
+                // An unloaded pad reads as an open circuit.
                 Some(RangeEnd::Open) => sensor.is_flex(),
                 Some(RangeEnd::Short) => true,
                 None => false,
@@ -153,13 +153,13 @@ impl Observed<'_> {
             format!("nothing for {length:.2} s from {from:.2} s on: {}", gap.cause)
         };
         let gaps = self.gaps.iter().filter(long).map(told);
-        // What broke the connection is the cause of a gap as well, where anything came after it.
+        // If readings follow, a broken connection is also the cause of a gap: it is listed only once.
         let untold = |cause: &&String| !self.gaps.iter().any(|gap| gap.cause.contains(cause.as_str()));
         let broken = self.interruptions.iter().filter(untold).cloned();
         joined(gaps.chain(broken).chain(Sensor::ALL.into_iter().filter_map(|sensor| self.without_numbers(sensor))))
     }
 
-    /// A sensor that most readings say nothing of: an open circuit, as far as the board can tell.
+    /// Remark for a sensor without a value in most readings: probably an open circuit.
     fn without_numbers(&self, sensor: Sensor) -> Option<String> {
         let column = self.board.channel_of(sensor)?;
         let is_missing = |reading: &&Reading| reading.counts.get(column).copied().flatten().is_none();
@@ -188,13 +188,13 @@ impl Observed<'_> {
         joined(told.into_iter())
     }
 
-    /// Readings per second: as the board says, or as they came.
+    /// Readings per second: as the board states, otherwise as measured.
     fn rate(&self) -> Option<f64> {
         self.board.rate_hz.or(Some(self.cadence.rate_hz)).filter(|rate| rate.is_finite() && *rate > 0.0)
     }
 }
 
-/// How far a pad rose while the hand was closed.
+/// Rise of a pad while the hand was closed.
 struct PadRise {
     pad: Sensor,
     rise: f64,
@@ -215,19 +215,19 @@ fn joined(parts: impl Iterator<Item = String>) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 
-/// The largest value that some readings in a row reach; readings without one are passed over.
+/// Largest value held for [`IN_A_ROW`] consecutive readings; readings without a value are skipped.
 fn lasting_peak(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let values: Vec<f64> = values.flatten().filter(|value| value.is_finite()).collect();
     let least = |window: &[f64]| window.iter().copied().fold(f64::INFINITY, f64::min);
     values.windows(IN_A_ROW.min(values.len().max(1))).map(least).max_by(f64::total_cmp)
 }
 
-/// Median and standard deviation, the latter from the median deviation, so that a knock does no harm. At least that of the
-/// rounding to whole counts.
+/// Median, and standard deviation from the median absolute deviation, so that a knock has no influence. The deviation
+/// is at least that of rounding to whole counts.
 pub(super) fn middle_and_deviation(mut values: Vec<f64>) -> Option<(f64, f64)> {
     let middle = median(&mut values)?;
     let mut off: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
-    // For normally distributed noise.
+    // Ratio of standard to median absolute deviation for normally distributed noise.
     let deviation = 1.4826 * median(&mut off)?;
     Some((middle, deviation.max(12f64.sqrt().recip())))
 }
@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn a_hand_that_missed_is_flagged_and_an_empty_one_may() {
         for missed in [readings(0.0), readings(600.0), {
-            // One reading alone is a knock.
+            // A single reading is a knock.
             let mut knocked = readings(0.0);
             knocked[80].counts[2] = Some(3000.0);
             knocked

@@ -1,12 +1,12 @@
-//! Where grasps begin and end in a stream of readings, and their phases.
+//! Segmentation of a stream of readings into grasps and their phases.
 //!
-//! Where the board reports the line pressure, that says it: a grasp closes when it rises from zero, holds when it stops
-//! rising, releases when it falls, and is over when it is zero and the fingers are back. Else the flex strips say it: they
-//! leave what they read at rest, stop, come back.
+//! If the board reports the line pressure, the pressure decides: a grasp closes when it rises from zero, holds when it
+//! stops rising, releases when it falls, and ends when it is zero and the fingers are back at rest. Otherwise the flex
+//! strips decide: they leave their rest value, stop, and return.
 //!
-//! Readings are first put together into [`Tick`]s of 20 ms, so that a stream of 1 kHz is judged like one of 50 Hz and memory
-//! is bounded. What is rest is the middle of a quiet stretch that lags behind by some tenths of a second: slow drift is
-//! followed, a closing is not.
+//! Readings are first averaged into [`Tick`]s of 20 ms, so that streams of 1 kHz and 50 Hz are treated alike and memory
+//! is bounded. The rest value is the median of a window that ends 0.3 s before the present: it follows slow drift, but
+//! not the closing of the fingers.
 
 use super::flags::middle_and_deviation;
 use palpate_sim::gripper::Phase;
@@ -14,59 +14,60 @@ use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::trial::PhaseMark;
 use std::collections::VecDeque;
 
-/// Readings from so long before a grasp begins belong to its trial (s): sensors are zeroed in that window.
+/// Time before the start of a grasp that belongs to its trial (s): the sensors are zeroed in this window.
 pub const PRE_ROLL_S: f64 = 0.5;
 
-/// Whoever keeps readings for the pre-roll keeps so much of them (s): a beginning is noticed up to half a second late.
+/// Length of the reading buffer needed for the pre-roll (s): a start is detected up to half a second late.
 pub const LOOK_BACK_S: f64 = PRE_ROLL_S + 1.0;
 
-/// Length of a tick (s); slower streams have one to a reading.
+/// Length of a tick (s); in slower streams, each reading is a tick.
 const TICK_S: f64 = 0.02;
-/// Rest is learned from what lies so far back, from and to (s).
+/// Window for the rest value, as start and end before the present (s).
 const REST_WINDOW_S: [f64; 2] = [2.0, 0.3];
-/// Ticks without which nothing is known of rest.
+/// Fewest ticks from which a rest value is computed.
 const LEAST_TICKS: usize = 7;
-/// A strip has left rest when it is off by so many deviations ...
+/// Offset from rest at which a strip has left rest, in standard deviations ...
 const DEVIATIONS: f64 = 6.0;
-/// ... and by this share of the converter's range: two degrees of a nominal strip.
+/// ... and as a share of the converter's range: two degrees of a nominal strip. Both must be exceeded.
 const LEAST_SHARE: f64 = 0.004;
-/// So many ticks in a row: one or two may be a knock.
+/// Consecutive ticks required: one or two may be a knock.
 const IN_A_ROW: usize = 3;
-/// Nothing has risen for so long: it is held (s). A hand at the control box takes a third of a second from step to step.
+/// Time without a rise after which the hold begins (s). A person at the control box needs a third of a second per step.
 const HOLD_AFTER_S: f64 = 0.4;
-/// What a strip does less than this share of its way within that time is no rise.
+/// Smallest rise of a strip in that time, as a share of its travel.
 const STILL_SHARE: f64 = 0.06;
-/// A strip that has come back by this share of its way is released.
+/// Return of a strip that starts the release, as a share of its travel.
 const RELEASED_SHARE: f64 = 0.15;
-/// One that is within this share of its way from rest is back.
+/// Distance from rest at which a strip counts as back, as a share of its travel.
 const BACK_SHARE: f64 = 0.15;
-/// Strips creep: fingers without pressure, or without any motion, are back after this time (s).
+/// Time without pressure or motion after which fingers count as back (s), because strips creep and may not return
+/// fully.
 const LEFT_ALONE_S: f64 = 1.5;
-/// Below this the line is without pressure (bar): a step of the control box is 0.05 bar.
+/// Line pressure that counts as zero (bar): a step of the control box is 0.05 bar.
 const NO_BAR: f64 = 0.02;
-/// Nobody holds for so long without any motion (s): what was taken for a grasp was none.
+/// Longest hold without motion (s): after it, the detected grasp was a false one and ends.
 const LONGEST_STILL_S: f64 = 20.0;
-/// After a gap of this length nothing is known any more (s).
+/// Longest gap in the stream that does not reset the segmentation (s).
 const LONGEST_GAP_S: f64 = 5.0;
 
-/// What happened in a stream.
+/// Event in a stream of readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SegmentEvent {
-    /// A trial has begun; readings from this time on belong to it (s).
+    /// Start of a trial; readings from this time on belong to it.
     Began {
-        /// On the clock of the readings.
+        /// Time on the clock of the readings (s).
         from_s: f64,
     },
-    /// A phase of its grasp has begun.
+    /// Start of a phase of its grasp.
     Phase(PhaseMark),
-    /// It has ended; readings up to this time belong to it (s).
+    /// End of the trial; readings up to this time belong to it.
     Ended {
-        /// On the clock of the readings.
+        /// Time on the clock of the readings (s).
         at_s: f64,
     },
 }
 
-/// Some readings in one: means of counts, the newest pressure.
+/// Average of several readings: mean counts, newest pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Tick {
     /// Time of its first reading (s).
@@ -75,7 +76,7 @@ struct Tick {
     line_bar: Option<f64>,
 }
 
-/// A tick that is being put together.
+/// Tick under construction.
 #[derive(Clone, Copy, Debug)]
 struct Gathering {
     t_s: f64,
@@ -83,29 +84,29 @@ struct Gathering {
     line_bar: Option<f64>,
 }
 
-/// What a strip reads at rest (counts).
+/// Rest value of a strip, and the smallest offset that has left it (counts).
 #[derive(Clone, Copy, Debug)]
 struct Rest {
     middle: f64,
     least: f64,
 }
 
-/// A grasp that is going on.
+/// Grasp in progress.
 #[derive(Clone, Copy, Debug)]
 struct Grasp {
     phase: Phase,
     by_pressure: bool,
     rest: [Option<Rest>; 2],
-    /// Highest pressure so far (bar), or farthest way of a strip from rest (counts), and when it was last exceeded (s).
+    /// Highest pressure (bar) or farthest travel of a strip from rest (counts) so far, and time of its last rise (s).
     most: f64,
     rose_s: f64,
-    /// Since when the line is without pressure (s).
+    /// Time at which the line pressure became zero (s).
     vented_s: Option<f64>,
-    /// Ticks in a row that said that the phase is over, and the first of them (s).
+    /// Consecutive ticks that indicate the end of the phase, and time of the first (s).
     doubt: (usize, f64),
 }
 
-/// Tells grasps in a stream. It goes on for ever in bounded memory.
+/// Finds grasps in an endless stream of readings, in bounded memory.
 #[derive(Clone, Debug)]
 pub struct Segmenter {
     columns: [Option<usize>; 2],
@@ -113,15 +114,15 @@ pub struct Segmenter {
     last_s: Option<f64>,
     gathering: Option<Gathering>,
     ring: VecDeque<Tick>,
-    /// Ticks in a row in which a strip had left rest, and the first of them (s).
+    /// Consecutive ticks in which a strip was off its rest value, and time of the first (s).
     leaving: (usize, f64),
     grasp: Option<Grasp>,
-    /// Readings up to here belong to the trial before (s).
+    /// End of the previous trial (s): readings up to here belong to it.
     taken_s: f64,
 }
 
 impl Segmenter {
-    /// Begins to listen to a board.
+    /// Starts segmenting the readings of a board.
     pub fn new(board: &Board) -> Self {
         let mut segmenter = Self {
             columns: [None; 2],
@@ -137,28 +138,28 @@ impl Segmenter {
         segmenter
     }
 
-    /// The board has other channels from now on.
+    /// Changes the channels and the full scale to those of `board`.
     pub fn set_board(&mut self, board: &Board) {
         self.columns = [Sensor::FlexLeft, Sensor::FlexRight].map(|sensor| board.channel_of(sensor));
         self.full_scale = f64::from(board.full_scale);
     }
 
-    /// True between a beginning and its end.
+    /// True during a grasp.
     pub fn in_grasp(&self) -> bool {
         self.grasp.is_some()
     }
 
-    /// Ticks that are remembered.
+    /// Number of ticks in memory.
     #[cfg(test)]
     pub(super) fn held(&self) -> usize {
         self.ring.len()
     }
 
-    /// Takes the next reading; what has happened, in order.
+    /// Takes the next reading and returns new events in order.
     pub fn push(&mut self, reading: &Reading) -> Vec<SegmentEvent> {
         let mut events = Vec::new();
         let t_s = reading.t_s;
-        // Time that does not rise is no time; where the clock was set back, all begins anew.
+        // Readings whose time is not finite or does not rise are skipped; a clock set back far resets everything.
         let Some(last_s) = self.last_s.filter(|_| t_s.is_finite()) else {
             self.last_s = self.last_s.or(t_s.is_finite().then_some(t_s));
             self.gather(reading, &mut events);
@@ -175,7 +176,7 @@ impl Segmenter {
         events
     }
 
-    /// Nothing is known any more; a grasp that was going on has ended with the last reading.
+    /// Resets the segmentation; a grasp in progress ends at the last reading.
     fn forget(&mut self, last_s: f64, events: &mut Vec<SegmentEvent>) {
         if self.grasp.is_some() {
             self.end(last_s, events);
@@ -189,7 +190,7 @@ impl Segmenter {
         if !reading.t_s.is_finite() {
             return;
         }
-        // A tick is over when the next begins; a reading of a slow stream is one by itself.
+        // A tick is complete when the next one begins; in a slow stream, each reading is a tick.
         if let Some(done) = self.gathering.filter(|gathering| reading.t_s >= gathering.t_s + TICK_S - 1e-4) {
             self.gathering = None;
             self.tick(done.tick(), events);
@@ -217,12 +218,12 @@ impl Segmenter {
         }
     }
 
-    /// No grasp is going on: does one begin?
+    /// Checks whether a grasp begins.
     fn wait(&mut self, tick: &Tick, events: &mut Vec<SegmentEvent>) {
         let rest = self.rest(tick.t_s);
         let speaks = self.ring.iter().any(|tick| tick.line_bar.is_some());
         if let Some(bar) = tick.line_bar.filter(|bar| *bar > NO_BAR) {
-            // One that is under pressure already when it is first heard is no beginning.
+            // Pressure in the first reading of a stream does not start a grasp: its start was missed.
             let before = self.ring.iter().rev().skip(1).find_map(|tick| tick.line_bar);
             if before.is_some_and(|before| before <= NO_BAR) {
                 self.begin(tick.t_s, Some(bar), rest, events);
@@ -251,7 +252,7 @@ impl Segmenter {
     fn end(&mut self, at_s: f64, events: &mut Vec<SegmentEvent>) {
         self.grasp = None;
         self.taken_s = at_s;
-        // What lies before is no rest: it is learned anew from here.
+        // The grasp must not enter the rest value, which is computed from later ticks only.
         self.ring.clear();
         events.push(SegmentEvent::Ended { at_s });
     }
@@ -276,7 +277,7 @@ impl Segmenter {
                 let rose_s = grasp.rose_s;
                 enter(&mut grasp, Phase::Hold, rose_s, events);
             }
-            // It closes again before it was open: that is another grasp.
+            // Closing again before the fingers were open starts another grasp.
             Phase::Release if rises => {
                 self.end(tick.t_s, events);
                 self.begin(tick.t_s, Some(bar), grasp.rest, events);
@@ -339,7 +340,7 @@ impl Segmenter {
         }
     }
 
-    /// True where no strip has moved for as long as fingers take to come back.
+    /// True if no strip has moved for [`LEFT_ALONE_S`].
     fn is_still(&self, now_s: f64, step: f64) -> bool {
         let since = now_s - LEFT_ALONE_S;
         let whole = self.ring.front().is_some_and(|oldest| oldest.t_s <= since);
@@ -350,7 +351,7 @@ impl Segmenter {
         whole && (0..2).all(|side| range(side) < step)
     }
 
-    /// What the strips read at rest, from a quiet stretch that lags behind.
+    /// Rest values of the strips, from the window [`REST_WINDOW_S`].
     fn rest(&self, now_s: f64) -> [Option<Rest>; 2] {
         let [from, to] = REST_WINDOW_S.map(|back| now_s - back);
         [0, 1].map(|side| {
@@ -376,17 +377,17 @@ fn mark(from_s: f64, phase: Phase, line_bar: Option<f64>) -> SegmentEvent {
     SegmentEvent::Phase(PhaseMark { from_s, phase, line_bar })
 }
 
-/// How far the farther strip is from rest, beyond what counts as rest (counts): above zero where it has left.
+/// Offset of the farther strip beyond its rest threshold (counts): positive when it has left rest.
 fn farthest(tick: &Tick, rest: &[Option<Rest>; 2]) -> Option<f64> {
     each(tick, rest).map(|(off, rest)| off - rest.least).max_by(f64::total_cmp)
 }
 
-/// How far the farther strip is from rest (counts).
+/// Offset of the farther strip from rest (counts).
 fn way(tick: &Tick, rest: &[Option<Rest>; 2]) -> Option<f64> {
     each(tick, rest).map(|(off, _)| off).max_by(f64::total_cmp)
 }
 
-/// What counts as rest, of the noisier strip (counts).
+/// Rest threshold of the noisier strip (counts).
 fn least(rest: &[Option<Rest>; 2]) -> f64 {
     rest.iter().flatten().map(|rest| rest.least).fold(0.0, f64::max)
 }

@@ -1,4 +1,4 @@
-//! Grasps in streams: made up, random, and of the emulated gripper.
+//! Segmentation of synthetic streams, random streams and streams of the emulated gripper.
 
 use super::segmentation::*;
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
@@ -10,13 +10,13 @@ use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::model::Stream;
 use proptest::prelude::*;
 
-/// All that happens in a stream.
+/// All events of a stream.
 fn events(board: &Board, readings: impl IntoIterator<Item = Reading>) -> Vec<SegmentEvent> {
     let mut segmenter = Segmenter::new(board);
     readings.into_iter().flat_map(|reading| segmenter.push(&reading)).collect()
 }
 
-/// A grasp as it was told: beginning, first closing, first release, end (s).
+/// Detected grasp: start, phases and end (s).
 #[derive(Debug, PartialEq)]
 struct Told {
     from_s: f64,
@@ -24,7 +24,7 @@ struct Told {
     at_s: f64,
 }
 
-/// Beginnings and ends must take turns; phases lie between them.
+/// Groups events into grasps. Starts and ends must alternate, with the phases between them.
 fn grasps(events: &[SegmentEvent]) -> Vec<Told> {
     let mut told = Vec::new();
     let mut open: Option<Told> = None;
@@ -49,12 +49,13 @@ fn grasps(events: &[SegmentEvent]) -> Vec<Told> {
     told
 }
 
-/// How far a strip is bent at a time after a closing began (share): up in 2 s, held for 1 s, back in 1 s.
+/// Bend of a strip at a time after the start of a closing (share): 2 s up, 1 s hold, 1 s back.
 fn bend(t: f64) -> f64 {
     (t / 2.0).min(4.0 - t).clamp(0.0, 1.0)
 }
 
-/// A stream at a rate with grasps that begin at `starts`; the right strip does half of what the left one does, and drifts.
+/// Stream at a given rate with grasps that begin at `starts`; the right strip bends half as far as the left, and
+/// drifts.
 fn stream(rate_hz: f64, seconds: f64, starts: &[f64], rise: f64) -> Vec<Reading> {
     let mut noise = Stream::new(7, "segmenter", "noise");
     let reading = |k: u32| {
@@ -121,16 +122,16 @@ fn a_dead_strip_missing_numbers_and_gaps_are_survived() {
             reading.counts[1] = Some(f32::NAN);
         }
     }
-    // A second is missing while it holds, four between the grasps.
+    // One second is missing during the hold, four between the grasps.
     readings.retain(|reading| !(5.1..5.9).contains(&reading.t_s) && !(7.5..9.5).contains(&reading.t_s));
     let told = grasps(&events(&Board::default(), readings));
     assert_eq!(told.len(), 2, "{told:?}");
-    // One that is cut off for long has ended where it was cut off.
+    // A grasp followed by a long gap ends where the gap begins.
     let mut cut = stream(50.0, 30.0, &[3.0, 22.0], 600.0);
     cut.retain(|reading| !(5.5..15.0).contains(&reading.t_s));
     let told = grasps(&events(&Board::default(), cut));
     assert!(told.len() == 2 && (told[0].at_s - 5.5).abs() < 0.05, "{told:?}");
-    // A board without strips and without pressure says nothing.
+    // A board without strips and without pressure yields no events.
     let blind = Board { channels: vec!["fsrL".to_owned()], ..Board::default() };
     assert_eq!(events(&blind, stream(50.0, 10.0, &[3.0], 600.0)), []);
 }
@@ -150,7 +151,7 @@ fn pressure_says_it_to_the_reading() {
         assert!(*phase == want && (t - want_t).abs() < 0.021, "{want:?} at {want_t}: {told:?}");
     }
     assert!((told[0].from_s - (closes - PRE_ROLL_S)).abs() < 0.021 && told[0].at_s < 7.5, "{told:?}");
-    // Without strips the line alone will do, and one that is pressed again before it was open is another grasp.
+    // Without strips the line pressure suffices, and a rise before the line is vented starts another grasp.
     let blind = Board { channels: vec!["fsrL".to_owned()], ..Board::default() };
     let twice = (0..600).map(|k| {
         let t_s = 0.02 * f64::from(k);
@@ -161,7 +162,7 @@ fn pressure_says_it_to_the_reading() {
     assert!(told.len() == 2 && told[1].from_s >= told[0].at_s, "{told:?}");
 }
 
-/// What a board prints while a script is done, read as a host reads it.
+/// Output of a board while it runs a script, decoded as the host decodes it.
 fn emulated(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
@@ -228,7 +229,7 @@ proptest! {
         let (mut t, mut events) = (0.0, Vec::new());
         for ((step, counts, line_bar), times) in steps {
             for _ in 0..times {
-                // One broken time is no clock that is broken for ever.
+                // A single bad time stamp must not stop the segmentation.
                 let t_s = t + step;
                 t = if t_s.is_finite() { t_s } else { t };
                 let reading = Reading { t_s, arrived_s: t, seq: None, counts: counts.to_vec(), line_bar };

@@ -17,7 +17,7 @@ pub struct AccuracyCost {
     pub error: ErrorNorms,
 }
 
-/// Runs a grasp and its refined run; `None` where it was cancelled, or the grasp ended early.
+/// Runs a grasp and its refined run; `None` if it was cancelled or the grasp ended early.
 pub fn accuracy_cost(
     scene: &Scene,
     object: Option<&ObjectModel>,

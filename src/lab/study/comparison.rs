@@ -1,4 +1,4 @@
-//! Comparison of methods on the same grasps: fitted to some, evaluated on others.
+//! Comparison of methods: all fitted to the same training grasps and evaluated on the same test grasps.
 
 use palpate_learn::evaluation::{Answers, Evaluation, Round, answer, evaluate, product_of_experts, rounds};
 use palpate_learn::metrics::{Bootstrap, Confusion, Interval, McNemar, holm};
@@ -7,24 +7,24 @@ use serde::Serialize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// One method's row.
+/// Row of one method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ComparisonRow {
     /// Key of the method, or path of a model.
     pub model: String,
     /// Display name.
     pub title: String,
-    /// The measures.
+    /// Evaluation on the test grasps.
     #[serde(flatten)]
     pub evaluation: Evaluation,
     /// CPU time of the fit (s).
     pub train_cpu_s: f64,
-    /// Numbers learned.
+    /// Number of learned parameters.
     pub parameters: usize,
-    /// Macro F1 after one grasp, two, and so on, where grasps count as independent: the product of experts.
+    /// Macro F1 after one grasp, two, and so on, by the product of experts, which treats grasps as independent.
     pub f1_by_grasps_independent: Vec<f64>,
-    /// Gain of feeding the PMF back over that after one grasp, two, and so on: difference of macro F1 on the same
-    /// grasps, with paired 95 % intervals.
+    /// Gain of PMF feedback over the product of experts after one grasp, two, and so on: difference of macro F1 on the
+    /// same grasps, with paired 95 % intervals.
     pub gain_over_independent: Vec<Interval>,
     /// Origin of the grasps.
     pub data: DataCard,
@@ -37,11 +37,11 @@ pub struct ComparisonRow {
 /// One model against another on the same grasps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// Macro F1 of this model less that of the other, with its paired 95 % interval.
+    /// Macro F1 of this model minus that of the other, with its paired 95 % interval.
     pub f1: Interval,
     /// Exact McNemar test of the decisions.
     pub mcnemar_p: f64,
-    /// The same adjusted for the number of comparisons, after Holm.
+    /// The same p-value with Holm's correction for the number of comparisons.
     pub mcnemar_p_holm: f64,
 }
 
@@ -49,7 +49,7 @@ pub struct Difference {
 pub struct Comparison<'a> {
     /// Training set.
     pub train: &'a Dataset,
-    /// Test set; no grasp of it is in `train`.
+    /// Test set, disjoint from `train`.
     pub test: &'a Dataset,
     /// Seed of fits and draws.
     pub seed: u64,
@@ -57,11 +57,11 @@ pub struct Comparison<'a> {
     pub quick: bool,
     /// Stop rule of grasping until sure.
     pub stop: StopRule,
-    /// Set from outside to end the work.
+    /// Flag that cancels the work.
     pub interrupted: &'a AtomicBool,
 }
 
-/// A method and how it did, before rows are compared.
+/// A method's results before rows are compared.
 struct Judged {
     row: ComparisonRow,
     decided: Vec<Option<usize>>,
@@ -73,9 +73,9 @@ pub enum ComparisonError {
     /// A method could not be fitted.
     #[error("{method}: {cause}")]
     Fit {
-        /// Its key.
+        /// Key of the method.
         method: &'static str,
-        /// Why.
+        /// Cause.
         cause: LearnError,
     },
     /// No test grasps.
@@ -84,8 +84,8 @@ pub enum ComparisonError {
 }
 
 impl Comparison<'_> {
-    /// Fits and judges methods side by side, each on one thread; rows come in the order of the methods. `tell` receives
-    /// every method that is done.
+    /// Fits and evaluates methods in parallel, each on one thread; rows are in the order of the methods. `tell`
+    /// receives every finished method.
     pub fn of_methods(
         &self,
         methods: &[&'static Method],
@@ -121,7 +121,7 @@ impl Comparison<'_> {
         Ok(self.compared(judged))
     }
 
-    /// The method's own settings, without progress.
+    /// Settings of the method, without progress reports.
     fn fitting(&self) -> Fitting<'_> {
         Fitting {
             seed: self.seed,
@@ -139,7 +139,7 @@ impl Comparison<'_> {
         self.of_model(method.key, method.title, &model)
     }
 
-    /// Judges a model that was fitted elsewhere.
+    /// Evaluates a model that was fitted elsewhere.
     pub fn of_fitted(&self, name: &str, model: &Model) -> Result<ComparisonRow, ComparisonError> {
         let title = palpate_learn::method(&model.card.method).map_or("", |m| m.title);
         self.of_model(name, title, model).map(|judged| judged.row)
@@ -197,8 +197,8 @@ impl Comparison<'_> {
         judged.into_iter().map(|j| j.row).collect()
     }
 
-    /// The controls of a fair comparison: a method that learned from shuffled labels, which must not know more than
-    /// chance, and one that is given the true size and shape, an upper bound for methods that must find them.
+    /// Controls of a fair comparison: a method trained on shuffled labels, which must score at chance, and one that is
+    /// given the true size and shape, an upper bound for methods that must estimate them.
     pub fn controls(&self, method: &'static Method) -> Result<Controls, ComparisonError> {
         let fitting = self.fitting();
         let failed = |cause| ComparisonError::Fit { method: method.key, cause };
@@ -244,9 +244,9 @@ pub struct Controls {
     pub method: &'static str,
     /// One over the number of classes.
     pub chance: f64,
-    /// Learned from labels that were exchanged at random.
+    /// Trained on shuffled labels.
     pub shuffled_labels: Interval,
-    /// Learned from the true labels.
+    /// Trained on the true labels.
     pub plain: Interval,
     /// Given the true size and shape.
     pub true_size_and_shape: Interval,
@@ -256,7 +256,7 @@ fn decisions(answers: &Answers) -> Vec<Option<usize>> {
     answers.verdicts.iter().map(|v| Some(v.pmf.top().0)).collect()
 }
 
-/// Iterated recognition against the product of experts on the same rounds: F1 of the first less that of the second
+/// Iterated recognition against the product of experts on the same rounds: F1 of the first minus that of the second
 /// after each number of grasps, with paired 95 % intervals.
 fn fed_back_against_independent(classes: usize, fed_back: &[Round], independent: &[Round]) -> Vec<Interval> {
     let truth: Vec<usize> = fed_back.iter().map(|r| r.truth).collect();

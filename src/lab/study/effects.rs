@@ -1,9 +1,9 @@
-//! Cost and influence of each effect: switch it off, or on, and compare whole trials.
+//! Cost and influence of each effect, from whole trials with the effect on and off.
 //!
-//! Every effect is flipped alone, as a user would: effects at `auto` are decided anew, so that
-//! an object let go has its weight. Cost comes from pairs of runs, with and without, one after the other in one thread,
-//! of which the quickest of each kind count, because whatever else a machine does only adds. Differences are taken over
-//! all samples and both fingers.
+//! Effects are flipped one at a time, as a user would: effects at `auto` are decided again, so that, for example, an
+//! object that is no longer fixed has weight. Cost comes from pairs of runs, with and without the effect, one after the
+//! other in one thread. The fastest of each kind counts, because other load on the machine only adds time. Differences
+//! are taken over all samples and both fingers.
 
 use crate::grasping::{ErrorNorms, GraspSummary, prepare};
 use palpate_geometry::units::three_digits;
@@ -22,9 +22,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub struct Explanation {
     /// Name of the object.
     pub object: String,
-    /// CPU time of the trial as the scene has it (ms).
+    /// CPU time of the trial with the scene unchanged (ms).
     pub cpu_ms: f64,
-    /// First contact (s); null when never.
+    /// Time of first contact (s); null without contact.
     pub contact_onset_s: Option<f64>,
     /// Remarks on the trial.
     pub warnings: Vec<String>,
@@ -32,7 +32,7 @@ pub struct Explanation {
     pub effects: Vec<ExplainedEffect>,
 }
 
-/// One effect, explained.
+/// Decision, cost and influence of one effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExplainedEffect {
     /// Decision of the plan.
@@ -40,23 +40,23 @@ pub struct ExplainedEffect {
     pub planned: PlannedEffect,
     /// Description, one sentence.
     pub about: &'static str,
-    /// Definition of its number.
+    /// Definition of its dimensionless number.
     pub number_is: &'static str,
-    /// Cost where it is on, or cost of switching it on, as a share of the trial's CPU time.
+    /// Cost if the effect is on, otherwise cost of switching it on, as a share of the trial's CPU time.
     pub cost_share: f64,
-    /// Change of the trial when the effect is switched the other way.
+    /// Change of the trial when the effect is flipped.
     pub change: EffectChange,
 }
 
 /// Differences between two trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EffectChange {
-    /// Of what the sensors read.
+    /// Differences of the sensor values.
     #[serde(flatten)]
     pub norms: ErrorNorms,
-    /// First contact in the other trial (s); null when never.
+    /// Time of first contact in the other trial (s); null without contact.
     pub contact_onset_s: Option<f64>,
-    /// Delay of first contact in the other trial (ms), in whole samples; null unless both touch.
+    /// Delay of first contact in the other trial (ms), in whole samples; null unless both have contact.
     pub onset_ms: Option<f64>,
 }
 
@@ -70,7 +70,7 @@ impl ExplainedEffect {
         } else if percent > 0.0 {
             format!("{costs} {percent:.0} % of the CPU time")
         } else {
-            // Without friction, for example, an object rolls about and takes more steps of the solver.
+            // The cost may be negative: without friction, for example, an object rolls and needs more solver steps.
             format!("{saves} {:.0} % of the CPU time", -percent)
         }
     }
@@ -98,20 +98,20 @@ impl ExplainedEffect {
     }
 }
 
-/// Pairs of runs that are timed. Long trials are timed once: they average over much already.
+/// Number of timed pairs of runs. Long trials are timed once, because they average over enough steps.
 const PAIRS: usize = 5;
-/// Shares of CPU time below this differ from run to run on a busy machine.
+/// Share of CPU time below which a cost is noise on a busy machine.
 const NOISE: f64 = 0.03;
-/// Duration above which a trial is long (s).
+/// Duration above which a trial counts as long (s).
 const LONG: f64 = 10.0;
 
 /// Settings of the measurement.
 pub struct Measuring<'a> {
-    /// Threads to work in.
+    /// Number of threads.
     pub threads: usize,
-    /// Set to give up.
+    /// Flag that cancels the measurement.
     pub cancelled: &'a AtomicBool,
-    /// Receives the numbers of effects done and in all.
+    /// Receives the number of measured effects and the number of all.
     pub progress: &'a (dyn Fn(usize, usize) + Sync),
 }
 
@@ -127,7 +127,7 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
         Some(explained)
     };
     let all = || Effect::ALL.par_iter().map(one).collect::<Option<Vec<ExplainedEffect>>>();
-    // Falls back to rayon's global pool where no threads can be started.
+    // Falls back to rayon's global pool if no threads can be started.
     let effects = match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
         Ok(pool) => pool.install(all),
         Err(_none) => all(),
@@ -171,14 +171,14 @@ fn explain_one(
     })
 }
 
-/// The scene with one effect switched the other way.
+/// Scene with one effect flipped.
 fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
     let mut scene = scene.clone();
     scene.effects.set(effect, if plan.is_on(effect.name()) { Setting::Off } else { Setting::On });
     scene
 }
 
-/// A whole trial and its CPU time (s); `None` when cancelled.
+/// Runs a whole trial and returns it with its CPU time (s); `None` when cancelled.
 fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> Option<(SimulatedTrial, f64)> {
     let start = cpu_time::ThreadTime::now();
     let mut run = prepare(scene, object, 0);
@@ -191,7 +191,7 @@ fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> O
     Some((run.finish(scene), seconds))
 }
 
-/// A trial, and when its first contact was (s).
+/// Trial with the time of its first contact (s).
 struct GraspOutcome {
     trial: SimulatedTrial,
     onset_s: Option<f64>,
@@ -202,7 +202,7 @@ impl GraspOutcome {
         Self { onset_s: GraspSummary::new(&trial, scene).contact_onset_s, trial }
     }
 
-    /// From this trial to another; the sensors of `scene` read both.
+    /// Change from this trial to another, both read by the sensors of `scene`.
     fn change_to(&self, other: &Self, scene: &Scene) -> EffectChange {
         let sensors = Sensors::whole_fingers(&scene.gripper);
         let both = self.onset_s.zip(other.onset_s);
@@ -257,7 +257,7 @@ mod tests {
         for effect in [Effect::FingerGravity, Effect::Friction, Effect::FingerInertia] {
             assert!(report.of(effect).change.norms.curvature_per_m > 1e-3, "{effect:?} {:?}", report.of(effect).change);
         }
-        // Effects left out change nothing: no finger comes near the pedestal or the other finger.
+        // Effects that are off have no influence: no finger comes near the pedestal or the other finger.
         for effect in [Effect::ObjectGravity, Effect::Support, Effect::FingerContact, Effect::PneumaticLag] {
             assert_eq!(report.of(effect).change.norms.curvature_per_m, 0.0, "{effect:?}");
             assert_eq!(report.of(effect).change.norms.force_n, 0.0, "{effect:?}");
@@ -275,7 +275,7 @@ mod tests {
             "{weight:?}"
         );
         assert!(report.of(Effect::Friction).change.norms.force_share > weight.change.norms.force_share);
-        // Weight does matter for a heavy one.
+        // Weight matters for a heavy object.
         let heavy = explained(&draft(), Some(&ball(0.020, 4000.0)));
         assert!(
             heavy.of(Effect::ObjectGravity).planned.on && heavy.of(Effect::ObjectGravity).change.norms.force_n > 1e-3
@@ -324,7 +324,7 @@ mod tests {
         let report = explained(&scene, Some(&ball));
         let free = GraspOutcome::new(&scene, crate::grasping::grasp(&draft(), Some(&ball), 0));
         let held = GraspOutcome::new(&scene, crate::grasping::grasp(&scene, Some(&ball), 0));
-        // An object let go has its weight, and rests.
+        // An object that is no longer fixed has weight, and comes to rest.
         let expected = held.change_to(&free, &scene);
         assert_eq!(report.of(Effect::FreeObject).change, expected);
         assert!(expected.norms.force_n > 1e-3);

@@ -1,5 +1,5 @@
-//! Training on labelled trials: a recogniser is fitted to some trials of the real gripper and evaluated on the others,
-//! and the evaluated model is kept.
+//! Training on labelled trials: a recogniser is fitted to some trials of the real gripper and evaluated on the held-out
+//! ones.
 
 use super::comparison::{Comparison, ComparisonError};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
@@ -13,11 +13,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Held-out share of each object's trials.
 pub const HELD_BACK: f64 = 0.2;
 
-/// Trials of an object from which on it is learned: four to learn from, of which the dual-stage networks take one half
-/// for each stage, and one to judge by.
+/// Fewest trials with which an object becomes a class: four for training, of which dual-stage networks use half for
+/// each stage, and one held out.
 pub const LEAST_TRIALS: usize = 5;
 
-/// Labelled trials of an object.
+/// Number of labelled trials of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelledClass {
     /// Its label.
@@ -27,7 +27,7 @@ pub struct LabelledClass {
 }
 
 impl LabelledClass {
-    /// True where that is enough to learn it.
+    /// True if there are enough trials for training.
     pub fn is_enough(&self) -> bool {
         self.trials >= LEAST_TRIALS
     }
@@ -48,9 +48,9 @@ pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError>
 /// Progress of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TrainingStage {
-    /// Trials read, of so many.
+    /// Number of trials read, and of all.
     Reading(usize, usize),
-    /// Share of the fit that is done.
+    /// Completed share of the fit.
     Fitting(f64),
     /// Evaluation on the held-out trials.
     Judging,
@@ -58,15 +58,15 @@ pub enum TrainingStage {
 
 /// Settings of a training.
 pub struct LabelledTraining<'a> {
-    /// The method.
+    /// Method to fit.
     pub method: &'static Method,
-    /// Seed of the fit, and of which trials are held back.
+    /// Seed of the fit and of the choice of held-out trials.
     pub seed: u64,
     /// A quick fit with worse results.
     pub quick: bool,
     /// Receives the progress.
     pub tell: &'a (dyn Fn(TrainingStage) + Sync),
-    /// Set from outside to end the work.
+    /// Flag that cancels the training.
     pub stop: &'a AtomicBool,
 }
 
@@ -77,11 +77,11 @@ pub struct JudgedModel {
     pub model: Model,
     /// Evaluation on the held-out trials.
     pub evaluation: Evaluation,
-    /// Trials to learn from, and to judge by.
+    /// Number of training trials and of held-out trials.
     pub trials: [usize; 2],
-    /// Objects left out for too few trials.
+    /// Objects excluded because they have too few trials.
     pub too_few: Vec<LabelledClass>,
-    /// Trials that could not be used: without calibration, or not sound.
+    /// Unusable trials: without calibration, or unsound.
     pub left_out: usize,
 }
 
@@ -103,29 +103,29 @@ pub enum TrainingError {
          which parts are calibrated by `palpate calibrate list`"
     )]
     TooFewUsable {
-        /// Trials that can be used.
+        /// Number of usable trials.
         usable: usize,
-        /// All of them.
+        /// Number of all trials.
         all: usize,
-        /// Objects with enough.
+        /// Number of objects with enough trials.
         found: usize,
     },
-    /// The store.
+    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The trials make no data set.
+    /// The trials do not form a data set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The fit.
+    /// The fit failed.
     #[error(transparent)]
     Fit(#[from] LearnError),
-    /// The model could not be judged.
+    /// The evaluation failed.
     #[error(transparent)]
     Judge(#[from] ComparisonError),
 }
 
 impl LabelledTraining<'_> {
-    /// Reads the labelled trials of the real gripper, fits and judges.
+    /// Reads the labelled trials of the real gripper, fits the method and evaluates the model.
     pub fn train(&self, store: &Store) -> Result<JudgedModel, TrainingError> {
         let (enough, mut too_few): (Vec<LabelledClass>, Vec<LabelledClass>) =
             labelled_classes(store)?.into_iter().partition(LabelledClass::is_enough);
@@ -179,7 +179,7 @@ impl LabelledTraining<'_> {
     }
 }
 
-/// Some trials may not be readable: objects with too few readable trials are no classes.
+/// Drops objects with too few readable trials from the classes.
 fn without_small_classes(
     data: &Dataset,
     all: usize,
@@ -198,6 +198,6 @@ fn without_small_classes(
     let kept = data.part(&kept);
     let mut labels = kept.labels.clone();
     labels.classes.retain(|class| !too_few.iter().any(|small| small.name == class.name));
-    // Those that remain know their classes.
+    // Relabelling cannot fail: all remaining examples belong to remaining classes.
     Ok(kept.relabelled(&labels).unwrap_or(kept))
 }

@@ -1,4 +1,4 @@
-//! Experiments as functions: data in, tables out, no window. Each can be run from the command line.
+//! Experiments as functions from data to tables, without a window. The command line runs each of them.
 
 mod accuracy_cost;
 mod comparison;

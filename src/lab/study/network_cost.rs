@@ -1,5 +1,5 @@
 //! Cost of the macro-layer: a training step and a live step of our kernel, and the same training step in candle's own
-//! LSTM, on the same numbers in one run. `tests/peers/lstm_step.py` times PyTorch on the same sizes.
+//! LSTM, with the same data in one run. `tests/peers/lstm_step.py` times PyTorch on the same sizes.
 
 use candle_core::{DType, Device, Tensor};
 use candle_nn::rnn::{self, LSTMConfig, RNN as _};
@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// Sizes of the step that is timed; those of the reference measurements.
+/// Sizes of the timed step; the defaults are those of the reference measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct StepSizes {
     /// Time steps of a sequence.
@@ -62,7 +62,7 @@ fn shape(sizes: StepSizes) -> MacroShape {
     }
 }
 
-/// Sequences that differ by class, as time-major numbers.
+/// Sequences that differ by class, in time-major order.
 fn batch(sizes: StepSizes, random: &mut ChaCha8Rng) -> Batch {
     let targets: Vec<usize> = (0..sizes.batch).map(|s| s % sizes.classes).collect();
     let mut x = Vec::with_capacity(sizes.steps * sizes.batch * sizes.channels);
@@ -101,7 +101,7 @@ pub fn kernel_step_cost(sizes: StepSizes, runs: usize) -> NetworkCost {
 
 /// Times the same training step in candle: `candle_nn`'s LSTM, two linear layers, its autograd and AdamW.
 pub fn candle_step_cost(sizes: StepSizes, runs: usize) -> candle_core::Result<NetworkCost> {
-    // candle spreads over all cores, and is slower for it here.
+    // On all cores, its default, candle is slower at these sizes.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.map_err(|e| candle_core::Error::Msg(e.to_string()))?;
     pool.install(|| {
@@ -115,7 +115,8 @@ pub fn candle_step_cost(sizes: StepSizes, runs: usize) -> candle_core::Result<Ne
         let config = LSTMConfig {
             w_ih_init: even,
             w_hh_init: even,
-            // One where the forget gates stand, as in our kernel; without it candle meets subnormal numbers.
+            // Positive biases for the forget gates, as in our kernel; without them candle computes with subnormal
+            // numbers.
             b_ih_init: Some(candle_nn::Init::Const(0.25)),
             b_hh_init: Some(candle_nn::Init::Const(0.25)),
             ..LSTMConfig::default()

@@ -1,8 +1,8 @@
-//! Cost of a grasp: CPU time of one whole trial on one thread, and its error against a far finer one, for scenes from a
-//! fixed ball to a baked mesh.
+//! Cost of a grasp: CPU time of one whole trial on one thread, and its error against a much finer trial, for scenes
+//! from a fixed ball to a baked mesh.
 //!
-//! Times are those of the thread, not of the wall clock, and the median of several runs, so that a busy machine
-//! disturbs them little. Numbers to compare on one machine, not to assert in a test.
+//! Times are CPU times of the thread, not wall-clock times, and medians of several runs, so that other load on the
+//! machine has little influence. Compare them on one machine; do not assert them in a test.
 
 use crate::grasping::{ErrorNorms, grasp, prepare};
 use glam::DVec3;
@@ -13,14 +13,14 @@ use palpate_tactile::Sensors;
 use palpate_tactile::trial::SimulatedTrial;
 use serde::Serialize;
 
-/// One of the scenes that are timed.
+/// Timed scene.
 #[derive(Clone, Debug)]
 pub struct BenchScene {
     /// Its name in tables.
     pub name: &'static str,
     /// Grasped object.
     pub object: ObjectModel,
-    /// Held in place, or free.
+    /// True if the object is fixed in place.
     pub fixed: bool,
 }
 
@@ -53,7 +53,7 @@ pub struct CostRow {
 /// of that of steps of 1/300 s.
 const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
 
-/// The grasp of a scene that errors are measured against.
+/// Reference grasp of a scene, against which errors are measured.
 pub fn physics_truth(bench: &BenchScene) -> SimulatedTrial {
     let mut scene = bench.scene();
     scene.solver.accuracy = TRUTH;
@@ -92,7 +92,7 @@ pub fn bench_scenes() -> Result<Vec<BenchScene>, ObjectError> {
     Ok(scenes)
 }
 
-/// Times `runs` trials of a scene, and holds the last against the truth where that is given.
+/// Times `runs` trials of a scene, and compares the last with the reference grasp if one is given.
 pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: Option<&SimulatedTrial>) -> CostRow {
     let mut scene = bench.scene();
     scene.solver.accuracy = accuracy;

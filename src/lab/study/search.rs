@@ -1,5 +1,5 @@
-//! A small, stated search for the settings of a network: every point of a grid is judged by cross-validation on
-//! training data alone.
+//! A small grid search for the settings of a network: every point is scored by cross-validation on the training data
+//! alone.
 
 use palpate_learn::evaluation::answer;
 use palpate_learn::metrics::Confusion;
@@ -7,21 +7,21 @@ use palpate_learn::{Dataset, Fitting, LearnError, Method};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
-/// Settings that were tried, and how well they did.
+/// Settings and their score.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SearchRow {
-    /// Changed setting.
+    /// Changed settings.
     pub settings: serde_json::Map<String, serde_json::Value>,
-    /// Macro F1 on parts of the training data that were left out.
+    /// Macro F1 on the held-out folds of the training data.
     pub f1_macro: f64,
 }
 
-/// The grid: units, dropout and weight decay, the three that mattered when networks were built.
+/// The grid: units, dropout and weight decay, the three settings with the largest influence in earlier experiments.
 const GRID: [(&str, &[f64]); 3] = [("units", &[64.0, 128.0]), ("dropout", &[0.3, 0.5]), ("weight_decay", &[0.1, 0.4])];
-/// Parts of the data; each is left out once.
+/// Number of folds; each is held out once.
 const FOLDS: usize = 2;
 
-/// Tries all points of the grid; the best comes first. Settings that are given are kept.
+/// Scores all points of the grid, best first. Settings given by the caller stay fixed.
 pub fn search(
     method: &'static Method,
     data: &Dataset,

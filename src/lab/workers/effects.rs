@@ -1,5 +1,5 @@
-//! Measuring what effects cost and change, beside the simulation: the newest command replaces older ones, and what has been
-//! measured is kept for when the scene comes back.
+//! Background measurement of cost and influence of the effects: a new request replaces older ones, and results are kept
+//! in case the scene returns.
 
 use super::latest::Latest;
 use super::messages::Wake;
@@ -12,32 +12,32 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A scene has to stay this long before it is measured: sliders pass many on their way.
+/// Time without a change before a scene is measured: a moving slider passes many scenes.
 const SETTLE: Duration = Duration::from_millis(300);
-/// Scenes whose measurements are kept.
+/// Number of scenes whose results are kept.
 const KEPT: usize = 32;
 
-/// How far the measurement of a scene has come.
+/// State of the measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EffectsState {
-    /// Effects done, and of how many.
+    /// Number of effects measured, and of all.
     Measuring(usize, usize),
-    /// All is known.
+    /// Finished.
     Ready(Arc<Explanation>),
-    /// It cannot be measured; a sentence for the user.
+    /// Failed, with a message for the user.
     Failed(String),
 }
 
-/// The newest state of affairs.
+/// Newest measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectsView {
-    /// The scene it is about.
+    /// Measured scene.
     pub scene: Arc<Scene>,
-    /// How far it has come.
+    /// State of the measurement.
     pub state: EffectsState,
 }
 
-/// What measures a scene: its explanation, nothing when cancelled, or why it cannot be had.
+/// Function that measures a scene: its explanation, `None` when cancelled, or the reason for a failure.
 pub type Explain = Arc<dyn Fn(&Scene, &Measuring<'_>) -> Result<Option<Explanation>, String> + Send + Sync>;
 
 /// Loads a scene's object and explains the scene.
@@ -46,16 +46,16 @@ pub fn explain_scene(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explan
     Ok(explain_effects(scene, object.as_ref(), how))
 }
 
-/// A scene to be measured, and the flag by which that is given up.
+/// Scene to measure, with a flag that cancels the measurement.
 struct Wish {
     scene: Arc<Scene>,
     cancelled: Arc<AtomicBool>,
 }
 
-/// A handle on the thread. Dropping it gives up what is under way and ends the thread.
+/// Handle of the measuring thread. Dropping it cancels the measurement and ends the thread.
 #[derive(Debug)]
 pub struct EffectsWorker {
-    /// Absent once the thread is being ended.
+    /// `None` while the thread is being ended.
     commands: Option<Sender<Wish>>,
     asked: Option<(Arc<Scene>, Arc<AtomicBool>)>,
     view: Arc<Latest<EffectsView>>,
@@ -72,7 +72,7 @@ impl EffectsWorker {
         Ok(Self { commands: Some(commands), asked: None, view, thread: Some(thread) })
     }
 
-    /// Asks for a scene to be measured instead of whatever was asked for before.
+    /// Requests the measurement of a scene, in place of any earlier request.
     pub fn ask(&mut self, scene: &Scene) {
         if self.asked().is_some_and(|asked| asked == scene) {
             return;
@@ -81,24 +81,24 @@ impl EffectsWorker {
         let command = Wish { scene: Arc::new(scene.clone()), cancelled: Arc::new(AtomicBool::new(false)) };
         self.asked = Some((Arc::clone(&command.scene), Arc::clone(&command.cancelled)));
         if let Some(commands) = &self.commands {
-            // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
+            // Sending fails only if the thread panicked, which standard error reports; the rest of the window works.
             let _heard = commands.send(command);
         }
     }
 
-    /// Gives up what is under way; to be asked for again.
+    /// Cancels the current measurement; a new request may follow.
     pub fn give_up(&mut self) {
         if let Some((_, cancelled)) = self.asked.take() {
             cancelled.store(true, Ordering::Relaxed);
         }
     }
 
-    /// The scene that was asked for last.
+    /// Scene of the last request.
     pub fn asked(&self) -> Option<&Scene> {
         self.asked.as_ref().map(|(scene, _)| scene.as_ref())
     }
 
-    /// The newest state of affairs.
+    /// Newest measurement.
     pub fn view(&self) -> Option<Arc<EffectsView>> {
         self.view.get()
     }
@@ -114,7 +114,7 @@ impl Drop for EffectsWorker {
     }
 }
 
-/// What the thread owns.
+/// State owned by the thread.
 struct BackgroundJob {
     explain: Explain,
     view: Arc<Latest<EffectsView>>,
@@ -145,7 +145,7 @@ impl BackgroundJob {
 
     fn measure(&mut self, command: &Wish) {
         let progress = |done: usize, of: usize| self.publish(&command.scene, EffectsState::Measuring(done, of));
-        // One core is left to the simulation that is being watched.
+        // Leaves one core to the simulation on screen.
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
         let how = Measuring { threads, cancelled: &command.cancelled, progress: &progress };
         let explanation = match (self.explain)(&command.scene, &how) {
@@ -183,7 +183,7 @@ mod tests {
     fn start() -> (EffectsWorker, Receiver<()>) {
         let (wake, woken) = channel();
         let wake: Wake = Arc::new(move || {
-            // The test may have stopped listening.
+            // The test may have dropped its receiver.
             let _heard = wake.send(());
         });
         (EffectsWorker::start(Arc::new(explain_scene), wake).expect("a thread"), woken)

@@ -1,5 +1,5 @@
-//! Fitting the simulated finger beside a window: a thread "fit" that lists the recorded trials of the real gripper, and fits
-//! the finger to some of them.
+//! Background fit of the simulated finger for the window: a thread "fit" that lists the recorded trials of the real
+//! gripper and fits the finger to some of them.
 
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
@@ -11,32 +11,32 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What the user wants of a fit.
+/// Command to the fitting thread.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FitCommand {
-    /// Look which trials there are.
+    /// List the trials.
     List,
-    /// Fit the finger to these.
+    /// Fit the finger to these trials.
     Fit(Vec<TrialId>),
 }
 
-/// A finger that was fitted.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct FittedFinger {
-    /// The trials it was fitted to.
+    /// Trials used for the fit.
     pub trials: Vec<TrialId>,
-    /// What came out.
+    /// Estimates of the fit.
     pub fit: FingerFit,
     /// Scene of the first trial, with the fitted gripper.
     pub scene: Scene,
-    /// What should be known of the trials, in sentences.
+    /// Warnings about the trials, as sentences.
     pub warnings: Vec<String>,
 }
 
-/// What fits the finger to trials of a store: [`fit_trials`]. The text says why it cannot.
+/// Function that fits the finger to trials of a store, such as [`fit_trials`]; the error is a message for the user.
 pub type FitTrials = Arc<dyn Fn(&Path, &[TrialId], &FitWatch<'_>) -> Result<FittedFinger, String> + Send + Sync>;
 
-/// Reads the trials through the newest calibrations of their parts and fits the finger to them.
+/// Reads trials with the newest calibrations of their parts and fits the finger to them.
 pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Result<FittedFinger, String> {
     let store = Store::open(store).map_err(|error| error.to_string())?;
     let mut recorded = RecordedGrasps::default();
@@ -50,18 +50,19 @@ pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Res
     Ok(FittedFinger { trials: trials.to_vec(), fit, scene, warnings })
 }
 
-/// Where the fit stands.
+/// State of the fitting thread.
 #[derive(Clone, Debug, Default)]
 pub struct FitterView {
-    /// Whole trials of the real gripper, newest first, or why they cannot be listed; none before they were looked for.
+    /// Complete trials of the real gripper, newest first, or why they cannot be listed; `None` before the first
+    /// listing.
     pub trials: Option<Result<Arc<[TrialRow]>, String>>,
-    /// Steps done of the fit that goes on; none while none does.
+    /// Steps done of the fit in progress; `None` without one.
     pub running: Option<f64>,
-    /// How the last fit ended that was not given up.
+    /// Result of the last fit that was not cancelled.
     pub ended: Option<Result<Arc<FittedFinger>, String>>,
 }
 
-/// A handle on the thread.
+/// Handle of the fitting thread.
 pub type Fitter = BackgroundJob<FitCommand, FitterView>;
 
 impl Fitter {
@@ -111,7 +112,7 @@ mod tests {
     use palpate_store::BoardInfo;
     use palpate_tactile::trial::TrialHeader;
 
-    /// A quick close of an empty hand.
+    /// Scene in which an empty hand closes quickly.
     fn close() -> Scene {
         let mut scene = Scene::default();
         palpate_sim::objects::EMPTY.clone_into(&mut scene.object.source);
@@ -143,7 +144,7 @@ mod tests {
         let listed: Vec<&str> = rows.iter().map(|row| row.object.as_str()).collect();
         assert_eq!(listed, ["empty", "lemon"], "whole trials of the board, newest first");
 
-        // Any trial can be fitted; this one's finger is known.
+        // The finger of this trial is known, so the fit can be checked.
         job.ask(FitCommand::Fit(vec![simulated]));
         until(&job, &woken, |view| view.running.is_some_and(|steps| steps > 1.0));
         let view = until(&job, &woken, |view| view.running.is_none() && view.ended.is_some());

@@ -1,4 +1,4 @@
-//! Recognition in the simulation's thread, with a recogniser that says what it is told to say.
+//! Recognition in the simulation thread, with a stub recogniser that returns preset probabilities.
 
 use super::sim_tests::{Watched, ball, start_with};
 use super::{Command, Notice, Snapshot};
@@ -10,15 +10,15 @@ use palpate_store::Store;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Says "ball" with this probability after the first grasp, the second and so on, and is more or less at a loss before.
+/// Stub recogniser: preset probabilities of "ball" after the first grasp, the second and so on.
 #[derive(Clone)]
 struct Parrot {
     ball: Vec<f64>,
-    /// Samples that it has been given.
+    /// Number of samples received.
     heard: Arc<AtomicUsize>,
 }
 
-/// This probability for the ball, the rest evenly for all others.
+/// Verdict with this probability for the ball, and the rest shared evenly by all other classes.
 fn saying(ball: f64) -> Verdict {
     let labels = labels_of_catalogue();
     let others = (1.0 - ball) / (labels.classes.len() - 1) as f64;
@@ -30,7 +30,7 @@ fn saying(ball: f64) -> Verdict {
 }
 
 impl Parrot {
-    /// What it says after a grasp; it counts by how sure the grasps before have made it.
+    /// Verdict after a grasp; the probability of the previous verdict gives the number of the grasp.
     fn after(&self, before: Option<&Pmf>) -> Verdict {
         let known = before.map(|pmf| pmf.top().1);
         let next = self.ball.iter().position(|p| known.is_some_and(|k| (k - p).abs() < 1e-9)).map_or(0, |k| k + 1);

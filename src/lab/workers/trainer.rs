@@ -1,5 +1,5 @@
-//! Training beside a window: a thread "train" that counts the labelled trials of the real gripper, trains a recogniser on
-//! them, keeps it as a file, and loads such files.
+//! Background training for the window: a thread "train" that counts the labelled trials of the real gripper, trains a
+//! recogniser on them, saves it to a file, and loads such files.
 
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
@@ -13,64 +13,64 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What the user wants of training.
+/// Command to the training thread.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TrainCommand {
-    /// Look which trials and models there are.
+    /// List the trials and models.
     Look,
-    /// Train.
+    /// Train a model.
     Train(TrainRequest),
     /// Load a model.
     Load(PathBuf),
 }
 
-/// How to train.
+/// Settings of a training.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainRequest {
     /// Key of the method.
     pub method: String,
-    /// Seed of the fit and of which trials are held back.
+    /// Seed of the fit and of the choice of held-out trials.
     pub seed: u64,
     /// A quick fit with worse results.
     pub quick: bool,
 }
 
-/// A model with the file it is kept in.
+/// Model and its file.
 #[derive(Clone, Debug)]
 pub struct TrainedModel {
     /// The model.
     pub model: Arc<Model>,
     /// Its file.
     pub path: PathBuf,
-    /// What it is, in a line.
+    /// One-line description.
     pub about: String,
 }
 
-/// A model that has just been trained, and how it did.
+/// Newly trained model and its evaluation.
 #[derive(Clone, Debug)]
 pub struct FinishedTraining {
     /// The model.
     pub trained: TrainedModel,
-    /// How it did on the trials that were held back.
+    /// Evaluation on the held-out trials.
     pub judged: JudgedModel,
 }
 
-/// Where training stands.
+/// State of the training thread.
 #[derive(Clone, Debug, Default)]
 pub struct TrainerView {
-    /// Labelled trials of each object, or why they cannot be counted; none before they were looked for.
+    /// Labelled trials of each object, or why they cannot be counted; `None` before the first count.
     pub classes: Option<Result<Arc<[LabelledClass]>, String>>,
-    /// Models that were saved, newest first.
+    /// Saved models, newest first.
     pub models: Arc<[SavedModel]>,
-    /// What is being trained, and how far it is.
+    /// Training in progress and its stage.
     pub running: Option<(TrainRequest, TrainingStage)>,
-    /// How the last training ended that was not given up.
+    /// Result of the last training that was not cancelled.
     pub finished: Option<Result<Arc<FinishedTraining>, String>>,
-    /// How often a model was asked for, and what came of it last.
+    /// Number of load commands, and result of the last.
     pub loaded: (u64, Option<Result<Arc<TrainedModel>, String>>),
 }
 
-/// A handle on the thread.
+/// Handle of the training thread.
 pub type Trainer = BackgroundJob<TrainCommand, TrainerView>;
 
 impl Trainer {
@@ -84,7 +84,7 @@ impl Trainer {
     }
 }
 
-/// What the thread owns.
+/// State owned by the thread.
 struct Room {
     store: PathBuf,
     models: PathBuf,
@@ -136,7 +136,7 @@ impl Room {
     }
 }
 
-/// Reads a model that can listen to the real gripper.
+/// Loads a model that works with the channels of the real gripper.
 fn loaded(path: &Path) -> Result<TrainedModel, ModelError> {
     let model = Model::load(path)?;
     check_listens(&model)?;
@@ -144,7 +144,7 @@ fn loaded(path: &Path) -> Result<TrainedModel, ModelError> {
     Ok(TrainedModel { model: Arc::new(model), path: path.to_owned(), about })
 }
 
-/// Refuses a model that wants channels which the real gripper does not have.
+/// Refuses a model that needs channels the real gripper does not have.
 fn check_listens(model: &Model) -> Result<(), ModelError> {
     let channels = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&GripperModel::default()));
     let names: Vec<String> = channels.unwrap_or_default().iter().map(Channel::name).collect();
@@ -156,7 +156,7 @@ fn check_listens(model: &Model) -> Result<(), ModelError> {
 }
 
 impl TrainerView {
-    /// Why nothing can be trained yet, in a sentence.
+    /// Reason why training is not possible yet, as a sentence; `None` if it is.
     pub fn too_little(&self) -> Option<String> {
         let Some(Ok(classes)) = &self.classes else { return None };
         let enough = classes.iter().filter(|class| class.is_enough()).count();
