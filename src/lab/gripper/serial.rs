@@ -157,7 +157,7 @@ mod tests {
         let mut controller = GraspController::new(GraspPlan::recorded(&Scene::default(), Control::Driven), 0.0);
         let (mut readings, mut ticks) = (0i32, 0i32);
         // Up to the middle of the hold: then the gripper is dropped under pressure.
-        while gripper.now_s() < 4.3 {
+        while gripper.now_s() < 4.4 {
             match gripper.next_event(Duration::ZERO).expect("an open port") {
                 GripperEvent::Board(_) => readings += 1,
                 GripperEvent::Tick => ticks += 1,
