@@ -118,7 +118,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
             scene: options.scene,
             store: options.store,
             view,
-            model: shipped_model().map(Arc::new).map_err(|cause| cause.to_string()),
+            model: shipped_model().map(Arc::new),
             explain: Arc::new(explain_scene),
             listen: Arc::new(listen_to_port),
             tools: GripperToolsSetup {

@@ -25,7 +25,7 @@ use palpate_lab::workers::{
     EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelView, MeasuredAccuracy,
     SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
 };
-use palpate_learn::Model;
+use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
 use palpate_sim::objects::{catalogue, thumbnail};
 use palpate_sim::scene::Scene;
@@ -43,14 +43,14 @@ pub struct WorkbenchSetup<'a> {
     /// View state of the last run.
     pub view: ViewState,
     /// Recognition model, or why there is none; everything else works without.
-    pub model: Result<Arc<Model>, String>,
+    pub model: Result<Arc<Model>, ModelError>,
     /// Measures cost and influence of effects.
     pub explain: Explain,
-    /// Listens to the board of a real gripper.
+    /// Opens the port of a real gripper.
     pub listen: Listen,
     /// Parts of diagnostics, fit and training.
     pub tools: GripperToolsSetup,
-    /// The first grasp starts by itself.
+    /// The first grasp starts automatically.
     pub playing: bool,
     /// Requests a redraw; called from other threads.
     pub wake: Wake,
@@ -91,6 +91,10 @@ impl Workbench {
     pub fn new(ctx: &egui::Context, setup: WorkbenchSetup<'_>) -> Result<Self, ThreadError> {
         let WorkbenchSetup { scene, store, mut view, explain, listen, playing, wake, .. } = setup;
         let model = setup.model.as_ref().ok();
+        // Before the other threads, so that it opens the store first and can report what an update did to the file.
+        let labeller =
+            start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
+        let labelling = LabellingFeature::new(labeller, store.clone());
         let worker = SimWorker::start(SimWorkerSetup {
             scene: scene.clone(),
             layout: SensorLayout::named(LIVE_LAYOUT).expect("is in the catalogue of layouts"),
@@ -116,8 +120,6 @@ impl Workbench {
         .map_err(ThreadError::of("the gripper's thread"))?;
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let mut tools = GripperTools::start(tools, &store, &wake)?;
-        let labeller =
-            start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -132,7 +134,7 @@ impl Workbench {
             notices,
             simulation,
             gripper: GripperFeature::new(gripper, scene),
-            labelling: LabellingFeature::new(labeller, store),
+            labelling,
             recognition,
             tools,
             files: FileFeature::new(wake),

@@ -4,9 +4,9 @@ use super::{Failure, report};
 use crate::fuzz_stream::{FuzzListener, FuzzStream};
 use std::time::{Duration, Instant};
 
-/// A listener hears this many chunks; then another begins, with the next seed.
+/// Number of chunks per seed.
 const CHUNKS: u32 = 200_000;
-/// Memory may grow by this much over what it was after a minute, or the first listener (kB): the allocator's habits.
+/// Allowed growth of memory after the first seed (kB), for the allocator.
 const GROWTH_KB: u64 = 16_384;
 
 pub(crate) fn run(seconds: f64) -> Result<(), Failure> {
@@ -41,7 +41,7 @@ pub(crate) fn run(seconds: f64) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Memory that this program holds (kB), where the system tells (Linux).
+/// Resident memory of this process (kB); Linux only.
 fn resident_kb() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.split_whitespace().next()?.parse().ok()

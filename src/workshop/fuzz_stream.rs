@@ -15,11 +15,32 @@ pub(crate) struct FuzzStream {
     format: u64,
 }
 
+/// Rule that the decoder broke.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BrokenRule {
+    /// An event is wrong.
+    #[error("{rule}: {event:?}")]
+    Event {
+        /// The rule.
+        rule: &'static str,
+        /// The event.
+        event: DecodedEvent,
+    },
+    /// The cadence counts other readings than were decoded.
+    #[error("cadence counts {counted} readings, {decoded} were decoded")]
+    Count {
+        /// Readings by the cadence.
+        counted: u64,
+        /// Decoded readings.
+        decoded: u64,
+    },
+}
+
 /// Decoder of a stream that checks its events.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FuzzListener {
     decoder: Decoder,
-    heard: Vec<DecodedEvent>,
+    events: Vec<DecodedEvent>,
     last_s: Option<f64>,
     channels: usize,
     readings: u64,
@@ -119,18 +140,14 @@ impl FuzzStream {
 }
 
 impl FuzzListener {
-    /// Takes in bytes; an error names the broken rule and the event.
-    pub(crate) fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), String> {
-        self.decoder.push(bytes, arrived_s, &mut self.heard);
-        for event in std::mem::take(&mut self.heard) {
-            self.check(&event).map_err(|what| format!("{what}: {event:?}"))?;
+    /// Takes in bytes.
+    pub(crate) fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), BrokenRule> {
+        self.decoder.push(bytes, arrived_s, &mut self.events);
+        for event in std::mem::take(&mut self.events) {
+            self.check(&event).map_err(|rule| BrokenRule::Event { rule, event })?;
         }
         let counted = self.decoder.cadence().samples;
-        if counted == self.readings {
-            Ok(())
-        } else {
-            Err(format!("cadence counts {counted} readings, {} were decoded", self.readings))
-        }
+        if counted == self.readings { Ok(()) } else { Err(BrokenRule::Count { counted, decoded: self.readings }) }
     }
 
     fn check(&mut self, event: &DecodedEvent) -> Result<(), &'static str> {
@@ -175,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whatever_comes_nothing_breaks() -> Result<(), String> {
+    fn whatever_comes_nothing_breaks() -> Result<(), BrokenRule> {
         let mut bytes = Vec::new();
         for seed in 0..20 {
             let (mut stream, mut listener) = (FuzzStream::new(seed), FuzzListener::default());

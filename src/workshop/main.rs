@@ -5,7 +5,7 @@
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
-//! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks what it reads |
+//! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
 //!
 //! Dimensions are real-world ones, chosen to match the names of the paper's objects, whose sizes it does not publish.
 //! Objects lie as placed: z up, long side along y, so that the fingers close across it along x.
@@ -83,7 +83,7 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
-    /// Feed random bytes to the protocol decoder and check what it reads.
+    /// Feed random bytes to the protocol decoder and check its events.
     Fuzz {
         /// Duration (s).
         seconds: f64,

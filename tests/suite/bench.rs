@@ -8,7 +8,8 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::study::{Explanation, Measuring};
 use palpate_lab::workers::{Command, Examine, FitTrials, Snapshot, examine_port, explain_scene, fit_trials};
-use palpate_learn::Model;
+use palpate_learn::{Model, ModelError};
+use palpate_sim::objects::ObjectError;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
 use std::path::Path;
@@ -25,7 +26,7 @@ pub(crate) struct BenchSetup {
     pub(crate) panel: Option<&'static PanelKind>,
     pub(crate) render_state: Option<egui_wgpu::RenderState>,
     /// What recognises, or why nothing does.
-    pub(crate) model: Result<Arc<Model>, String>,
+    pub(crate) model: Result<Arc<Model>, ModelError>,
     /// Listens to the board of a real gripper.
     pub(crate) listen: Listen,
     /// Looks at its port for the doctor.
@@ -55,7 +56,7 @@ impl Default for BenchSetup {
 }
 
 /// Measures as the window does, but for times, which are made up so that pictures repeat.
-fn explain_steadily(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, String> {
+fn explain_steadily(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, ObjectError> {
     let steady = |mut explanation: Explanation| {
         explanation.cpu_ms = 12.3;
         for (k, effect) in explanation.effects.iter_mut().enumerate() {

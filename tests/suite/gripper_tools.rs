@@ -16,7 +16,7 @@ use palpate_device::protocol::{AdcRange, Saturation};
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
 use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, NotOpened};
-use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
+use palpate_lab::study::{Course, Estimate, FingerFit, FingerFitError, Known, Remainder};
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, Examine, FitTrials, FittedFinger, GripperCommand};
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
@@ -128,11 +128,11 @@ fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
         // With hysteresis and drift.
         capture(&parts(3, true), &format!("{script} rest=3"), faults, 16.0, &at.join("hand.bytes"));
         let ran = run(at, &["doctor", "hand.bytes", "--crosstalk", "--json"]);
-        let told: Value = serde_json::from_str(&ran.out).unwrap();
-        assert_eq!((ran.code, &told["sound"]), (Some(i32::from(!sound)), &Value::Bool(sound)), "{ran:?}");
+        let result: Value = serde_json::from_str(&ran.out).unwrap();
+        assert_eq!((ran.code, &result["sound"]), (Some(i32::from(!sound)), &Value::Bool(sound)), "{ran:?}");
         assert!(ran.err.contains("1 of 4: bend the left finger") && ran.err.contains("4 of 4: release"), "{ran:?}");
-        let found = told["found"].as_array().unwrap();
-        assert_eq!(found.len(), 8, "{told}");
+        let found = result["found"].as_array().unwrap();
+        assert_eq!(found.len(), 8, "{result}");
         for bleed in found {
             // Each channel takes from the one before it, which for the first is the last.
             let [from, into] = ["from", "into"].map(|key| bleed[key].as_str().unwrap());
@@ -237,7 +237,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     bench.wait();
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
-    bench.until_shown(true, "a calibration goes on: end it first");
+    bench.until_shown(true, "a calibration is running: end it first");
     bench.tell(GripperCommand::Calibrate(CalibrationCommand::Stop));
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
@@ -266,8 +266,8 @@ fn wiring_and_sketch_come_with_the_program() {
     let page = run(at, &["doctor", "--wiring"]);
     assert!(page.code == Some(0) && page.out.contains("47 k to 3.3 V") && page.out.contains("2341:003e"), "{page:?}");
     for _ in 0..2 {
-        let told = run(at, &["doctor", "--sketch", "due_gripper"]);
-        assert!(told.code == Some(0) && told.out.contains("gripper_logic.h"), "{told:?}");
+        let result = run(at, &["doctor", "--sketch", "due_gripper"]);
+        assert!(result.code == Some(0) && result.out.contains("gripper_logic.h"), "{result:?}");
     }
     std::fs::write(at.join("due_gripper/due_gripper.ino"), "mine").unwrap();
     refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "nothing was written", "another folder"]);
@@ -412,7 +412,7 @@ fn a_finger_is_fitted_and_used_without_the_mouse() {
             // A single trial is never enough for this one.
             while trials.len() < 2 {
                 if watch.stop.load(Ordering::Relaxed) {
-                    return Err("it was stopped".to_owned());
+                    return Err(FingerFitError::Stopped.into());
                 }
                 std::thread::sleep(Duration::from_millis(2));
             }

@@ -10,7 +10,7 @@ use image::RgbaImage;
 use palpate::app::{ALL_PANELS, PanelKind, SimulationAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, Snapshot};
-use palpate_learn::StopReason;
+use palpate_learn::{ModelError, StopReason};
 
 fn panel() -> &'static PanelKind {
     ALL_PANELS.iter().find(|panel| panel.name == "recognition").unwrap()
@@ -134,7 +134,10 @@ fn the_truth_can_be_hidden() {
 
 #[test]
 fn without_a_model_everything_else_works_and_it_says_so() {
-    let mut bench = bench(BenchSetup { model: Err("it is broken".to_owned()), ..BenchSetup::default() });
+    let mut bench = bench(BenchSetup {
+        model: Err(ModelError::Channels { difference: "it is broken".to_owned() }),
+        ..BenchSetup::default()
+    });
     assert!(bench.workbench().messages().iter().any(|text| text.contains("it is broken")));
     assert!(says(&bench, "Recognition is off"));
     bench.tell(Command::SetGrasps(2));

@@ -62,11 +62,11 @@ fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32
     let reading = |k: u32| {
         let t_s = 0.02 * f64::from(k);
         let share = spread * t_s.min(1.0);
-        let felt = |sensor: Sensor| match SensorKind::of(sensor) {
+        let stimulus = |sensor: Sensor| match SensorKind::of(sensor) {
             SensorKind::Flex => (share * degrees).to_radians(),
             SensorKind::Pad => share * newton,
         };
-        let counts = Sensor::ALL.map(|sensor| Some(counts(sensor, felt(sensor)) as f32)).to_vec();
+        let counts = Sensor::ALL.map(|sensor| Some(counts(sensor, stimulus(sensor)) as f32)).to_vec();
         Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
     };
     let id = store.begin_board(&header, &about).unwrap();
@@ -96,10 +96,10 @@ fn unmounted(store: &mut Store) {
 fn trainer(at: &Path, fill: fn(&mut Store)) -> (Trainer, Receiver<()>) {
     let store = at.join("trials.sqlite");
     fill(&mut Store::open(&store).unwrap());
-    let (told, woken) = channel();
+    let (result, woken) = channel();
     let wake = Arc::new(move || {
         // The test may have stopped listening.
-        let _heard = told.send(());
+        let _heard = result.send(());
     });
     (Trainer::start(store, at.join("models"), wake).unwrap(), woken)
 }
@@ -158,20 +158,20 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     let mut foreign = Model::clone(&loaded.model);
     foreign.card.channels[0] = "grip".to_owned();
     foreign.save(&odd).unwrap();
-    for (file, told) in [("gone.safetensors", "cannot read the model"), ("odd.safetensors", "it needs grip")] {
+    for (file, result) in [("gone.safetensors", "cannot read the model"), ("odd.safetensors", "it needs grip")] {
         let before = trainer.view().unwrap().loaded.0;
         trainer.ask(TrainCommand::Load(folder.path().join(file)));
         let view = until(&trainer, &woken, |view| view.loaded.0 > before);
         let cause = view.loaded.1.clone().unwrap().unwrap_err();
-        assert!(cause.contains(told), "{cause}");
+        assert!(cause.to_string().contains(result), "{cause}");
     }
 }
 
 #[test]
 fn too_little_to_learn_from_is_told() {
     let few = |store: &mut Store| (0..6).for_each(|number| trial(store, "ball", 60.0, 1.0, number));
-    for (fill, told) in [
-        (few as fn(&mut Store), "1 of the objects have 5 labelled trials or more, and two are needed"),
+    for (fill, result) in [
+        (few as fn(&mut Store), "training needs two objects with 5 labelled trials each (now 1)"),
         (
             unmounted,
             "none of the 60 trials of the real gripper is calibrated: no part is mounted as the left flex strip",
@@ -182,7 +182,7 @@ fn too_little_to_learn_from_is_told() {
         trainer.ask(request("knn"));
         let view = until(&trainer, &woken, |view| view.running.is_none());
         let cause = view.finished.clone().unwrap().unwrap_err();
-        assert!(cause.contains(told), "{cause}");
+        assert!(cause.to_string().contains(result), "{cause}");
         assert!(view.models.is_empty(), "nothing is saved");
     }
 }

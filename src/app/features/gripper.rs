@@ -99,11 +99,11 @@ impl GripperFeature {
 
     pub(in crate::app) fn apply(&mut self, action: GripperAction, view: &mut ViewState, notices: &mut Notices) {
         match action {
-            GripperAction::Send(wish) => {
-                if let GripperCommand::Connect(Some(port)) = &wish {
+            GripperAction::Send(command) => {
+                if let GripperCommand::Connect(Some(port)) = &command {
                     view.port = Some(port.clone());
                 }
-                self.worker.command(wish);
+                self.worker.command(command);
             }
             GripperAction::ToggleConnection => {
                 self.worker.command(match self.connected {

@@ -89,7 +89,7 @@ impl LabellingFeature {
     ) {
         for effect in effects {
             match effect {
-                LabellingEffect::Edit(wish) => self.labeller.ask(wish),
+                LabellingEffect::Edit(command) => self.labeller.ask(command),
                 LabellingEffect::BeginTrial(request) => {
                     let number = gripper.worker().command(GripperCommand::Begin(request));
                     self.session.trial_requested(number);
@@ -99,6 +99,7 @@ impl LabellingFeature {
                 }
                 LabellingEffect::SetBlind(blind) => view.blind = blind,
                 LabellingEffect::Inform(text) => notices.info(text),
+                LabellingEffect::Warn(text) => notices.warning(text),
                 LabellingEffect::Fail(cause) => notices.error(cause),
             }
         }

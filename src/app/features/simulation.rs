@@ -42,13 +42,13 @@ pub(in crate::app) struct SimulationFeature {
     unsent: bool,
     /// Object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
-    deck: ShuffledObjects,
+    shuffled: ShuffledObjects,
 }
 
 impl SimulationFeature {
     pub(in crate::app) fn new(worker: SimWorker, effects: EffectsWorker, scene: Scene) -> Self {
-        let deck = ShuffledObjects::new(DECK_SEED);
-        Self { worker, effects, scene, traces: TraceHistory::default(), unsent: false, seen: None, deck }
+        let shuffled = ShuffledObjects::new(DECK_SEED);
+        Self { worker, effects, scene, traces: TraceHistory::default(), unsent: false, seen: None, shuffled }
     }
 
     pub(in crate::app) fn worker(&self) -> &SimWorker {
@@ -137,7 +137,7 @@ impl SimulationFeature {
 
     /// Grasps another built-in object, drawn at random.
     pub(in crate::app) fn open_next(&mut self, notices: &mut Notices) {
-        let next = self.deck.next(&self.scene.object.source);
+        let next = self.shuffled.next(&self.scene.object.source);
         self.open(next, notices);
         self.send(Command::Play, notices);
     }

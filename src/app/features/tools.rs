@@ -2,10 +2,12 @@
 
 use crate::app::notices::Notices;
 use crate::app::startup::ThreadError;
+use palpate_lab::study::TrainingError;
 use palpate_lab::workers::{
     DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, TrainCommand,
     TrainRequest, TrainedModel, Trainer, Wake,
 };
+use palpate_learn::ModelError;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -59,7 +61,7 @@ pub struct GripperTools {
 
 struct Awaited {
     /// Outcome of the training before it.
-    before: Option<Result<Arc<FinishedTraining>, String>>,
+    before: Option<Result<Arc<FinishedTraining>, Arc<TrainingError>>>,
     /// It has been seen running.
     begun: bool,
 }
@@ -81,9 +83,9 @@ impl GripperTools {
         match action {
             ToolAction::Examine(request) => self.examiner.ask(request),
             ToolAction::StopExamining => self.examiner.give_up(),
-            ToolAction::Fit(wish) => self.fitter.ask(wish),
+            ToolAction::Fit(command) => self.fitter.ask(command),
             ToolAction::StopFitting => self.fitter.give_up(),
-            ToolAction::Train(wish) => self.trainer.ask(wish),
+            ToolAction::Train(command) => self.trainer.ask(command),
             ToolAction::TrainAndUse => {
                 let before = self.trainer.view().and_then(|view| view.finished.clone());
                 self.awaited = Some(Awaited { before, begun: false });
@@ -96,13 +98,13 @@ impl GripperTools {
     }
 
     /// Outcome of [`ToolAction::TrainAndUse`], once it has ended.
-    pub(in crate::app) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, String>> {
+    pub(in crate::app) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, Arc<TrainingError>>> {
         let awaited = self.awaited.as_mut()?;
         let view = self.trainer.view()?;
         awaited.begun |= view.running.is_some();
         let same = match (&view.finished, &awaited.before) {
             (Some(Ok(now)), Some(Ok(before))) => Arc::ptr_eq(now, before),
-            (Some(Err(now)), Some(Err(before))) => now == before,
+            (Some(Err(now)), Some(Err(before))) => Arc::ptr_eq(now, before),
             (now, before) => now.is_none() && before.is_none(),
         };
         let ended = view.running.is_none() && (awaited.begun || !same);
@@ -112,7 +114,7 @@ impl GripperTools {
     }
 
     /// Model loaded since the last call, or why it could not be.
-    pub(in crate::app) fn loaded(&mut self) -> Option<Result<Arc<TrainedModel>, String>> {
+    pub(in crate::app) fn loaded(&mut self) -> Option<Result<Arc<TrainedModel>, ModelError>> {
         let view = self.trainer.view()?;
         let (loads, outcome) = &view.loaded;
         let is_new = *loads > std::mem::replace(&mut self.loads, *loads);

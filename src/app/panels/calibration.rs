@@ -9,7 +9,9 @@ use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, RunningCalibration};
+use palpate_lab::workers::{
+    CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, RunningCalibration, SensorJobError,
+};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Curve, Point, SensorKind};
 use std::path::PathBuf;
@@ -37,12 +39,17 @@ impl Default for Form {
     }
 }
 
-fn begin_ui(ui: &mut Ui, context: &PanelContext<'_>, ended: Option<&Result<String, String>>, actions: &mut Actions) {
+fn begin_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    ended: Option<&Result<String, SensorJobError>>,
+    actions: &mut Actions,
+) {
     let id = egui::Id::unique("calibration form");
     let mut form = ui.data_mut(|data| data.get_temp::<Form>(id)).unwrap_or_default();
     match ended {
         Some(Ok(text)) => wrapped(ui, RichText::new(text).strong()),
-        Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+        Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
         None => {}
     }
     wrapped(
@@ -92,22 +99,28 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
     wrapped(ui, RichText::new(format!("\"{}\", {}", running.plan.part, running.plan.sensor.label())).weak());
     wrapped(ui, RichText::new(&running.instruction).strong());
     let counts = running.latest.map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
-    let state = running.settled.as_ref().map_or_else(String::as_str, |_| "settled");
+    let state = match &running.settled {
+        Some(Ok(_)) => "settled".to_owned(),
+        Some(Err(why)) => why.to_string(),
+        None if running.closing => "watching the empty close".to_owned(),
+        None => "no readings yet".to_owned(),
+    };
     wrapped(ui, RichText::new(format!("{counts} counts, {state}")));
     ui.horizontal_wrapped(|ui| buttons_ui(ui, running, actions));
     if let Some(why) = &running.not_taken {
         wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
     }
     let kind = SensorKind::of(running.plan.sensor);
-    let fit = running.fit.as_deref().ok();
+    let fit = running.fit.as_ref().and_then(|fit| fit.as_deref().ok());
     match &running.fit {
-        Ok(calibration) => {
+        Some(Ok(calibration)) => {
             wrapped(ui, RichText::new(calibration.summary()));
             for warning in &calibration.warnings {
                 wrapped(ui, RichText::new(warning).color(ui.visuals().warn_fg_color));
             }
         }
-        Err(why) => wrapped(ui, RichText::new(why).weak()),
+        Some(Err(why)) => wrapped(ui, RichText::new(why.to_string()).weak()),
+        None => wrapped(ui, RichText::new("no points yet").weak()),
     }
     let theme = context.view.theme;
     curve_plot(ui, kind, &running.points, fit, theme);
@@ -118,14 +131,14 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
 }
 
 fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
-    let mut button = |ready: bool, text: &str, about: &str, wish: Option<CalibrationCommand>| {
-        let clicked = ui.add_enabled(ready && wish.is_some(), Button::new(text)).on_hover_text(about).clicked();
-        if let Some(wish) = wish.filter(|_| clicked) {
-            actions.push(GripperCommand::Calibrate(wish));
+    let mut button = |ready: bool, text: &str, about: &str, command: Option<CalibrationCommand>| {
+        let clicked = ui.add_enabled(ready && command.is_some(), Button::new(text)).on_hover_text(about).clicked();
+        if let Some(command) = command.filter(|_| clicked) {
+            actions.push(GripperCommand::Calibrate(command));
         }
     };
     let take = running.next.map(CalibrationCommand::Take);
-    button(running.settled.is_ok(), "Take point", "Take the settled reading", take);
+    button(matches!(running.settled, Some(Ok(_))), "Take point", "Take the settled reading", take);
     let free = !running.closing;
     button(free && running.next.is_some(), "Skip", "Leave this point out", Some(CalibrationCommand::Skip));
     button(
@@ -139,7 +152,7 @@ fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) 
         button(running.can_close, "Empty close", about, Some(CalibrationCommand::EmptyClose));
     }
     button(
-        free && running.fit.is_ok(),
+        free && matches!(running.fit, Some(Ok(_))),
         "Save",
         "Store the calibration; it applies to earlier trials too",
         Some(CalibrationCommand::Keep),

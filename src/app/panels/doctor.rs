@@ -15,6 +15,7 @@ use palpate_device::doctor::{
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{
     CrosstalkCommand, CrosstalkView, DiagnosticsReport, ExamineRequest, GripperCommand, RunningCrosstalk,
+    SensorJobError,
 };
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -97,23 +98,23 @@ fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCros
     }
     wrapped(ui, RichText::new(format!("{}.", sentence(&running.instruction))).strong());
     ui.horizontal_wrapped(|ui| {
-        for (text, about, wish) in [
+        for (text, about, command) in [
             ("Skip", "Continue with the next sensor", CrosstalkCommand::Skip),
             ("Stop", "End the test and report so far", CrosstalkCommand::Stop),
         ] {
             if ui.button(text).on_hover_text(about).clicked() {
-                actions.push(GripperCommand::Crosstalk(wish));
+                actions.push(GripperCommand::Crosstalk(command));
             }
         }
     });
     bleeds_ui(ui, &view.found);
 }
 
-fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<String>, String>) {
+fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<String>, SensorJobError>) {
     ui.add_space(6.0);
     let bleeds = view.found.iter().any(|bleed| bleed.bleeds);
     match ended {
-        Err(cause) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+        Err(cause) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
         Ok(report) => {
             for (k, text) in report.iter().enumerate() {
                 let text = RichText::new(format!("{text}."));

@@ -48,7 +48,7 @@ fn state_ui(ui: &mut Ui, view: Option<&EffectsView>) {
         Some(EffectsState::Ready(explanation)) => {
             format!("a grasp takes {} ms of CPU time", three_digits(explanation.cpu_ms))
         }
-        Some(EffectsState::Failed(cause)) => cause.clone(),
+        Some(EffectsState::Failed(cause)) => cause.to_string(),
     };
     ui.weak(text);
     ui.add_space(4.0);

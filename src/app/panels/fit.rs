@@ -37,12 +37,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             None => match &view.trials {
                 None => wrapped(ui, RichText::new("loading trials ..").weak()),
                 Some(Ok(rows)) => choice_ui(ui, rows, actions),
-                Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+                Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
             },
         }
         match &view.ended {
             Some(Ok(fitted)) => fitted_ui(ui, context, fitted, actions),
-            Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
             None => {}
         }
     });

@@ -32,7 +32,7 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         if let Some(command) = &refused.command {
             command_ui(ui, "the port", command);
         }
-        wrapped(ui, RichText::new("The panel Doctor in the mode Label examines port and board.").weak());
+        wrapped(ui, RichText::new("The Doctor panel in Label mode examines port and board.").weak());
     } else {
         wrapped(ui, RichText::new("No gripper connected. Everything works with the simulated one too.").weak());
     }
@@ -129,7 +129,7 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
         pair(ui, "firmware", firmware, false, "Firmware that the board reports");
         ui.end_row();
     });
-    wrapped(ui, RichText::new(link.heard_as()).small().weak());
+    wrapped(ui, RichText::new(link.format_summary()).small().weak());
     for text in link.line_remarks() {
         wrapped(ui, RichText::new(text).color(ui.visuals().error_fg_color));
     }
@@ -178,9 +178,9 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, l
 fn value_text(latest: &LatestReading, sensor: Sensor) -> String {
     let side = sensor as usize % 2;
     let text = if sensor.is_flex() {
-        latest.felt.angle[side].map(|angle| format!("{:6.1}°", angle.to_degrees()))
+        latest.estimate.angle[side].map(|angle| format!("{:6.1}°", angle.to_degrees()))
     } else {
-        latest.felt.force[side].map(|force| format!("{:>5} N", three_digits(force)))
+        latest.estimate.force[side].map(|force| format!("{:>5} N", three_digits(force)))
     };
     text.unwrap_or_else(|| "–".to_owned())
 }

@@ -27,12 +27,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         }
         match &view.finished {
             Some(Ok(finished)) => finished_ui(ui, context, finished, actions),
-            Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
             None => {}
         }
         match &view.classes {
             Some(Ok(classes)) => classes_ui(ui, context.view.theme, classes),
-            Some(Err(cause)) => wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color)),
+            Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
             None => wrapped(ui, RichText::new("loading labelled trials ..").weak()),
         }
         models_ui(ui, context, &view, actions);

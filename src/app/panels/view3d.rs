@@ -140,9 +140,9 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
 
 /// Curvature of the real fingers (1/m), while they are shown.
 fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
-    let felt = context.gripper?.latest.as_ref()?.felt;
+    let estimate = context.gripper?.latest.as_ref()?.estimate;
     // In invisible steps, so that noise alone does not redraw the picture.
-    let curvature = felt.curvature.map(|side| side.map(|kappa| (kappa / SEEN_PER_M).round() * SEEN_PER_M));
+    let curvature = estimate.curvature.map(|side| side.map(|kappa| (kappa / SEEN_PER_M).round() * SEEN_PER_M));
     (context.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 

@@ -13,9 +13,9 @@ use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::SimulatedTrial;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// Scene, objects and amount of a collection.
@@ -80,11 +80,17 @@ pub struct CollectionProgress {
 #[derive(Debug, thiserror::Error)]
 pub enum CollectionError {
     /// An object failed to load.
-    #[error("{0}")]
-    Object(String),
+    #[error(transparent)]
+    Object(#[from] Arc<ObjectError>),
     /// The store failed.
-    #[error("{0}")]
-    Store(StoreError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A grasp panicked; standard error says where.
+    #[error("internal error in the grasp with seed {seed}; earlier trials are stored. Please report it")]
+    Internal {
+        /// Its seed.
+        seed: u64,
+    },
 }
 
 /// Trial to simulate.
@@ -139,16 +145,16 @@ fn mixed(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Simulates and stores the trials of the plan that the store lacks, on `threads` threads. `tell` receives the
-/// progress.
+/// Simulates and stores the trials of the plan that the store lacks, on `threads` threads. `progress` receives
+/// the progress.
 pub fn collect(
     plan: &CollectionPlan,
     store: &mut Store,
     threads: usize,
-    tell: &mut dyn FnMut(CollectionProgress),
+    progress: &mut dyn FnMut(CollectionProgress),
 ) -> Result<CollectionReport, CollectionError> {
     let collection = plan.name();
-    let known = store.collected(&collection).map_err(CollectionError::Store)?;
+    let known = store.collected(&collection)?;
     let all = plan.tasks();
     let bench = Bench::new(plan, &collection);
     let is_new = |task: &Task| !known.contains(&(bench.stored_name(task.object), task.seed));
@@ -165,7 +171,7 @@ pub fn collect(
         }
         drop(sender);
         let outcome = store_in_order(&line, &made, store, &mut report, &mut |done, object| {
-            tell(CollectionProgress { done, of: all.len() as u32, object });
+            progress(CollectionProgress { done, of: all.len() as u32, object });
         });
         // Threads that wait for room in the channel find it closed.
         line.stop.store(true, Ordering::Relaxed);
@@ -176,7 +182,7 @@ pub fn collect(
 }
 
 /// A finished trial and how often its pose was redrawn, or the reason for a failure.
-type Made = Result<(SimulatedTrial, u32), String>;
+type Made = Result<(SimulatedTrial, u32), CollectionError>;
 
 /// Queue of the tasks in order, shared by all threads.
 struct Line<'a> {
@@ -202,8 +208,7 @@ impl Line<'_> {
             }
             // If a panic ended the thread, the other threads would wait for this task forever.
             let make = std::panic::AssertUnwindSafe(|| bench.make(*task));
-            let outcome = std::panic::catch_unwind(make)
-                .unwrap_or_else(|_| Err(format!("grasping with seed {} met a fault of the program", task.seed)));
+            let outcome = std::panic::catch_unwind(make).unwrap_or(Err(CollectionError::Internal { seed: task.seed }));
             if made.send((k, outcome)).is_err() {
                 return;
             }
@@ -217,7 +222,7 @@ fn store_in_order(
     made: &Receiver<(usize, Made)>,
     store: &mut Store,
     report: &mut CollectionReport,
-    tell: &mut dyn FnMut(u32, String),
+    progress: &mut dyn FnMut(u32, String),
 ) -> Result<(), CollectionError> {
     let mut waiting: BTreeMap<usize, Made> = BTreeMap::new();
     let mut due = 0;
@@ -229,7 +234,7 @@ fn store_in_order(
         while let Some(next) = waiting.remove(&due).filter(|_| failure.is_none()) {
             match next {
                 Ok(next) => ready.push(next),
-                Err(cause) => failure = Some(CollectionError::Object(cause)),
+                Err(cause) => failure = Some(cause),
             }
             due += 1;
         }
@@ -240,13 +245,12 @@ fn store_in_order(
             }
         };
         let object = newest.header.object.clone();
-        report.stored +=
-            store.insert_collected(ready.iter().map(|(trial, _)| trial)).map_err(CollectionError::Store)?;
+        report.stored += store.insert_collected(ready.iter().map(|(trial, _)| trial))?;
         report.redrawn += ready.iter().map(|(_, redrawn)| redrawn).sum::<u32>();
         let unsound = |(trial, _): &&(SimulatedTrial, u32)| !trial.data.quality.is_sound();
         report.unsound += ready.iter().filter(unsound).count() as u32;
         line.stored.store(due, Ordering::Relaxed);
-        tell(report.known + due as u32, object);
+        progress(report.known + due as u32, object);
         if let Some(failure) = failure {
             return Err(failure);
         }
@@ -263,7 +267,7 @@ struct OnBench {
 struct Bench<'a> {
     plan: &'a CollectionPlan,
     collection: &'a str,
-    objects: Vec<OnceLock<Result<OnBench, String>>>,
+    objects: Vec<OnceLock<Result<OnBench, Arc<ObjectError>>>>,
 }
 
 impl<'a> Bench<'a> {
@@ -287,8 +291,8 @@ impl<'a> Bench<'a> {
 
     fn make(&self, task: Task) -> Made {
         let slot = &self.objects[task.object];
-        let loaded = slot.get_or_init(|| self.load(task.object).map_err(|error| error.to_string()));
-        let on_bench = loaded.as_ref().map_err(Clone::clone)?;
+        let loaded = slot.get_or_init(|| self.load(task.object).map_err(Arc::new));
+        let on_bench = loaded.as_ref().map_err(Arc::clone)?;
         let model = on_bench.model.as_ref();
         // The object's pose depends on the earlier grasps of the same succession. They are simulated again instead of
         // read from the store, so that trials can be simulated independently and in any order.
@@ -416,7 +420,7 @@ mod tests {
         let objects = ["ball", "/nowhere/at/all.urdf"].map(str::to_owned).to_vec();
         let outcome = collect(&CollectionPlan { objects, ..plan() }, &mut store, 2, &mut |_| ());
         assert!(
-            matches!(&outcome, Err(CollectionError::Object(text)) if text.contains("/nowhere/at/all.urdf")),
+            matches!(&outcome, Err(CollectionError::Object(cause)) if cause.to_string().contains("/nowhere/at/all.urdf")),
             "{outcome:?}"
         );
         assert_eq!(store.list(false).expect("lists").len(), 5);

@@ -79,18 +79,18 @@ pub enum ComparisonError {
         cause: LearnError,
     },
     /// No test grasps.
-    #[error("no grasps are left to test with; collect more, or train on fewer with --train-trials")]
+    #[error("no test grasps left: collect more trials, or train on fewer with --train-trials")]
     NoTest,
 }
 
 impl Comparison<'_> {
-    /// Fits and evaluates methods in parallel, each on one thread; rows are in the order of the methods. `tell`
-    /// receives every finished method.
+    /// Fits and evaluates methods in parallel, each on one thread; rows are in the order of the methods.
+    /// `progress` receives every finished method.
     pub fn of_methods(
         &self,
         methods: &[&'static Method],
         threads: usize,
-        tell: &(dyn Fn(&ComparisonRow) + Sync),
+        progress: &(dyn Fn(&ComparisonRow) + Sync),
     ) -> Result<Vec<ComparisonRow>, ComparisonError> {
         if self.test.examples.is_empty() {
             return Err(ComparisonError::NoTest);
@@ -106,7 +106,7 @@ impl Comparison<'_> {
                     {
                         let judged = self.of_method(method);
                         if let Ok(judged) = &judged {
-                            tell(&judged.row);
+                            progress(&judged.row);
                         }
                         // The lock is poisoned only when another thread has panicked, and then the scope panics too.
                         if let Ok(mut done) = done.lock() {

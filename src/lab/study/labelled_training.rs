@@ -4,7 +4,7 @@
 use super::comparison::{Comparison, ComparisonError};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_learn::evaluation::Evaluation;
-use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, StopRule};
+use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, ModelError, StopRule};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
@@ -65,7 +65,7 @@ pub struct LabelledTraining<'a> {
     /// A quick fit with worse results.
     pub quick: bool,
     /// Receives the progress.
-    pub tell: &'a (dyn Fn(TrainingStage) + Sync),
+    pub progress: &'a (dyn Fn(TrainingStage) + Sync),
     /// Flag that cancels the training.
     pub stop: &'a AtomicBool,
 }
@@ -90,8 +90,8 @@ pub struct JudgedModel {
 pub enum TrainingError {
     /// Fewer than two objects with enough trials.
     #[error(
-        "{found} of the objects have {LEAST_TRIALS} labelled trials or more, and two are needed: record and label more \
-         trials of the real gripper"
+        "training needs two objects with {LEAST_TRIALS} labelled trials each (now {found}): record and label more trials of \
+         the real gripper"
     )]
     TooFew {
         /// Number of objects with enough trials.
@@ -99,8 +99,8 @@ pub enum TrainingError {
     },
     /// Too few readable trials.
     #[error(
-        "{usable} of {all} trials can be used, and only {found} of the objects have {LEAST_TRIALS} of them or more: see \
-         which parts are calibrated by `palpate calibrate list`"
+        "training needs two objects with {LEAST_TRIALS} usable trials each (now {found}): {usable} of {all} labelled trials \
+         are usable. `palpate calibrate list` shows which parts are calibrated"
     )]
     TooFewUsable {
         /// Number of usable trials.
@@ -122,6 +122,12 @@ pub enum TrainingError {
     /// The evaluation failed.
     #[error(transparent)]
     Judge(#[from] ComparisonError),
+    /// No such method.
+    #[error("unknown method \"{0}\"")]
+    UnknownMethod(String),
+    /// The model could not be saved.
+    #[error(transparent)]
+    Save(#[from] ModelError),
 }
 
 impl LabelledTraining<'_> {
@@ -135,7 +141,7 @@ impl LabelledTraining<'_> {
         let objects = enough.iter().map(|class| class.name.clone()).collect();
         let source = DatasetQuery { source: Some(TrialSource::Recorded), objects, ..DatasetQuery::default() };
         let data = source.read(store, &SensorView::default(), &mut |done, of| {
-            (self.tell)(TrainingStage::Reading(done, of));
+            (self.progress)(TrainingStage::Reading(done, of));
         })?;
         let all = enough.iter().map(|class| class.trials).sum();
         let data = without_small_classes(&data, all, &mut too_few)?;
@@ -161,7 +167,7 @@ impl LabelledTraining<'_> {
             seed: self.seed,
             quick: self.quick,
             settings: serde_json::Map::new(),
-            progress: &|share| (self.tell)(TrainingStage::Fitting(share)),
+            progress: &|share| (self.progress)(TrainingStage::Fitting(share)),
             stop: self.stop,
         };
         fitting.check()?;
@@ -172,7 +178,7 @@ impl LabelledTraining<'_> {
         if self.stop.load(Ordering::Relaxed) {
             return Err(LearnError::Stopped.into());
         }
-        (self.tell)(TrainingStage::Judging);
+        (self.progress)(TrainingStage::Judging);
         let (seed, quick, stop) = (self.seed, self.quick, StopRule::default());
         let comparison = Comparison { train, test, seed, quick, stop, interrupted: self.stop };
         Ok(comparison.of_fitted(self.method.key, model)?.evaluation)

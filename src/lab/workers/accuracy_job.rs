@@ -17,7 +17,7 @@ struct Job {
     object: Option<Arc<ObjectModel>>,
 }
 
-/// A handle on the thread. Dropping it gives up what is being measured and ends it.
+/// Handle of the thread. Dropping it cancels the measurement and ends the thread.
 #[derive(Debug)]
 pub(super) struct AccuracyJob {
     jobs: Option<Sender<Job>>,

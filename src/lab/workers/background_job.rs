@@ -10,12 +10,12 @@ use std::thread::JoinHandle;
 /// Handle of the thread: commands `W` in, the newest view `V` out. Dropping it cancels running work and ends the thread.
 #[derive(Debug)]
 pub struct BackgroundJob<W, V> {
-    /// Absent once the thread is being ended.
+    /// `None` while the thread is being ended.
     commands: Option<Sender<(W, Arc<AtomicBool>)>>,
     /// Set to cancel all commands sent with it.
     stop: Arc<AtomicBool>,
     view: Arc<Latest<V>>,
-    /// Commands so far, and how many of them have been dealt with.
+    /// Number of commands, and of those handled.
     asked: AtomicU64,
     done: Arc<AtomicU64>,
     thread: Option<JoinHandle<()>>,
@@ -46,11 +46,11 @@ impl<W: Send + 'static, V: Send + Sync + 'static> BackgroundJob<W, V> {
         let view = Arc::new(Latest::default());
         let outlet = Outlet { view: Arc::clone(&view), wake };
         let (asked, done) = (AtomicU64::new(0), Arc::new(AtomicU64::new(0)));
-        let dealt_with = Arc::clone(&done);
+        let handled = Arc::clone(&done);
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             while let Ok((command, stop)) = inbox.recv() {
                 work(command, &stop, &outlet);
-                dealt_with.fetch_add(1, Ordering::Release);
+                handled.fetch_add(1, Ordering::Release);
                 (outlet.wake)();
             }
         })?;
@@ -59,26 +59,26 @@ impl<W: Send + 'static, V: Send + Sync + 'static> BackgroundJob<W, V> {
 }
 
 impl<W, V> BackgroundJob<W, V> {
-    /// Asks for something; it is done after what was asked for before.
+    /// Sends a command; commands are handled in order.
     pub fn ask(&self, command: W) {
         self.asked.fetch_add(1, Ordering::Relaxed);
         if let Some(commands) = &self.commands {
-            // A thread that has died of a fault of ours has said so on standard error; the rest of the window works.
+            // Fails only after a panic of the thread, which standard error reports; the rest of the window works.
             let _heard = commands.send((command, Arc::clone(&self.stop)));
         }
     }
 
-    /// True when the view shows what came of everything that was asked for.
+    /// True when all commands are handled and the view shows their results.
     pub fn is_settled(&self) -> bool {
         self.done.load(Ordering::Acquire) == self.asked.load(Ordering::Relaxed)
     }
 
-    /// Gives up everything that was asked for.
+    /// Cancels all commands sent so far.
     pub fn give_up(&mut self) {
         std::mem::take(&mut self.stop).store(true, Ordering::Relaxed);
     }
 
-    /// The newest state of affairs; nothing before anything was asked for.
+    /// The newest view; none before the first command is handled.
     pub fn view(&self) -> Option<Arc<V>> {
         self.view.get()
     }
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_handle_that_goes_takes_its_work_with_it() {
+    fn dropping_the_handle_cancels_its_work() {
         let (job, _woken) = counter();
         job.ask(u64::MAX);
         drop(job);

@@ -27,7 +27,7 @@ pub(super) struct Current {
 }
 
 impl Current {
-    /// Pulls at the object; a trial that was meddled with says so.
+    /// Pulls at the object; the trial gets a warning.
     pub(super) fn pull(&mut self, force: DVec3) {
         if force != DVec3::ZERO && !self.pulled {
             self.pulled = true;

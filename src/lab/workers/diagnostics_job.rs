@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// What is to be examined.
+/// Examination to run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExamineRequest {
     /// The port, or a file of captured bytes; the only likely port where nothing is named.
@@ -19,11 +19,11 @@ pub struct ExamineRequest {
     pub seconds: f64,
 }
 
-/// What looks at the port: [`examine_port`], or whoever holds the link already. The function it is given wants to hear again
-/// and again how long it has listened (s), and ends the look by saying no.
+/// Function that examines a port: [`examine_port`], or one that uses an open link. It calls the given function repeatedly
+/// with the time so far (s), and ends early when that returns false.
 pub type Examine = Arc<dyn Fn(&ExamineRequest, &mut dyn FnMut(f64) -> bool) -> Observations + Send + Sync>;
 
-/// Opens the port and listens to it.
+/// Examines a port by opening it.
 pub fn examine_port(request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bool) -> Observations {
     let options = LinkOptions { path: request.port.clone(), ..LinkOptions::default() };
     let seconds = request.seconds.clamp(0.0, 600.0);
@@ -33,7 +33,7 @@ pub fn examine_port(request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bo
 /// Where the doctor stands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DiagnosticsView {
-    /// What is being examined, and for how long already (s).
+    /// Running examination and its duration so far (s).
     pub running: Option<(ExamineRequest, f64)>,
     /// What came out of the last examination.
     pub last: Option<Arc<DiagnosticsReport>>,
@@ -114,7 +114,7 @@ mod tests {
         std::fs::write(&bytes, file)?;
         let (wake, woken) = waker();
         let doctor = DiagnosticsJob::start(Arc::new(examine_port), wake)?;
-        assert!(doctor.view().is_none(), "nobody asked");
+        assert!(doctor.view().is_none(), "before a request");
         doctor.ask(request(bytes, 5.0));
         until(&doctor, &woken, |view| view.running.is_some() && view.last.is_none());
         let view = until(&doctor, &woken, |view| view.running.is_none());

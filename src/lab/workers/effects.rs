@@ -4,6 +4,7 @@
 use super::latest::Latest;
 use super::messages::Wake;
 use crate::study::{Explanation, Measuring, explain_effects};
+use palpate_sim::objects::ObjectError;
 use palpate_sim::scene::Scene;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,18 +19,18 @@ const SETTLE: Duration = Duration::from_millis(300);
 const KEPT: usize = 32;
 
 /// State of the measurement of a scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum EffectsState {
     /// Number of effects measured, and of all.
     Measuring(usize, usize),
     /// Finished.
     Ready(Arc<Explanation>),
-    /// Failed, with a message for the user.
-    Failed(String),
+    /// The object could not be loaded.
+    Failed(Arc<ObjectError>),
 }
 
 /// Newest measurement.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct EffectsView {
     /// Measured scene.
     pub scene: Arc<Scene>,
@@ -37,17 +38,17 @@ pub struct EffectsView {
     pub state: EffectsState,
 }
 
-/// Function that measures a scene: its explanation, `None` when cancelled, or the reason for a failure.
-pub type Explain = Arc<dyn Fn(&Scene, &Measuring<'_>) -> Result<Option<Explanation>, String> + Send + Sync>;
+/// Function that measures a scene: its explanation, `None` when cancelled.
+pub type Explain = Arc<dyn Fn(&Scene, &Measuring<'_>) -> Result<Option<Explanation>, ObjectError> + Send + Sync>;
 
 /// Loads a scene's object and explains the scene.
-pub fn explain_scene(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, String> {
-    let object = scene.load_object().map_err(|error| error.to_string())?;
+pub fn explain_scene(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explanation>, ObjectError> {
+    let object = scene.load_object()?;
     Ok(explain_effects(scene, object.as_ref(), how))
 }
 
 /// Scene to measure, with a flag that cancels the measurement.
-struct Wish {
+struct MeasureRequest {
     scene: Arc<Scene>,
     cancelled: Arc<AtomicBool>,
 }
@@ -56,7 +57,7 @@ struct Wish {
 #[derive(Debug)]
 pub struct EffectsWorker {
     /// `None` while the thread is being ended.
-    commands: Option<Sender<Wish>>,
+    commands: Option<Sender<MeasureRequest>>,
     asked: Option<(Arc<Scene>, Arc<AtomicBool>)>,
     view: Arc<Latest<EffectsView>>,
     thread: Option<JoinHandle<()>>,
@@ -67,8 +68,8 @@ impl EffectsWorker {
     pub fn start(explain: Explain, wake: Wake) -> std::io::Result<Self> {
         let (commands, inbox) = channel();
         let view = Arc::new(Latest::default());
-        let desk = BackgroundJob { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
-        let thread = std::thread::Builder::new().name("effects".to_owned()).spawn(move || desk.work(&inbox))?;
+        let job = MeasuringJob { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
+        let thread = std::thread::Builder::new().name("effects".to_owned()).spawn(move || job.work(&inbox))?;
         Ok(Self { commands: Some(commands), asked: None, view, thread: Some(thread) })
     }
 
@@ -78,7 +79,7 @@ impl EffectsWorker {
             return;
         }
         self.give_up();
-        let command = Wish { scene: Arc::new(scene.clone()), cancelled: Arc::new(AtomicBool::new(false)) };
+        let command = MeasureRequest { scene: Arc::new(scene.clone()), cancelled: Arc::new(AtomicBool::new(false)) };
         self.asked = Some((Arc::clone(&command.scene), Arc::clone(&command.cancelled)));
         if let Some(commands) = &self.commands {
             // Sending fails only if the thread panicked, which standard error reports; the rest of the window works.
@@ -115,15 +116,15 @@ impl Drop for EffectsWorker {
 }
 
 /// State owned by the thread.
-struct BackgroundJob {
+struct MeasuringJob {
     explain: Explain,
     view: Arc<Latest<EffectsView>>,
     wake: Wake,
     kept: VecDeque<(Arc<Scene>, Arc<Explanation>)>,
 }
 
-impl BackgroundJob {
-    fn work(mut self, inbox: &Receiver<Wish>) {
+impl MeasuringJob {
+    fn work(mut self, inbox: &Receiver<MeasureRequest>) {
         let mut next = inbox.recv().ok();
         while let Some(command) = next.take() {
             if let Some((_, known)) = self.kept.iter().find(|(scene, _)| *scene == command.scene) {
@@ -143,7 +144,7 @@ impl BackgroundJob {
         }
     }
 
-    fn measure(&mut self, command: &Wish) {
+    fn measure(&mut self, command: &MeasureRequest) {
         let progress = |done: usize, of: usize| self.publish(&command.scene, EffectsState::Measuring(done, of));
         // Leaves one core to the simulation on screen.
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
@@ -151,7 +152,7 @@ impl BackgroundJob {
         let explanation = match (self.explain)(&command.scene, &how) {
             Ok(Some(explanation)) => Arc::new(explanation),
             Ok(None) => return,
-            Err(cause) => return self.publish(&command.scene, EffectsState::Failed(cause)),
+            Err(cause) => return self.publish(&command.scene, EffectsState::Failed(Arc::new(cause))),
         };
         self.publish(&command.scene, EffectsState::Ready(Arc::clone(&explanation)));
         self.kept.push_back((Arc::clone(&command.scene), explanation));
@@ -202,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_wish_is_met_and_what_is_known_is_kept() {
+    fn the_newest_request_is_answered_and_results_are_kept() {
         let (mut worker, woken) = start();
         let [given_up, wanted] = [0.9, 1.0].map(empty_hand);
         worker.ask(&given_up);
@@ -226,7 +227,7 @@ mod tests {
                 break cause;
             }
         };
-        assert!(cause.contains("/nowhere/at/all.obj"), "{cause}");
+        assert!(cause.to_string().contains("/nowhere/at/all.obj"), "{cause}");
     }
 
     #[test]

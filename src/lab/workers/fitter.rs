@@ -3,9 +3,9 @@
 
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
-use crate::study::{FingerFit, FitWatch, RecordedGrasps, fit_finger_watched};
+use crate::study::{FingerFit, FingerFitError, FitWatch, RecordedGraspError, RecordedGrasps, fit_finger_watched};
 use palpate_sim::scene::Scene;
-use palpate_store::{Store, TrialRow};
+use palpate_store::{Store, StoreError, TrialRow};
 use palpate_tactile::trial::{TrialId, TrialSource};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,18 +33,30 @@ pub struct FittedFinger {
     pub warnings: Vec<String>,
 }
 
-/// Function that fits the finger to trials of a store, such as [`fit_trials`]; the error is a message for the user.
-pub type FitTrials = Arc<dyn Fn(&Path, &[TrialId], &FitWatch<'_>) -> Result<FittedFinger, String> + Send + Sync>;
+/// Error of a fit to stored trials.
+#[derive(Debug, thiserror::Error)]
+pub enum FitTrialsError {
+    /// A trial could not be read.
+    #[error(transparent)]
+    Trial(#[from] RecordedGraspError),
+    /// The fit failed.
+    #[error(transparent)]
+    Fit(#[from] FingerFitError),
+}
+
+/// Function that fits the finger to trials of a store, such as [`fit_trials`].
+pub type FitTrials =
+    Arc<dyn Fn(&Path, &[TrialId], &FitWatch<'_>) -> Result<FittedFinger, FitTrialsError> + Send + Sync>;
 
 /// Reads trials with the newest calibrations of their parts and fits the finger to them.
-pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Result<FittedFinger, String> {
-    let store = Store::open(store).map_err(|error| error.to_string())?;
+pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Result<FittedFinger, FitTrialsError> {
+    let store = Store::open(store).map_err(RecordedGraspError::Store)?;
     let mut recorded = RecordedGrasps::default();
     for id in trials {
-        recorded.add(&store, *id, None, &[]).map_err(|error| error.to_string())?;
+        recorded.add(&store, *id, None, &[])?;
     }
     let RecordedGrasps { observations, trust, warnings } = recorded;
-    let fit = fit_finger_watched(&observations, &trust, watch).map_err(|error| error.to_string())?;
+    let fit = fit_finger_watched(&observations, &trust, watch)?;
     let first = observations.first().map(|seen| seen.scene.clone()).unwrap_or_default();
     let scene = Scene { gripper: fit.gripper.clone(), ..first };
     Ok(FittedFinger { trials: trials.to_vec(), fit, scene, warnings })
@@ -55,11 +67,11 @@ pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Res
 pub struct FitterView {
     /// Complete trials of the real gripper, newest first, or why they cannot be listed; `None` before the first
     /// listing.
-    pub trials: Option<Result<Arc<[TrialRow]>, String>>,
+    pub trials: Option<Result<Arc<[TrialRow]>, Arc<StoreError>>>,
     /// Steps done of the fit in progress; `None` without one.
     pub running: Option<f64>,
     /// Result of the last fit that was not cancelled.
-    pub ended: Option<Result<Arc<FittedFinger>, String>>,
+    pub ended: Option<Result<Arc<FittedFinger>, Arc<FitTrialsError>>>,
 }
 
 /// Handle of the fitting thread.
@@ -71,11 +83,11 @@ impl Fitter {
         let mut view = FitterView::default();
         Self::spawn("fit", wake, move |command, stop, outlet| {
             match command {
-                FitCommand::List => view.trials = Some(listed(&store)),
+                FitCommand::List => view.trials = Some(listed(&store).map_err(Arc::new)),
                 FitCommand::Fit(trials) => {
                     let ended = fitted(&fit, &store, &trials, stop, outlet, &view);
                     if !stop.load(Ordering::Relaxed) {
-                        view.ended = Some(ended.map(Arc::new));
+                        view.ended = Some(ended.map(Arc::new).map_err(Arc::new));
                     }
                 }
             }
@@ -91,14 +103,14 @@ fn fitted(
     stop: &AtomicBool,
     outlet: &Outlet<FitterView>,
     view: &FitterView,
-) -> Result<FittedFinger, String> {
+) -> Result<FittedFinger, FitTrialsError> {
     let report = |steps: f64| outlet.publish(FitterView { running: Some(steps), ..view.clone() });
     report(0.0);
     fit(store, trials, &FitWatch { progress: &report, stop })
 }
 
-fn listed(store: &Path) -> Result<Arc<[TrialRow]>, String> {
-    let mut rows = Store::open(store).and_then(|store| store.list(false)).map_err(|error| error.to_string())?;
+fn listed(store: &Path) -> Result<Arc<[TrialRow]>, StoreError> {
+    let mut rows = Store::open(store)?.list(false)?;
     rows.retain(|row| row.source == TrialSource::Recorded && row.state == "complete");
     rows.reverse();
     Ok(rows.into())
@@ -161,7 +173,7 @@ mod tests {
         assert!(matches!(&view.ended, Some(Ok(kept)) if Arc::ptr_eq(kept, &fitted)), "what was there stays");
         job.ask(FitCommand::Fit(vec![77]));
         let view = until(&job, &woken, |view| matches!(view.ended, Some(Err(_))));
-        assert!(matches!(&view.ended, Some(Err(cause)) if cause.contains("77")), "{:?}", view.ended);
+        assert!(matches!(&view.ended, Some(Err(cause)) if cause.to_string().contains("77")), "{:?}", view.ended);
         Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! The other engine's run of a grasp, computed in a thread of its own while the grasp goes on: a ghost to compare with.
+//! Ghost: the grasp computed by the other engine in a thread of its own, for comparison.
 
 use super::latest::Latest;
 use super::messages::Wake;

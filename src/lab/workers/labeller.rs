@@ -4,11 +4,12 @@
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::labelling::{Disagreement, disagreements};
-use palpate_store::labels::{LabelledTrial, NextTrial, Progress};
-use palpate_store::{Exported, JournalEntry, Store, StoreError, export_labelled};
+use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, PlanError, Progress};
+use palpate_store::{ExportError, Exported, JournalEntry, Store, StoreError, export_labelled};
 use palpate_tactile::trial::TrialId;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Command to the label service.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,8 +40,30 @@ pub enum LabelCommand {
     Export(PathBuf),
 }
 
+/// Error of a label command.
+#[derive(Debug, thiserror::Error)]
+pub enum LabelError {
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The export failed.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+}
+
+/// Outcome of a label command, for a notice.
+#[derive(Clone, Debug)]
+pub enum LabelOutcome {
+    /// It is done, in a sentence.
+    Done(String),
+    /// Warning from opening the store.
+    Warning(String),
+    /// It failed.
+    Failed(Arc<LabelError>),
+}
+
 /// Contents of the store, for display.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct LabelView {
     /// All trials of the real gripper, newest first; discarded ones too.
     pub trials: Vec<LabelledTrial>,
@@ -52,8 +75,8 @@ pub struct LabelView {
     pub disagreements: Vec<Disagreement>,
     /// Last changes, newest first.
     pub journal: Vec<JournalEntry>,
-    /// Outcomes of commands, oldest first, numbered: a sentence or an error.
-    pub outcomes: Vec<(u64, Result<String, String>)>,
+    /// Outcomes of commands, oldest first, numbered.
+    pub outcomes: Vec<(u64, LabelOutcome)>,
 }
 
 impl LabelView {
@@ -80,10 +103,12 @@ pub type Labeller = BackgroundJob<LabelCommand, LabelView>;
 pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
     let mut service = LabelService { path, store: None, outcomes: VecDeque::new(), number: 0 };
     BackgroundJob::spawn("label", wake, move |command: LabelCommand, _stop, outlet: &Outlet<LabelView>| {
-        let outcome = service.handle(&command);
-        service.report(outcome);
+        match service.handle(&command) {
+            Ok(text) => text.into_iter().for_each(|text| service.report(LabelOutcome::Done(text))),
+            Err(cause) => service.report(LabelOutcome::Failed(Arc::new(cause))),
+        }
         let view = service.view().unwrap_or_else(|cause| {
-            service.report(Some(Err(cause)));
+            service.report(LabelOutcome::Failed(Arc::new(cause.into())));
             LabelView { outcomes: service.outcomes.iter().cloned().collect(), ..LabelView::default() }
         });
         outlet.publish(view);
@@ -94,20 +119,24 @@ pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
 struct LabelService {
     path: PathBuf,
     store: Option<Store>,
-    outcomes: VecDeque<(u64, Result<String, String>)>,
+    outcomes: VecDeque<(u64, LabelOutcome)>,
     number: u64,
 }
 
 impl LabelService {
-    fn store(&mut self) -> Result<&mut Store, String> {
-        match &mut self.store {
-            Some(store) => Ok(store),
-            empty @ None => Ok(empty.insert(Store::open(&self.path).map_err(|error| error.to_string())?)),
-        }
+    fn store(&mut self) -> Result<&mut Store, StoreError> {
+        let store = match self.store.take() {
+            Some(store) => store,
+            None => {
+                let store = Store::open(&self.path)?;
+                store.warnings().iter().for_each(|warning| self.report(LabelOutcome::Warning(warning.clone())));
+                store
+            }
+        };
+        Ok(self.store.insert(store))
     }
 
-    fn report(&mut self, outcome: Option<Result<String, String>>) {
-        let Some(outcome) = outcome else { return };
+    fn report(&mut self, outcome: LabelOutcome) {
         self.number += 1;
         self.outcomes.push_back((self.number, outcome));
         if self.outcomes.len() > OUTCOMES {
@@ -116,15 +145,12 @@ impl LabelService {
     }
 
     /// Handles a command; returns its outcome where it is worth a notice.
-    fn handle(&mut self, command: &LabelCommand) -> Option<Result<String, String>> {
-        let store = match self.store() {
-            Ok(store) => store,
-            Err(cause) => return Some(Err(cause)),
-        };
+    fn handle(&mut self, command: &LabelCommand) -> Result<Option<String>, LabelError> {
+        let store = self.store()?;
         let undone = |entry: JournalEntry| format!("undone: {}", entry.sentence());
         let redone = |entry: JournalEntry| format!("redone: {}", entry.restored());
         let outcome = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
-        let done: Result<Option<String>, StoreError> = match command {
+        let done = match command {
             LabelCommand::Refresh => Ok(None),
             LabelCommand::Label(id, object) => store.labels().set_label(*id, object).map(|()| None),
             LabelCommand::Discard(id) => {
@@ -137,34 +163,28 @@ impl LabelService {
             LabelCommand::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
             LabelCommand::Undo => store.journal().undo().map(|entry| outcome(entry.map(undone), "nothing to undo")),
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "nothing to redo")),
-            LabelCommand::Want(name, wanted) => {
-                return change_plan(store, |plan| plan.set(name, *wanted)).err().map(Err);
-            }
-            LabelCommand::Unplan(name) => return change_plan(store, |plan| plan.remove(name)).err().map(Err),
-            LabelCommand::Export(folder) => return Some(exported(store, folder)),
+            LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
+            LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
+            LabelCommand::Export(folder) => return Ok(Some(exported(store, folder)?)),
         };
-        done.map_err(|error| error.to_string()).transpose()
+        Ok(done?)
     }
 
-    fn view(&mut self) -> Result<LabelView, String> {
+    fn view(&mut self) -> Result<LabelView, StoreError> {
         let outcomes = self.outcomes.iter().cloned().collect();
         let store = self.store()?;
-        let read = |store: &Store| -> Result<LabelView, StoreError> {
-            let mut trials = store.labels().trials()?;
-            let progress = store.labels().plan()?.progress(&trials);
-            trials.sort_by_key(|trial| std::cmp::Reverse(trial.id));
-            let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
-            let next = progress.next(last);
-            let journal = store.journal().entries(ENTRIES)?;
-            Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, outcomes })
-        };
-        read(store).map_err(|error| error.to_string())
+        let mut trials = store.labels().trials()?;
+        let progress = store.labels().plan()?.progress(&trials);
+        trials.sort_by_key(|trial| std::cmp::Reverse(trial.id));
+        let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
+        let next = progress.next(last);
+        let journal = store.journal().entries(ENTRIES)?;
+        Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, outcomes })
     }
 }
 
-fn exported(store: &Store, folder: &Path) -> Result<String, String> {
-    let exported = export_labelled(store, folder).map_err(|error| error.to_string())?;
-    let Exported { folder, trials, derived, left_out } = exported;
+fn exported(store: &Store, folder: &Path) -> Result<String, ExportError> {
+    let Exported { folder, trials, derived, left_out } = export_labelled(store, folder)?;
     let missing = match left_out.first() {
         Some((id, why)) => format!("; {} without signals, such as trial {id}: {why}", left_out.len()),
         None => String::new(),
@@ -172,13 +192,13 @@ fn exported(store: &Store, folder: &Path) -> Result<String, String> {
     Ok(format!("{trials} labelled trials exported into {}, {derived} with signals{missing}", folder.display()))
 }
 
-fn change_plan<E: std::fmt::Display>(
+fn change_plan(
     store: &mut Store,
-    change: impl FnOnce(&mut palpate_store::labels::LabelPlan) -> Result<(), E>,
-) -> Result<(), String> {
-    let mut plan = store.labels().plan().map_err(|error| error.to_string())?;
-    change(&mut plan).map_err(|error| error.to_string())?;
-    store.labels().set_plan(&plan).map_err(|error| error.to_string())
+    change: impl FnOnce(&mut LabelPlan) -> Result<(), PlanError>,
+) -> Result<(), StoreError> {
+    let mut plan = store.labels().plan()?;
+    change(&mut plan)?;
+    store.labels().set_plan(&plan)
 }
 
 #[cfg(test)]
@@ -218,25 +238,41 @@ mod tests {
             labeller.ask(LabelCommand::Undo);
         }
         labeller.ask(LabelCommand::Redo);
-        until(&labeller, &woken, |view| {
-            view.outcomes.iter().any(|(_, outcome)| {
-                outcome.as_ref().is_ok_and(|text| {
-                    text.starts_with("redone: ") && text.ends_with(&format!("label unlabelled -> {next}"))
-                })
-            })
-        });
+        let is_done = |view: &LabelView, begin: &str, end: &str| {
+            let is = |outcome: &LabelOutcome| matches!(outcome, LabelOutcome::Done(text) if text.starts_with(begin) && text.ends_with(end));
+            view.outcomes.iter().any(|(_, outcome)| is(outcome))
+        };
+        until(&labeller, &woken, |view| is_done(view, "redone: ", &format!("label unlabelled -> {next}")));
         labeller.ask(LabelCommand::Undo);
         let back = until(&labeller, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
-        assert!(
-            back.outcomes.iter().any(|(_, outcome)| outcome.as_ref().is_ok_and(|text| text.starts_with("undone: ")))
-        );
+        assert!(is_done(&back, "undone: ", ""));
         labeller.ask(LabelCommand::Want("mug".to_owned(), 3));
         until(&labeller, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
         labeller.ask(LabelCommand::Want("mug".to_owned(), 0));
-        until(&labeller, &woken, |view| view.outcomes.iter().any(|(_, outcome)| outcome.is_err()));
+        let failures = |view: &LabelView| {
+            view.outcomes.iter().filter(|(_, outcome)| matches!(outcome, LabelOutcome::Failed(_))).count()
+        };
+        until(&labeller, &woken, |view| failures(view) == 1);
         labeller.ask(LabelCommand::Label(99, "mug".to_owned()));
-        let refused =
-            until(&labeller, &woken, |view| view.outcomes.iter().filter(|(_, outcome)| outcome.is_err()).count() == 2);
+        let refused = until(&labeller, &woken, |view| failures(view) == 2);
         assert!(format!("{:?}", refused.outcomes).contains("99"), "{:?}", refused.outcomes);
+    }
+
+    #[test]
+    fn an_update_of_the_store_is_reported_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("s.sqlite");
+        let old = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/suite/data/store_0_1.sqlite");
+        std::fs::copy(old, &path).expect("copies");
+        let (wake, woken) = waker();
+        let labeller = start_labeller(path, wake).expect("starts");
+        labeller.ask(LabelCommand::Refresh);
+        labeller.ask(LabelCommand::Refresh);
+        let view = until(&labeller, &woken, |_| labeller.is_settled());
+        assert!(
+            matches!(&view.outcomes[..], [(1, LabelOutcome::Warning(text))] if text.contains("s.before-v10.sqlite")),
+            "{:?}",
+            view.outcomes
+        );
     }
 }

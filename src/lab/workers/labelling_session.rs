@@ -1,5 +1,5 @@
 //! Workflow of a labelling session: which trial the next key is about, which label is chosen, and what happens when a
-//! trial begins, ends, or gets its label. Plain data in, effects out: whoever owns gripper and labels carries them out.
+//! trial begins, ends, or gets its label. Plain data in, effects out: the owner of gripper and labels carries them out.
 //!
 //! ```text
 //!  record -> trial ends -> question "what was it?" -> label -> next object of the plan
@@ -8,7 +8,7 @@
 //! ```
 
 use super::gripper::GripperView;
-use super::labeller::{LabelCommand, LabelView};
+use super::labeller::{LabelCommand, LabelOutcome, LabelView};
 use crate::recording::TrialRequest;
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_store::labels::LabelledTrial;
@@ -86,6 +86,8 @@ pub enum LabellingEffect {
     SetBlind(bool),
     /// Show a message.
     Inform(String),
+    /// Show a warning.
+    Warn(String),
     /// Show an error.
     Fail(String),
 }
@@ -267,7 +269,7 @@ impl LabellingSession {
             }
             let recording = gripper.trial.is_some();
             if recording && !self.recording {
-                // A trial may begin by itself: text being written is kept.
+                // A trial may begin automatically: unsaved text is kept.
                 let unsaved = now.labels.map(|labels| self.draft.unsaved(labels)).unwrap_or_default();
                 effects.extend(unsaved.into_iter().map(LabellingEffect::Edit));
                 self.draft.reset();
@@ -278,8 +280,9 @@ impl LabellingSession {
         for (number, outcome) in now.labels.iter().flat_map(|labels| &labels.outcomes).filter(|(n, _)| *n > before) {
             self.reported = *number;
             effects.push(match outcome {
-                Ok(text) => LabellingEffect::Inform(text.clone()),
-                Err(cause) => LabellingEffect::Fail(cause.clone()),
+                LabelOutcome::Done(text) => LabellingEffect::Inform(text.clone()),
+                LabelOutcome::Warning(text) => LabellingEffect::Warn(text.clone()),
+                LabelOutcome::Failed(cause) => LabellingEffect::Fail(cause.to_string()),
             });
         }
         effects
@@ -364,7 +367,7 @@ impl LabellingSession {
     }
 
     /// Trial that a key is about. None during a trial and until it is listed, and none while the outcome of the last key
-    /// is not shown: nobody means what they cannot see.
+    /// is not shown.
     fn in_question<'a>(&self, now: &SessionContext<'a>) -> Option<&'a LabelledTrial> {
         let shown = now.settled && !self.is_beginning(now);
         if self.recording || self.awaits_question(now) || !shown {
@@ -446,7 +449,8 @@ mod tests {
     use super::*;
     use crate::grasping::GraspStage;
     use crate::labelling::Disagreement;
-    use crate::workers::{EndedTrial, TrialView};
+    use crate::workers::{EndedTrial, LabelError, TrialView};
+    use palpate_store::ExportError;
     use palpate_store::labels::LabelPlan;
     use std::sync::Arc;
 
@@ -596,7 +600,7 @@ mod tests {
         let (idle, during) = (GripperView::default(), running(5));
         session.apply(LabellingAction::FocusSearch("c".to_owned()), &now(&idle, &done));
         assert_eq!(session.draft(), &LabelDraft::default());
-        // Text being written is kept when a trial begins by itself.
+        // Unsaved text is kept when a trial begins automatically.
         session.apply(LabellingAction::WriteNote(3, "slipped".to_owned()), &now(&idle, &labels));
         let kept = session.observe(&now(&during, &labels));
         assert_eq!(kept, [edit(LabelCommand::Note(3, "slipped".to_owned()))]);
@@ -630,10 +634,21 @@ mod tests {
     #[test]
     fn outcomes_are_reported_once() {
         let mut session = LabellingSession::default();
-        let outcomes = vec![(1, Ok("done".to_owned())), (2, Err("no".to_owned()))];
+        let failure = Arc::new(LabelError::from(ExportError::Nothing));
+        let text = |text: &str| text.to_owned();
+        let outcomes = vec![
+            (1, LabelOutcome::Warning(text("updated"))),
+            (2, LabelOutcome::Done(text("done"))),
+            (3, LabelOutcome::Failed(Arc::clone(&failure))),
+        ];
         let (gripper, labels) = (GripperView::default(), LabelView { outcomes, ..LabelView::default() });
         let effects = session.observe(&now(&gripper, &labels));
-        assert_eq!(effects, [LabellingEffect::Inform("done".to_owned()), LabellingEffect::Fail("no".to_owned())]);
+        let expected = [
+            LabellingEffect::Warn(text("updated")),
+            LabellingEffect::Inform(text("done")),
+            LabellingEffect::Fail(failure.to_string()),
+        ];
+        assert_eq!(effects, expected);
         assert!(session.observe(&now(&gripper, &labels)).is_empty());
     }
 }

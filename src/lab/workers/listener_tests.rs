@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 struct Parrot {
     ball: Vec<f64>,
     /// Number of samples received.
-    heard: Arc<AtomicUsize>,
+    rows: Arc<AtomicUsize>,
 }
 
 /// Verdict with this probability for the ball, and the rest shared evenly by all other classes.
@@ -38,8 +38,8 @@ impl Parrot {
     }
 
     fn model(ball: &[f64]) -> (Model, Arc<AtomicUsize>) {
-        let heard = Arc::new(AtomicUsize::new(0));
-        let parrot = Self { ball: ball.to_vec(), heard: Arc::clone(&heard) };
+        let rows = Arc::new(AtomicUsize::new(0));
+        let parrot = Self { ball: ball.to_vec(), rows: Arc::clone(&rows) };
         let channels =
             ["curvature", "pressure", "force"].iter().flat_map(|q| ["left", "right"].map(|s| format!("{q}_{s}")));
         let card = ModelCard {
@@ -57,7 +57,7 @@ impl Parrot {
             metrics: serde_json::Value::Null,
             version: String::new(),
         };
-        (Model { card, recogniser: Arc::new(parrot) }, heard)
+        (Model { card, recogniser: Arc::new(parrot) }, rows)
     }
 }
 
@@ -94,7 +94,7 @@ impl LiveRecogniser for LiveParrot {
     }
 
     fn push(&mut self, _t: f32, _row: &[f32]) -> Option<Verdict> {
-        self.parrot.heard.fetch_add(1, Ordering::Relaxed);
+        self.parrot.rows.fetch_add(1, Ordering::Relaxed);
         Some(saying(0.1))
     }
 
@@ -186,11 +186,11 @@ fn another_object_starts_over() {
 fn frames_are_the_same_with_and_without_a_model() {
     let [with, without] = [Some(Parrot::model(&[0.6])), None].map(|model| {
         let folder = folder();
-        let (model, heard) = model.map_or((None, None), |(model, heard)| (Some(model), Some(heard)));
+        let (model, rows) = model.map_or((None, None), |(model, rows)| (Some(model), Some(rows)));
         let watched = watch(model, &folder, 2);
         watched.until(|s| s.status.finished && s.grasp == 2);
         drop(watched);
-        assert!(heard.is_none_or(|heard| heard.load(Ordering::Relaxed) > 100), "it has listened");
+        assert!(rows.is_none_or(|rows| rows.load(Ordering::Relaxed) > 100), "it has listened");
         let store = Store::open(&folder.path().join("trials.sqlite")).expect("opens");
         [1, 2].map(|id| store.load(id).expect("whole"))
     });
@@ -209,9 +209,9 @@ fn a_model_that_reads_other_channels_says_so_once_for_each_scene() {
     assert!(end.recognition_off.as_ref().is_some_and(|why| why.contains("temperature")));
     watched.send(Command::SetScene(Box::new(ball())));
     watched.until(|s| s.status.finished && s.grasp == 4);
-    let told =
+    let found =
         watched.worker.notices().filter(|n| matches!(n, Notice::Warning(w) if w.contains("temperature"))).count();
-    assert_eq!(told, 2);
+    assert_eq!(found, 2);
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Named threads around rigs and stores: commands in, snapshots and notices out. Nothing here knows a window; whoever
-//! shows the results hands over a `wake` function.
+//! Named threads around grippers and stores: commands in, snapshots and notices out. They know no window; its owner passes
+//! a `wake` function.
 //!
 //! ```text
 //!  UI                         "sim"                          "recorder"
@@ -10,12 +10,11 @@
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
-//! A third thread, "effects", measures what the effects of a scene cost and change, when somebody asks. A thread "ghost"
-//! may compute each grasp by the other engine meanwhile; [`SimWorker::ghost`] has its newest.
+//! The thread "effects" measures on request what the effects of a scene cost and change. The thread "ghost" computes each
+//! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "examine" looks for what is wrong with it; "fit" lays the simulated finger over the real one;
-//! "train" learns from what was labelled.
+//! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -47,14 +46,14 @@ mod trainer;
 pub use background_job::BackgroundJob;
 pub use diagnostics_job::{DiagnosticsJob, DiagnosticsReport, DiagnosticsView, Examine, ExamineRequest, examine_port};
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
-pub use fitter::{FitCommand, FitTrials, FittedFinger, Fitter, FitterView, fit_trials};
+pub use fitter::{FitCommand, FitTrials, FitTrialsError, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationView, CrosstalkCommand, CrosstalkView, EndedTrial, GripperCommand,
     GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest, RunningCalibration, RunningCrosstalk,
-    TrialView,
+    SensorJobError, TrialView,
 };
-pub use labeller::{LabelCommand, LabelView, Labeller, start_labeller};
+pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
     object_title, parse_tags,

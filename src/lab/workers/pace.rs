@@ -24,7 +24,7 @@ impl Pace {
         self.simulated + self.wall.elapsed().as_secs_f64() * speed
     }
 
-    /// Goes on from a simulated time (s) that was reached too late, instead of chasing the clock.
+    /// Continues from a simulated time (s) reached too late, without catching up.
     pub(super) fn give_way(&mut self, simulated: f64) {
         self.wall = Instant::now();
         self.simulated = simulated;

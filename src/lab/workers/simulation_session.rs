@@ -68,7 +68,7 @@ pub(super) struct Session {
     last: Option<Arc<FinishedGrasp>>,
     revision: u64,
     grasp: u64,
-    /// The scene has been grasped as it is written; what follows comes from random poses.
+    /// The scene's own pose has been grasped; random poses follow.
     own_pose_done: bool,
     /// Random poses drawn for this scene so far; the next one's seed is one more.
     poses_drawn: u64,
@@ -306,7 +306,7 @@ impl Session {
         let again = self.own_pose_done;
         self.own_pose_done = true;
         // The first grasp is the scene as written; the following ones come from random poses, on the object as it was
-        // released where the scene says so.
+        // released if the scene asks for it.
         let (scene, seed) = if again {
             self.poses_drawn += 1;
             let sampler = self.sampler.get_or_insert_with(|| PoseSampler::new(&self.nominal, model.as_deref()));

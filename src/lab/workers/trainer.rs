@@ -4,10 +4,12 @@
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::datasets::{SavedModel, new_model_path, saved_models};
-use crate::study::{JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingStage, labelled_classes};
+use crate::study::{
+    JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage, labelled_classes,
+};
 use palpate_learn::{Model, ModelError, method};
 use palpate_sim::gripper::GripperModel;
-use palpate_store::Store;
+use palpate_store::{Store, StoreError};
 use palpate_tactile::{Channel, SensorLayout};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -59,15 +61,15 @@ pub struct FinishedTraining {
 #[derive(Clone, Debug, Default)]
 pub struct TrainerView {
     /// Labelled trials of each object, or why they cannot be counted; `None` before the first count.
-    pub classes: Option<Result<Arc<[LabelledClass]>, String>>,
+    pub classes: Option<Result<Arc<[LabelledClass]>, Arc<StoreError>>>,
     /// Saved models, newest first.
     pub models: Arc<[SavedModel]>,
     /// Training in progress and its stage.
     pub running: Option<(TrainRequest, TrainingStage)>,
     /// Result of the last training that was not cancelled.
-    pub finished: Option<Result<Arc<FinishedTraining>, String>>,
+    pub finished: Option<Result<Arc<FinishedTraining>, Arc<TrainingError>>>,
     /// Number of load commands, and result of the last.
-    pub loaded: (u64, Option<Result<Arc<TrainedModel>, String>>),
+    pub loaded: (u64, Option<Result<Arc<TrainedModel>, ModelError>>),
 }
 
 /// Handle of the training thread.
@@ -76,38 +78,38 @@ pub type Trainer = BackgroundJob<TrainCommand, TrainerView>;
 impl Trainer {
     /// Starts the thread; trials come from the store at `store`, models go into the folder `models`.
     pub fn start(store: PathBuf, models: PathBuf, wake: Wake) -> std::io::Result<Self> {
-        let mut room = Room { store, models, view: TrainerView::default() };
+        let mut service = TrainingService { store, models, view: TrainerView::default() };
         Self::spawn("train", wake, move |command, stop, outlet| {
-            room.handle(command, stop, outlet);
-            outlet.publish(room.view.clone());
+            service.handle(command, stop, outlet);
+            outlet.publish(service.view.clone());
         })
     }
 }
 
 /// State owned by the thread.
-struct Room {
+struct TrainingService {
     store: PathBuf,
     models: PathBuf,
     view: TrainerView,
 }
 
-impl Room {
+impl TrainingService {
     fn handle(&mut self, command: TrainCommand, stop: &AtomicBool, outlet: &Outlet<TrainerView>) {
         match command {
             TrainCommand::Look => {
                 let counted = Store::open(&self.store).and_then(|store| labelled_classes(&store));
-                self.view.classes = Some(counted.map(Arc::from).map_err(|error| error.to_string()));
+                self.view.classes = Some(counted.map(Arc::from).map_err(Arc::new));
                 self.view.models = saved_models(&self.models).into();
             }
             TrainCommand::Train(request) => {
-                let finished = self.trained(&request, stop, outlet).map(Arc::new);
+                let finished = self.trained(&request, stop, outlet).map(Arc::new).map_err(Arc::new);
                 if !stop.load(Ordering::Relaxed) {
                     self.view.finished = Some(finished);
                 }
                 self.view.models = saved_models(&self.models).into();
             }
             TrainCommand::Load(path) => {
-                let loaded = loaded(&path).map(Arc::new).map_err(|error| error.to_string());
+                let loaded = loaded(&path).map(Arc::new);
                 self.view.loaded = (self.view.loaded.0 + 1, Some(loaded));
             }
         }
@@ -118,19 +120,19 @@ impl Room {
         request: &TrainRequest,
         stop: &AtomicBool,
         outlet: &Outlet<TrainerView>,
-    ) -> Result<FinishedTraining, String> {
-        let tell = |stage| {
+    ) -> Result<FinishedTraining, TrainingError> {
+        let progress = |stage| {
             outlet.publish(TrainerView { running: Some((request.clone(), stage)), ..self.view.clone() });
         };
-        tell(TrainingStage::Reading(0, 0));
-        let method = method(&request.method).ok_or_else(|| format!("there is no method \"{}\"", request.method))?;
-        let store = Store::open(&self.store).map_err(|error| error.to_string())?;
+        progress(TrainingStage::Reading(0, 0));
+        let method = method(&request.method).ok_or_else(|| TrainingError::UnknownMethod(request.method.clone()))?;
+        let store = Store::open(&self.store)?;
         let (seed, quick) = (request.seed, request.quick);
-        let training = LabelledTraining { method, seed, quick, tell: &tell, stop };
-        let judged = training.train(&store).map_err(|error| error.to_string())?;
-        let now = store.now().map_err(|error| error.to_string())?;
+        let training = LabelledTraining { method, seed, quick, progress: &progress, stop };
+        let judged = training.train(&store)?;
+        let now = store.now()?;
         let path = new_model_path(&self.models, method.key, &now);
-        judged.model.save(&path).map_err(|error| error.to_string())?;
+        judged.model.save(&path)?;
         let (model, about) = (Arc::new(judged.model.clone()), judged.model.card.described());
         Ok(FinishedTraining { trained: TrainedModel { model, path, about }, judged })
     }
@@ -162,12 +164,12 @@ impl TrainerView {
         let enough = classes.iter().filter(|class| class.is_enough()).count();
         let so_far = match classes.len() {
             0 => String::new(),
-            of => format!(", and {enough} of {of} have as many"),
+            of => format!(" (now {enough} of {of})"),
         };
         (enough < 2).then(|| {
             format!(
-                "Two objects with {LEAST_TRIALS} labelled trials each are needed{so_far}: record and label more. The paper \
-                 has 40 to 55 of each."
+                "Training needs two objects with {LEAST_TRIALS} labelled trials each{so_far}. Record and label more; the \
+                 paper has 40 to 55 of each."
             )
         })
     }

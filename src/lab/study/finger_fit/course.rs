@@ -13,13 +13,13 @@ pub struct Course {
     pub side: Side,
     /// Times since the first command (s).
     pub t_s: Vec<f64>,
-    /// As recorded (1/m).
+    /// Recorded curvature (1/m).
     pub recorded: Vec<f64>,
-    /// As the fitted model shows it through the strip (1/m).
+    /// Curvature of the fitted model, read by the strip (1/m).
     pub fitted: Vec<f64>,
 }
 
-/// The courses that belong to residuals in the order of the fitted model's places.
+/// Courses from residuals in the order of the fitted model's places.
 pub(super) fn courses(observations: &[Observation], fitted: &FittedModel<'_>, residuals: &[f64]) -> Vec<Course> {
     let mut courses: Vec<Course> = Vec::new();
     let mut last = None;

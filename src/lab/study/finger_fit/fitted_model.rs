@@ -1,5 +1,6 @@
 //! The fitted model: signals of a finger with given parameters, simulated under the recorded line pressure.
 
+use super::FingerFitError;
 use super::least_squares::Problem;
 use super::observation::{Observation, Track};
 use palpate_sim::gripper::{GripperModel, Phase, TorquePoint};
@@ -7,22 +8,22 @@ use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::{Effect, Scene, Setting, Timing};
 use palpate_tactile::{Sensors, Signals};
 
-/// Command rate of the fitted model (Hz): fine enough for the commands of any control box. At 50 Hz they would be
-/// 10 ms late on average, which biases lag and damping.
+/// Actuation rate of the fitted model (Hz). At 50 Hz, commands of a control box would be 10 ms late on average, which
+/// biases lag and damping.
 const COMMAND_HZ: u32 = 300;
 
-/// Sampling rate of the fitted model (Hz). A finger swings at some 7 Hz; linear interpolation of samples at 50 Hz would
-/// lose a twelfth of it, which biases stiffness.
+/// Sampling rate of the fitted model (Hz). A finger swings at about 7 Hz; linear interpolation of samples at 50 Hz would
+/// lose a twelfth of the amplitude, which biases stiffness.
 const SAMPLE_HZ: u32 = 300;
 
-/// Fitted parameters of the finger, in front of those that only explain the sensors.
+/// Indices of the finger's parameters; those of the sensors follow.
 pub(super) const STIFFNESS: usize = 0;
 pub(super) const DAMPING: usize = 1;
 pub(super) const LAG: usize = 2;
 pub(super) const TORQUES: usize = 3;
 
-/// Sensor parameters, behind those of the finger: gain and offset of each strip, gain of each pad and what
-/// bending adds to it, then a shift in time of each observation.
+/// Indices of the sensors' parameters after those of the finger: gain and offset of each strip, gain of each pad and its
+/// load by bending, then the time shift of each observation.
 pub(super) const STRIP_GAIN: usize = 0;
 pub(super) const STRIP_OFFSET: usize = 2;
 pub(super) const PAD_GAIN: usize = 4;
@@ -35,7 +36,7 @@ pub(super) struct FittedModel<'a> {
     tracks: Vec<Vec<Track>>,
     /// Pressures of the torque curve's points (bar).
     knots: Vec<f64>,
-    /// Last simulation, with the finger's parameters it was made with.
+    /// Finger's parameters and signals of the last simulation.
     last: Option<(Vec<f64>, Vec<Signals>)>,
 }
 
@@ -51,7 +52,7 @@ impl<'a> FittedModel<'a> {
     }
 
     /// The gripper with these parameters: logarithms of stiffness and damping time, filling time, logarithms of torques
-    /// over stiffness. Torque itself would go with stiffness along a narrow valley, which takes many steps.
+    /// over stiffness. Torque itself is strongly correlated with stiffness, which would take many steps.
     pub(super) fn gripper(&self, gripper: &GripperModel, x: &[f64]) -> GripperModel {
         let mut gripper = gripper.clone();
         gripper.finger.bending_stiffness = x[STIFFNESS].exp();
@@ -64,10 +65,10 @@ impl<'a> FittedModel<'a> {
         gripper
     }
 
-    fn simulate(&mut self, finger: &[f64]) -> Result<(), String> {
+    fn simulate(&mut self, finger: &[f64]) -> Result<(), FingerFitError> {
         if self.last.as_ref().is_none_or(|(own, _)| own.as_slice() != finger) {
             let shown = |seen: &Observation| shown(seen, self.gripper(&seen.scene.gripper, finger));
-            let signals: Result<Vec<Signals>, String> = self.observations.iter().map(shown).collect();
+            let signals: Result<Vec<Signals>, FingerFitError> = self.observations.iter().map(shown).collect();
             self.last = Some((finger.to_vec(), signals?));
         }
         Ok(())
@@ -86,7 +87,7 @@ impl<'a> FittedModel<'a> {
 }
 
 impl Problem for FittedModel<'_> {
-    fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, String> {
+    fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, FingerFitError> {
         let of_finger = self.of_finger();
         self.simulate(&x[..of_finger])?;
         let sensors = &x[of_finger..];
@@ -106,7 +107,7 @@ impl Problem for FittedModel<'_> {
                 }
                 false => shown * sensors[STRIP_GAIN + side].exp() + sensors[STRIP_OFFSET + side],
             };
-            // Those without a deviation have no place.
+            // Samples without a deviation are not among the places.
             residuals.push((read - value) / track.deviation(value).unwrap_or(f64::INFINITY));
         }
         Ok(residuals)
@@ -141,7 +142,7 @@ fn at(signals: &Signals, column: usize, t: f64) -> f64 {
 }
 
 /// Signals of the fitted model for an observation: curvature, pressure and force, left and right.
-fn shown(seen: &Observation, gripper: GripperModel) -> Result<Signals, String> {
+fn shown(seen: &Observation, gripper: GripperModel) -> Result<Signals, FingerFitError> {
     let lag = gripper.actuation.filling_time > 0.0;
     let mut scene = Scene { gripper, ..seen.scene.clone() };
     scene.timing = Timing { sample_hz: SAMPLE_HZ, actuation_hz: COMMAND_HZ, duration_s: seen.duration() + 0.1 };
@@ -153,9 +154,9 @@ fn shown(seen: &Observation, gripper: GripperModel) -> Result<Signals, String> {
     let mut signals = Signals { channels, ..Signals::default() };
     let mut bar = 0.0;
     loop {
-        match rig.next_event().map_err(|e| format!("{}: {e}", seen.name))? {
+        match rig.next_event().map_err(|cause| FingerFitError::Simulation { name: seen.name.clone(), cause })? {
             SimEvent::ActuationDue { tick } => {
-                // A hair more, for times that were computed as a tick over a rate.
+                // Tolerance for times computed as tick over rate.
                 let now = f64::from(tick) / f64::from(COMMAND_HZ) + 1e-6;
                 let before = bar;
                 bar = seen.line.iter().rev().find(|(t, _)| *t <= now).map_or(0.0, |(_, bar)| *bar);

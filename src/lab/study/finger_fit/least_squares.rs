@@ -1,16 +1,18 @@
-//! Nonlinear least squares with prior knowledge (Levenberg 1944, Marquardt 1963), and what the data leave open.
+//! Nonlinear least squares with priors (Levenberg 1944, Marquardt 1963), and the covariance of the parameters.
 //!
 //! Minimises sum r_i(x)² + sum ((x_j - m_j) / s_j)², where the residuals r are in units of their deviation and a
-//! parameter may be known beforehand as m_j, give or take s_j. The covariance is the inverse of J'J + S⁻² at the
-//! minimum, the data's part of it widened by what the residuals show beyond their assumed noise, and by how far
-//! neighbouring residuals go together: n residuals with correlation rho count as n (1 - rho) / (1 + rho).
+//! parameter may have a prior m_j with deviation s_j. The covariance is the inverse of J'J + S⁻² at the minimum, the
+//! data's part of it widened by residuals beyond the assumed noise and by the correlation of neighbouring residuals: n
+//! residuals with correlation rho count as n (1 - rho) / (1 + rho).
+
+use super::FingerFitError;
 
 /// Least-squares problem.
 pub(super) trait Problem {
-    /// Residuals at a point, each in units of its deviation; always as many, in the order of time within runs.
-    fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, String>;
+    /// Residuals at a point in units of their deviation; their number and order are constant, by time within a run.
+    fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, FingerFitError>;
 
-    /// By how much a parameter is changed to see what it does.
+    /// Step of a parameter for finite differences.
     fn step(&self, parameter: usize) -> f64;
 
     /// Least value of a parameter.
@@ -22,7 +24,7 @@ pub(super) trait Problem {
 pub(super) struct Prior {
     /// Its value.
     pub(super) mean: f64,
-    /// Give or take (one deviation).
+    /// Standard deviation.
     pub(super) deviation: f64,
 }
 
@@ -35,22 +37,22 @@ pub(super) struct Minimum {
     pub(super) covariance: Vec<Vec<f64>>,
     /// Residuals there.
     pub(super) residuals: Vec<f64>,
-    /// By which factor deviations are wider than noise alone would make them.
+    /// Factor on the deviations over those from noise alone.
     pub(super) widened: f64,
     /// Steps taken.
     pub(super) steps: u32,
-    /// False where it was still going down after the last step.
+    /// True if it converged.
     pub(super) settled: bool,
 }
 
-/// Steps after which it ends.
+/// Maximum number of steps.
 pub const MOST_STEPS: u32 = 25;
 
-/// A step that changes the sum by less than this share of it is the last one.
+/// Relative change of the sum at which it has converged.
 const SETTLED: f64 = 1e-5;
 
-/// Goes down from `x`.
-pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) -> Result<Minimum, String> {
+/// Minimises from `x`.
+pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) -> Result<Minimum, FingerFitError> {
     let mut x = x.to_vec();
     let mut residuals = problem.residuals(&x)?;
     let mut sum = total(&residuals, &x, priors);
@@ -73,7 +75,7 @@ pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) 
             damping = (damping * 0.2).max(1e-9);
             jacobian = differences(problem, &x, &residuals)?;
         } else {
-            // If even short steps lead up, this is the minimum to numerical precision.
+            // If even short steps increase the sum, this is the minimum to numerical precision.
             settled = damping > 1e6 || sum_there - sum < SETTLED * sum * 1e-3;
             damping *= 8.0;
         }
@@ -84,7 +86,7 @@ pub(super) fn minimise(problem: &mut impl Problem, x: &[f64], priors: &[Prior]) 
     for (j, prior) in priors.iter().enumerate() {
         matrix[j][j] += 1.0 / (prior.deviation * prior.deviation);
     }
-    let covariance = inverse(&matrix).ok_or("the parameters cannot be identified from these data")?;
+    let covariance = inverse(&matrix).ok_or(FingerFitError::NotIdentifiable)?;
     Ok(Minimum { x, covariance, residuals, widened, steps, settled })
 }
 
@@ -94,7 +96,7 @@ fn total(residuals: &[f64], x: &[f64], priors: &[Prior]) -> f64 {
 }
 
 /// Derivatives of the residuals: `[parameters][residuals]`.
-fn differences(problem: &mut impl Problem, x: &[f64], residuals: &[f64]) -> Result<Vec<Vec<f64>>, String> {
+fn differences(problem: &mut impl Problem, x: &[f64], residuals: &[f64]) -> Result<Vec<Vec<f64>>, FingerFitError> {
     let mut columns = Vec::with_capacity(x.len());
     for j in 0..x.len() {
         let mut beside = x.to_vec();
@@ -192,7 +194,7 @@ mod tests {
     }
 
     impl Problem for Decay {
-        fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, String> {
+        fn residuals(&mut self, x: &[f64]) -> Result<Vec<f64>, FingerFitError> {
             let model = |t: &f64| x[0] * (-x[1] * t).exp();
             Ok(self.t.iter().zip(&self.y).map(|(t, y)| (model(t) - y) / self.deviation).collect())
         }
@@ -224,14 +226,14 @@ mod tests {
     }
 
     #[test]
-    fn the_minimum_is_found_from_afar() -> Result<(), String> {
+    fn the_minimum_is_found_from_afar() -> Result<(), FingerFitError> {
         let found = minimise(&mut decay(1, 1e-9), &[1.0, 0.2], &[OPEN; 2])?;
         assert!((found.x[0] - 3.0).abs() < 1e-6 && (found.x[1] - 1.5).abs() < 1e-6 && found.settled);
         Ok(())
     }
 
     #[test]
-    fn intervals_hold_the_truth_in_95_of_100_cases() -> Result<(), String> {
+    fn intervals_hold_the_truth_in_95_of_100_cases() -> Result<(), FingerFitError> {
         let mut held = [0; 2];
         for seed in 0..200 {
             let found = minimise(&mut decay(seed, 0.05), &[2.0, 1.0], &[OPEN; 2])?;
@@ -245,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn priors_count_and_bounds_hold() -> Result<(), String> {
+    fn priors_count_and_bounds_hold() -> Result<(), FingerFitError> {
         let known = [Prior { mean: 2.0, deviation: 1e-6 }, OPEN];
         let found = minimise(&mut decay(1, 0.05), &[2.0, 1.0], &known)?;
         assert!((found.x[0] - 2.0).abs() < 1e-3 && found.covariance[0][0].sqrt() < 1.1e-6);
@@ -256,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn residuals_that_go_together_count_less() {
+    fn correlated_residuals_count_less() {
         let alternating: Vec<f64> = (0..100).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
         let slow: Vec<f64> = (0..100).map(|i| if i < 50 { 1.0 } else { -1.0 }).collect();
         assert!((widening(&alternating, 0) - 1.0).abs() < 1e-12);

@@ -1,16 +1,15 @@
-//! Fit my finger: stiffness, damping, pressure-torque curve and lag of a real finger, from a few recorded grasps, so
-//! that the simulated finger lies on the real one.
+//! Fit of the simulated finger to a real one: stiffness, damping, pressure-torque curve and lag, from a few recorded
+//! grasps.
 //!
-//! The fitted model is simulated under the recorded line pressure; `least_squares` minimises the difference of its
-//! curvature and force from the recording. Fitted in logarithms: bending stiffness EI, damping time, the torques at
-//! points of the curve every 0.2 bar; and the time in which a chamber fills. Beside them, and only as far as their
-//! calibrations leave them open, gain and offset of the strips, gain of the pads and what bending adds to them, and
-//! when each recording began.
+//! The model is simulated under the recorded line pressure; `least_squares` minimises the differences of its curvature
+//! and force from the recording. Parameters, in logarithms: bending stiffness EI, damping time, torques at points of the
+//! curve every 0.2 bar; and the filling time of the chambers. Nuisance parameters, within the limits of their
+//! calibrations: gain and offset of the strips, gain of the pads, load of the pads by bending, start of each recording.
 //!
-//! **Identifiability.** In free bending the shape depends on torque over stiffness only: twice the torque on twice the
-//! stiffness bends alike. The scale comes from the finger's weight and inertia, which resist with k/m and g/k: with
-//! closes alone, EI and torques are as uncertain as the mass, and more uncertain the stiffer the finger. A press on a
-//! calibrated pad measures a force, and so the scale itself. The intervals show how much of this was in the data.
+//! **Identifiability.** In free bending the shape depends only on the ratio of torque to stiffness. The scale follows from
+//! the finger's weight and inertia: with closes alone, EI and torques are as uncertain as the mass, and more so the
+//! stiffer the finger. A press on a calibrated pad measures a force, and with it the scale. The intervals show what the
+//! data determine.
 
 mod course;
 mod fitted_model;
@@ -33,6 +32,7 @@ use fitted_model::{
 use least_squares::{Minimum, Prior, minimise};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::GripperModel;
+use palpate_sim::physics::SimulationError;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use watched::Watched;
@@ -104,7 +104,7 @@ pub struct FingerFit {
     pub estimates: Vec<Estimate>,
     /// Each recording against its fitted model.
     pub remainders: Vec<Remainder>,
-    /// By which factor intervals are wider than noise alone would make them: what the model does not explain.
+    /// Width of the intervals relative to noise alone, a measure of model error.
     pub widened: f64,
     /// Steps that the fit took.
     pub steps: u32,
@@ -119,15 +119,15 @@ pub struct FingerFit {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FingerFitError {
     /// No recording.
-    #[error("nothing to fit: name a few recorded empty closes, and presses against something held in place")]
+    #[error("nothing to fit: name recorded trials, such as empty closes and presses against a fixed object")]
     Nothing,
     /// A recording without curvature.
-    #[error("{name} has no curvature of either finger: is its flex strip calibrated? `palpate calibrate list` shows")]
+    #[error("{name} has no curvature of either finger: is its flex strip calibrated? See `palpate calibrate list`")]
     NoCurvature {
         /// The recording.
         name: String,
     },
-    /// A recording in which nothing was done.
+    /// A recording with hardly any motion.
     #[error("{name} hardly moves the fingers ({} 1/m at {} bar): record closes to half a bar and more", three_digits(*curvature), three_digits(*bar))]
     NoMotion {
         /// The recording.
@@ -145,45 +145,55 @@ pub enum FingerFitError {
         /// Its length (s).
         duration_s: f64,
     },
-    /// It was given up from outside.
+    /// Cancelled.
     #[error("the fit was stopped; nothing was changed")]
     Stopped,
-    /// The fitted model cannot be computed.
-    #[error("the fit failed: {0}")]
-    Failed(String),
+    /// The fitted model cannot be simulated.
+    #[error("{name} cannot be simulated with the fitted finger: {cause}")]
+    Simulation {
+        /// The recording.
+        name: String,
+        /// Cause.
+        cause: SimulationError,
+    },
+    /// The data do not determine the parameters.
+    #[error(
+        "the parameters cannot be identified from these recordings: add an empty close to a higher pressure, or a press \
+         against a fixed object"
+    )]
+    NotIdentifiable,
 }
 
-/// Pressure between points of the torque curve (bar), at most. A curve that bends between them cannot be fitted: the
-/// rest over then shows in the widening of the intervals.
+/// Largest distance between points of the torque curve (bar). Curvature between the points cannot be fitted; it widens
+/// the intervals.
 const KNOT_BAR: f64 = 0.2;
 
-/// Points of the torque curve besides zero, fewest and most; each costs a simulation of every recording a step.
+/// Fewest and most points of the torque curve besides zero; each costs one simulation of every recording per step.
 const KNOTS: [f64; 2] = [2.0, 8.0];
 
-/// Prior deviation of the finger's parameters from their start, in logarithms: a factor of four and a half, so that it
-/// hardly counts.
+/// Prior deviation of the finger's parameters from their start, in logarithms: a factor of 4.5, hardly a constraint.
 const OPEN: f64 = 1.5;
 
 /// Usual filling time (s).
 const USUAL_LAG: Prior = Prior { mean: 0.05, deviation: 0.3 };
 
-/// Deviation of a strip's zero after it was taken anew (1/m): 0.3 degrees.
+/// Deviation of a strip's zero after a tare (1/m): 0.3 degrees.
 const OFFSET: f64 = 0.1;
 
-/// Deviation of what bending adds to a pad besides its known zero, per curvature (N m). Below its threshold an empty
-/// close shows nothing of it: 0.15 N at 15 1/m.
+/// Deviation of the load of a pad by bending, beyond its calibrated zero, per curvature (N m): 0.15 N at 15 1/m, which a
+/// pad's threshold may hide in an empty close.
 const PRELOAD: f64 = 0.01;
 
-/// Deviation of the instant at which a recording begins (s): half an actuation tick.
+/// Deviation of the start of a recording (s): half an actuation tick.
 const START: f64 = 0.03;
 
-/// Half an interval of 95 % in deviations.
+/// Half width of a 95 % interval, in deviations.
 const HALF: f64 = 1.96;
 
 /// Least curvature that a recording must reach (1/m).
 const LEAST_CURVATURE: f64 = 2.0;
 
-/// Fits the finger to recordings; it begins at the gripper of the first one's scene.
+/// Fits the finger to recordings, starting at the gripper of the first one's scene.
 pub fn fit_finger(observations: &[Observation], trust: &Trust) -> Result<FingerFit, FingerFitError> {
     fit_finger_watched(observations, trust, &FitWatch { progress: &|_| (), stop: &AtomicBool::new(false) })
 }
@@ -201,8 +211,7 @@ pub fn fit_finger_watched(
     let knots: Vec<f64> = (1..=count as u32).map(|k| peak * f64::from(k) / count).collect();
     let mut fitted = FittedModel::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
-    let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)
-        .map_err(|cause| if watch.is_over() { FingerFitError::Stopped } else { FingerFitError::Failed(cause) })?;
+    let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)?;
     let gripper = fitted.gripper(&first.scene.gripper, &minimum.x);
     let estimates = estimates(&minimum, &knots);
     let remainders = remainders(observations, &fitted, &minimum);
@@ -274,7 +283,7 @@ fn estimates(minimum: &Minimum, knots: &[f64]) -> Vec<Estimate> {
         value: lag,
         low: (lag - half).max(0.0),
         high: lag + half,
-        // A lag near zero is known well when it is known to be near zero: against a sample of the real gripper.
+        // A lag near zero is judged against a sample of the real gripper, not against itself.
         known: Known::within(half / lag.max(0.1)),
     });
     let covariance = &minimum.covariance;
@@ -330,13 +339,15 @@ fn remarks(
 ) -> Vec<String> {
     let mut remarks = Vec::new();
     if !minimum.settled {
-        remarks.push("the fit had not settled: the numbers are where it stopped; begin nearer with --scene".to_owned());
+        remarks.push(
+            "the fit did not converge: these are the numbers of its last step. Start closer with --scene".to_owned(),
+        );
     }
     if remainders.iter().all(|remainder| remainder.force_share.is_none()) {
         let grams = 1e3 * first.scene.gripper.finger.mass;
         remarks.push(format!(
-            "no force was measured, so that stiffness and torques rest on the weight of the finger, {} g: one per cent more \
-             weight makes both one per cent more. Weigh it, or add presses with calibrated pads against something held in place",
+            "no force was measured, so stiffness and torques scale with the weight of the finger, {} g: 1 % more weight makes \
+             both 1 % larger. Weigh the finger, or add presses with calibrated pads against a fixed object",
             three_digits(grams)
         ));
     }
@@ -348,22 +359,20 @@ fn remarks(
         ));
     }
     if estimates[STIFFNESS].known != Known::Well && estimates.last().is_some_and(|ratio| ratio.known == Known::Well) {
-        remarks.push(
-            "torque over stiffness is known well, each of them is not: they may only be changed together".to_owned(),
-        );
+        remarks.push("only the ratio of torque to stiffness is identifiable: change both together".to_owned());
     }
     remarks.extend(corrected_sensors(fitted, minimum));
     if minimum.widened > 5.0 {
         let factor = minimum.widened;
         remarks.push(format!(
             "the fitted model explains the recordings only in part: intervals are {factor:.0} times as wide as the noise would make \
-             them. Look at the residuals: contact in an empty close, a strip that creeps, another pressure than commanded?"
+             them. Check the residuals for contact in an empty close, a creeping strip, or a pressure other than commanded"
         ));
     }
     remarks
 }
 
-/// Sensors that the fit had to correct by more than their calibration allows.
+/// Remarks on sensors that the fit corrected by more than their calibration allows.
 fn corrected_sensors(fitted: &FittedModel<'_>, minimum: &Minimum) -> Vec<String> {
     let sensor = |j: usize| minimum.x[fitted.of_finger() + j];
     let mut words = Vec::new();

@@ -5,7 +5,7 @@ use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Signals;
 
-/// One recorded grasp, an empty close or a press against something held in place.
+/// Recorded grasp: an empty close, or a press against a fixed object.
 #[derive(Clone, Debug)]
 pub struct Observation {
     /// Name in messages: `trial 3`.
@@ -20,13 +20,13 @@ pub struct Observation {
     pub object: Option<ObjectModel>,
 }
 
-/// Force below which a real pad is ignored (N): its threshold, and a margin for where it begins to conduct.
+/// Force below which a real pad is ignored (N): its threshold with a margin.
 const LEAST_FORCE: f64 = 0.2;
 
-/// A force is known to this share of itself besides its noise: the repeatability of such pads (data sheet).
+/// Repeatability of a pad as a share of the force (data sheet).
 const FORCE_SHARE: f64 = 0.02;
 
-/// Least deviation of a curvature (1/m): a tenth of a degree over the strip. Below it the model is the worse one.
+/// Least deviation of a curvature (1/m): a tenth of a degree over the strip, about the error of the model.
 const LEAST_CURVATURE_ERROR: f64 = 0.03;
 
 /// One channel of an observation that is fitted.
@@ -42,7 +42,7 @@ pub(super) struct Track {
 }
 
 impl Track {
-    /// Deviation of a sample of some value; none where it is not to be used.
+    /// Deviation of a sample with this value; none if it is not used.
     pub(super) fn deviation(&self, value: f64) -> Option<f64> {
         if self.is_force {
             (value >= LEAST_FORCE).then(|| self.noise.hypot(FORCE_SHARE * value))
@@ -53,14 +53,14 @@ impl Track {
 }
 
 impl Observation {
-    /// From the programme of a scene: what a control box did that followed it.
+    /// Line pressure of a control box that follows the programme of a scene.
     pub fn line_of(scene: &Scene) -> Vec<(f64, f64)> {
         let hz = f64::from(scene.timing.actuation_hz.max(1));
         let ticks = (scene.timing.duration_s * hz).ceil().clamp(0.0, 1e5) as u32;
         (0..ticks).map(|tick| (f64::from(tick) / hz, scene.programme.command(tick).0)).collect()
     }
 
-    /// The channels that can be fitted. Forces only count where something is pressed or the fingers may meet.
+    /// Channels that can be fitted.
     pub(super) fn tracks(&self) -> Vec<Track> {
         let named = |name: &str| self.signals.channels.iter().position(|own| own == name);
         let mut tracks = Vec::new();
@@ -74,14 +74,14 @@ impl Observation {
         tracks
     }
 
-    /// Deviation of the noise of a channel, from its second differences, which motion hardly has: the middle one of
-    /// their sizes, so that touches do not count.
+    /// Deviation of the noise of a channel, from the median size of its second differences, which neither slow motion nor
+    /// a few contacts change.
     fn noise(&self, column: usize) -> f64 {
         let width = self.signals.channels.len();
         let values: Vec<f64> = self.signals.values.chunks_exact(width).map(|row| f64::from(row[column])).collect();
         let mut sizes: Vec<f64> = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        // The middle size of a normal number is 0.6745 deviations, and second differences have sqrt(6) times as much.
+        // The median size of a normal variable is 0.6745 deviations; second differences have sqrt(6) times the deviation.
         sizes.get(sizes.len() / 2).map_or(0.0, |middle| middle / (0.6745 * 6f64.sqrt()))
     }
 

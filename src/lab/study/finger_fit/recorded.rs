@@ -1,5 +1,5 @@
-//! Stored trials as input of the fit: the board's readings through its calibrations, which also bound how far their
-//! gains can be relied on.
+//! Stored trials as input of the fit: the board's readings through its calibrations, which also give the deviations of the
+//! gains.
 
 use super::{Observation, Trust};
 use palpate_sim::gripper::GripperModel;
@@ -28,7 +28,7 @@ pub struct RecordedGrasps {
 /// Error of reading a stored trial for a fit.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedGraspError {
-    /// The store.
+    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// Its object cannot be loaded.
@@ -42,8 +42,8 @@ pub enum RecordedGraspError {
 }
 
 impl RecordedGrasps {
-    /// Reads a trial. The fit begins at `gripper`, or else at the trial's own; `calibrations` are used instead of the
-    /// newest of each part.
+    /// Reads a trial. The fit starts at `gripper`, by default the trial's own; `calibrations` replace the newest of each
+    /// part.
     pub fn add(
         &mut self,
         store: &Store,
@@ -55,7 +55,7 @@ impl RecordedGrasps {
         let own = trial.header.scene;
         let mut scene = own.clone();
         if let Some(gripper) = gripper {
-            // Object and pose are the trial's.
+            // Object and pose remain those of the trial.
             scene.gripper = gripper.clone();
         }
         let empty = trial.header.object == EMPTY;
@@ -86,8 +86,8 @@ impl RecordedGrasps {
 }
 
 impl Trust {
-    /// Standard deviations of the gains: from the calibration's interval, and no better than parts of these kinds
-    /// repeat.
+    /// Takes the standard deviations of the gains from the calibrations' intervals; they are no smaller than the
+    /// repeatability of the parts.
     fn take(&mut self, serving: &Serving) {
         const HALF: f64 = 1.96;
         for (sensor, calibration) in &serving.calibrations {

@@ -38,7 +38,7 @@ fn scene(gripper: &GripperModel) -> Scene {
     scene
 }
 
-/// Something to press against, held in place.
+/// Fixed object to press against.
 fn block() -> ObjectModel {
     ObjectModel::from_primitive("block", palpate_geometry::Primitive::Sphere { radius: 0.033 }, 400.0, 0.6)
 }
@@ -50,7 +50,7 @@ fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
 }
 
 fn observed(name: &str, signals: Signals, scene: &Scene, object: Option<ObjectModel>) -> Observation {
-    // The fit knows everything but the finger.
+    // The fit starts with the default finger.
     let scene = Scene { gripper: GripperModel::default(), ..scene.clone() };
     Observation { name: name.to_owned(), signals, line: Observation::line_of(&scene), scene, object }
 }
@@ -158,7 +158,7 @@ fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FingerFitEr
     // A close alone cannot determine this well; the result shows it.
     assert!(fit.estimates[0].known == Known::Roughly && fit.estimates[6].known == Known::Well, "{:?}", fit.estimates);
     assert!(fit.remarks.iter().any(|r| r.contains("weight of the finger, 30.0 g")), "{:?}", fit.remarks);
-    assert!(fit.remarks.iter().any(|r| r.contains("only be changed together")), "{:?}", fit.remarks);
+    assert!(fit.remarks.iter().any(|r| r.contains("change both together")), "{:?}", fit.remarks);
     Ok(())
 }
 

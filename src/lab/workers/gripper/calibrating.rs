@@ -1,8 +1,9 @@
 //! Calibration on the shared link: readings and applied values in, a curve out.
 
+use super::sensor_job_error::SensorJobError;
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
-use palpate_tactile::calibration::{Calibration, EmptyClose, Point, Procedure};
+use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyClose, Point, Procedure, Unsettled};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -38,12 +39,12 @@ pub struct CalibrationPlan {
 }
 
 /// State of the calibration.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct CalibrationView {
     /// Running calibration.
     pub running: Option<RunningCalibration>,
     /// Result of the last one, in a sentence.
-    pub ended: Option<Result<String, String>>,
+    pub ended: Option<Result<String, SensorJobError>>,
 }
 
 /// Running calibration.
@@ -59,8 +60,8 @@ pub struct RunningCalibration {
     pub next: Option<f64>,
     /// The newest reading (counts).
     pub latest: Option<f64>,
-    /// The settled reading (counts), or the reason why there is none yet.
-    pub settled: Result<f64, String>,
+    /// The settled reading (counts); `None` before the first reading and during an empty close.
+    pub settled: Option<Result<f64, Unsettled>>,
     /// Reason why the last point was not taken.
     pub not_taken: Option<String>,
     /// The points so far.
@@ -69,12 +70,9 @@ pub struct RunningCalibration {
     pub closing: bool,
     /// An empty close can be watched: a pad is calibrated, and none is being watched.
     pub can_close: bool,
-    /// Fit of the points, or the reason why there is none yet.
-    pub fit: Result<Arc<Calibration>, String>,
+    /// Fit of the points; `None` before the first reading.
+    pub fit: Option<Result<Arc<Calibration>, CalibrationFault>>,
 }
-
-/// Reason why other commands are refused meanwhile.
-const WATCHED: &str = "the empty close is being watched";
 
 /// Running calibration in the gripper thread.
 pub(super) struct Calibrating {
@@ -94,7 +92,7 @@ impl Calibrating {
     }
 
     /// Adds a reading; fails where the board has no such channel.
-    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), String> {
+    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), SensorJobError> {
         self.readings = self.readings.saturating_add(1);
         if self.readings < KNOWN_AFTER {
             return Ok(());
@@ -125,14 +123,14 @@ impl Calibrating {
     /// Begins to watch an empty close, with the present calibrations.
     pub(super) fn close_empty(&mut self, board: &Board, store: &Store) {
         let Some(procedure) = &self.procedure else { return };
-        let begun = procedure.fit().map_err(|fault| fault.to_string()).and_then(|pad| {
-            let serving = store.calibrations().serving(None, &[]).map_err(|error| error.to_string())?;
-            let pad = (procedure.sensor(), pad);
-            EmptyClose::begin(board, pad, &serving.calibrations, EmptyClose::SECONDS).map_err(|fault| fault.to_string())
-        });
-        match begun {
+        let begin = || -> Result<EmptyClose, SensorJobError> {
+            let pad = (procedure.sensor(), procedure.fit()?);
+            let serving = store.calibrations().serving(None, &[]).map_err(Arc::new)?;
+            Ok(EmptyClose::begin(board, pad, &serving.calibrations, EmptyClose::SECONDS)?)
+        };
+        match begin() {
             Ok(closing) => (self.closing, self.not_taken) = (Some(closing), None),
-            Err(cause) => self.not_taken = Some(cause),
+            Err(cause) => self.not_taken = Some(cause.to_string()),
         }
     }
 
@@ -145,7 +143,7 @@ impl Calibrating {
             return;
         }
         if self.closing.is_some() {
-            self.not_taken = Some(WATCHED.to_owned());
+            self.not_taken = Some("not possible during an empty close".to_owned());
             return;
         }
         self.not_taken = None;
@@ -165,26 +163,14 @@ impl Calibrating {
     }
 
     /// Stores the calibration and mounts the part at its sensor; none before the first reading.
-    pub(super) fn keep(&self, store: &mut Store) -> Option<Result<String, String>> {
+    pub(super) fn keep(&self, store: &mut Store) -> Option<Result<String, SensorJobError>> {
         let procedure = self.procedure.as_ref().filter(|_| self.closing.is_none())?;
-        let stored = procedure.fit().map_err(|fault| fault.to_string()).and_then(|calibration| {
-            let stored = store.calibrations().add(&calibration.record).map_err(|error| error.to_string())?;
-            store.calibrations().mount(procedure.sensor(), &stored.record.part).map_err(|error| error.to_string())?;
-            Ok(stored)
-        });
-        Some(stored.map(|stored| {
-            let (id, version, part) = (stored.id, stored.version, &stored.record.part);
-            format!("calibration {id} stored: version {version} of \"{part}\", the {}", procedure.sensor().label())
-        }))
+        Some(keep(procedure, store))
     }
 
     pub(super) fn view(&self, link: String) -> RunningCalibration {
         let procedure = self.procedure.as_ref();
-        let waiting = || Err("no readings yet".to_owned());
-        let fit = procedure.map_or_else(
-            || Err("no points yet".to_owned()),
-            |procedure| procedure.fit().map(Arc::new).map_err(|fault| fault.to_string()),
-        );
+        let fit = procedure.map(|procedure| procedure.fit().map(Arc::new));
         let instruction = match (&self.closing, procedure) {
             (Some(closing), _) => closing.instruction(),
             (None, Some(procedure)) => procedure.instruction(),
@@ -196,23 +182,27 @@ impl Calibrating {
             link,
             next: procedure.and_then(Procedure::next),
             latest: procedure.and_then(Procedure::latest),
-            settled: match procedure {
-                _ if self.closing.is_some() => Err(WATCHED.to_owned()),
-                Some(procedure) => procedure.settled().map(|p| p.counts).map_err(|why| why.to_string()),
-                None => waiting(),
-            },
+            settled: procedure
+                .filter(|_| self.closing.is_none())
+                .map(|procedure| procedure.settled().map(|point| point.counts)),
             closing: self.closing.is_some(),
             not_taken: self.not_taken.clone(),
             points: procedure.map(|procedure| procedure.record().points.clone()).unwrap_or_default(),
-            can_close: !self.plan.sensor.is_flex() && self.closing.is_none() && fit.is_ok(),
+            can_close: !self.plan.sensor.is_flex() && self.closing.is_none() && matches!(fit, Some(Ok(_))),
             fit,
         }
     }
 }
 
-fn begin(plan: &CalibrationPlan, board: &Board) -> Result<Procedure, String> {
-    Procedure::new(board, plan.sensor, &plan.part, None).ok_or_else(|| {
-        let (wanted, has) = (plan.sensor.channel(), board.channels.join(", "));
-        format!("the board has no channel \"{wanted}\"; it has {has}")
-    })
+fn begin(plan: &CalibrationPlan, board: &Board) -> Result<Procedure, SensorJobError> {
+    let missing = || SensorJobError::NoChannel { wanted: plan.sensor.channel(), has: board.channels.join(", ") };
+    Procedure::new(board, plan.sensor, &plan.part, None).ok_or_else(missing)
+}
+
+fn keep(procedure: &Procedure, store: &mut Store) -> Result<String, SensorJobError> {
+    let calibration = procedure.fit()?;
+    let stored = store.calibrations().add(&calibration.record).map_err(Arc::new)?;
+    let (id, version, part) = (stored.id, stored.version, &stored.record.part);
+    store.calibrations().mount(procedure.sensor(), part).map_err(Arc::new)?;
+    Ok(format!("calibration {id} stored: version {version} of \"{part}\", the {}", procedure.sensor().label()))
 }

@@ -1,6 +1,7 @@
 //! Crosstalk test on the shared link.
 
-use palpate_device::doctor::{Bleed, CrosstalkTest};
+use super::sensor_job_error::SensorJobError;
+use palpate_device::doctor::{Bleed, CrosstalkError, CrosstalkTest};
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading};
 use std::path::PathBuf;
 
@@ -16,14 +17,14 @@ pub enum CrosstalkCommand {
 }
 
 /// State of the crosstalk test.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct CrosstalkView {
     /// Running test.
     pub running: Option<RunningCrosstalk>,
     /// Crosstalk found so far, or in the last test.
     pub found: Vec<Bleed>,
-    /// Result of the last test, in sentences, or the reason why it failed.
-    pub ended: Option<Result<Vec<String>, String>>,
+    /// Result of the last test, in sentences.
+    pub ended: Option<Result<Vec<String>, SensorJobError>>,
 }
 
 /// Running crosstalk test.
@@ -45,14 +46,14 @@ pub(super) struct Crossing {
 
 impl Crossing {
     /// Adds a reading; true when the test is over. Fails where the board has too few sensors.
-    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<bool, String> {
+    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<bool, CrosstalkError> {
         self.readings = self.readings.saturating_add(1);
         if self.readings < KNOWN_AFTER {
             return Ok(false);
         }
         let test = match &mut self.test {
             Some(test) => test,
-            empty @ None => empty.insert(CrosstalkTest::new(board).map_err(|error| error.to_string())?),
+            empty @ None => empty.insert(CrosstalkTest::new(board)?),
         };
         test.see(board);
         test.feed(reading);
@@ -75,8 +76,8 @@ impl Crossing {
     }
 
     /// Result, in sentences.
-    pub(super) fn summary(&self) -> Result<Vec<String>, String> {
-        self.test.as_ref().map(CrosstalkTest::summary).ok_or_else(|| "no readings from the board".to_owned())
+    pub(super) fn summary(&self) -> Result<Vec<String>, SensorJobError> {
+        self.test.as_ref().map(CrosstalkTest::summary).ok_or(SensorJobError::NoReadings)
     }
 
     pub(super) fn view(&self, link: String) -> RunningCrosstalk {

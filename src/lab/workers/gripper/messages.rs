@@ -80,7 +80,7 @@ pub struct LatestReading {
     /// Counts by channel of the board.
     pub counts: Vec<Option<f32>>,
     /// Angle, curvature, force and pressure by the calibrations; nothing where there are none.
-    pub felt: SensorEstimate,
+    pub estimate: SensorEstimate,
     /// Sensors outside their calibrated range, in the order of `Sensor::ALL`.
     pub beyond: [bool; 4],
     /// Line pressure: as commanded, or as the board reports it (bar).

@@ -1,4 +1,4 @@
-//! The real gripper for a window: a thread "gripper" that owns the link to the board and shares its readings between live view,
+//! The real gripper for the window: a thread "gripper" that owns the link to the board and shares its readings between live view,
 //! recorded trial, recognition and calibration.
 //!
 //! ```text
@@ -14,6 +14,7 @@ mod crosstalk;
 mod messages;
 mod observing;
 mod plotted;
+mod sensor_job_error;
 mod session;
 mod worker;
 
@@ -21,4 +22,5 @@ pub use calibrating::{CalibrationCommand, CalibrationPlan, CalibrationView, Runn
 pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
 pub use messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;
+pub use sensor_job_error::SensorJobError;
 pub use worker::GripperWorker;

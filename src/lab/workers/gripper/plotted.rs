@@ -87,7 +87,7 @@ impl Bin {
         self.last_s = t_s;
         self.many += 1;
         for ((least, largest), value) in self.least.iter_mut().zip(&mut self.largest).zip(values) {
-            // `min` and `max` pass over what is no number.
+            // `min` and `max` skip NaN.
             *least = least.min(*value);
             *largest = largest.max(*value);
         }

@@ -9,6 +9,7 @@ use super::crosstalk::{Crossing, CrosstalkView};
 use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
+use super::sensor_job_error::SensorJobError;
 use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
@@ -18,7 +19,7 @@ use crate::workers::{Latest, Notice, TraceRow, Wake};
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
 use palpate_sim::scene::Scene;
-use palpate_store::Store;
+use palpate_store::{Store, StoreError};
 use palpate_tactile::Channel;
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::{Drift, Readout};
@@ -101,7 +102,7 @@ pub(super) struct GripperSession {
     ended: Option<Arc<EndedTrial>>,
     calibrating: Option<Calibrating>,
     observing: Vec<Observing>,
-    calibrated: Option<Result<String, String>>,
+    calibrated: Option<Result<String, SensorJobError>>,
     crossing: Option<Crossing>,
     crossed: CrosstalkView,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
@@ -298,7 +299,7 @@ impl GripperSession {
     fn disconnect(&mut self, why: &str) {
         self.end(false, Some(format!("ended early: {why}")));
         if self.calibrating.take().is_some() {
-            self.calibrated = Some(Err(format!("nothing was stored: {why}")));
+            self.calibrated = Some(Err(SensorJobError::Disconnected(why.to_owned())));
         }
         if let Some(crossing) = self.crossing.take() {
             self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(crossing.summary()) };
@@ -388,7 +389,7 @@ impl GripperSession {
         let row = connection.plotted.row(reading, &estimate, line_bar);
         let rows = connection.plotted.push(row.clone());
         let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&estimate));
-        connection.latest = Some(LatestReading { counts, felt: estimate, beyond, line_bar });
+        connection.latest = Some(LatestReading { counts, estimate, beyond, line_bar });
         self.plot(rows);
         self.watch(reading);
         self.recognise(&row);
@@ -464,9 +465,9 @@ impl GripperSession {
 }
 
 /// The store, opened when it is first needed.
-fn open<'a>(store: &'a mut Option<Store>, path: &Path) -> Result<&'a mut Store, String> {
+fn open<'a>(store: &'a mut Option<Store>, path: &Path) -> Result<&'a mut Store, StoreError> {
     match store {
         Some(store) => Ok(store),
-        empty @ None => Ok(empty.insert(Store::open(path).map_err(|error| error.to_string())?)),
+        empty @ None => Ok(empty.insert(Store::open(path)?)),
     }
 }

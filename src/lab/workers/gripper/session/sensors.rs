@@ -6,9 +6,11 @@ use crate::workers::Notice;
 use crate::workers::gripper::calibrating::{Calibrating, CalibrationCommand, CalibrationPlan};
 use crate::workers::gripper::crosstalk::{Crossing, CrosstalkCommand, CrosstalkView};
 use crate::workers::gripper::plotted::Plotted;
+use crate::workers::gripper::sensor_job_error::SensorJobError;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Readings before the closing from which the zeros are taken (s).
 const REST_S: f64 = 0.6;
@@ -21,23 +23,18 @@ impl GripperSession {
         let Some(connection) = &self.connection else { return };
         let board = connection.board.clone();
         let read = open(&mut self.store, &self.path).and_then(|store| {
-            let tare = store.calibrations().tare().map_err(|error| error.to_string())?;
-            let serving = store.calibrations().serving(None, &[]).map_err(|error| error.to_string())?;
-            Ok((serving, tare.map(|tare| tare.zero)))
+            let tare = store.calibrations().tare()?;
+            Ok((store.calibrations().serving(None, &[])?, tare.map(|tare| tare.zero)))
         });
-        let (read, zero) = match read {
-            Ok((serving, zero)) => (Ok(serving), zero),
-            Err(cause) => (Err(cause), None),
-        };
-        let (readout, remarks) = match read {
-            Ok(serving) => match Readout::new(&board, &serving.calibrations) {
+        let (readout, remarks, zero) = match read {
+            Ok((serving, zero)) => match Readout::new(&board, &serving.calibrations) {
                 Ok(readout) => {
                     let remarks = serving.warnings.into_iter().chain(readout.warnings().iter().cloned()).collect();
-                    (readout, remarks)
+                    (readout, remarks, zero)
                 }
-                Err(fault) => (Readout::default(), vec![fault.to_string()]),
+                Err(fault) => (Readout::default(), vec![fault.to_string()], zero),
             },
-            Err(cause) => (Readout::default(), vec![cause]),
+            Err(cause) => (Readout::default(), vec![cause.to_string()], None),
         };
         if let Some(connection) = &mut self.connection {
             connection.plotted = Plotted::new(self.channels.to_vec(), board.channels.len());
@@ -95,8 +92,7 @@ impl GripperSession {
         for text in far {
             self.outlets.notify(Notice::Warning(text));
         }
-        let stored = open(&mut self.store, &self.path)
-            .and_then(|store| store.calibrations().add_tare(&zero).map_err(|error| error.to_string()));
+        let stored = open(&mut self.store, &self.path).and_then(|store| store.calibrations().add_tare(&zero));
         match stored {
             Ok(_) => {
                 self.outlets.notify(Notice::Info("Tared.".to_owned()));
@@ -118,7 +114,7 @@ impl GripperSession {
                 let kept = match (&self.calibrating, open(&mut self.store, &self.path)) {
                     (None, _) => return,
                     (Some(calibrating), Ok(store)) => calibrating.keep(store),
-                    (Some(_), Err(cause)) => Some(Err(cause)),
+                    (Some(_), Err(cause)) => Some(Err(Arc::new(cause).into())),
                 };
                 if let Some(kept) = kept {
                     self.end_calibration(Some(kept));
@@ -129,7 +125,7 @@ impl GripperSession {
                 let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection) else { return };
                 match open(&mut self.store, &self.path) {
                     Ok(store) => calibrating.close_empty(&connection.board, store),
-                    Err(cause) => self.outlets.notify(Notice::Warning(cause)),
+                    Err(cause) => self.outlets.notify(Notice::Warning(cause.to_string())),
                 }
             }
             CalibrationCommand::Take(_) | CalibrationCommand::Skip | CalibrationCommand::Undo => {
@@ -147,30 +143,29 @@ impl GripperSession {
         }
     }
 
-    /// What has the fingers at present, where something has, in a sentence.
+    /// Job that uses the fingers now, in a sentence.
     pub(super) fn occupied(&self) -> Option<&'static str> {
         match (&self.recording, &self.calibrating, &self.crossing) {
-            (Some(_), _, _) => Some("a trial goes on: end it first"),
-            (None, Some(_), _) => Some("a calibration goes on: end it first, in the panel Calibration"),
-            (None, None, Some(_)) => Some("a crosstalk test goes on: end it first, in the panel Doctor"),
+            (Some(_), _, _) => Some("a trial is running: end it first"),
+            (None, Some(_), _) => Some("a calibration is running: end it first, in the panel Calibration"),
+            (None, None, Some(_)) => Some("a crosstalk test is running: end it first, in the panel Doctor"),
             (None, None, None) => None,
         }
     }
 
-    /// Sees to it that something is listened to and nothing else has the fingers; or says why not.
-    fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), String> {
+    /// Takes the fingers for a calibration or test; opens a port where none is open.
+    fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), SensorJobError> {
         if let Some(occupied) = self.occupied() {
-            return Err(occupied.to_owned());
+            return Err(SensorJobError::Occupied(occupied));
         }
         if self.connection.is_some() {
             return Ok(());
         }
         self.refused = None;
         if let Err(refused) = self.open_stream(port) {
-            let cause = refused.text.clone();
-            self.outlets.notify(Notice::Failed(cause.clone()));
-            self.refused = Some(refused);
-            return Err(cause);
+            self.outlets.notify(Notice::Failed(refused.text.clone()));
+            self.refused = Some(refused.clone());
+            return Err(refused.into());
         }
         // A port that the user connected stays open.
         let borrowed = self.retried.take().is_none();
@@ -186,7 +181,7 @@ impl GripperSession {
         }
     }
 
-    pub(super) fn end_calibration(&mut self, ended: Option<Result<String, String>>) {
+    pub(super) fn end_calibration(&mut self, ended: Option<Result<String, SensorJobError>>) {
         self.calibrating = None;
         self.calibrated = ended;
         self.return_port("the calibration has ended");
@@ -216,11 +211,11 @@ impl GripperSession {
         match crossing.feed(reading, &connection.board) {
             Ok(false) => {}
             Ok(true) => self.end_crosstalk(None),
-            Err(cause) => self.end_crosstalk(Some(cause)),
+            Err(cause) => self.end_crosstalk(Some(cause.into())),
         }
     }
 
-    fn end_crosstalk(&mut self, cause: Option<String>) {
+    fn end_crosstalk(&mut self, cause: Option<SensorJobError>) {
         let Some(crossing) = self.crossing.take() else { return };
         let ended = cause.map_or_else(|| crossing.summary(), Err);
         self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(ended) };
