@@ -23,7 +23,7 @@ pub(in crate::app) const fn key(
 }
 
 impl Binding {
-    /// Shift beyond what is bound is ignored: some keyboards need it to reach the key.
+    /// True if the key triggers the binding. An additional Shift is ignored: some keyboards need it for the key.
     pub(in crate::app) fn is(&self, key: Key, modifiers: Modifiers) -> bool {
         let KeyboardShortcut { modifiers: wanted, logical_key } = self.shortcut;
         logical_key == key && modifiers.alt == wanted.alt && modifiers.matches_logically(wanted)

@@ -59,8 +59,10 @@ static COMMON: [Binding; 26] = [
         let camera = Camera { parallel: !c.view.camera.parallel, ..c.view.camera };
         Some(ViewAction::SetCamera(camera).into())
     }),
-    key(Modifiers::NONE, Key::F1, "this sheet", |c| Some(ViewAction::ShowKeys(!c.view.keys_shown).into())),
-    key(Modifiers::NONE, Key::Escape, "STOP: vent the real gripper; close this sheet", |_| Some(Action::Stop)),
+    key(Modifiers::NONE, Key::F1, "show or hide the keys", |c| Some(ViewAction::ShowKeys(!c.view.keys_shown).into())),
+    key(Modifiers::NONE, Key::Escape, "STOP: vent the real gripper and end the trial; close the keys", |_| {
+        Some(Action::Stop)
+    }),
     key(Modifiers::NONE, Key::F11, "full screen", |_| None),
 ];
 
@@ -166,6 +168,7 @@ pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::manual::TOPICS;
 
     #[test]
     fn no_key_does_two_things() {
@@ -177,11 +180,29 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_manual_lists_the_same_keys() {
+        let row = |how: &str, does: &str| if does.is_empty() { String::new() } else { format!("| {how} | {does} |\n") };
+        let name = |binding: &Binding| binding.shortcut.format(&egui::ModifierNames::NAMES, false);
+        let table = |keys: &mut dyn Iterator<Item = &'static Binding>| -> String {
+            let rows: String = keys.map(|binding| row(&name(binding), binding.does)).collect();
+            format!("| key | action |\n|---|---|\n{rows}\n")
+        };
+        let mouse: String = MOUSE.iter().map(|(how, does)| row(how, does)).collect();
+        for (topic, expected) in [
+            ("keys", table(&mut bindings(Mode::Demo)) + "| mouse | action |\n|---|---|\n" + &mouse),
+            ("labelling", table(&mut modes::kind(Mode::Label).keys.iter())),
+        ] {
+            let text = TOPICS.iter().find(|own| own.name == topic).expect("a topic").text;
+            assert!(text.contains(&expected), "assets/help/{topic}.md should hold:\n{expected}");
+        }
+    }
+
     fn key(key: Key, modifiers: Modifiers, repeat: bool) -> egui::Event {
         egui::Event::Key { key, physical_key: None, pressed: true, repeat, modifiers }
     }
 
-    /// Lines of the sheet that act on these events in the mode Label.
+    /// Lines of the sheet that act on these events in Label mode.
     fn does(events: Vec<egui::Event>) -> Vec<&'static str> {
         let ctx = egui::Context::default();
         let mut does = Vec::new();

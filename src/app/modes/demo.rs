@@ -1,4 +1,4 @@
-//! Mode Demo: grasp and recognise, live.
+//! Demo mode: grasp and recognise, live.
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
@@ -13,7 +13,7 @@ pub(super) const KIND: ModeKind = ModeKind {
     title: "Demo",
     about: "Grasp and recognise, live (Ctrl+1)",
     layout,
-    open: key(Modifiers::COMMAND, Key::Num1, "mode Demo", |_| Some(ViewAction::SetMode(Mode::Demo).into())),
+    open: key(Modifiers::COMMAND, Key::Num1, "Demo mode", |_| Some(ViewAction::SetMode(Mode::Demo).into())),
     keys: KEYS,
     typed: |_, _| None,
 };

@@ -1,4 +1,4 @@
-//! Mode Label: record and label trials of the real gripper, from the keyboard.
+//! Label mode: record and label trials of the real gripper, from the keyboard.
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
@@ -17,7 +17,7 @@ pub(super) const KIND: ModeKind = ModeKind {
     title: "Label",
     about: "Record and label trials of the real gripper (Ctrl+3)",
     layout,
-    open: key(Modifiers::COMMAND, Key::Num3, "mode Label", |_| Some(ViewAction::SetMode(Mode::Label).into())),
+    open: key(Modifiers::COMMAND, Key::Num3, "Label mode", |_| Some(ViewAction::SetMode(Mode::Label).into())),
     keys: KEYS,
     typed: typed_for_search,
 };
@@ -54,8 +54,8 @@ fn choose(place: usize) -> Option<Action> {
     Some(LabellingAction::ChooseObject(place).into())
 }
 
-/// Text typed in this frame after the key of the search field, or while the cursor is on its way there: it belongs into
-/// the field and is no keys.
+/// Text typed in this frame after the key of the search field, or before the field has focus: it goes into the field and
+/// triggers no keys.
 fn typed_for_search(ctx: &egui::Context, context: &PanelContext<'_>) -> Option<Action> {
     ctx.input_mut(|input| {
         let slash = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Slash, pressed: true, .. });

@@ -1,4 +1,4 @@
-//! Name of a mode, as it is remembered between runs.
+//! Modes of the window, as stored between runs.
 
 use serde::{Deserialize, Serialize};
 
