@@ -73,6 +73,6 @@ actions_from! {
     FileAction => |action| Self::File(action);
     UserMessage => |message| Self::Tell(message);
     Command => |command| Self::Simulation(SimulationAction::Send(command));
-    GripperCommand => |wish| Self::Gripper(GripperAction::Send(wish));
-    LabelCommand => |wish| Self::Labelling(LabellingAction::Edit(wish));
+    GripperCommand => |command| Self::Gripper(GripperAction::Send(command));
+    LabelCommand => |command| Self::Labelling(LabellingAction::Edit(command));
 }

@@ -24,7 +24,7 @@ pub(super) fn channel_curves(context: &PanelContext<'_>, quantity: Quantity, fac
         .collect()
 }
 
-/// Span and finger; the legend shows only colours, so a dashed line says so.
+/// Span and finger; the legend shows only colours, so the name mentions a dashed line.
 fn label(channel: &Channel) -> String {
     let name = channel.name();
     let place = name.trim_start_matches(channel.quantity.name()).trim_start_matches('_').replace('_', " ");

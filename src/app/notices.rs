@@ -73,7 +73,7 @@ impl Notices {
     }
 }
 
-/// Breaks a text between words into lines of at most so many letters: a notice does not wrap by itself.
+/// Breaks a text between words into lines of at most `width` letters; notices do not wrap.
 fn folded(text: &str, width: usize) -> String {
     let mut folded = String::new();
     let mut column = 0;

@@ -130,7 +130,7 @@ fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'sta
     nothing.then_some(if plot.id == "line pressure" {
         "The board does not report line pressure."
     } else {
-        "Sensors not calibrated: see panel Calibration in the mode Label. Raw counts: panel Counts."
+        "Sensors not calibrated: see the Calibration panel in Label mode. Raw counts: Counts panel."
     })
 }
 
@@ -248,7 +248,7 @@ fn hatch(ui: &Ui, transform: &PlotTransform, [from, to]: [f64; 2], shade: Color3
     }
 }
 
-/// Shades times without readings, so that nobody takes them for quiet ones.
+/// Shades times without readings, to tell them from rest.
 fn add_gaps(plot_ui: &mut egui_plot::PlotUi<'_>, gaps: &[[f64; 2]], theme: Theme) {
     let error = theme.colours().error;
     for [from, to] in gaps {

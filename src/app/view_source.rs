@@ -38,7 +38,7 @@ pub(super) struct Recognised<'a> {
     pub(super) truth: Option<(&'a str, String)>,
     /// Text before the first answer.
     pub(super) waiting: &'static str,
-    /// No further grasp follows by itself.
+    /// No further grasp follows automatically.
     pub(super) finished: bool,
 }
 

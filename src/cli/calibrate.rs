@@ -33,7 +33,7 @@ pub(super) struct CalibrateArguments {
     /// Sensor: flexL, flexR, fsrL or fsrR.
     #[arg(required = true, value_parser = parse_sensor)]
     sensor: Option<Sensor>,
-    /// Name of the mounted part, such as the number on its tail (default: the known one). Calibrations belong to parts,
+    /// Name of the mounted part, such as the number written on it (default: the known one). Calibrations belong to parts,
     /// because parts get swapped.
     #[arg(long, value_name = "NAME")]
     part: Option<String>,

@@ -102,7 +102,7 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
 struct CrosstalkReport<'a> {
     sound: bool,
     found: &'a [Bleed],
-    told: Vec<String>,
+    result: Vec<String>,
 }
 
 /// Silence of the board that ends the test.
@@ -157,7 +157,7 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
     };
     let sound = test.is_sound();
     if json {
-        say_json(&CrosstalkReport { sound, found: test.found(), told: test.summary() })?;
+        say_json(&CrosstalkReport { sound, found: test.found(), result: test.summary() })?;
     } else {
         let row = |bleed: &Bleed| {
             let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));

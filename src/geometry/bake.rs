@@ -38,7 +38,7 @@ impl SolidPart {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BakeError {
     /// Nothing to bake.
-    #[error("there is no solid to compute distances from")]
+    #[error("the object has no solid part to compute distances from")]
     NothingSolid,
     /// The lattice would not fit into reasonable memory.
     #[error("a distance grid of {nodes} nodes is too fine; raise solver.distance_cell (the limit is 8 million nodes)")]

@@ -148,7 +148,7 @@ fn parse_stl(name: &str, mut bytes: Vec<u8>) -> Result<TriMesh, MeshFileError> {
         };
         return Err(damaged(name, &cause));
     }
-    // The reader tells the two kinds apart by how a file begins, and stops at the end of the first solid.
+    // The reader detects the kind from the beginning of the file, and stops at the end of the first solid.
     if looks_like_text {
         bytes = as_one_solid(&String::from_utf8_lossy(&bytes));
     } else if let Some(first) = bytes.first_mut() {

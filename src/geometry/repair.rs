@@ -24,7 +24,7 @@ pub enum MeshError {
         index: usize,
     },
     /// A triangle names a corner that does not exist.
-    #[error("triangle {index} of the mesh names a corner that does not exist")]
+    #[error("triangle {index} of the mesh refers to a corner that does not exist")]
     BadIndex {
         /// Index of the triangle.
         index: usize,

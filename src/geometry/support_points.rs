@@ -1,4 +1,4 @@
-//! Points of a surface with which a solid can touch what it rests on: its extreme corners, and an even cover of the
+//! Points of a surface with which a solid can touch its support: its extreme corners, and an even cover of the
 //! rest, since a pedestal is smaller than most things that lie on it.
 
 use super::TriMesh;

@@ -43,7 +43,7 @@ pub enum LearnError {
         class: String,
     },
     /// The data set is empty.
-    #[error("the data set contains no grasps")]
+    #[error("the data set contains no grasps; `palpate collect` and `palpate record` make some")]
     NoData,
     /// A class with too few grasps.
     #[error("class \"{class}\" has only {found} grasps, {needed} are needed; record more or leave the class out")]

@@ -23,7 +23,7 @@ pub enum GpuError {
     )]
     NoDriver,
     /// A driver that gives no device.
-    #[error("the graphics driver {driver} gives no device: {cause}")]
+    #[error("the graphics driver {driver} cannot be used: {cause}; update the driver")]
     NoDevice {
         /// Its name.
         driver: String,

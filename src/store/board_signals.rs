@@ -72,7 +72,7 @@ const HALF_STEP_BAR: f64 = 0.026;
 const ANSWER_S: f64 = 0.1;
 
 /// Whether the reported pressures follow the commands, whose times are then more exact. Where the board refused a
-/// command or vented by itself, only its reports are right.
+/// command or vented on its own, only its reports are right.
 fn follows_commands(commanded: &[(f64, f64)], reported: &[(f64, f64)]) -> bool {
     let other = |(t_s, bar): &&(f64, f64)| {
         let last = commanded.iter().take_while(|(from_s, _)| from_s <= t_s).last();

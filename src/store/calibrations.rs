@@ -369,8 +369,8 @@ pub(super) mod tests {
         };
         let degrees = |store: &Store, asked: &[CalibrationId]| -> Result<f64, Box<dyn std::error::Error>> {
             let serving = store.calibrations().serving(Some(trial), asked)?;
-            let felt = Readout::new(&Board::default(), &serving.calibrations)?.estimate(&reading);
-            Ok(felt.angle[0].ok_or("calibrated")?.to_degrees())
+            let estimate = Readout::new(&Board::default(), &serving.calibrations)?.estimate(&reading);
+            Ok(estimate.angle[0].ok_or("calibrated")?.to_degrees())
         };
         // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.
         let old = store.calibrations().add(&strip("A", 18e3))?.id;

@@ -181,7 +181,7 @@ fn free_name(store: &Path) -> PathBuf {
     std::iter::once(name(String::new())).chain(numbered).find(|path| !path.exists()).unwrap_or_else(|| store.to_owned())
 }
 
-/// Copies a store through a connection of its own, which reads what is committed; the copy appears whole or not at all.
+/// Copies the committed content of a store through a connection of its own; the copy appears whole or not at all.
 fn copy_file(store: &Path, copy: &Path) -> Result<(), String> {
     let unfinished = copy.with_extension("unfinished");
     let _no_remains = std::fs::remove_file(&unfinished);

@@ -18,7 +18,7 @@ const FULL: u64 = 64 << 10;
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The folder cannot be made.
-    #[error("cannot make the folder \"{path}\" for the store: {cause}", path = path.display())]
+    #[error("cannot create the folder \"{path}\" for the store: {cause}; choose another place with --store", path = path.display())]
     Folder {
         /// Path of the folder.
         path: PathBuf,
@@ -86,7 +86,7 @@ pub enum StoreError {
         needed_mb: u64,
     },
     /// The file is read-only.
-    #[error("the store \"{path}\" cannot be written: it or its folder is read-only", path = path.display())]
+    #[error("the store \"{path}\" cannot be written: it or its folder is read-only. Choose another with --store", path = path.display())]
     ReadOnly {
         /// Path of the store.
         path: PathBuf,
@@ -100,7 +100,7 @@ pub enum StoreError {
         hint: &'static str,
     },
     /// A trial to be restored that is not deleted.
-    #[error("trial {id} is not deleted")]
+    #[error("trial {id} is not deleted: nothing to restore")]
     NotDeleted {
         /// Number of the trial.
         id: TrialId,
@@ -112,7 +112,7 @@ pub enum StoreError {
         id: TrialId,
         /// Number of the chunk.
         chunk: i64,
-        /// What the decoder found.
+        /// Error of the decoder.
         cause: BlobError,
     },
     /// A trial whose data differ from their checksum.
@@ -130,7 +130,7 @@ pub enum StoreError {
     BadInfo {
         /// Number of the trial.
         id: TrialId,
-        /// What is wrong with it.
+        /// Cause.
         cause: String,
     },
     /// A trial whose scene this version cannot read.
@@ -160,7 +160,7 @@ pub enum StoreError {
     BadCalibration {
         /// Number of the calibration.
         id: i64,
-        /// What is wrong with it.
+        /// Cause.
         cause: String,
     },
     /// A text that cannot be a label.
@@ -208,7 +208,7 @@ pub enum StoreError {
         change: String,
     },
     /// Any other error of SQLite.
-    #[error("the store \"{path}\" reports: {cause}", path = path.display())]
+    #[error("SQLite error in the store \"{path}\": {cause}", path = path.display())]
     Sqlite {
         /// Path of the store.
         path: PathBuf,

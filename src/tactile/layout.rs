@@ -156,7 +156,7 @@ impl Channel {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LayoutError {
     /// The name is not in the catalogue.
-    #[error("there is no sensor layout \"{name}\"; there are C1 to C8, each also as C1+F and so on")]
+    #[error("unknown sensor layout \"{name}\"; choose C1 to C8, or with force C1+F to C8+F")]
     Unknown {
         /// The name given.
         name: String,

@@ -49,17 +49,17 @@ pub(crate) fn readings(
         seed,
     };
     let mut gripper = EmulatedGripper::new(setup).unwrap();
-    let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+    let (mut decoder, mut events) = (Decoder::default(), Vec::new());
     for k in 1..=(seconds / 0.005) as u32 {
         let now = 0.005 * f64::from(k);
         gripper.advance(now);
-        decoder.push(&gripper.take_bytes(), now, &mut heard);
+        decoder.push(&gripper.take_bytes(), now, &mut events);
     }
-    let reading = |heard| match heard {
+    let reading = |events| match events {
         DecodedEvent::Reading(reading) => Some(reading),
         DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
     };
-    (decoder.board().clone(), heard.into_iter().filter_map(reading).collect())
+    (decoder.board().clone(), events.into_iter().filter_map(reading).collect())
 }
 
 /// The steps of a script that hold angles (degrees) and then loads (kg), 2 s each.
@@ -166,8 +166,8 @@ fn a_resistor_that_is_not_what_the_board_says_is_told() {
             procedure.take(next).unwrap();
         }
     }
-    let told = procedure.fit().expect_err("no such pad").to_string();
-    assert!(told.contains("is not the 47.0 kOhm entered"), "{told}");
+    let found = procedure.fit().expect_err("no such pad").to_string();
+    assert!(found.contains("is not the 47.0 kOhm entered"), "{found}");
 }
 
 /// The twin's scene, and the one with the hidden finger.
@@ -359,8 +359,8 @@ fn a_tare_is_taken_kept_and_shown_beside_the_drift_of_trials() {
     assert!(said.out.contains("corrected from now on") && said.out.contains("slipped"), "{said:?}");
     assert!(said.out.contains("\"flexL\" version 2"), "{said:?}");
     stored(&mut store, &board, rest, &scene, EMPTY, 2.0);
-    let told = json(at, &["calibrate", "drift", "--json"]);
-    assert_eq!((&told[0]["trial"], &told[0]["drift"][1]["level"]), (&1.into(), &"too-far".into()), "{told}");
+    let found = json(at, &["calibrate", "drift", "--json"]);
+    assert_eq!((&found[0]["trial"], &found[0]["drift"][1]["level"]), (&1.into(), &"too-far".into()), "{found}");
     let text = run(at, &["calibrate", "drift", "1"]);
     assert!(text.out.contains("moved") && text.out.contains("tare 2"), "{text:?}");
     refused(at, &["calibrate", "drift", "9"], &["no trial 9", "trials list"]);
@@ -423,8 +423,8 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     assert!((stiffness / hidden.gripper.finger.bending_stiffness - 1.0).abs() < 0.03, "{stiffness} {fit}");
     let twin = Scene::from_file(&at.join("twin.toml")).unwrap();
     assert_eq!(twin.gripper.finger.bending_stiffness, stiffness);
-    let told = run(at, &["recognise", "1", "2"]);
-    assert!(told.code == Some(0) && told.out.contains("bigball"), "{told:?}");
+    let found = run(at, &["recognise", "1", "2"]);
+    assert!(found.code == Some(0) && found.out.contains("bigball"), "{found:?}");
     // Another strip calibration, and the old trial reads differently.
     let mut record = calibrations[0].1.record.clone();
     record.points.iter_mut().for_each(|point| point.stimulus *= 0.9);

@@ -40,9 +40,9 @@ fn a_scene_is_explained_effect_by_effect() {
     let folder = folder();
     let at = folder.path();
     std::fs::write(at.join("scene.toml"), "[effects]\nfriction = \"off\"\n[solver]\naccuracy = \"draft\"\n").unwrap();
-    let told = json(at, &["scene", "explain", "scene.toml", "--set", "object.source=ball", "--fixed", "--json"]);
-    assert_eq!(told["object"], "ball");
-    let effects = told["effects"].as_array().unwrap();
+    let found = json(at, &["scene", "explain", "scene.toml", "--set", "object.source=ball", "--fixed", "--json"]);
+    assert_eq!(found["object"], "ball");
+    let effects = found["effects"].as_array().unwrap();
     let of = |name: &str| effects.iter().find(|effect| effect["name"] == name).unwrap();
     assert_eq!(effects.len(), Effect::ALL.len());
     assert_eq!((&of("friction")["on"], &of("friction")["setting"]), (&false.into(), &"off".into()));
@@ -230,8 +230,8 @@ fn a_grasp_to_a_tolerance_tells_its_error() {
     }
     assert_eq!(fine["accuracy"], "1e-5");
     assert!(fine["quality"]["rejected_steps"].as_u64().unwrap() > 0 && fine["quality"]["missed_steps"] == 0);
-    let told = run(at, &["grasp", "ball", "--set", "solver.accuracy=1e-3", "--error-band", "--no-store"]);
-    assert!(told.code == Some(0) && told.out.contains("shortest step") && told.out.contains("±"), "{told:?}");
+    let found = run(at, &["grasp", "ball", "--set", "solver.accuracy=1e-3", "--error-band", "--no-store"]);
+    assert!(found.code == Some(0) && found.out.contains("shortest step") && found.out.contains("±"), "{found:?}");
     refused(at, &["grasp", "ball", "--set", "solver.accuracy=7"], &["solver.accuracy = 7", "0.1"]);
 }
 

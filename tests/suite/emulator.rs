@@ -86,9 +86,9 @@ fn recorded(emulated: &Emulated, seconds: &str) -> (Value, BoardLog) {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let output = start(command).wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let id = told["trial_id"].as_i64().unwrap();
-    (told, Store::open(&store).unwrap().board_log(id).unwrap().unwrap())
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let id = found["trial_id"].as_i64().unwrap();
+    (found, Store::open(&store).unwrap().board_log(id).unwrap().unwrap())
 }
 
 /// Finds every recorded reading among what was sent, in its order: which of the sent ones they are.
@@ -124,7 +124,7 @@ const CASES: [Case; 12] = [
     case("burst=0.3@1.6/0.7", [0, 0], ""),
     case("clock=200@0", [0, 0], ""),
     case("stuck=0@1.6/0.7", [0, 0], ""),
-    case("rail=2@1.6", [0, 0], ""),
+    case("saturation=2@1.6", [0, 0], ""),
     case("nan=3@1.6/0.7", [0, 0], ""),
     case("loss=0.3@1.6/0.7", [2, 30], ""),
     case("garbage@1.6/0.7", [30, 45], ""),
@@ -137,22 +137,22 @@ const CASES: [Case; 12] = [
 fn survives(case: &Case) {
     let folder = tempfile::tempdir().unwrap();
     let emulated = Emulated::new(folder.path(), &["--faults", case.faults]);
-    let (told, trial) = recorded(&emulated, "4.0");
+    let (found, trial) = recorded(&emulated, "4.0");
     let sent = emulated.sent();
     let kept = among(&sent, &trial);
     let whole: Vec<usize> = kept.windows(2).map(|pair| pair[1] - pair[0] - 1).collect();
     let missing: usize = whole.iter().sum();
     let faults = case.faults;
     let [least, most] = case.missing;
-    assert!((least..=most).contains(&missing), "{faults}: {missing} are missing: {told}");
-    assert_eq!(told["lost"], missing, "{faults}: what is missing is said: {told}, {:?}", trial.gaps);
-    assert_eq!(told["reconnects"], case.reconnects, "{faults}: {told}");
-    assert_eq!(told["dropped"], serde_json::json!([0, 0]), "{faults}");
+    assert!((least..=most).contains(&missing), "{faults}: {missing} are missing: {found}");
+    assert_eq!(found["lost"], missing, "{faults}: what is missing is said: {found}, {:?}", trial.gaps);
+    assert_eq!(found["reconnects"], case.reconnects, "{faults}: {found}");
+    assert_eq!(found["dropped"], serde_json::json!([0, 0]), "{faults}");
     // It goes on to the end: the last reading is no older than a burst, and what a busy machine is behind by.
-    let behind = (told["delay_p95_ms"].as_f64().unwrap() * 0.05) as usize;
+    let behind = (found["delay_p95_ms"].as_f64().unwrap() * 0.05) as usize;
     assert!(
         kept[kept.len() - 1] + 25 + behind > sent.len() && trial.readings.len() + missing > 100,
-        "{faults}: {told}"
+        "{faults}: {found}"
     );
     assert_eq!(missing > 0, !trial.gaps.is_empty(), "{faults}: {:?}", trial.gaps);
     assert!(missing == 0 || trial.gaps.iter().any(|gap| gap.cause.contains(case.cause)), "{faults}: {:?}", trial.gaps);
@@ -180,9 +180,9 @@ fn whatever_fails_nothing_is_invented_and_what_is_missing_is_said() {
 fn a_board_that_restarts_counts_anew_and_its_readings_go_on() {
     let folder = tempfile::tempdir().unwrap();
     let emulated = Emulated::new(folder.path(), &["--faults", "reset@1/0.5"]);
-    let (told, trial) = recorded(&emulated, "3");
+    let (found, trial) = recorded(&emulated, "3");
     let kept = among(&emulated.sent(), &trial);
-    assert!(kept.len() > 100 && kept.windows(2).all(|pair| pair[1] == pair[0] + 1), "{told}");
+    assert!(kept.len() > 100 && kept.windows(2).all(|pair| pair[1] == pair[0] + 1), "{found}");
     assert!(trial.readings.windows(2).all(|pair| pair[0].t_s < pair[1].t_s), "time goes on");
     assert_eq!(trial.gaps.len(), 1, "{:?}", trial.gaps);
     let gap = &trial.gaps[0];
@@ -208,16 +208,16 @@ fn a_port_that_another_program_has_is_waited_for() {
     drop(other);
     let recorded = ran(&waits.wait_with_output().unwrap());
     assert!(recorded.code == Some(0) && recorded.err.contains("retrying each second"), "{recorded:?}");
-    let told: Value = serde_json::from_str(&recorded.out).unwrap();
-    assert!(told["samples"].as_u64() > Some(30) && told["baud"] == 115_200, "{told}");
+    let found: Value = serde_json::from_str(&recorded.out).unwrap();
+    assert!(found["samples"].as_u64() > Some(30) && found["baud"] == 115_200, "{found}");
 }
 
 #[test]
 fn a_clock_that_wraps_is_no_gap() {
     let folder = tempfile::tempdir().unwrap();
     let emulated = Emulated::new(folder.path(), &["--clock-start", "4293967295"]);
-    let (told, trial) = recorded(&emulated, "2.5");
-    assert!(trial.gaps.is_empty() && told["lost"] == 0 && trial.readings.len() > 90, "{told}");
+    let (found, trial) = recorded(&emulated, "2.5");
+    assert!(trial.gaps.is_empty() && found["lost"] == 0 && trial.readings.len() > 90, "{found}");
     // The first readings are placed by when they arrived.
     for pair in trial.readings[10..].windows(2) {
         assert!((pair[1].t_s - pair[0].t_s - 0.02).abs() < 5e-3, "{pair:?}");
@@ -228,10 +228,10 @@ fn a_clock_that_wraps_is_no_gap() {
 fn a_thousand_samples_a_second_on_eight_channels_are_all_recorded() {
     let folder = tempfile::tempdir().unwrap();
     let emulated = Emulated::new(folder.path(), &["--rate", "1000", "--channels", "8"]);
-    let (told, trial) = recorded(&emulated, "2");
-    assert_eq!((&told["lost"], &told["bad_lines"]), (&0.into(), &0.into()), "{told}");
+    let (found, trial) = recorded(&emulated, "2");
+    assert_eq!((&found["lost"], &found["bad_lines"]), (&0.into(), &0.into()), "{found}");
     let numbers: Vec<u64> = trial.readings.iter().map(|reading| reading.seq.unwrap()).collect();
-    assert!(numbers.len() > 1500 && numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "{told}");
+    assert!(numbers.len() > 1500 && numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "{found}");
     assert!(trial.readings.iter().all(|reading| reading.counts.len() == 8));
 }
 
@@ -266,16 +266,16 @@ fn diagnosed(arguments: &[&str], seconds: &str) -> (i32, Vec<(String, String)>, 
     command.arg("doctor").arg(emulated.port()).args(["--seconds", seconds, "--json"]);
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let output = start(command).wait_with_output().unwrap();
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {output:?}"));
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {output:?}"));
     let text = |finding: &Value, key: &str| finding[key].as_str().unwrap_or_default().to_owned();
-    let findings = told["findings"].as_array().unwrap();
+    let findings = found["findings"].as_array().unwrap();
     for finding in findings.iter().filter(|finding| ["note", "failed"].contains(&text(finding, "verdict").as_str())) {
         let all = ["cause", "fix", "command"];
         assert!(all.iter().all(|part| !text(finding, part).is_empty()), "{finding}");
     }
     let wrong = findings.iter().filter(|finding| !["passed", "skipped"].contains(&text(finding, "verdict").as_str()));
     let wrong = wrong.map(|finding| (text(finding, "check"), text(finding, "verdict"))).collect();
-    (output.status.code().unwrap_or(-1), wrong, told)
+    (output.status.code().unwrap_or(-1), wrong, found)
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
     let moving = "rest=0.2; angleL=60 hold=0.4; rest=0.4; angleR=60 hold=0.4; rest=0.4; load=2N hold=0.5; rest=9";
     let cases: [(&str, &[&str], &str, &str); 9] = [
         ("", &[], "3", ""),
-        ("rail=2@0", &[], "3", "saturation"),
+        ("saturation=2@0", &[], "3", "saturation"),
         ("open=0@0", &[], "3", "open-circuit"),
         ("nan=1@0", &[], "3", "open-circuit"),
         ("crosstalk=0.2@0", &[], "3", "crosstalk"),
@@ -300,16 +300,16 @@ fn the_doctor_finds_each_fault_and_nothing_in_a_sound_gripper() {
         };
         let looks: Vec<_> = cases.iter().map(|case| (case, scope.spawn(move || look(case)))).collect();
         for ((faults, _, _, check), look) in looks {
-            let (code, wrong, told) = look.join().unwrap();
+            let (code, wrong, found) = look.join().unwrap();
             let wrong: Vec<&str> =
                 wrong.iter().filter(|(_, verdict)| verdict == "failed").map(|(c, _)| c.as_str()).collect();
             let want: Vec<&str> = check.split_whitespace().collect();
-            assert_eq!((code, &wrong), (i32::from(!want.is_empty()), &want), "{faults}: {told:#}");
+            assert_eq!((code, &wrong), (i32::from(!want.is_empty()), &want), "{faults}: {found:#}");
         }
     });
     // It is found by trying, and worth a note. Not beside the others: a host that is late loses bytes at speeds it tries.
-    let (code, wrong, told) = diagnosed(&["--baud", "250000"], "9");
-    assert!(code == 0 && wrong.contains(&("baud".to_owned(), "note".to_owned())), "{told:#}");
+    let (code, wrong, found) = diagnosed(&["--baud", "250000"], "9");
+    assert!(code == 0 && wrong.contains(&("baud".to_owned(), "note".to_owned())), "{found:#}");
 }
 
 #[test]

@@ -220,8 +220,11 @@ fn the_demo_goes_on_until_it_is_sure_and_says_so() {
         assert!(most < 0.9, "it would have been sure earlier: {grasp}");
     }
     assert!(catalogue().len() + 1 == last.len() && story["stage_one"]["size"].is_string());
-    let told = run(at, &["demo", "--object", "box", "--seed", "3", "--no-pictures", "--no-store"]);
-    assert!(told.code == Some(0) && told.out.contains("Most likely:") && told.out.contains("Stage one: "), "{told:?}");
+    let found = run(at, &["demo", "--object", "box", "--seed", "3", "--no-pictures", "--no-store"]);
+    assert!(
+        found.code == Some(0) && found.out.contains("Most likely:") && found.out.contains("Stage one: "),
+        "{found:?}"
+    );
     assert_eq!(run(at, &["demo", "--threshold", "1.5"]).code, Some(2));
     refused(at, &["demo", "--model", "gone.safetensors"], &["gone.safetensors"]);
 }

@@ -51,7 +51,7 @@ impl Board {
         let (stop, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU32::new(first)));
         let (stopped, count) = (Arc::clone(&stop), Arc::clone(&sent));
         let thread = std::thread::spawn(move || {
-            let (mut told, mut buffer, start) = (Vec::new(), [0; 256], Instant::now());
+            let (mut result, mut buffer, start) = (Vec::new(), [0; 256], Instant::now());
             let hello = b"\n# tactile-gripper fw=1 adc=12 vref=3.3 rate=100 ch=flexL,flexR,fsrL,fsrR\n";
             let _unheard = board.write_all(hello);
             let mut i = first;
@@ -61,13 +61,13 @@ impl Board {
                 i += 1;
                 count.store(i, Ordering::Relaxed);
                 if let Ok(n) = board.read(&mut buffer) {
-                    told.extend_from_slice(&buffer[..n]);
+                    result.extend_from_slice(&buffer[..n]);
                 }
                 let due = start + Duration::from_millis(10) * (i - first);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));
             }
             drop(port);
-            told
+            result
         });
         Self { link: link.to_owned(), stop, sent, thread: Some(thread) }
     }
@@ -77,8 +77,8 @@ impl Board {
         // Its number may be another's the moment it is free.
         std::fs::remove_file(&self.link).unwrap();
         self.stop.store(true, Ordering::Relaxed);
-        let told = self.thread.take().unwrap().join().unwrap();
-        (String::from_utf8(told).unwrap(), self.sent.load(Ordering::Relaxed))
+        let result = self.thread.take().unwrap().join().unwrap();
+        (String::from_utf8(result).unwrap(), self.sent.load(Ordering::Relaxed))
     }
 }
 
@@ -95,7 +95,7 @@ fn record(folder: &Path, port: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-fn told(child: Child) -> serde_json::Value {
+fn result(child: Child) -> serde_json::Value {
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).unwrap()
@@ -119,12 +119,12 @@ fn a_second_of_a_board_is_a_trial_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let port = folder.path().join("due");
     let board = Board::plug_in(&port, 0);
-    let told = told(start(record(folder.path(), &port, &["--seconds", "1"])));
+    let result = result(start(record(folder.path(), &port, &["--seconds", "1"])));
     board.unplug();
-    assert_eq!((&told["lost"], &told["bad_lines"], &told["reconnects"]), (&0.into(), &0.into(), &0.into()));
-    let samples = told["samples"].as_u64().unwrap();
-    assert!(told["trial_id"] == 1 && (97..=103).contains(&samples), "{told}");
-    assert!((told["rate_hz"].as_f64().unwrap() - 100.0).abs() < 1.0 && told["jitter_p95_ms"].is_f64(), "{told}");
+    assert_eq!((&result["lost"], &result["bad_lines"], &result["reconnects"]), (&0.into(), &0.into(), &0.into()));
+    let samples = result["samples"].as_u64().unwrap();
+    assert!(result["trial_id"] == 1 && (97..=103).contains(&samples), "{result}");
+    assert!((result["rate_hz"].as_f64().unwrap() - 100.0).abs() < 1.0 && result["jitter_p95_ms"].is_f64(), "{result}");
     let store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
     let trial = store.board_log(1).unwrap().unwrap();
     for pair in trial.readings.windows(2) {
@@ -140,7 +140,7 @@ fn a_second_of_a_board_is_a_trial_and_says_so() {
     assert_eq!(text.code, Some(0), "{text:?}");
     assert_eq!(std::fs::read_to_string(&out).unwrap().lines().count() as u64, samples + 1);
     let again = start(record(folder.path(), &out.with_extension("bytes"), &["--speed", "0"]));
-    let again = self::told(again);
+    let again = self::result(again);
     assert!(again["samples"].as_u64().unwrap() >= samples && again["lost"] == 0, "{again}");
     let shown = crate::program::json(folder.path(), &["trials", "show", "1", "--json"]);
     assert_eq!(shown["cadence"]["samples"], samples);
@@ -155,9 +155,9 @@ fn a_board_that_vanishes_while_it_is_recorded_leaves_a_gap_and_comes_back() {
     wait_for_samples(&store, 0, 50);
     let (_, sent) = board.unplug();
     let board = Board::plug_in(&port, sent + 50);
-    let told = told(child);
+    let result = result(child);
     board.unplug();
-    assert_eq!(told["reconnects"], 1, "{told}");
+    assert_eq!(result["reconnects"], 1, "{result}");
     let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     assert_eq!(trial.gaps.len(), 1, "{:?}", trial.gaps);
     assert!(trial.gaps[0].cause.contains("unplugged") && trial.gaps[0].lost >= Some(50), "{:?}", trial.gaps);
@@ -177,12 +177,12 @@ fn a_board_that_does_not_come_back_leaves_a_gap_to_the_end() {
     let child = start(record(folder.path(), &port, &["--seconds", "2.5"]));
     wait_for_samples(&store, 0, 50);
     board.unplug();
-    let told = told(child);
+    let result = result(child);
     let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     let [gap] = &trial.gaps[..] else { panic!("{:?}", trial.gaps) };
     assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.began_s >= 2.5, "{gap:?}");
     assert_eq!(gap.from_s, trial.readings.last().unwrap().t_s);
-    assert!(told["warnings"].to_string().contains("interrupted"), "{told}");
+    assert!(result["warnings"].to_string().contains("interrupted"), "{result}");
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn a_kill_loses_no_more_than_the_last_second_and_no_other_trial() {
     let folder = tempfile::tempdir().unwrap();
     let (port, store) = (folder.path().join("due"), folder.path().join("trials.sqlite"));
     let board = Board::plug_in(&port, 0);
-    told(start(record(folder.path(), &port, &["--seconds", "0.3"])));
+    result(start(record(folder.path(), &port, &["--seconds", "0.3"])));
     let mut child = start(record(folder.path(), &port, &[]));
     wait_for_samples(&store, 1, 100);
     std::thread::sleep(Duration::from_millis(500));
@@ -216,9 +216,9 @@ fn an_end_by_ctrl_c_is_an_end_in_order() {
     wait_for_samples(&store, 0, 50);
     let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(interrupted.success());
-    let told = told(child);
+    let result = result(child);
     board.unplug();
-    assert!(told["samples"].as_u64().unwrap() >= 50 && told["lost"] == 0, "{told}");
+    assert!(result["samples"].as_u64().unwrap() >= 50 && result["lost"] == 0, "{result}");
     assert_eq!(Store::open(&store).unwrap().list(false).unwrap()[0].state, "complete");
 }
 
@@ -229,15 +229,22 @@ fn two_programs_record_two_boards_into_one_store() {
     let boards: Vec<Board> = ports.iter().map(|port| Board::plug_in(port, 0)).collect();
     let children: Vec<Child> =
         ports.iter().map(|port| start(record(folder.path(), port, &["--seconds", "1"]))).collect();
-    let told: Vec<serde_json::Value> = children.into_iter().map(told).collect();
+    let result: Vec<serde_json::Value> = children.into_iter().map(result).collect();
     boards.into_iter().for_each(|board| drop(board.unplug()));
     let store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
-    for told in told {
-        let trial = store.board_log(told["trial_id"].as_i64().unwrap()).unwrap().unwrap();
-        assert_eq!((told["samples"].as_u64(), &told["lost"]), (Some(trial.readings.len() as u64), &0.into()), "{told}");
+    for result in result {
+        let trial = store.board_log(result["trial_id"].as_i64().unwrap()).unwrap().unwrap();
+        assert_eq!(
+            (result["samples"].as_u64(), &result["lost"]),
+            (Some(trial.readings.len() as u64), &0.into()),
+            "{result}"
+        );
         // How many come within a second is up to the machine; none of them may be missing in between.
         let counted = |pair: &[Reading]| pair[0].seq.zip(pair[1].seq).is_none_or(|(a, b)| b == a + 1);
-        assert!(trial.readings.len() > 50 && trial.gaps.is_empty() && trial.readings.windows(2).all(counted), "{told}");
+        assert!(
+            trial.readings.len() > 50 && trial.gaps.is_empty() && trial.readings.windows(2).all(counted),
+            "{result}"
+        );
     }
 }
 
@@ -251,7 +258,7 @@ fn a_driven_grasp_tells_the_board_each_pressure_and_vents() {
     std::fs::write(&scene, programme).unwrap();
     let board = Board::plug_in(&port, 0);
     let scene = scene.to_string_lossy().into_owned();
-    told(start(record(folder.path(), &port, &["--drive", "--scene", &scene])));
+    result(start(record(folder.path(), &port, &["--drive", "--scene", &scene])));
     let (lines, _) = board.unplug();
     let said: Vec<&str> = lines.lines().collect();
     let pressures: Vec<&str> = said.iter().copied().filter(|line| line.starts_with('P')).collect();

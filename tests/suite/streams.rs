@@ -127,13 +127,13 @@ impl BoardStream for Emulated {
         std::thread::sleep(self.look);
         self.t_s += LOOK_S;
         self.gripper.advance(self.t_s);
-        let (bytes, mut heard) = (self.gripper.take_bytes(), Vec::new());
+        let (bytes, mut decoded) = (self.gripper.take_bytes(), Vec::new());
         if bytes.is_empty() {
             return Vec::new();
         }
-        self.decoder.push(&bytes, self.t_s, &mut heard);
+        self.decoder.push(&bytes, self.t_s, &mut decoded);
         let piece = LinkEvent::Captured(Captured::Bytes { arrived_s: self.t_s, bytes });
-        std::iter::once(piece).chain(heard.into_iter().map(LinkEvent::Decoded)).collect()
+        std::iter::once(piece).chain(decoded.into_iter().map(LinkEvent::Decoded)).collect()
     }
 
     fn status(&self) -> LinkStatus {

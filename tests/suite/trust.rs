@@ -58,11 +58,11 @@ fn a_trial_that_misses_its_tolerance_says_where_and_when() {
     assert!(quality.finite && !quality.converged && quality.unconverged_steps > 0, "{quality:?}");
     assert!(imbalance.worst_excess > 1.0, "{imbalance:?}");
     assert!((imbalance.first_tick as f64 / 300.0 - imbalance.first_s).abs() < 1e-9, "{imbalance:?}");
-    let told = trial.header.warnings.iter().find(|w| w.contains("missed the solver's tolerance")).unwrap();
+    let found = trial.header.warnings.iter().find(|w| w.contains("missed the solver's tolerance")).unwrap();
     let steps = format!("{} of 1200 steps", quality.unconverged_steps);
     let tick = format!("(tick {})", imbalance.first_tick);
     for part in [&steps, &tick, &imbalance.worst_at] {
-        assert!(told.contains(part.as_str()), "{told}");
+        assert!(found.contains(part.as_str()), "{found}");
     }
     assert!(imbalance.worst_at == "the object" || imbalance.worst_at.contains("finger"), "{imbalance:?}");
     assert_eq!(sound().data.quality.imbalance, None);
@@ -72,8 +72,8 @@ fn a_trial_that_misses_its_tolerance_says_where_and_when() {
 fn a_trial_that_leaves_the_range_keeps_what_came_before_and_says_what_left() {
     let trial = not_finite();
     assert!(!trial.data.quality.finite && trial.frames().len() == 75, "{:?}", trial.data.quality);
-    let told = trial.header.warnings.iter().find(|w| w.contains("left the range of numbers")).unwrap();
-    assert!(told.contains("1.000 s (step 300)") && told.contains("the object"), "{told}");
+    let found = trial.header.warnings.iter().find(|w| w.contains("left the range of numbers")).unwrap();
+    assert!(found.contains("1.000 s (step 300)") && found.contains("the object"), "{found}");
     assert!(trial.frames().iter().all(|f| f.q.iter().all(|q| q.is_finite())));
 }
 

@@ -133,7 +133,7 @@ fn table(rows: &[Vec<String>], width: usize, bold: bool) -> String {
             _ => break,
         }
     }
-    // Where first cells wrap, rows need a gap to be told apart.
+    // Where first cells wrap, rows need a gap between them.
     let spread = rows.iter().any(|row| widths.first().is_some_and(|width| cell(row, 0).chars().count() > *width));
     let mut lines = Vec::new();
     for (number, row) in rows.iter().enumerate() {

@@ -58,7 +58,7 @@ impl Next {
                 // The two ports of a Due are two boards to the tools of Arduino.
                 let write = format!("palpate doctor --sketch {SKETCH}");
                 let due = port.filter(|port| port.usb.as_ref().is_some_and(|usb| matches!(usb.pid, 0x003d | 0x003e)));
-                // Nothing is uploaded to another board by a command that somebody copies.
+                // A copied command must not upload to another board.
                 let Some(due) = due else { return Some(write) };
                 let (board, host) = match due.kind.native {
                     true => ("arduino_due_x", ""),
@@ -473,7 +473,7 @@ fn rate(seen: &Observations) -> Outcome {
         if lost > LOST_SHARE {
             let seen = format!("{} of {} samples lost", cadence.lost, cadence.samples + cadence.lost);
             if cadence.bad_lines > 0 {
-                // Another check's: what is unreadable is missing.
+                // Unreadable lines are missing readings; another check reports them.
                 return Outcome::note(seen).because("Some lines were unreadable", "See the check of lines");
             }
             let cause = if bytes + rows > 0 {

@@ -352,7 +352,7 @@ mod tests {
         test: CrosstalkTest,
         t_s: f64,
         share: f64,
-        /// Moves the right pad by itself while the left one is pressed.
+        /// Moves the right pad while the left one is pressed.
         clumsy: bool,
     }
 
@@ -378,8 +378,8 @@ mod tests {
             }
         }
 
-        /// Does what is asked for, to the end.
-        fn obey(&mut self) {
+        /// Follows the instructions to the end.
+        fn follow(&mut self) {
             while let Some(sensor) = self.test.source() {
                 assert_eq!(self.test.instruction(), "do not touch the fingers");
                 self.rest(1.1);
@@ -402,7 +402,7 @@ mod tests {
     fn each_pair_that_bleeds_is_found_and_no_other() {
         let mut hand = Hand::new(0.1);
         assert_eq!(hand.test.step(), [1, 4]);
-        hand.obey();
+        hand.follow();
         let bleeds: Vec<(Sensor, Sensor, i32)> = hand
             .test
             .found()
@@ -423,7 +423,7 @@ mod tests {
     fn a_sound_board_and_a_clumsy_hand_are_no_crosstalk() {
         for clumsy in [false, true] {
             let mut hand = Hand { clumsy, ..Hand::new(0.0) };
-            hand.obey();
+            hand.follow();
             let lines = hand.test.summary();
             let sound = "No crosstalk of 1 % or more";
             let touched =

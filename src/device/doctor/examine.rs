@@ -11,7 +11,7 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// Times of the query `?`: the board may restart when the port is opened.
 const ASKED_AT: [Duration; 2] = [Duration::from_millis(300), Duration::from_millis(4500)];
 
-/// Opens a port and listens for a time. `goes_on` is called again and again with the time so far (s); false ends it
+/// Opens a port and listens for a time. `goes_on` is called repeatedly with the time so far (s); false ends it
 /// early.
 pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(f64) -> bool) -> Observations {
     let mut seen = Observations {

@@ -49,12 +49,12 @@ fn moving(counts: impl Fn(f32) -> [f32; 4]) -> ChannelTraces {
 
 /// The checks that do not find everything good.
 fn complaints(seen: &Observations) -> Vec<(&'static str, CheckStatus)> {
-    let told = findings(seen).into_iter().filter(|finding| finding.verdict != CheckStatus::Passed);
-    let told: Vec<CheckFinding> = told.collect();
-    for finding in told.iter().filter(|finding| finding.verdict > CheckStatus::Passed) {
+    let found = findings(seen).into_iter().filter(|finding| finding.verdict != CheckStatus::Passed);
+    let found: Vec<CheckFinding> = found.collect();
+    for finding in found.iter().filter(|finding| finding.verdict > CheckStatus::Passed) {
         assert!(finding.cause.is_some() && finding.fix.is_some(), "{finding:?}");
     }
-    told.iter().map(|finding| (finding.check, finding.verdict)).collect()
+    found.iter().map(|finding| (finding.check, finding.verdict)).collect()
 }
 
 fn changed(change: impl Fn(&mut LinkStatus)) -> Observations {
@@ -84,11 +84,11 @@ fn a_port_that_does_not_open_is_told_once_and_the_rest_is_not_seen() {
             command: Some("sudo".to_owned()),
         };
         let seen = Observations { refused: Some(refused), link: None, ..sound() };
-        let told = findings(&seen);
-        let wrong: Vec<&CheckFinding> = told.iter().filter(|finding| finding.verdict == CheckStatus::Failed).collect();
+        let found = findings(&seen);
+        let wrong: Vec<&CheckFinding> = found.iter().filter(|finding| finding.verdict == CheckStatus::Failed).collect();
         assert!(wrong.len() == 1 && wrong[0].check == check, "{wrong:?}");
         assert_eq!((wrong[0].command.as_deref(), wrong[0].cause.as_deref()), (Some("sudo"), Some("why")));
-        assert!(told.iter().filter(|finding| finding.verdict == CheckStatus::Skipped).count() >= 10);
+        assert!(found.iter().filter(|finding| finding.verdict == CheckStatus::Skipped).count() >= 10);
     }
 }
 
@@ -110,10 +110,10 @@ fn a_silent_port_is_told_by_what_it_is() {
             link.port.kind.native = native;
         });
         seen.traces = ChannelTraces::default();
-        let told =
+        let found =
             findings(&seen).into_iter().find(|finding| finding.verdict == CheckStatus::Failed).expect("one is wrong");
-        assert_eq!(told.check, "silence");
-        told.cause.unwrap_or_default()
+        assert_eq!(found.check, "silence");
+        found.cause.unwrap_or_default()
     };
     assert!(silent(true).contains("DTR") && !silent(false).contains("DTR"));
 }
@@ -171,10 +171,10 @@ fn nonsense_is_told_as_a_wrong_rate() {
         link.cadence = Cadence { printable_share: 0.4, bad_lines: 30, ..Cadence::default() };
     });
     seen.traces = ChannelTraces::default();
-    let told = complaints(&seen);
+    let found = complaints(&seen);
     assert!(
-        told.contains(&("baud", CheckStatus::Failed)) && told.contains(&("lines", CheckStatus::Failed)),
-        "{told:?}"
+        found.contains(&("baud", CheckStatus::Failed)) && found.contains(&("lines", CheckStatus::Failed)),
+        "{found:?}"
     );
 }
 

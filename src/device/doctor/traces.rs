@@ -11,7 +11,7 @@ const WITHIN_S: f64 = 0.2;
 /// Changes that are remembered.
 const MOST_CHANGES: usize = 1000;
 
-/// Range of one channel, and how it follows the one before it.
+/// Range of one channel, and its correlation with the one before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelTrace {
     /// Readings with a number.
@@ -114,26 +114,26 @@ mod tests {
         // Pressed meanwhile, while the one before it rests: that is not its doing.
         let press = |k: u8| if (100..150).contains(&k) { 500.0 } else { 0.0 };
         let bent = |k: u8| 1000.0 + 7.0 * f32::from(k.min(99));
-        let told = traces((0..200_u8).map(|k| [Some(bent(k)), Some(0.2 * bent(k) + press(k)), Some(50.0)]));
-        let share = told.channels[1].takes().expect("it does");
+        let found = traces((0..200_u8).map(|k| [Some(bent(k)), Some(0.2 * bent(k) + press(k)), Some(50.0)]));
+        let share = found.channels[1].takes().expect("it does");
         assert!((share - 0.2).abs() < 1e-4);
-        assert_eq!((told.channels[0].takes(), told.channels[2].takes()), (None, None));
-        assert_eq!((told.channels[0].least, told.channels[0].most), (1000.0, 1693.0));
+        assert_eq!((found.channels[0].takes(), found.channels[2].takes()), (None, None));
+        assert_eq!((found.channels[0].least, found.channels[0].most), (1000.0, 1693.0));
     }
 
     #[test]
     fn a_channel_that_is_held_or_goes_its_own_way_takes_nothing() {
         let bent = |k: u8| 1000.0 + 7.0 * f32::from(k);
-        let told = traces((0..100_u8).map(|k| [Some(bent(k)), Some(300.0), Some(300.0 + 10.0 * f32::from(k))]));
-        assert_eq!((told.channels[1].takes(), told.channels[2].takes()), (None, None));
+        let found = traces((0..100_u8).map(|k| [Some(bent(k)), Some(300.0), Some(300.0 + 10.0 * f32::from(k))]));
+        assert_eq!((found.channels[1].takes(), found.channels[2].takes()), (None, None));
         let closing = traces((0..100_u8).map(|k| [Some(bent(k)), Some(200.0 + 2.0 * bent(k)), None]));
         assert_eq!(closing.channels[1].takes(), Some(2.2), "what no multiplexer does is left to the check");
     }
 
     #[test]
     fn readings_without_a_number_are_counted_and_no_more() {
-        let told = traces((0..4_u8).map(|k| [Some(1.0), (k > 0).then_some(2.0), None]));
-        assert_eq!((told.channels[1].numbers, told.channels[1].without), (3, 1));
-        assert_eq!((told.channels[2].numbers, told.channels[2].without), (0, 4));
+        let found = traces((0..4_u8).map(|k| [Some(1.0), (k > 0).then_some(2.0), None]));
+        assert_eq!((found.channels[1].numbers, found.channels[1].without), (3, 1));
+        assert_eq!((found.channels[2].numbers, found.channels[2].without), (0, 4));
     }
 }

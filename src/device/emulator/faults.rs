@@ -57,7 +57,7 @@ const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, w
 
 const TABLE: [Row; 16] = [
     row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE is stuck at its reading"),
-    row(FaultKind::Saturated, "rail", 0.0, FOR_EVER, "channel VALUE is saturated at full scale"),
+    row(FaultKind::Saturated, "saturation", 0.0, FOR_EVER, "channel VALUE is saturated at full scale"),
     row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE is disconnected"),
     row(FaultKind::Nan, "nan", 0.0, FOR_EVER, "channel VALUE is printed as nan"),
     row(FaultKind::Crosstalk, "crosstalk", 0.2, FOR_EVER, "each channel picks up a share VALUE of the one before"),
@@ -124,11 +124,11 @@ pub fn fault_help() -> String {
 pub struct FaultError {
     /// The fault.
     pub text: String,
-    /// What is wrong with it.
+    /// Problem.
     pub problem: FaultProblem,
 }
 
-/// What is wrong with a fault.
+/// Problem of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FaultProblem {
     /// No time.
@@ -138,7 +138,7 @@ pub enum FaultProblem {
     #[error("is not one of {names}", names = TABLE.map(|row| row.name).join(", "))]
     Unknown,
     /// A wrong number.
-    #[error("has a wrong number")]
+    #[error("has an invalid number")]
     Number,
 }
 
@@ -151,6 +151,8 @@ pub fn parse_faults(text: &str) -> Result<Vec<EmulatedFault>, FaultError> {
 fn parse_fault(text: &str) -> Result<EmulatedFault, FaultProblem> {
     let (named, times) = text.split_once('@').ok_or(FaultProblem::NoTime)?;
     let (name, value) = named.split_once('=').map_or((named, None), |(name, value)| (name, Some(value)));
+    // Its name in version 0.1.0.
+    let name = if name == "rail" { FaultKind::Saturated.name() } else { name };
     let row = TABLE.iter().find(|row| row.name == name).ok_or(FaultProblem::Unknown)?;
     let (from, duration) = times.split_once('/').map_or((times, None), |(from, lasts)| (from, Some(lasts)));
     let number = |text: Option<&str>, usual: f64| match text {
@@ -174,6 +176,7 @@ mod tests {
         assert_eq!((faults[0].kind, faults[0].until_s), (FaultKind::Vanish, 6.0));
         assert!(faults[2].value == 2.0 && faults[2].until_s.is_infinite() && faults[2].is_on(1e9));
         assert!(garbage.is_on(7.0) && !garbage.is_on(9.0) && !garbage.is_on(6.9));
+        assert_eq!(parse_faults("rail=2@1"), parse_faults("saturation=2@1"));
         for fault in faults {
             assert_eq!(parse_faults(&fault.to_string()), Ok(vec![fault]));
         }
@@ -190,8 +193,8 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_fault_is_said() {
         for (text, word) in [("vanish", "time"), ("vnish@3", "vanish"), ("loss=x@3", "number"), ("loss@-1", "number")] {
-            let told = parse_faults(text).expect_err(text).to_string();
-            assert!(told.contains(word) && told.contains(text), "{told}");
+            let found = parse_faults(text).expect_err(text).to_string();
+            assert!(found.contains(word) && found.contains(text), "{found}");
         }
     }
 }

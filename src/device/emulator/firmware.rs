@@ -146,8 +146,8 @@ impl FirmwareBoard {
     /// Takes one byte from the host; true when a pressure was set by it.
     pub(super) fn hear(&mut self, byte: u8, now_us: u32, out: &mut String) -> bool {
         // SAFETY: `run` gives valid pointers.
-        let heard = |board, pins| unsafe { palpate_firmware_hear(board, pins, byte, now_us) };
-        !self.run(&mut |_| 0, out, heard).is_empty()
+        let receive = |board, pins| unsafe { palpate_firmware_hear(board, pins, byte, now_us) };
+        !self.run(&mut |_| 0, out, receive).is_empty()
     }
 
     /// Samples when one is due, vents when the host has gone silent. `convert` makes one conversion of a channel.

@@ -87,8 +87,8 @@ fn polls(start_us: u32, every_us: u32, count: u32) -> Vec<Input> {
 fn samples_are_due_every_20_ms_and_do_not_drift_across_the_wrap_of_the_clock() {
     // Polled every 330 us, which 20 ms are no multiple of, from a second before micros() wraps.
     let start = u32::MAX - 1_000_000;
-    let told = run(&setup(20_000, 4, 0), start, &polls(start, 330, 10_000));
-    let lines = lines(&told);
+    let ran = run(&setup(20_000, 4, 0), start, &polls(start, 330, 10_000));
+    let lines = lines(&ran);
     assert_eq!(
         lines[0],
         "# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700 ck=55195"
@@ -102,28 +102,28 @@ fn samples_are_due_every_20_ms_and_do_not_drift_across_the_wrap_of_the_clock() {
 
 #[test]
 fn each_channel_is_the_average_of_eight_conversions_after_one_that_is_thrown_away() {
-    let told = run(&setup(20_000, 4, 0), 0, &polls(0, 20_000, 2));
-    assert_eq!(told.conversions, 72, "2 samples x 4 channels x 9");
+    let ran = run(&setup(20_000, 4, 0), 0, &polls(0, 20_000, 2));
+    assert_eq!(ran.conversions, 72, "2 samples x 4 channels x 9");
     // Conversions 2 to 9 on channel 0 are 10 + w² + n mod 7 with w = 1..8 and n = 2..9; the first, 4095, is not among them.
     let kept: u32 = (1..=8).map(|w| 10 + w * w + (w + 1) % 7).sum();
-    let line = lines(&told)[1];
+    let line = lines(&ran)[1];
     assert!((number(line, "flexL") - f64::from(kept) / 8.0).abs() <= 0.05 + 1e-9, "{line}");
 }
 
 #[test]
 fn the_parser_reads_what_it_prints_and_takes_no_line_that_lost_a_digit() {
-    let told = run(&setup(20_000, 8, 20), 7, &polls(7, 20_000, 400));
-    let lines = lines(&told);
+    let ran = run(&setup(20_000, 8, 20), 7, &polls(7, 20_000, 400));
+    let lines = lines(&ran);
     let hear = |lost: &dyn Fn(usize) -> Option<usize>| {
-        let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+        let (mut decoder, mut events) = (Decoder::default(), Vec::new());
         for (k, line) in lines.iter().enumerate() {
             let mut bytes = format!("{line}\n").into_bytes();
             if let Some(at) = lost(k) {
                 bytes.remove(at % line.len());
             }
-            decoder.push(&bytes, 0.02 * k as f64, &mut heard);
+            decoder.push(&bytes, 0.02 * k as f64, &mut events);
         }
-        let counts = heard.iter().filter_map(|heard| match heard {
+        let counts = events.iter().filter_map(|events| match events {
             DecodedEvent::Reading(reading) => Some((reading.seq, reading.counts.clone())),
             DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
         });
@@ -139,9 +139,9 @@ fn the_parser_reads_what_it_prints_and_takes_no_line_that_lost_a_digit() {
 
 #[test]
 fn a_sample_that_is_missed_is_counted_and_the_next_is_on_time() {
-    let told = run(&setup(20_000, 2, 0), 0, &[0, 20_000, 95_000, 100_000, 120_500].map(Input::Poll));
+    let ran = run(&setup(20_000, 2, 0), 0, &[0, 20_000, 95_000, 100_000, 120_500].map(Input::Poll));
     let pairs: Vec<[f64; 2]> =
-        lines(&told)[1..].iter().map(|line| ["t_us", "seq"].map(|key| number(line, key))).collect();
+        lines(&ran)[1..].iter().map(|line| ["t_us", "seq"].map(|key| number(line, key))).collect();
     assert_eq!(pairs, [[0.0, 0.0], [20_000.0, 1.0], [95_000.0, 4.0], [100_000.0, 5.0], [120_500.0, 6.0]]);
 }
 
@@ -150,9 +150,9 @@ fn pressure_comes_in_steps_up_to_the_maximum_and_rubbish_is_refused() {
     let asked = ["P 0.55", "P 0.57", "P 1.05", "P 1.00", "K", "p 0.5", "P", "P -1", "P 0.5x", "hello", "", "V", "?"];
     let mut happenings: Vec<Input> = asked.iter().map(|line| hear(line)).collect();
     happenings.push(Input::Hear([vec![b'A'; 500], b"\nP 0.05\r\n".to_vec()].concat()));
-    let told = run(&setup(20_000, 4, 20), 0, &happenings);
+    let ran = run(&setup(20_000, 4, 20), 0, &happenings);
     let not_understood = "# refused reason=not-understood";
-    let hello = lines(&told)[0];
+    let hello = lines(&ran)[0];
     assert!(hello.contains(" p_max=1.00 ck="), "{hello}");
     let want = [
         hello,
@@ -171,17 +171,17 @@ fn pressure_comes_in_steps_up_to_the_maximum_and_rubbish_is_refused() {
         "# refused reason=too-long",
         "# ok p=0.05",
     ];
-    assert_eq!(lines(&told), want);
-    let mut pressures = told.line_bar.clone();
+    assert_eq!(lines(&ran), want);
+    let mut pressures = ran.line_bar.clone();
     pressures.dedup();
     assert_eq!(pressures, [0.55, 1.0, 0.0, 0.05], "no other reaches the control box");
 }
 
 #[test]
 fn a_board_without_a_control_box_says_so() {
-    let told = run(&setup(20_000, 4, 0), 0, &[hear("P 0.50"), Input::Poll(0)]);
-    assert_eq!(lines(&told)[1], "# refused reason=no-control-box");
-    assert!(!lines(&told)[2].contains("p_bar"));
+    let ran = run(&setup(20_000, 4, 0), 0, &[hear("P 0.50"), Input::Poll(0)]);
+    assert_eq!(lines(&ran)[1], "# refused reason=no-control-box");
+    assert!(!lines(&ran)[2].contains("p_bar"));
 }
 
 #[test]
@@ -189,10 +189,10 @@ fn silence_of_the_host_vents_within_a_second_but_a_sign_of_life_does_not() {
     let start = u32::MAX - 700_000;
     let after = |us: u32| Input::Poll(start.wrapping_add(us));
     let vents = |happenings: &[Input]| {
-        let told = run(&setup(20_000, 4, 30), start, happenings);
-        let vented = lines(&told).contains(&"# vent reason=watchdog");
+        let ran = run(&setup(20_000, 4, 30), start, happenings);
+        let vented = lines(&ran).contains(&"# vent reason=watchdog");
         // Only a vent that the host asked for comes without the remark.
-        assert!(!vented || told.line_bar.last() == Some(&0.0), "{}", told.printed);
+        assert!(!vented || ran.line_bar.last() == Some(&0.0), "{}", ran.printed);
         vented
     };
     let on = || hear("P 0.50");
@@ -206,10 +206,10 @@ fn silence_of_the_host_vents_within_a_second_but_a_sign_of_life_does_not() {
 #[test]
 fn the_watchdog_vents_without_a_word_while_the_loop_is_stuck_and_says_so_later() {
     let stuck = [Input::Poll(0), hear("P 0.50"), Input::Watch(900_000), Input::Watch(1_000_001)];
-    let told = run(&setup(20_000, 4, 30), 0, &stuck);
-    assert!(told.printed.ends_with("# ok p=0.50\n") && told.line_bar == [0.0, 0.5, 0.5, 0.0], "{}", told.printed);
-    let told = run(&setup(20_000, 4, 30), 0, &[&stuck[..], &[Input::Poll(1_020_000)]].concat());
-    assert_eq!(lines(&told)[3], "# vent reason=watchdog");
+    let ran = run(&setup(20_000, 4, 30), 0, &stuck);
+    assert!(ran.printed.ends_with("# ok p=0.50\n") && ran.line_bar == [0.0, 0.5, 0.5, 0.0], "{}", ran.printed);
+    let ran = run(&setup(20_000, 4, 30), 0, &[&stuck[..], &[Input::Poll(1_020_000)]].concat());
+    assert_eq!(lines(&ran)[3], "# vent reason=watchdog");
 }
 
 #[test]

@@ -256,12 +256,12 @@ impl EmulatedGripper {
         let (_, anchor_us) = self.anchor;
         let clock_us = anchor_us + u64::from(due.wrapping_sub(anchor_us as u32));
         self.anchor = (self.now_s, clock_us);
-        let felt = self.hand.at(self.now_s, self.board.line_bar());
+        let stimulus = self.hand.at(self.now_s, self.board.line_bar());
         self.tell_hand();
         if let Some(bar) = self.hand.own_bar() {
             self.board.set_by_hand((bar * 20.0).round() as u8, due);
         }
-        let shares = self.shares(felt);
+        let shares = self.shares(stimulus);
         self.converter.strike(&self.faults, self.now_s);
         let converter = &mut self.converter;
         let mut said = String::new();
@@ -273,9 +273,9 @@ impl EmulatedGripper {
     }
 
     /// Shares of the supply on all inputs.
-    fn shares(&mut self, felt: Stimulus) -> Vec<f64> {
+    fn shares(&mut self, stimulus: Stimulus) -> Vec<f64> {
         let spare = |k: usize| 0.5 + 0.4 * (self.now_s * (k as f64 + 1.0) * 0.2).sin();
-        let mut shares: Vec<f64> = self.sensors.shares(felt).into_iter().chain((0..4).map(spare)).collect();
+        let mut shares: Vec<f64> = self.sensors.shares(stimulus).into_iter().chain((0..4).map(spare)).collect();
         for fault in self.faults.iter().filter(|fault| fault.is_on(self.now_s)) {
             let channel = fault.value as usize;
             if let (FaultKind::Open, Some(share)) = (fault.kind, shares.get_mut(channel)) {

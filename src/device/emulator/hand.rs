@@ -176,9 +176,9 @@ impl Hand {
             Doing::Rest => Stimulus::default(),
             Doing::Held { from, to, since_s, .. } => from.towards(*to, ((t - *since_s) / RAMP_S).clamp(0.0, 1.0)),
             Doing::Grasp(grasp) => {
-                let felt = grasp.at(t, host_bar);
+                let stimulus = grasp.at(t, host_bar);
                 self.began.extend(grasp.failed.take().map(Began::Failed));
-                felt
+                stimulus
             }
         };
         self.last
@@ -312,16 +312,16 @@ impl LiveGrasp {
 
     fn feel(&self, frame: &Frame) -> Stimulus {
         let values = self.sensors.read(frame);
-        let mut felt = Stimulus::default();
+        let mut stimulus = Stimulus::default();
         for (channel, value) in self.sensors.channels().iter().zip(values) {
             let (side, value) = (channel.side.index(), value.unwrap_or_default());
             match channel.quantity {
-                palpate_tactile::Quantity::Curvature => felt.kappa[side] = value,
-                palpate_tactile::Quantity::Force => felt.force[side] = value,
+                palpate_tactile::Quantity::Curvature => stimulus.kappa[side] = value,
+                palpate_tactile::Quantity::Force => stimulus.force[side] = value,
                 palpate_tactile::Quantity::Pressure => {}
             }
         }
-        felt
+        stimulus
     }
 }
 

@@ -1,4 +1,4 @@
-//! Parts of the emulated gripper: values that nobody knows of a real one, and that a calibration estimates.
+//! Parts of the emulated gripper: hidden values that a calibration estimates.
 
 use palpate_tactile::electronics::{Divider, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::model::Stream;

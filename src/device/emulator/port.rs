@@ -119,11 +119,11 @@ impl<'a> Port<'a> {
             self.appear(gripper)?;
         }
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
-        let mut heard = [0; 256];
-        match terminal.near.read(&mut heard) {
+        let mut bytes = [0; 256];
+        match terminal.near.read(&mut bytes) {
             Ok(count) => {
                 self.host_is_there(gripper);
-                gripper.hear(&heard[..count]);
+                gripper.hear(&bytes[..count]);
             }
             // A host is connected and silent.
             Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => self.host_is_there(gripper),
@@ -235,7 +235,7 @@ struct Terminal {
     waiting: Arc<AtomicUsize>,
     /// Dropped bytes since the last report, and its time.
     dropped: u64,
-    told: Instant,
+    reported: Instant,
 }
 
 impl Terminal {
@@ -257,7 +257,7 @@ impl Terminal {
             })
             .map_err(ServeError::Thread)?;
         link.lead_to(&name)?;
-        Ok((Self { near, output, waiting, dropped: 0, told: Instant::now() }, name))
+        Ok((Self { near, output, waiting, dropped: 0, reported: Instant::now() }, name))
     }
 
     /// Sends bytes to the host, or drops them when the buffer is full.
@@ -277,10 +277,10 @@ impl Terminal {
 
     /// Dropped bytes since the last report, once per [`REPORT_EVERY`].
     fn take_dropped(&mut self) -> Option<u64> {
-        if self.dropped == 0 || self.told.elapsed() < REPORT_EVERY {
+        if self.dropped == 0 || self.reported.elapsed() < REPORT_EVERY {
             return None;
         }
-        self.told = Instant::now();
+        self.reported = Instant::now();
         Some(std::mem::take(&mut self.dropped))
     }
 }

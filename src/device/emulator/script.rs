@@ -15,7 +15,7 @@
 
 use palpate_geometry::units::STANDARD_GRAVITY;
 
-/// How long a step is held unless it says so (s).
+/// Default duration of a step (s).
 const HOLD_S: f64 = 2.0;
 
 /// One step.
@@ -32,7 +32,7 @@ pub enum Step {
     },
     /// The hand closes, on an object or on nothing.
     Grasp {
-        /// What is grasped: a built-in name, a file, or `empty`.
+        /// Object: a built-in name, a file, or `empty`.
         object: String,
         /// Highest pressure (bar); the programme's own where it is not given.
         bar: Option<f64>,
@@ -47,7 +47,7 @@ pub struct ScriptError {
     pub number: usize,
     /// Its text.
     pub step: String,
-    /// What is wrong with it.
+    /// Problem.
     pub problem: StepProblem,
 }
 
@@ -205,8 +205,8 @@ mod tests {
             ("grasp lemon bar=2", ["bar", "2", "1.5"]),
             ("wave", ["wave", "angle=30", "step 1"]),
         ] {
-            let told = parse_script(text).expect_err(text).to_string();
-            assert!(words.iter().all(|word| told.contains(word)), "{told}");
+            let found = parse_script(text).expect_err(text).to_string();
+            assert!(words.iter().all(|word| found.contains(word)), "{found}");
         }
     }
 }

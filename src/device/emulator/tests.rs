@@ -43,12 +43,12 @@ fn samples(text: &str) -> Vec<&str> {
 
 #[test]
 fn it_says_hello_and_prints_fifty_samples_a_second_at_exact_times() {
-    let told = text(setup("", ""), 2.0);
+    let found = text(setup("", ""), 2.0);
     assert!(
-        told.starts_with("# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,"),
-        "{told}"
+        found.starts_with("# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,"),
+        "{found}"
     );
-    let lines = samples(&told);
+    let lines = samples(&found);
     assert_eq!(lines.len(), 101);
     for (k, line) in lines.iter().enumerate() {
         assert_eq!((number(line, "t_us"), number(line, "seq")), (Some(20_000.0 * k as f64), Some(k as f64)), "{line}");
@@ -59,8 +59,8 @@ fn it_says_hello_and_prints_fifty_samples_a_second_at_exact_times() {
 fn counts_are_those_of_the_hidden_parts() {
     let setup = setup("angle=60 hold=2; load=0.2kg hold=2", "");
     let parts = setup.parts.clone();
-    let told = text(setup, 4.0);
-    let lines = samples(&told);
+    let found = text(setup, 4.0);
+    let lines = samples(&found);
     let count = |line: &str, key: &str| number(line, key).expect("printed");
     for (side, key) in ["flexL", "flexR"].into_iter().enumerate() {
         let strip = parts.strips[side];
@@ -99,18 +99,18 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_turns() {
 fn a_host_drives_it_and_the_watchdog_lets_go() {
     let mut gripper = EmulatedGripper::new(setup("", "")).expect("nothing to load");
     let open = sent(&mut gripper, 0.0, 0.1);
-    let mut told = Vec::new();
+    let mut found = Vec::new();
     gripper.hear(b"P 0.50\n");
     // Alive for two seconds, then silent.
     for k in 0..4 {
-        told.extend(sent(&mut gripper, 0.1 + 0.5 * f64::from(k), 0.6 + 0.5 * f64::from(k)));
+        found.extend(sent(&mut gripper, 0.1 + 0.5 * f64::from(k), 0.6 + 0.5 * f64::from(k)));
         gripper.hear(b"K\n");
     }
     let flex = |bytes: &[u8]| {
         let text = String::from_utf8_lossy(bytes).into_owned();
         samples(&text).last().and_then(|line| Some((number(line, "flexL")?, number(line, "p_bar")?)))
     };
-    let (open, closed) = (flex(&open).expect("a sample"), flex(&told).expect("a sample"));
+    let (open, closed) = (flex(&open).expect("a sample"), flex(&found).expect("a sample"));
     assert!(closed.0 > open.0 + 50.0 && closed.1 == 0.5, "{open:?} {closed:?}");
     let silent = sent(&mut gripper, 2.1, 5.0);
     let text = String::from_utf8_lossy(&silent).into_owned();
@@ -126,7 +126,7 @@ fn every_fault_does_what_it_says() {
         String::from_utf8_lossy(&sent(&mut gripper, 0.0, 3.0)).into_owned()
     };
     let at = |text: &str, s: f64, key: &str| number(samples(text)[(50.0 * s) as usize], key);
-    assert_eq!(at(&lines("rail=2@1"), 2.0, "fsrL"), Some(4095.0));
+    assert_eq!(at(&lines("saturation=2@1"), 2.0, "fsrL"), Some(4095.0));
     assert_eq!((at(&lines("open=0@1"), 2.0, "flexL"), at(&lines("open=2@1"), 2.0, "fsrL")), (Some(4095.0), Some(0.0)));
     let nan = lines("nan=3@1");
     assert!(samples(&nan)[100].contains("fsrR:nan") && nan.lines().count() == clean.lines().count());
@@ -154,8 +154,8 @@ fn every_fault_does_what_it_says() {
 
 #[test]
 fn a_stuck_channel_keeps_its_reading_while_the_others_go_on() {
-    let told = text(setup("rest=1;angle=90 hold=2", "stuck=0@0.5"), 2.5);
-    let lines = samples(&told);
+    let found = text(setup("rest=1;angle=90 hold=2", "stuck=0@0.5"), 2.5);
+    let lines = samples(&found);
     let count = |k: usize, key: &str| number(lines[k], key).expect("printed");
     assert_eq!(count(110, "flexL"), count(10, "flexL"));
     assert!(count(110, "flexR") > count(10, "flexR") + 300.0);
@@ -164,8 +164,8 @@ fn a_stuck_channel_keeps_its_reading_while_the_others_go_on() {
 #[test]
 fn a_thousand_samples_a_second_on_eight_channels() {
     let setup = EmulatorSetup { rate_hz: 1000, channels: 8, parts: HiddenParts::drawn(1), ..setup("", "") };
-    let told = text(setup, 1.0);
-    let lines = samples(&told);
+    let found = text(setup, 1.0);
+    let lines = samples(&found);
     assert_eq!(lines.len(), 1001);
     assert!(lines.iter().all(|line| line.split(',').count() == 12 && number(line, "aux4").is_some()));
 }
@@ -174,8 +174,8 @@ fn a_thousand_samples_a_second_on_eight_channels() {
 fn sensors_with_a_memory_follow_a_grasp_from_its_first_sample_on() {
     let setup = EmulatorSetup { parts: HiddenParts::drawn(1), ..setup("close empty", "") };
     assert!(setup.parts.hysteresis && setup.parts.drift && setup.parts.noise_counts > 0.0);
-    let told = text(setup, 4.5);
-    let count = |k: usize| number(samples(&told)[k], "flexL").expect("printed");
+    let found = text(setup, 4.5);
+    let count = |k: usize| number(samples(&found)[k], "flexL").expect("printed");
     // 11.7 1/m at 1 bar: a bend of 0.65 rad, which raises the resistance by four tenths.
     assert!(count(140) > count(0) + 250.0 && (count(224) - count(0)).abs() < 40.0, "{} {}", count(140), count(224));
 }

@@ -94,7 +94,7 @@ impl Meter {
             self.bins.retain(|bin| bin.number + BINS as u64 > number);
             self.bins.push_back(Bin { number, ..Bin::default() });
         }
-        // Just made sure that there is one; a clock that steps back goes on in the newest.
+        // There is one; a clock that steps back continues in the newest.
         let newest = self.bins.len() - 1;
         &mut self.bins[newest]
     }

@@ -72,13 +72,13 @@ fn is_same_channel(a: &str, b: &str) -> bool {
 }
 
 impl Decoder {
-    /// Decodes bytes that arrived at a time (s since the stream began) and appends their events to `heard`.
-    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
+    /// Decodes bytes that arrived at a time (s since the stream began) and appends their events to `events`.
+    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
         let Self { splitter, reader } = self;
         reader.meter.bytes(bytes, arrived_s);
         splitter.push(bytes, |line| match line {
-            Line::Whole(line) => reader.line(line, arrived_s, heard),
-            Line::First(line) => reader.first(line, arrived_s, heard),
+            Line::Whole(line) => reader.line(line, arrived_s, events),
+            Line::First(line) => reader.first(line, arrived_s, events),
             Line::TooLong => reader.bad(b"", "too long", arrived_s),
         });
     }
@@ -96,7 +96,7 @@ impl Decoder {
         self.reader.meter.forget_start();
     }
 
-    /// The board, as far as it is known.
+    /// Present description of the board.
     pub fn board(&self) -> Board {
         self.reader.board()
     }
@@ -172,13 +172,13 @@ impl Reader {
         }
     }
 
-    fn line(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
+    fn line(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
         if line.starts_with(b"#") {
-            return self.remark(line, arrived_s, heard);
+            return self.remark(line, arrived_s, events);
         }
         let (format, fields) = match self.check(line).and_then(|()| parse(line)) {
             Err(why) => return self.bad(line, why, arrived_s),
-            Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, heard),
+            Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, events),
             Ok(Parsed::Columns(values)) => {
                 (Format::Csv, self.columns.name(values, self.handshake.as_ref().map(|handshake| &handshake.board)))
             }
@@ -188,9 +188,9 @@ impl Reader {
         match self.shapes.judge(Candidate { format, fields, arrived_s }) {
             Judged::Known(line) => {
                 self.give_up(arrived_s);
-                self.reading(&line, heard);
+                self.reading(&line, events);
             }
-            Judged::Changed(lines) => lines.iter().for_each(|line| self.reading(line, heard)),
+            Judged::Changed(lines) => lines.iter().for_each(|line| self.reading(line, events)),
             Judged::Waits { given_up } => {
                 for _ in 0..given_up {
                     self.unreadable += 1;
@@ -202,11 +202,11 @@ impl Reader {
 
     /// Skips the first line, which is most often the rest of one, unless it is a header: a board that restarts on connection
     /// begins with it. It is complete where its first name is known.
-    fn first(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
+    fn first(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
         let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
         if names.first().is_some_and(is_known) {
-            self.header(names, line, arrived_s, heard);
+            self.header(names, line, arrived_s, events);
         }
     }
 
@@ -217,7 +217,7 @@ impl Reader {
         if wanted && !has_one { Err("checksum missing") } else { Ok(()) }
     }
 
-    fn remark(&mut self, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
+    fn remark(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
         let text = std::str::from_utf8(line).map_err(|_not_text| "not text");
         let (text, handshake) = match text.and_then(|text| Ok((text, handshake::parse(text)?))) {
             Ok(said) => said,
@@ -227,22 +227,22 @@ impl Reader {
         if handshake.is_some() && self.handshake != handshake {
             self.handshake = handshake;
             self.find_sensors();
-            self.name_columns(heard);
-            heard.push(DecodedEvent::Board(self.board()));
+            self.name_columns(events);
+            events.push(DecodedEvent::Board(self.board()));
         }
-        heard.push(DecodedEvent::Reply(BoardReply::parse(text)));
+        events.push(DecodedEvent::Reply(BoardReply::parse(text)));
     }
 
-    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, heard: &mut Vec<DecodedEvent>) {
+    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
         if !self.columns.set_header(names) {
             return self.bad(line, "neither numbers nor names of sensors", arrived_s);
         }
         self.line_log.add(line, arrived_s, LineKind::Remark);
-        self.name_columns(heard);
+        self.name_columns(events);
     }
 
     /// Renames columns whose names have become known.
-    fn name_columns(&mut self, heard: &mut Vec<DecodedEvent>) {
+    fn name_columns(&mut self, events: &mut Vec<DecodedEvent>) {
         if self.shapes.format != Some(Format::Csv) {
             return;
         }
@@ -261,7 +261,7 @@ impl Reader {
         }
         self.shapes.roles(&mut self.channels);
         self.find_sensors();
-        heard.push(DecodedEvent::Board(self.board()));
+        events.push(DecodedEvent::Board(self.board()));
     }
 
     fn find_sensors(&mut self) {
@@ -274,7 +274,7 @@ impl Reader {
         self.strips = self.sensors.iter().map(is_strip).collect();
     }
 
-    fn reading(&mut self, line: &Candidate, heard: &mut Vec<DecodedEvent>) {
+    fn reading(&mut self, line: &Candidate, events: &mut Vec<DecodedEvent>) {
         let known = self.channels.len();
         let roles = self.shapes.roles(&mut self.channels);
         let mut counts = vec![None; self.channels.len()];
@@ -299,14 +299,14 @@ impl Reader {
         }
         if self.channels.len() != known {
             self.find_sensors();
-            heard.push(DecodedEvent::Board(self.board()));
+            events.push(DecodedEvent::Board(self.board()));
         }
         let stamp = if whole { self.clock.stamp(&counters, line.arrived_s) } else { None };
         let Some(stamp) = stamp else {
             self.unreadable += 1;
             return self.meter.bad_line(line.arrived_s);
         };
-        self.report_gap(&stamp, heard);
+        self.report_gap(&stamp, events);
         self.last_s = Some(stamp.t_s);
         self.meter.reading(&stamp, line.arrived_s);
         let full_scale = self.said().map_or(FULL_12_BIT, |board| board.full_scale);
@@ -314,7 +314,7 @@ impl Reader {
         let ten_bits = self.saturation.adc_range() == AdcRange::LooksTenBit;
         self.saturation.add(&counts, &sent, stamp.t_s, if ten_bits { FULL_10_BIT } else { full_scale });
         let Stamp { t_s, seq, .. } = stamp;
-        heard.push(DecodedEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
+        events.push(DecodedEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
     }
 
     /// Largest count of the strips, and of all sensors; other channels need not come from the converter.
@@ -330,7 +330,7 @@ impl Reader {
         largest
     }
 
-    fn report_gap(&mut self, stamp: &Stamp, heard: &mut Vec<DecodedEvent>) {
+    fn report_gap(&mut self, stamp: &Stamp, events: &mut Vec<DecodedEvent>) {
         let unreadable = std::mem::take(&mut self.unreadable);
         let broken = self.broken.take();
         let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
@@ -344,6 +344,6 @@ impl Reader {
             (None, false, n) => format!("{n} unreadable lines"),
         };
         self.meter.gap(stamp.missing);
-        heard.push(DecodedEvent::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
+        events.push(DecodedEvent::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
     }
 }

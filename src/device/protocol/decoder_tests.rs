@@ -8,11 +8,11 @@ use proptest::prelude::*;
 /// What a stream says, with each chunk arriving at its time.
 fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<DecodedEvent>) {
     let mut decoder = Decoder::default();
-    let mut heard = Vec::new();
+    let mut events = Vec::new();
     for (t, bytes) in chunks {
-        decoder.push(bytes, t, &mut heard);
+        decoder.push(bytes, t, &mut events);
     }
-    (decoder, heard)
+    (decoder, events)
 }
 
 /// Lines that arrive every 20 ms, the first behind the end of another.
@@ -21,12 +21,12 @@ fn hear_lines(lines: &[String]) -> (Decoder, Vec<DecodedEvent>) {
     hear(lines.iter().enumerate().map(|(i, line)| (0.02 * i as f64, line.as_bytes())))
 }
 
-fn readings(heard: &[DecodedEvent]) -> Vec<&Reading> {
-    heard.iter().filter_map(|h| if let DecodedEvent::Reading(reading) = h { Some(reading) } else { None }).collect()
+fn readings(events: &[DecodedEvent]) -> Vec<&Reading> {
+    events.iter().filter_map(|h| if let DecodedEvent::Reading(reading) = h { Some(reading) } else { None }).collect()
 }
 
-fn gaps(heard: &[DecodedEvent]) -> Vec<&Gap> {
-    heard.iter().filter_map(|h| if let DecodedEvent::Gap(gap) = h { Some(gap) } else { None }).collect()
+fn gaps(events: &[DecodedEvent]) -> Vec<&Gap> {
+    events.iter().filter_map(|h| if let DecodedEvent::Gap(gap) = h { Some(gap) } else { None }).collect()
 }
 
 fn firmware_line(i: u32) -> String {
@@ -40,9 +40,9 @@ const HELLO: &str = "# tactile-gripper fw=1 adc=12 vref=3.3 rate=50 ch=flexL,fle
 fn the_firmwares_stream_is_heard_whole() {
     let mut lines = vec![HELLO.to_owned()];
     lines.extend((0..100).map(firmware_line));
-    let (decoder, heard) = hear_lines(&lines);
-    let readings = readings(&heard);
-    assert_eq!((readings.len(), gaps(&heard).len()), (100, 0));
+    let (decoder, events) = hear_lines(&lines);
+    let readings = readings(&events);
+    assert_eq!((readings.len(), gaps(&events).len()), (100, 0));
     assert_eq!(readings[40].counts, [Some(2005.125), Some(2100.0), Some(12.5), Some(0.0)]);
     assert_eq!(readings[40].line_bar, Some(0.55));
     assert!(readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 1e-6));
@@ -63,9 +63,9 @@ fn the_same_stream_is_found_in_every_format() {
     ];
     for (format, write) in formats {
         let lines: Vec<String> = std::iter::once("rest of a line".to_owned()).chain((10..60).map(write)).collect();
-        let (decoder, heard) = hear_lines(&lines);
+        let (decoder, events) = hear_lines(&lines);
         assert_eq!(decoder.detected().map(|d| d.format), Some(format));
-        let readings = readings(&heard);
+        let readings = readings(&events);
         assert_eq!(readings.len(), 50, "{format:?}");
         assert_eq!(decoder.board().channels, Board::default().channels, "{format:?}");
         for (reading, i) in readings.iter().zip(10u8..) {
@@ -79,10 +79,10 @@ fn the_same_stream_is_found_in_every_format() {
 fn a_header_that_comes_late_renames_the_columns() {
     let mut lines: Vec<String> = (0..30).map(|i| format!("{},{i},7,8,9", 20 * i)).collect();
     lines[10] = "ms,flexR,flexL,fsrL,fsrR".to_owned();
-    let (decoder, heard) = hear_lines(&lines);
+    let (decoder, events) = hear_lines(&lines);
     let board = decoder.board();
     assert_eq!(board.channels, ["column 1", "flexR", "flexL", "fsrL", "fsrR"]);
-    assert_eq!(readings(&heard).last().map(|r| r.counts.clone()), {
+    assert_eq!(readings(&events).last().map(|r| r.counts.clone()), {
         Some(vec![None, Some(29.0), Some(7.0), Some(8.0), Some(9.0)])
     });
     assert_eq!(decoder.detected().map(|d| d.time), Some(TimeSource::Device));
@@ -97,11 +97,11 @@ fn lost_lines_and_bad_lines_are_gaps_and_nothing_is_invented() {
     lines[120] = format!("{}{}", &lines[120][..60], lines[121]);
     lines.drain(200..204);
     lines.remove(121);
-    let (decoder, heard) = hear_lines(&lines);
-    let gaps = gaps(&heard);
+    let (decoder, events) = hear_lines(&lines);
+    let gaps = gaps(&events);
     assert_eq!(gaps.iter().map(|gap| gap.lost).collect::<Vec<_>>(), [Some(1), Some(1), Some(2), Some(4)]);
     assert_eq!((gaps[1].cause.as_str(), gaps[3].cause.as_str()), ("1 unreadable line", "lost in transit"));
-    for reading in readings(&heard) {
+    for reading in readings(&events) {
         let i = reading.seq.unwrap_or_default();
         let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
         assert_eq!(reading.counts, wanted, "{i}");
@@ -131,10 +131,10 @@ fn a_digit_that_is_lost_is_a_bad_line_where_lines_have_checksums() {
                 lines[*line] = sound[*line][..end].to_owned();
             }
         }
-        let (decoder, heard) = hear_lines(&std::iter::once(first).chain(lines).collect::<Vec<_>>());
+        let (decoder, events) = hear_lines(&std::iter::once(first).chain(lines).collect::<Vec<_>>());
         let cadence = decoder.cadence();
         assert_eq!((cadence.samples, cadence.lost, cadence.bad_lines), (500, 100, 100));
-        for reading in readings(&heard) {
+        for reading in readings(&events) {
             let i = reading.seq.unwrap_or_default();
             let wanted = [Some((2000 + i % 7) as f32 + 0.125), Some((2100 + i % 5) as f32), Some(12.5), Some(0.0)];
             assert_eq!((&reading.counts[..], i % 5 == 0 && i >= 100), (&wanted[..], false), "{i}");
@@ -146,35 +146,35 @@ fn a_digit_that_is_lost_is_a_bad_line_where_lines_have_checksums() {
 #[test]
 fn a_board_that_comes_back_with_another_sketch_needs_no_checksums() {
     let mut decoder = Decoder::default();
-    let mut heard = Vec::new();
+    let mut events = Vec::new();
     let hello = signed("# tactile-gripper fw=2 adc=12 ch=flexL", " ck=");
-    decoder.push(format!("{hello}\nflexL:1\nflexL:2\n").as_bytes(), 0.0, &mut heard);
-    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (0, 2), "they lack what was said of them");
+    decoder.push(format!("{hello}\nflexL:1\nflexL:2\n").as_bytes(), 0.0, &mut events);
+    assert_eq!((readings(&events).len(), decoder.cadence().bad_lines), (0, 2), "they lack what was said of them");
     decoder.interrupt("unplugged");
-    decoder.push(b"\nflexL:1\nflexL:2\n", 1.0, &mut heard);
-    assert_eq!(readings(&heard).len(), 2);
+    decoder.push(b"\nflexL:1\nflexL:2\n", 1.0, &mut events);
+    assert_eq!(readings(&events).len(), 2);
 }
 
 #[test]
 fn a_board_that_restarts_or_comes_back_leaves_a_gap_with_its_cause() {
     let mut decoder = Decoder::default();
-    let mut heard = Vec::new();
+    let mut events = Vec::new();
     let mut t = 0.0;
-    decoder.push(b"\n", t, &mut heard);
+    decoder.push(b"\n", t, &mut events);
     for i in 0..150u32 {
         if i == 100 {
             t += 3.0;
             decoder.interrupt("the cable was pulled");
-            decoder.push(b"45,fsrR:0\n", t, &mut heard);
+            decoder.push(b"45,fsrR:0\n", t, &mut events);
         }
         let restarted = i % 100;
-        decoder.push(format!("{}\n", firmware_line(restarted)).as_bytes(), t, &mut heard);
+        decoder.push(format!("{}\n", firmware_line(restarted)).as_bytes(), t, &mut events);
         t += 0.02;
     }
-    let gaps = gaps(&heard);
+    let gaps = gaps(&events);
     assert_eq!(gaps.len(), 1);
     assert!(gaps[0].cause.starts_with("the cable was pulled") && gaps[0].to_s - gaps[0].from_s > 2.9, "{gaps:?}");
-    assert_eq!(readings(&heard).len(), 150);
+    assert_eq!(readings(&events).len(), 150);
 }
 
 #[test]
@@ -209,15 +209,15 @@ fn of_a_line_that_lost_its_beginning_nothing_is_taken() {
     for from in 1..whole.len() {
         let mut lines: Vec<String> = (0..100).map(plain_line).collect();
         lines[50] = whole[from..].to_owned();
-        let (decoder, heard) = hear_lines(&lines);
-        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{}", &whole[from..]);
+        let (decoder, events) = hear_lines(&lines);
+        assert_eq!((readings(&events).len(), decoder.cadence().bad_lines), (99, 1), "{}", &whole[from..]);
         assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL"], "{}", &whole[from..]);
     }
     for damaged in ["flexL:2003m,flexR:2100,fsrL:14", "flexL:2003,flexR:210o,fsrL:14"] {
         let mut lines: Vec<String> = (0..100).map(plain_line).collect();
         lines[50] = damaged.to_owned();
-        let (decoder, heard) = hear_lines(&lines);
-        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{damaged}");
+        let (decoder, events) = hear_lines(&lines);
+        assert_eq!((readings(&events).len(), decoder.cadence().bad_lines), (99, 1), "{damaged}");
     }
 }
 
@@ -230,8 +230,8 @@ fn a_word_in_place_of_a_number_costs_that_channel_alone() {
     let named = |i| format!("flexL:{i},flexR:{},fsrL: {}", word(i, 3, "open", 7), word(i, 5, "n/a", 8));
     let columns = |i| format!("{i},{},{}", word(i, 3, "err", 7), word(i, 5, "OFF", 8));
     for lines in [(1..90).map(named).collect::<Vec<_>>(), (1..90).map(columns).collect()] {
-        let (decoder, heard) = hear_lines(&lines);
-        let readings = readings(&heard);
+        let (decoder, events) = hear_lines(&lines);
+        let readings = readings(&events);
         assert_eq!((readings.len(), decoder.cadence().bad_lines), (89, 0), "{}", lines[2]);
         for (i, reading) in (1u8..).zip(readings) {
             let wanted = [Some(f32::from(i)), (i % 3 != 0).then_some(7.0), (i % 5 != 0).then_some(8.0)];
@@ -244,42 +244,42 @@ fn a_word_in_place_of_a_number_costs_that_channel_alone() {
 fn a_number_without_a_name_belongs_to_every_line_or_was_torn_off() {
     // A sketch that prints its scale behind its values, for Arduino's plotter.
     let always = |i: u32| format!("flexL:{},flexR:7,0,1023", 500 + i);
-    let (decoder, heard) = hear_lines(&(0..60).map(always).collect::<Vec<_>>());
-    assert_eq!((decoder.board().channels.join(" ").as_str(), readings(&heard).len() > 55), ("flexL flexR", true));
+    let (decoder, events) = hear_lines(&(0..60).map(always).collect::<Vec<_>>());
+    assert_eq!((decoder.board().channels.join(" ").as_str(), readings(&events).len() > 55), ("flexL flexR", true));
     // One bit, and a digit is a blank.
     for torn in ["flexL:2 03,flexR:2100,fsrL:14", "flexL:2003,flexR:2 00,fsrL:14", "flexL:2003,flexR:21,0,fsrL:14"] {
         let mut lines: Vec<String> = (0..100).map(plain_line).collect();
         lines[50] = torn.to_owned();
-        let (decoder, heard) = hear_lines(&lines);
-        assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (99, 1), "{torn}");
+        let (decoder, events) = hear_lines(&lines);
+        assert_eq!((readings(&events).len(), decoder.cadence().bad_lines), (99, 1), "{torn}");
     }
 }
 
 #[test]
 fn another_sketch_after_an_interruption_is_another_board() {
     let mut decoder = Decoder::default();
-    let (mut heard, mut t) = (Vec::new(), 0.0);
+    let (mut events, mut t) = (Vec::new(), 0.0);
     let mut say = |decoder: &mut Decoder, lines: &mut dyn Iterator<Item = String>| {
         for line in lines {
             t += 0.02;
-            decoder.push(format!("\n{line}\n").as_bytes(), t, &mut heard);
+            decoder.push(format!("\n{line}\n").as_bytes(), t, &mut events);
         }
-        heard.iter().rev().find_map(|h| if let DecodedEvent::Board(board) = h { Some(board.clone()) } else { None })
+        events.iter().rev().find_map(|h| if let DecodedEvent::Board(board) = h { Some(board.clone()) } else { None })
     };
-    let told = say(
+    let found = say(
         &mut decoder,
         &mut std::iter::once("flexL,fsrL".to_owned()).chain((0..300).map(|i| format!("{},3", 350 + i % 5))),
     );
-    assert_eq!((told.map(|board| board.full_scale), decoder.adc_range()), (Some(4095), AdcRange::LooksTenBit));
+    assert_eq!((found.map(|board| board.full_scale), decoder.adc_range()), (Some(4095), AdcRange::LooksTenBit));
     decoder.interrupt("unplugged");
     // The same names stay until others come; the counts are judged anew.
-    let told = say(&mut decoder, &mut (0..20).map(|i| format!("{},3", 1400 + i)));
-    assert_eq!(told.map(|board| board.channels), Some(vec!["flexL".into(), "fsrL".into()]));
+    let found = say(&mut decoder, &mut (0..20).map(|i| format!("{},3", 1400 + i)));
+    assert_eq!(found.map(|board| board.channels), Some(vec!["flexL".into(), "fsrL".into()]));
     assert_eq!(decoder.adc_range(), AdcRange::Fits);
     decoder.interrupt("unplugged");
-    let told =
+    let found =
         say(&mut decoder, &mut std::iter::once("time,angle".to_owned()).chain((0..20).map(|i| format!("{i},3"))));
-    assert_eq!(told.map(|board| board.channels), Some(vec!["time".into(), "angle".into()]));
+    assert_eq!(found.map(|board| board.channels), Some(vec!["time".into(), "angle".into()]));
 }
 
 #[test]
@@ -293,15 +293,15 @@ fn what_a_board_says_while_it_sets_itself_up_is_no_reading() {
         "Calibrating, please wait",
     ];
     let lines: Vec<String> = chatter.iter().map(|line| (*line).to_owned()).chain((0..40).map(plain_line)).collect();
-    let (decoder, heard) = hear_lines(&lines);
-    assert_eq!((readings(&heard).len(), decoder.board().channels.len()), (40, 3), "{:?}", decoder.board().channels);
+    let (decoder, events) = hear_lines(&lines);
+    assert_eq!((readings(&events).len(), decoder.board().channels.len()), (40, 3), "{:?}", decoder.board().channels);
     // Names that have been said are not put out of use by words.
     let mut lines = vec!["flexL,flexR".to_owned()];
     lines.extend(
         (0..40).map(|i| if i == 20 { "Calibrating,please".to_owned() } else { format!("{},{}", 500 + i, 600 + i) }),
     );
-    let (decoder, heard) = hear_lines(&lines);
-    assert_eq!((readings(&heard).len(), decoder.cadence().bad_lines), (39, 1));
+    let (decoder, events) = hear_lines(&lines);
+    assert_eq!((readings(&events).len(), decoder.cadence().bad_lines), (39, 1));
     assert_eq!(decoder.board().channels, ["flexL", "flexR"]);
 }
 
@@ -324,8 +324,8 @@ fn resistors_are_found_by_the_sensor_whatever_its_channel_is_called() {
 fn another_sketch_is_believed_after_two_of_its_lines() {
     let lines: Vec<String> =
         (0..20).map(|i| if i < 10 { format!("{i},1,2,3") } else { format!("grip:{i} bend:2") }).collect();
-    let (decoder, heard) = hear_lines(&lines);
-    assert_eq!(readings(&heard).len(), 20);
+    let (decoder, events) = hear_lines(&lines);
+    assert_eq!(readings(&events).len(), 20);
     assert_eq!(decoder.board().channels, ["flexL", "flexR", "fsrL", "fsrR", "grip", "bend"]);
     assert_eq!(decoder.cadence().bad_lines, 0);
 }
@@ -345,16 +345,16 @@ fn bytes() -> impl Strategy<Value = Vec<u8>> {
 
 #[test]
 fn nonsense_at_a_wrong_speed_is_not_held_against_the_lines() {
-    let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
-    decoder.push(b"\xff\xfe\n\x81\x90\n\xa0\n", 0.1, &mut heard);
+    let (mut decoder, mut events) = (Decoder::default(), Vec::new());
+    decoder.push(b"\xff\xfe\n\x81\x90\n\xa0\n", 0.1, &mut events);
     assert!(decoder.cadence().bad_lines > 0);
     decoder.interrupt("the speed was found to be 250000 baud");
     for k in 0..5 {
-        decoder.push(format!("flexL:{k},flexR:2\n").as_bytes(), 0.2 + 0.02 * f64::from(k), &mut heard);
+        decoder.push(format!("flexL:{k},flexR:2\n").as_bytes(), 0.2 + 0.02 * f64::from(k), &mut events);
     }
     assert_eq!((decoder.cadence().bad_lines, decoder.cadence().samples > 2), (0, true));
     // Once something was read, what cannot be read counts.
-    decoder.push(b"\xff\n", 0.4, &mut heard);
+    decoder.push(b"\xff\n", 0.4, &mut events);
     decoder.interrupt("the cable was pulled");
     assert_eq!(decoder.cadence().bad_lines, 1);
 }
@@ -365,13 +365,13 @@ proptest! {
     #[test]
     fn whatever_comes_time_moves_on_and_counts_add_up(chunks in prop::collection::vec((bytes(), 0.0f64..0.5), 0..150)) {
         let mut decoder = Decoder::default();
-        let (mut heard, mut t) = (Vec::new(), 0.0);
+        let (mut events, mut t) = (Vec::new(), 0.0);
         for (chunk, wait) in &chunks {
             t += wait;
-            decoder.push(chunk, t, &mut heard);
+            decoder.push(chunk, t, &mut events);
         }
         let (mut last, mut channels) = (f64::NEG_INFINITY, 0);
-        for event in &heard {
+        for event in &events {
             match event {
                 DecodedEvent::Reading(reading) => {
                     prop_assert!(reading.t_s > last && reading.t_s <= reading.arrived_s + 1e-3, "{reading:?}");
@@ -387,7 +387,7 @@ proptest! {
                 DecodedEvent::Reply(_) => {}
             }
         }
-        prop_assert_eq!(decoder.cadence().samples as usize, readings(&heard).len());
+        prop_assert_eq!(decoder.cadence().samples as usize, readings(&events).len());
     }
 
     #[test]
@@ -403,8 +403,8 @@ proptest! {
 fn names_that_are_the_first_line_are_read_where_they_are_whole() {
     let after = |first: &str| {
         let text: String = (0..20).map(|i| format!("{},{i},21{i:02},20{i:02},5,6\n", 20_000 * i)).collect();
-        let (decoder, heard) = hear([(0.0, first.as_bytes()), (0.5, text.as_bytes())]);
-        (decoder.board().channels, readings(&heard).len())
+        let (decoder, events) = hear([(0.0, first.as_bytes()), (0.5, text.as_bytes())]);
+        (decoder.board().channels, readings(&events).len())
     };
     let (channels, read) = after("t_us,seq,flexR,flexL,fsrL,fsrR\n");
     assert_eq!((channels.join(" ").as_str(), read), ("flexR flexL fsrL fsrR", 20));

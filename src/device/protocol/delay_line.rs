@@ -48,8 +48,8 @@ impl DelayLine {
 
     /// Time of an event at `x` on its own clock (s); none while too little is known.
     pub(super) fn at(&self, x: f64) -> Option<f64> {
-        let (x0, heard0) = self.origin?;
-        Some(heard0 + self.offset + self.gain? * (x - x0))
+        let (x0, arrived0) = self.origin?;
+        Some(arrived0 + self.offset + self.gain? * (x - x0))
     }
 
     /// Seconds per unit of x, once known.
@@ -58,9 +58,9 @@ impl DelayLine {
     }
 
     /// Takes in the arrival of an event at `x` (s).
-    pub(super) fn add(&mut self, x: f64, heard: f64) {
-        let (x0, heard0) = *self.origin.get_or_insert((x, heard));
-        let point = (x - x0, heard - heard0);
+    pub(super) fn add(&mut self, x: f64, arrived: f64) {
+        let (x0, arrived0) = *self.origin.get_or_insert((x, arrived));
+        let point = (x - x0, arrived - arrived0);
         // An earlier arrival than the line allows moves it at once: nothing arrives before it happens.
         if let Some(gain) = self.gain {
             self.offset = self.offset.min(point.1 - gain * point.0);
@@ -152,7 +152,7 @@ mod tests {
             for i in 0..3000u32 {
                 let device = 100.0 + 0.02 * f64::from(i);
                 let happened = 5.0 + (1.0 + drift) * (device - 100.0);
-                // Every tenth second the host is busy for 0.4 s and then hears all at once.
+                // Every tenth second the host is busy for 0.4 s and then receives everything at once.
                 let stalled = if i % 500 < 20 { 0.02 * f64::from(20 - i % 500) } else { 0.0 };
                 line.add(device, happened + delay(i) + stalled);
                 if i > 400 {

@@ -42,7 +42,7 @@ impl Default for LineSplitter {
 }
 
 impl LineSplitter {
-    /// Takes in bytes and hands over the lines that they end, without empty ones.
+    /// Takes in bytes and passes on each complete line that is not empty.
     pub(super) fn push(&mut self, bytes: &[u8], mut take: impl FnMut(Line<'_>)) {
         for &byte in bytes {
             if byte == b'\n' || byte == b'\r' {
@@ -101,14 +101,14 @@ mod tests {
     #[test]
     fn a_line_that_never_ends_costs_one_line_and_bounded_memory() {
         let mut splitter = LineSplitter::default();
-        let mut told = Vec::new();
+        let mut too_long = Vec::new();
         splitter.push(b"\n", |_| {});
         for _ in 0..1000 {
-            splitter.push(&[b'x'; 1000], |line| told.push(line == Line::TooLong));
+            splitter.push(&[b'x'; 1000], |line| too_long.push(line == Line::TooLong));
             assert!(splitter.begun.capacity() <= 2 * MAX_LINE);
         }
-        splitter.push(b"\n1,2\n", |line| told.push(line == Line::TooLong));
-        assert_eq!(told, [true, false]);
+        splitter.push(b"\n1,2\n", |line| too_long.push(line == Line::TooLong));
+        assert_eq!(too_long, [true, false]);
     }
 
     proptest! {

@@ -3,7 +3,7 @@
 //! ```text
 //! # ok p=0.55                                  pressure that is on (bar)
 //! # refused reason=above-maximum max=1.00      a command that was not carried out
-//! # vent reason=watchdog                       the board vented by itself
+//! # vent reason=watchdog                       the board vented on its own
 //! ```
 
 use std::fmt;
@@ -21,7 +21,7 @@ pub enum BoardReply {
         /// Why, in the board's words: `above-maximum max=1.00`.
         reason: String,
     },
-    /// The board vented by itself.
+    /// The board vented on its own.
     Vented {
         /// Why, in the board's words: `watchdog`.
         cause: String,

@@ -14,7 +14,7 @@ pub enum Saturation {
 
 /// A channel counts as saturated after this long at an end (s).
 const AFTER_S: f64 = 0.5;
-/// Counts within this share of the range of an end are at it: 8 of 4096, 2 of 1024. What is open or shorted picks up noise,
+/// Counts within this share of the range of an end are at it: 8 of 4096, 2 of 1024. Open or shorted inputs pick up noise,
 /// half of which the end cuts off. With a deviation of 2 counts of 12 bits, and no average taken, one reading in a thousand
 /// is 6 counts away, one in 300 000 more than 8; the mean of eight conversions is never more than 3 away. With 10 bits,
 /// the same noise goes 2 counts far, or half a count. A sound pad under its largest load (49 N) is 100 counts away beside 4.7 kOhm,
@@ -22,7 +22,7 @@ const AFTER_S: f64 = 0.5;
 const NEAR: f32 = 1.0 / 512.0;
 /// Full scale of the Due as our firmware sets it up.
 pub(super) const FULL_12_BIT: u32 = 4095;
-/// Full scale of `analogRead` when nobody asked for more.
+/// Default full scale of `analogRead`.
 pub(super) const FULL_10_BIT: u32 = 1023;
 /// How long counts are watched before their largest says something of the converter (s): a close and a release.
 const WATCHED_S: f64 = 5.0;
@@ -73,25 +73,25 @@ impl SaturationWatch {
         let full = full_scale as f32;
         let near = NEAR * (full + 1.0);
         for ((channel, count), sent) in self.channels.iter_mut().zip(counts).zip(sent) {
-            let rail = match count {
-                // What is beyond does not come from this converter.
+            let state = match count {
+                // Values beyond do not come from this converter.
                 Some(count) if *count > full + near => None,
                 Some(count) if *count >= full - near => Some(Saturation::High),
                 Some(count) if *count <= near => Some(Saturation::Low),
                 None if *sent => Some(Saturation::NoNumber),
                 Some(_) | None => None,
             };
-            channel.at = rail.map(|rail| match channel.at {
-                Some((before, since)) if before == rail => (rail, since),
-                _ => (rail, t_s),
+            channel.at = state.map(|state| match channel.at {
+                Some((before, since)) if before == state => (state, since),
+                _ => (state, t_s),
             });
         }
     }
 
     /// Saturation of each channel.
     pub(super) fn at(&self) -> Vec<Option<Saturation>> {
-        let told = |(rail, since): (Saturation, f64)| (self.now_s - since > AFTER_S).then_some(rail);
-        self.channels.iter().map(|channel| channel.at.and_then(told)).collect()
+        let found = |(state, since): (Saturation, f64)| (self.now_s - since > AFTER_S).then_some(state);
+        self.channels.iter().map(|channel| channel.at.and_then(found)).collect()
     }
 
     /// Takes in the largest counts of a reading, of the strips and of all sensors.
@@ -142,11 +142,11 @@ mod tests {
                 t,
                 FULL_12_BIT,
             );
-            let told = watch.at();
-            assert_eq!(told[0], (t > 0.5).then_some(Saturation::High), "{t}");
-            assert_eq!((told[1], told[2]), (None, (t > 0.5).then_some(Saturation::NoNumber)));
-            assert_eq!(told[4], None, "it is not sent any more");
-            assert_eq!(told[3], (t > 0.5).then_some(Saturation::Low), "{t}");
+            let found = watch.at();
+            assert_eq!(found[0], (t > 0.5).then_some(Saturation::High), "{t}");
+            assert_eq!((found[1], found[2]), (None, (t > 0.5).then_some(Saturation::NoNumber)));
+            assert_eq!(found[4], None, "it is not sent any more");
+            assert_eq!(found[3], (t > 0.5).then_some(Saturation::Low), "{t}");
         }
         watch.add(
             &[Some(4000.0), Some(5000.0), Some(9.0), Some(9.0), None],
@@ -158,7 +158,7 @@ mod tests {
     }
 
     /// How often each end is reported of each channel, in ten seconds of readings at 50 Hz.
-    fn told(levels: f64, average: u32, shares: [f64; 3]) -> [[u32; 2]; 3] {
+    fn found(levels: f64, average: u32, shares: [f64; 3]) -> [[u32; 2]; 3] {
         let converter = Converter { levels, ..Converter::DUE };
         let mut noise = Stream::new(1, "rails", "noise");
         let mut watch = SaturationWatch::default();
@@ -170,9 +170,9 @@ mod tests {
                 Some((sum / f64::from(average)) as f32)
             });
             watch.add(&counts, &[true; 3], 0.02 * f64::from(i), levels as u32 - 1);
-            for (times, told) in times.iter_mut().zip(watch.at()) {
-                times[0] += u32::from(told == Some(Saturation::Low));
-                times[1] += u32::from(told == Some(Saturation::High));
+            for (times, found) in times.iter_mut().zip(watch.at()) {
+                times[0] += u32::from(found == Some(Saturation::Low));
+                times[1] += u32::from(found == Some(Saturation::High));
             }
         }
         times
@@ -185,7 +185,7 @@ mod tests {
         let pressed = ratio / (1.0 + ratio);
         for levels in [4096.0, 1024.0] {
             for average in [1, 8] {
-                let [shorted, open, sound] = told(levels, average, [0.0, 1.0, pressed]);
+                let [shorted, open, sound] = found(levels, average, [0.0, 1.0, pressed]);
                 // All but the first half second, and never the other end.
                 assert!(shorted[0] > 470 && shorted[1] == 0, "{levels} {average} {shorted:?}");
                 assert!(open[1] > 470 && open[0] == 0, "{levels} {average} {open:?}");

@@ -36,7 +36,7 @@ pub struct LinkStatus {
     pub port: PortInfo,
     /// Baud rate; none for captured bytes.
     pub baud: Option<u32>,
-    /// The board, as far as it is known.
+    /// Present description of the board.
     pub board: Board,
     /// Detected line format; none before two lines agree.
     pub detected: Option<Detected>,
@@ -88,9 +88,9 @@ impl LinkStatus {
             )),
         }
         let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
-        for (channel, (name, rail)) in self.board.channels.iter().zip(&self.saturation).enumerate() {
+        for (channel, (name, saturation)) in self.board.channels.iter().zip(&self.saturation).enumerate() {
             let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
-            remarks.extend(match (rail, sensor.is_some_and(Sensor::is_flex)) {
+            remarks.extend(match (saturation, sensor.is_some_and(Sensor::is_flex)) {
                 (Some(Saturation::High), true) => {
                     Some(format!("{name} is at full scale: the strip or one of its wires is disconnected"))
                 }
@@ -109,8 +109,8 @@ impl LinkStatus {
         remarks
     }
 
-    /// At what speed it is heard, and how its lines are read.
-    pub fn heard_as(&self) -> String {
+    /// Baud rate and line format, in words.
+    pub fn format_summary(&self) -> String {
         let speed = self.baud.map(|baud| format!("{baud} baud"));
         let format = self.detected.as_ref().map(|detected| detected.why.clone());
         speed.into_iter().chain(format).collect::<Vec<String>>().join("; ")

@@ -94,9 +94,9 @@ fn lines_go_to_the_board_and_its_remarks_come_back() {
     let link = SerialLink::open(&options(&path)).expect("opens");
     let start = Instant::now();
     while link.send("P 0.55").is_err() && start.elapsed() < Duration::from_secs(5) {}
-    let mut told = [0; 7];
-    emulated.board.read_exact(&mut told).expect("is told");
-    assert_eq!(&told, b"P 0.55\n");
+    let mut received = [0; 7];
+    emulated.board.read_exact(&mut received).expect("is told");
+    assert_eq!(&received, b"P 0.55\n");
     emulated.board.write_all(b"# ok p=0.55\n").expect("writes");
     let said = |events: &[LinkEvent]| {
         events.contains(&LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar: 0.55 })))

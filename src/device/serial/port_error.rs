@@ -162,7 +162,7 @@ fn group_of(path: &Path) -> Option<String> {
     let gid = std::fs::metadata(path).ok()?.gid().to_string();
     let groups = std::fs::read_to_string("/etc/group").ok()?;
     let line = groups.lines().find(|line| line.split(':').nth(2) == Some(gid.as_str()))?;
-    // Nobody should join root's group.
+    // No user should join root's group.
     line.split(':').next().filter(|name| *name != "root").map(str::to_owned)
 }
 

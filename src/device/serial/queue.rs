@@ -30,7 +30,7 @@ pub(super) enum WhenFull {
     Wait,
 }
 
-/// A lock is only ever held for a few instructions that cannot fail; what it guards is sound even where a thread died.
+/// A lock is only ever held for a few instructions that cannot fail; its data are valid even after a panic.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -112,7 +112,7 @@ fn size_of_piece(piece: &Captured) -> usize {
     }
 }
 
-/// From the decoder to whoever listens.
+/// From the decoder to the receiver.
 #[derive(Debug)]
 pub(super) struct EventQueue {
     state: Mutex<Events>,
@@ -148,7 +148,7 @@ impl EventQueue {
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
         state.events.extend(events);
-        // A board's description is small and rare, and whoever listens later needs it.
+        // A board's description is small and rare, and later receivers need it.
         let mut kept = Vec::new();
         while state.events.len() > self.room {
             match state.events.pop_front() {

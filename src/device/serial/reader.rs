@@ -148,8 +148,8 @@ impl PortReader {
         let readings = self.shared.readings.load(Ordering::Relaxed);
         let mute = connection.newest.elapsed();
         let native = self.port.kind.native;
-        let heard = readings > connection.progress.0;
-        if heard {
+        let received = readings > connection.progress.0;
+        if received {
             connection.progress = (readings, Instant::now(), connection.bytes);
             connection.understood = true;
         }
@@ -163,7 +163,7 @@ impl PortReader {
             if mute >= BOOT {
                 self.shared.set_state(LinkState::Silent { hint: self.silence() });
             }
-        } else if heard {
+        } else if received {
             self.shared.set_state(LinkState::Listening);
             if !std::mem::replace(&mut connection.asked, true) {
                 self.ask(port);

@@ -52,7 +52,7 @@ pub(super) fn scan(port: &mut dyn SerialPort, current: Baud, stop: &AtomicBool) 
 
 fn listen(port: &mut dyn SerialPort, stop: &AtomicBool) -> Cadence {
     let mut decoder = Decoder::default();
-    let (mut buffer, mut heard) = ([0; 1024], Vec::new());
+    let (mut buffer, mut events) = ([0; 1024], Vec::new());
     let (start, mut any) = (Instant::now(), false);
     loop {
         let cadence = decoder.cadence();
@@ -68,12 +68,12 @@ fn listen(port: &mut dyn SerialPort, stop: &AtomicBool) -> Cadence {
             Ok(0) => return decoder.cadence(),
             Ok(count) => {
                 any = true;
-                decoder.push(&buffer[..count], start.elapsed().as_secs_f64(), &mut heard);
+                decoder.push(&buffer[..count], start.elapsed().as_secs_f64(), &mut events);
             }
             Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
             Err(_) => return decoder.cadence(),
         }
-        heard.clear();
+        events.clear();
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
             assert_eq!(found, Scan::Found(Baud::B115200));
         });
         let stop = AtomicBool::new(true);
-        // Told to stop, it leaves the port as it was.
+        // After a stop, it leaves the port unchanged.
         assert_eq!(scan(&mut port, Baud::B9600, &stop), Scan::Nothing);
         assert_eq!(port.baud_rate().ok(), Some(9_600));
     }

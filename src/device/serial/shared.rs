@@ -20,7 +20,7 @@ pub struct LinkOptions {
     pub baud: Option<Baud>,
     /// Wait for a board that disconnects.
     pub reconnect: bool,
-    /// Speed of a replay, as a multiple of the original; infinite for as fast as it is read.
+    /// Speed of a replay, as a multiple of the original; infinite for as fast as possible.
     pub replay_speed: f64,
 }
 
@@ -131,18 +131,18 @@ impl Shared {
 
     /// Decodes until there is nothing more to come.
     pub(super) fn decode(&self) {
-        let mut heard = Vec::new();
+        let mut decoded = Vec::new();
         while let Some(pieces) = self.bytes.take() {
             for piece in pieces {
                 {
                     let mut decoder = lock(&self.decoder);
                     match &piece {
-                        Captured::Bytes { arrived_s, bytes } => decoder.push(bytes, *arrived_s, &mut heard),
+                        Captured::Bytes { arrived_s, bytes } => decoder.push(bytes, *arrived_s, &mut decoded),
                         Captured::Interrupted { cause, .. } => decoder.interrupt(cause),
                     }
                     self.readings.store(decoder.readings(), Ordering::Relaxed);
                 }
-                let events = heard.drain(..).map(LinkEvent::Decoded);
+                let events = decoded.drain(..).map(LinkEvent::Decoded);
                 self.events.push(std::iter::once(LinkEvent::Captured(piece)).chain(events));
             }
         }

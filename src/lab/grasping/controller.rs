@@ -179,7 +179,7 @@ impl GraspController {
                 return None;
             }
             GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Vented { cause }))) => {
-                format!("the board vented by itself ({cause})")
+                format!("the board vented on its own ({cause})")
             }
             GripperEvent::Board(LinkEvent::Captured(Captured::Interrupted { cause, .. })) => cause.clone(),
             GripperEvent::Board(_)
@@ -302,7 +302,7 @@ mod tests {
         let vented = GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(vented)));
         for (control, aborts) in [(Control::Driven, true), (Control::ByHand, false), (Control::Free, false)] {
             let mut controller = GraspController::new(plan(control), 0.0);
-            assert_eq!(controller.observe(&vented), Some("the board vented by itself (watchdog)".to_owned()));
+            assert_eq!(controller.observe(&vented), Some("the board vented on its own (watchdog)".to_owned()));
             assert_eq!(controller.abort_cause().is_some(), aborts, "{control:?}");
             assert_eq!(controller.is_over(0.0), aborts);
             assert_eq!(controller.command(9.0).is_none(), control != Control::ByHand, "{control:?}");

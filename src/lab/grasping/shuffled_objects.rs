@@ -1,20 +1,20 @@
-//! The built-in objects in random order: everyone gets a turn before anyone gets a second.
+//! The built-in objects in random order: each occurs once before any occurs again.
 
 use palpate_sim::objects::catalogue;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// Deals built-in objects. The same seed deals the same sequence.
+/// Sequence of built-in objects; the same seed gives the same sequence.
 #[derive(Clone, Debug)]
 pub struct ShuffledObjects {
     random: ChaCha8Rng,
-    /// Indices into the catalogue that have not been dealt yet, the next one last.
+    /// Indices into the catalogue still to come, the next one last.
     left: Vec<usize>,
 }
 
 impl ShuffledObjects {
-    /// A shuffled deck.
+    /// Starts a sequence.
     pub fn new(seed: u64) -> Self {
         Self { random: ChaCha8Rng::seed_from_u64(seed), left: Vec::new() }
     }
@@ -27,7 +27,7 @@ impl ShuffledObjects {
             self.left.shuffle(&mut self.random);
         }
         let other = self.left.iter().rposition(|k| all[*k].name != in_hand);
-        // Only the one in the hand is left: the deck is shuffled anew without it.
+        // Only the one in the hand is left: the next round is drawn.
         let Some(at) = other else {
             self.left.clear();
             return self.next(in_hand);
@@ -42,12 +42,12 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn everyone_gets_a_turn_and_nobody_two_in_a_row() {
+    fn each_object_occurs_once_per_round_and_never_twice_in_a_row() {
         let deal = |seed: u64| {
-            let mut deck = ShuffledObjects::new(seed);
+            let mut shuffled = ShuffledObjects::new(seed);
             let mut dealt = vec!["lemon"];
             for _ in 0..100 {
-                dealt.push(deck.next(dealt[dealt.len() - 1]));
+                dealt.push(shuffled.next(dealt[dealt.len() - 1]));
             }
             dealt
         };

@@ -12,16 +12,16 @@ pub struct Disagreement {
     pub id: TrialId,
     /// Its label.
     pub label: String,
-    /// What the model saw.
+    /// Class predicted by the model.
     pub guess: String,
-    /// How sure it was of that.
+    /// Its probability.
     pub p: f64,
-    /// What it gave the label.
+    /// Its probability of the label.
     pub label_p: f64,
 }
 
-/// Trials to look at again, surest guess first. Reviewed ones are done with; a model that does not know a label's class
-/// cannot disagree with it.
+/// Trials whose label differs from the prediction, most certain first, without reviewed ones and labels unknown to the
+/// model.
 pub fn disagreements(rows: &[LabelledTrial]) -> Vec<Disagreement> {
     let differs = |row: &LabelledTrial| {
         let (label, guess) = (row.object.as_ref()?, row.guess.as_ref()?);

@@ -91,7 +91,7 @@ impl Observed<'_> {
     fn no_contact(&self) -> Option<String> {
         let (rest, pressed) = self.split();
         if pressed.is_empty() {
-            return (!self.readings.is_empty()).then(|| "it ended before the hand began to close".to_owned());
+            return (!self.readings.is_empty()).then(|| "ended before the fingers closed".to_owned());
         }
         let pads = [Sensor::PadLeft, Sensor::PadRight];
         let rises: Vec<PadRise> = pads.into_iter().filter_map(|pad| self.rise(pad, rest, pressed)).collect();
@@ -99,7 +99,7 @@ impl Observed<'_> {
             return None;
         }
         let each: Vec<String> = rises.iter().map(PadRise::summary).collect();
-        Some(format!("no load on any pad: {}", each.join(", ")))
+        Some(format!("no pad was loaded: {}", each.join(", ")))
     }
 
     /// Rise of a pad: in newtons if it is calibrated, otherwise in counts.
@@ -123,7 +123,7 @@ impl Observed<'_> {
 
     fn saturated(&self) -> Option<String> {
         let (_, pressed) = self.split();
-        let told = |sensor: Sensor| {
+        let remark = |sensor: Sensor| {
             let column = self.board.channel_of(sensor)?;
             let made_with = self.calibrations.iter().find(|(own, _)| *own == sensor).map(|(_, c)| c.record.input);
             let usual = Input::on(self.board, sensor);
@@ -138,24 +138,23 @@ impl Observed<'_> {
             let (count, all) = (counts.filter(at_its_end).count(), pressed.len());
             let worth_it = count >= IN_A_ROW && count as f64 > SATURATED_SHARE * all as f64;
             let percent = 100.0 * count as f64 / all.max(1) as f64;
-            worth_it
-                .then(|| format!("the {} is at the end of its range for {percent:.0} % of the grasp", sensor.label()))
+            worth_it.then(|| format!("{} saturated for {percent:.0} % of the grasp", sensor.label()))
         };
-        joined(Sensor::ALL.into_iter().filter_map(told))
+        joined(Sensor::ALL.into_iter().filter_map(remark))
     }
 
     fn interrupted(&self) -> Option<String> {
         let period = self.rate().map_or(0.0, |rate| 1.0 / rate);
         let long = |gap: &&Gap| gap.to_s - gap.from_s > LEAST_GAP_S.max(3.5 * period);
         let began = self.readings.first().map_or(0.0, |reading| reading.t_s);
-        let told = |gap: &Gap| {
+        let remark = |gap: &Gap| {
             let (from, length) = (gap.from_s - began, gap.to_s - gap.from_s);
-            format!("nothing for {length:.2} s from {from:.2} s on: {}", gap.cause)
+            format!("no readings for {length:.2} s from {from:.2} s: {}", gap.cause)
         };
-        let gaps = self.gaps.iter().filter(long).map(told);
+        let gaps = self.gaps.iter().filter(long).map(remark);
         // If readings follow, a broken connection is also the cause of a gap: it is listed only once.
-        let untold = |cause: &&String| !self.gaps.iter().any(|gap| gap.cause.contains(cause.as_str()));
-        let broken = self.interruptions.iter().filter(untold).cloned();
+        let has_no_gap = |cause: &&String| !self.gaps.iter().any(|gap| gap.cause.contains(cause.as_str()));
+        let broken = self.interruptions.iter().filter(has_no_gap).cloned();
         joined(gaps.chain(broken).chain(Sensor::ALL.into_iter().filter_map(|sensor| self.without_numbers(sensor))))
     }
 
@@ -165,27 +164,27 @@ impl Observed<'_> {
         let is_missing = |reading: &&Reading| reading.counts.get(column).copied().flatten().is_none();
         let (missing, all) = (self.readings.iter().filter(is_missing).count(), self.readings.len());
         let percent = 100.0 * missing as f64 / all.max(1) as f64;
-        (percent > 50.0).then(|| format!("the {} gave no number in {percent:.0} % of the readings", sensor.label()))
+        (percent > 50.0).then(|| format!("{}: no value in {percent:.0} % of readings", sensor.label()))
     }
 
     fn bad_cadence(&self) -> Option<String> {
         let Cadence { lost, gaps, rate_hz, jitter_p95_ms, samples, .. } = self.cadence;
-        let mut told = Vec::new();
+        let mut faults = Vec::new();
         if *samples > 0 && *lost > 0 {
             let share = 100.0 * *lost as f64 / (*samples + *lost) as f64;
-            told.push(format!("{lost} readings lost, {share:.1} %"));
+            faults.push(format!("{lost} readings lost, {share:.1} %"));
         }
         if let Some(stated) = self.board.rate_hz.filter(|stated| *stated > 0.0 && *gaps == 0 && *rate_hz > 0.0) {
             let off = rate_hz / stated - 1.0;
             if off.abs() > RATE_SHARE {
-                told.push(format!("{rate_hz:.2} Hz instead of {stated:.0}, {:+.1} %", 100.0 * off));
+                faults.push(format!("{rate_hz:.2} Hz instead of {stated:.0}, {:+.1} %", 100.0 * off));
             }
         }
         let half_period_ms = self.rate().map_or(f64::INFINITY, |rate| 500.0 / rate);
         if *jitter_p95_ms > half_period_ms {
-            told.push(format!("jitter {jitter_p95_ms:.1} ms, above half a period, {half_period_ms:.1} ms"));
+            faults.push(format!("jitter {jitter_p95_ms:.1} ms, limit {half_period_ms:.1} ms (half a period)"));
         }
-        joined(told.into_iter())
+        joined(faults.into_iter())
     }
 
     /// Readings per second: as the board states, otherwise as measured.
@@ -206,7 +205,7 @@ impl PadRise {
     fn summary(&self) -> String {
         let digits = if self.unit == "N" { 2 } else { 0 };
         let Self { pad, rise, least, unit } = self;
-        format!("{rise:.digits$} {unit} on the {}, a touch is {least:.digits$} {unit}", pad.label())
+        format!("{} {rise:.digits$} {unit} (contact from {least:.digits$} {unit})", pad.label())
     }
 }
 
@@ -289,7 +288,7 @@ mod tests {
         }] {
             let found = flags(&missed, &[], &[], &good());
             assert_eq!(found.iter().map(|found| found.flag).collect::<Vec<_>>(), [Flag::NoContact]);
-            assert!(found[0].remark.contains("counts on the left pad"), "{found:?}");
+            assert!(found[0].remark.starts_with("no pad was loaded: left pad "), "{found:?}");
             assert_eq!(flaws(found.clone(), Some("lemon")), found);
             assert_eq!(flaws(found, Some(EMPTY)), []);
         }
@@ -309,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn pressure_stands_in_for_phases_that_nobody_noted() {
+    fn pressure_replaces_missing_phases() {
         let mut readings = readings(0.0);
         readings.iter_mut().for_each(|r| r.line_bar = Some(if (0.5..2.5).contains(&r.t_s) { 1.0 } else { 0.0 }));
         let (board, cadence) = (Board::default(), good());
@@ -330,37 +329,37 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_told_with_its_length() {
+    fn gaps_are_flagged_with_their_length() {
         let gap = |from_s, to_s, cause: &str| Gap { from_s, to_s, lost: Some(1), cause: cause.to_owned() };
         assert_eq!(flags(&readings(1500.0), &[gap(1.0, 1.04, "lost")], &[], &good()), []);
-        let told = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &[], &good());
-        assert_eq!(told[0].flag, Flag::Interrupted);
-        assert_eq!(told[0].remark, "nothing for 1.25 s from 1.00 s on: the board was unplugged");
+        let found = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &[], &good());
+        assert_eq!(found[0].flag, Flag::Interrupted);
+        assert_eq!(found[0].remark, "no readings for 1.25 s from 1.00 s: the board was unplugged");
         let causes = ["the board was unplugged".to_owned(), "the port is gone".to_owned()];
-        let told = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &causes, &good());
-        assert!(told[0].remark.ends_with("unplugged; the port is gone"), "{told:?}");
+        let found = flags(&readings(1500.0), &[gap(1.0, 2.25, "the board was unplugged")], &causes, &good());
+        assert!(found[0].remark.ends_with("unplugged; the port is gone"), "{found:?}");
     }
 
     #[test]
-    fn a_board_that_does_not_keep_time_is_told_of_with_numbers() {
+    fn a_board_with_bad_timing_is_flagged_with_numbers() {
         let cases = [
             (Cadence { lost: 3, gaps: 1, ..good() }, "3 readings lost, 2.0 %"),
             (Cadence { rate_hz: 48.5, ..good() }, "48.50 Hz instead of 50, -3.0 %"),
-            (Cadence { jitter_p95_ms: 11.0, ..good() }, "jitter 11.0 ms, above half a period, 10.0 ms"),
+            (Cadence { jitter_p95_ms: 11.0, ..good() }, "jitter 11.0 ms, limit 10.0 ms (half a period)"),
         ];
         for (cadence, want) in cases {
-            let told = flags(&readings(1500.0), &[], &[], &cadence);
-            assert_eq!((told.len(), told[0].flag, told[0].remark.as_str()), (1, Flag::Cadence, want));
+            let found = flags(&readings(1500.0), &[], &[], &cadence);
+            assert_eq!((found.len(), found[0].flag, found[0].remark.as_str()), (1, Flag::Cadence, want));
         }
         let within = Cadence { rate_hz: 49.2, jitter_p95_ms: 9.9, ..good() };
         assert_eq!(flags(&readings(1500.0), &[], &[], &within), []);
     }
 
     #[test]
-    fn nothing_heard_raises_nothing_that_is_not_known() {
+    fn without_readings_no_flag_is_raised() {
         assert_eq!(flags(&[], &[], &[], &Cadence::default()), []);
         let short = &readings(0.0)[..10];
-        assert!(flags(short, &[], &[], &good())[0].remark.contains("before the hand began to close"));
+        assert!(flags(short, &[], &[], &good())[0].remark.contains("before the fingers closed"));
     }
 
     #[test]

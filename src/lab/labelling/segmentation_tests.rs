@@ -26,7 +26,7 @@ struct Told {
 
 /// Groups events into grasps. Starts and ends must alternate, with the phases between them.
 fn grasps(events: &[SegmentEvent]) -> Vec<Told> {
-    let mut told = Vec::new();
+    let mut found = Vec::new();
     let mut open: Option<Told> = None;
     for event in events {
         match event {
@@ -42,11 +42,11 @@ fn grasps(events: &[SegmentEvent]) -> Vec<Told> {
             SegmentEvent::Ended { at_s } => {
                 let open = open.take().expect("what ends has begun");
                 assert!(*at_s >= open.from_s, "{events:?}");
-                told.push(Told { at_s: *at_s, ..open });
+                found.push(Told { at_s: *at_s, ..open });
             }
         }
     }
-    told
+    found
 }
 
 /// Bend of a strip at a time after the start of a closing (share): 2 s up, 1 s hold, 1 s back.
@@ -73,16 +73,16 @@ fn stream(rate_hz: f64, seconds: f64, starts: &[f64], rise: f64) -> Vec<Reading>
 #[test]
 fn grasps_are_found_at_any_rate_by_the_strips_alone() {
     for rate_hz in [10.0, 50.0, 200.0, 1000.0] {
-        let told = grasps(&events(&Board::default(), stream(rate_hz, 20.0, &[3.0, 11.0], 600.0)));
-        assert_eq!(told.len(), 2, "{rate_hz} Hz: {told:?}");
-        for (told, start) in told.iter().zip([3.0, 11.0]) {
+        let found = grasps(&events(&Board::default(), stream(rate_hz, 20.0, &[3.0, 11.0], 600.0)));
+        assert_eq!(found.len(), 2, "{rate_hz} Hz: {found:?}");
+        for (found, start) in found.iter().zip([3.0, 11.0]) {
             let near = |t: f64, want: f64, before: f64, after: f64| t > want - before && t < want + after;
-            assert!(near(told.from_s, start - PRE_ROLL_S, 0.1, 0.3), "{rate_hz} Hz: {told:?}");
-            let phases: Vec<Phase> = told.phases.iter().map(|(phase, _)| *phase).collect();
+            assert!(near(found.from_s, start - PRE_ROLL_S, 0.1, 0.3), "{rate_hz} Hz: {found:?}");
+            let phases: Vec<Phase> = found.phases.iter().map(|(phase, _)| *phase).collect();
             assert_eq!(phases, [Phase::Close, Phase::Hold, Phase::Release], "{rate_hz} Hz");
-            assert!(near(told.phases[1].1, start + 2.0, 0.3, 0.3), "{rate_hz} Hz: {told:?}");
-            assert!(near(told.phases[2].1, start + 3.0, 0.1, 0.5), "{rate_hz} Hz: {told:?}");
-            assert!(near(told.at_s, start + 4.0, 0.3, 0.6), "{rate_hz} Hz: {told:?}");
+            assert!(near(found.phases[1].1, start + 2.0, 0.3, 0.3), "{rate_hz} Hz: {found:?}");
+            assert!(near(found.phases[2].1, start + 3.0, 0.1, 0.5), "{rate_hz} Hz: {found:?}");
+            assert!(near(found.at_s, start + 4.0, 0.3, 0.6), "{rate_hz} Hz: {found:?}");
         }
     }
 }
@@ -124,13 +124,13 @@ fn a_dead_strip_missing_numbers_and_gaps_are_survived() {
     }
     // One second is missing during the hold, four between the grasps.
     readings.retain(|reading| !(5.1..5.9).contains(&reading.t_s) && !(7.5..9.5).contains(&reading.t_s));
-    let told = grasps(&events(&Board::default(), readings));
-    assert_eq!(told.len(), 2, "{told:?}");
+    let found = grasps(&events(&Board::default(), readings));
+    assert_eq!(found.len(), 2, "{found:?}");
     // A grasp followed by a long gap ends where the gap begins.
     let mut cut = stream(50.0, 30.0, &[3.0, 22.0], 600.0);
     cut.retain(|reading| !(5.5..15.0).contains(&reading.t_s));
-    let told = grasps(&events(&Board::default(), cut));
-    assert!(told.len() == 2 && (told[0].at_s - 5.5).abs() < 0.05, "{told:?}");
+    let found = grasps(&events(&Board::default(), cut));
+    assert!(found.len() == 2 && (found[0].at_s - 5.5).abs() < 0.05, "{found:?}");
     // A board without strips and without pressure yields no events.
     let blind = Board { channels: vec!["fsrL".to_owned()], ..Board::default() };
     assert_eq!(events(&blind, stream(50.0, 10.0, &[3.0], 600.0)), []);
@@ -144,13 +144,13 @@ fn pressure_says_it_to_the_reading() {
     let at = |wanted: &dyn Fn(f64) -> bool| readings.iter().find(|r| wanted(r.t_s)).map_or(f64::NAN, |r| r.t_s);
     let (closes, holds) = (at(&|t| bar(t) > 0.0), at(&|t| bar(t) > 0.99));
     let releases = at(&|t| t > 5.5 && bar(t) < 1.0);
-    let told = grasps(&events(&Board::default(), readings));
-    assert_eq!(told.len(), 1, "{told:?}");
+    let found = grasps(&events(&Board::default(), readings));
+    assert_eq!(found.len(), 1, "{found:?}");
     let want = [(Phase::Close, closes), (Phase::Hold, holds), (Phase::Release, releases)];
-    for ((phase, t), (want, want_t)) in told[0].phases.iter().zip(want) {
-        assert!(*phase == want && (t - want_t).abs() < 0.021, "{want:?} at {want_t}: {told:?}");
+    for ((phase, t), (want, want_t)) in found[0].phases.iter().zip(want) {
+        assert!(*phase == want && (t - want_t).abs() < 0.021, "{want:?} at {want_t}: {found:?}");
     }
-    assert!((told[0].from_s - (closes - PRE_ROLL_S)).abs() < 0.021 && told[0].at_s < 7.5, "{told:?}");
+    assert!((found[0].from_s - (closes - PRE_ROLL_S)).abs() < 0.021 && found[0].at_s < 7.5, "{found:?}");
     // Without strips the line pressure suffices, and a rise before the line is vented starts another grasp.
     let blind = Board { channels: vec!["fsrL".to_owned()], ..Board::default() };
     let twice = (0..600).map(|k| {
@@ -158,8 +158,8 @@ fn pressure_says_it_to_the_reading() {
         let line_bar = Some(bend(t_s - 1.0).max(0.3 * f64::from(t_s > 2.0 && t_s < 5.2)).max(bend(t_s - 5.1)));
         Reading { t_s, arrived_s: t_s, seq: None, counts: vec![Some(0.0)], line_bar }
     });
-    let told = grasps(&events(&blind, twice));
-    assert!(told.len() == 2 && told[1].from_s >= told[0].at_s, "{told:?}");
+    let found = grasps(&events(&blind, twice));
+    assert!(found.len() == 2 && found[1].from_s >= found[0].at_s, "{found:?}");
 }
 
 /// Output of a board while it runs a script, decoded as the host decodes it.
@@ -172,17 +172,17 @@ fn emulated(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) {
     let (rate_hz, channels, most_steps, clock_start_us) = (50, 4, 30, 0);
     let setup = EmulatorSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 5 };
     let mut gripper = EmulatedGripper::new(setup).expect("it knows them");
-    let (mut decoder, mut heard) = (Decoder::default(), Vec::new());
+    let (mut decoder, mut decoded) = (Decoder::default(), Vec::new());
     for k in 1..=(seconds / 0.005) as u32 {
         let now = 0.005 * f64::from(k);
         gripper.advance(now);
-        decoder.push(&gripper.take_bytes(), now, &mut heard);
+        decoder.push(&gripper.take_bytes(), now, &mut decoded);
     }
-    let reading = |heard| match heard {
+    let reading = |decoded| match decoded {
         DecodedEvent::Reading(reading) => Some(reading),
         DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
     };
-    (decoder.board(), heard.into_iter().filter_map(reading).collect())
+    (decoder.board(), decoded.into_iter().filter_map(reading).collect())
 }
 
 #[test]
@@ -198,15 +198,15 @@ fn the_emulated_gripper_is_followed_with_and_without_its_pressure() {
     let mut without = with.clone();
     without.iter_mut().for_each(|reading| reading.line_bar = None);
     for (readings, late_s) in [(with, 0.03), (without, 0.6)] {
-        let told = grasps(&events(&board, readings));
-        assert_eq!(told.len(), 3, "{told:?}");
-        for (told, pressed) in told.iter().zip(&pressed) {
-            let late = told.from_s + PRE_ROLL_S - pressed;
-            assert!((-0.03..late_s).contains(&late), "{late} s late: {told:?}");
-            assert_eq!(told.phases.first().map(|first| first.0), Some(Phase::Close));
-            let release = told.phases.iter().find(|(phase, _)| *phase == Phase::Release).expect("it opens");
-            assert!(release.1 > pressed + 2.3 && release.1 < pressed + 3.7, "{told:?} {pressed}");
-            assert!(told.at_s > release.1 && told.at_s < pressed + 6.5, "{told:?} {pressed}");
+        let found = grasps(&events(&board, readings));
+        assert_eq!(found.len(), 3, "{found:?}");
+        for (found, pressed) in found.iter().zip(&pressed) {
+            let late = found.from_s + PRE_ROLL_S - pressed;
+            assert!((-0.03..late_s).contains(&late), "{late} s late: {found:?}");
+            assert_eq!(found.phases.first().map(|first| first.0), Some(Phase::Close));
+            let release = found.phases.iter().find(|(phase, _)| *phase == Phase::Release).expect("it opens");
+            assert!(release.1 > pressed + 2.3 && release.1 < pressed + 3.7, "{found:?} {pressed}");
+            assert!(found.at_s > release.1 && found.at_s < pressed + 6.5, "{found:?} {pressed}");
         }
     }
 }

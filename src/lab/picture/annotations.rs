@@ -111,7 +111,7 @@ fn add_legend(overlay: &mut Overlay, view: &PictureView) {
 
 fn add_badge(overlay: &mut Overlay, badge: &str, theme: Theme) {
     let colours = theme.colours();
-    // Letters of this font are half as wide as it is high.
+    // The letters of this font are half as wide as high.
     let width = 7.6 * badge.chars().count() as f32 + 18.0;
     let (min, max) = (Vec2::new(MARGIN - 4.0, MARGIN - 4.0), Vec2::new(MARGIN - 4.0 + width, MARGIN + 19.0));
     overlay.shapes.push(Shape2::Rectangle { min, max, colours: [colours.raised; 2], opacity: 0.92 });

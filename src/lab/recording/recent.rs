@@ -5,7 +5,7 @@ use palpate_device::serial::LinkEvent;
 use palpate_tactile::board::Reading;
 use std::collections::VecDeque;
 
-/// Length of what is remembered (s).
+/// Length of the history (s).
 const REMEMBERED_S: f64 = 2.0;
 /// Events that are remembered at most: 2 s at 1 kHz, bytes and readings.
 const MOST: usize = 6000;

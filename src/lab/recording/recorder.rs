@@ -61,7 +61,7 @@ enum Message {
     FinishBoard(Box<BoardTrialEnd>),
 }
 
-/// A handle on the recorder's thread. Dropping it writes everything that was handed over and waits for that.
+/// Handle of the recorder's thread. Dropping it waits until everything is written.
 #[derive(Debug)]
 pub struct Recorder {
     messages: Option<Sender<Message>>,

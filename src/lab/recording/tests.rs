@@ -77,8 +77,8 @@ fn a_trial_keeps_every_reading_every_gap_and_every_byte() -> Result<(), Box<dyn 
     }
     assert!(recorded.warnings.iter().any(|warning| warning.starts_with("interrupted")), "{:?}", recorded.warnings);
     let row = &store.list(false)?[0];
-    let told = (row.source, row.object.as_str(), row.state.as_str(), row.samples, row.sound);
-    assert_eq!(told, (TrialSource::Recorded, "lemon", "complete", 299, true));
+    let found = (row.source, row.object.as_str(), row.state.as_str(), row.samples, row.sound);
+    assert_eq!(found, (TrialSource::Recorded, "lemon", "complete", 299, true));
     // The bytes are those that came, mark by mark.
     let stored = store.board_bytes(recorded.id)?.ok_or("it has bytes")?;
     let pieces = |bytes: &[u8]| CaptureReader::new(bytes)?.collect::<std::io::Result<Vec<Captured>>>();

@@ -66,7 +66,7 @@ impl ExplainedEffect {
         let (costs, saves) = if self.planned.on { ("costs", "saves") } else { ("would cost", "would save") };
         let percent = 100.0 * self.cost_share;
         if self.cost_share.abs() < NOISE {
-            format!("{costs} next to nothing: less than {:.0} % of the CPU time", 100.0 * NOISE)
+            format!("{costs} less than {:.0} % of the CPU time", 100.0 * NOISE)
         } else if percent > 0.0 {
             format!("{costs} {percent:.0} % of the CPU time")
         } else {
@@ -80,7 +80,7 @@ impl ExplainedEffect {
         let change = &self.change;
         let how = if self.planned.on { "without it" } else { "with it" };
         if change.norms.curvature_per_m == 0.0 && change.norms.force_n == 0.0 && change.contact_onset_s == onset_here {
-            return format!("{how} nothing changes");
+            return format!("no change {how}");
         }
         let part = |name: &str, value: f64, unit: &str, share: f64| {
             format!("{name} {} {unit} ({} %)", three_digits(value), three_digits(100.0 * share))

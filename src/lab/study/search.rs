@@ -28,11 +28,11 @@ pub fn search(
     seed: u64,
     quick: bool,
     given: &serde_json::Map<String, serde_json::Value>,
-    tell: &dyn Fn(usize, usize),
+    progress: &dyn Fn(usize, usize),
 ) -> Result<Vec<SearchRow>, LearnError> {
     if method.recipe.is_none() {
         let cause = "only networks have settings to search for".to_owned();
-        return Err(LearnError::Setting { name: "of the search".to_owned(), cause });
+        return Err(LearnError::Setting { name: "search".to_owned(), cause });
     }
     let mut points = vec![given.clone()];
     for (name, values) in GRID.iter().filter(|(name, _)| !given.contains_key(*name)) {
@@ -52,7 +52,7 @@ pub fn search(
     for (n, settings) in points.iter().enumerate() {
         let mut pairs = Vec::new();
         for fold in 0..FOLDS {
-            tell(n * FOLDS + fold, points.len() * FOLDS);
+            progress(n * FOLDS + fold, points.len() * FOLDS);
             let of = |inside: bool| -> Vec<usize> {
                 (0..fold_of.len()).filter(|k| (fold_of[*k] == fold) == inside).collect()
             };

@@ -30,7 +30,7 @@ impl Default for Bootstrap {
     }
 }
 
-/// Share of the resamples on which the statistic must be defined. Leaving out more would tell of unusual draws only.
+/// Share of the resamples on which the statistic must be defined. With fewer, the interval would describe unusual draws only.
 const DEFINED: f64 = 0.95;
 
 impl Bootstrap {

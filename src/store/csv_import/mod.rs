@@ -109,7 +109,7 @@ pub enum ImportFault {
     /// A file, row, trial or name beyond the limits.
     #[error("{problem}")]
     TooLarge {
-        /// What is too large.
+        /// Problem.
         problem: String,
     },
     /// No header, or no row below it.
@@ -121,7 +121,7 @@ pub enum ImportFault {
     /// Missing, repeated or invalid columns.
     #[error("{problem}")]
     Header {
-        /// What is wrong with them.
+        /// Problem.
         problem: String,
     },
     /// A row with too many or too few fields.
@@ -135,13 +135,13 @@ pub enum ImportFault {
     /// An invalid name, time, word or reading.
     #[error("{problem}")]
     Field {
-        /// What is wrong with it.
+        /// Problem.
         problem: String,
     },
     /// A row that contradicts an earlier one: falling time, another label, size or shape.
     #[error("{problem}")]
     Contradiction {
-        /// What it contradicts.
+        /// Contradiction.
         problem: String,
     },
     /// A trial that is too short, has an empty channel or a wild time.
@@ -149,7 +149,7 @@ pub enum ImportFault {
     Trial {
         /// Name of the trial.
         trial: String,
-        /// What is wrong with it.
+        /// Problem.
         problem: String,
     },
 }

@@ -284,8 +284,8 @@ mod tests {
             LabelledTrial { complete: false, ..row("a") },
             LabelledTrial { object: None, ..row("a") },
         ];
-        let told = |name: &str, wanted, done| ObjectProgress { name: name.to_owned(), wanted, done, flagged: 0 };
-        assert_eq!(plan.progress(&rows).objects, [told("a", 5, 1), told("mug", 0, 1)]);
+        let row = |name: &str, wanted, done| ObjectProgress { name: name.to_owned(), wanted, done, flagged: 0 };
+        assert_eq!(plan.progress(&rows).objects, [row("a", 5, 1), row("mug", 0, 1)]);
     }
 
     #[test]

@@ -59,7 +59,7 @@ pub enum CalibrationFault {
     },
     /// Part without a name.
     #[error(
-        "the part needs a name, such as the number on its tail: calibrations belong to parts, and parts get swapped"
+        "the part needs a name, such as the number written on it: calibrations belong to parts, and parts get swapped"
     )]
     NoName,
 }

@@ -49,16 +49,16 @@ pub enum Unsettled {
         need_s: f64,
     },
     /// No numbers on the channel.
-    #[error("the board sends no number on this channel: check the wire, or which channel it is")]
+    #[error("the board sends no value on this channel: check the wiring and the name of the channel")]
     Silent,
     /// Still on its way.
-    #[error("still moving, {by:+.1} counts in half a window: hold it still and wait")]
+    #[error("still moving ({by:+.1} counts): hold it still and wait")]
     Moving {
         /// The later half less the earlier (counts).
         by: f64,
     },
     /// At the end of the converter's range.
-    #[error("{counts:.0} counts is the end of the range: the circuit is open, shorted, or the pad saturated")]
+    #[error("{counts:.0} counts is an end of the range: the circuit is open or shorted, or the pad is saturated")]
     RangeEnd {
         /// Reading (counts).
         counts: f64,

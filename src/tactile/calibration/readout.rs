@@ -344,7 +344,7 @@ impl Wired {
         match (&self.calibration.curve, self.input.range_end(counts)) {
             (Curve::Flex(curve), None) => Some(curve.angle(self.input.ohm(counts))),
             (Curve::Flex(_), Some(_)) => None,
-            // A pad at its end is saturated: the number is what it takes to get there, and no less.
+            // A pad at the end of its range is saturated: the value is a lower bound.
             (Curve::Pad(curve), None | Some(RangeEnd::Open | RangeEnd::Short)) => {
                 Some(self.input.siemens(counts) - curve.idle_siemens)
             }

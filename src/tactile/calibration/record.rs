@@ -14,7 +14,7 @@ const LONGEST_NAME: usize = 80;
 /// Measured points of a part: the form in which calibrations are stored and exchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Name of the part, such as what is written on its tail.
+    /// Name of the part, such as the number written on it.
     pub part: String,
     /// SensorKind of the sensor.
     pub kind: SensorKind,

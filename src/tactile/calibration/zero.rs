@@ -21,19 +21,19 @@ pub struct Zero {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unrest {
     /// Too few readings.
-    #[error("only {have} readings came: is the board sending?")]
+    #[error("only {have} readings arrived: check that the board is sending")]
     TooFew {
         /// Number of readings.
         have: usize,
     },
     /// Pressure is on.
-    #[error("{bar:.2} bar is on: vent, let the fingers come to rest, and try again")]
+    #[error("the line pressure is {bar:.2} bar: vent, let the fingers come to rest, and try again")]
     Pressed {
         /// The line pressure (bar).
         bar: f64,
     },
     /// A sensor moves.
-    #[error("the {place} moves: leave the fingers alone until they have come to rest, and try again", place = .sensor.label())]
+    #[error("the {place} is moving: let the fingers come to rest, and try again", place = .sensor.label())]
     Moving {
         /// Sensor that moves.
         sensor: Sensor,

@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn readings_are_whole_counts_between_the_rails() {
+    fn readings_are_whole_counts_within_full_scale() {
         for i in -10..=110 {
             let read = Converter::DUE.counts(f64::from(i) / 100.0, 0.3);
             assert!(read.fract() == 0.0 && (0.0..=4095.0).contains(&read), "{read}");

@@ -1,7 +1,7 @@
 //! The force-sensing pad that reads force or pressure: Ohmite FSR07CE (paper, section IV-B).
 //!
 //! Its law stands in [`crate::electronics`]; here it saturates at last, and the divider is amplified so that the
-//! converter meets its rail where the pad saturates. Loads are counted here as shares u of the load that saturates the
+//! converter reaches full scale where the pad saturates. Loads are counted here as shares u of the load that saturates the
 //! nominal pad: G = G_full u^b.
 //!
 //! Recordings of the real gripper know three levels: idle, touched, and saturated soon after the touch. No circuit or
@@ -126,7 +126,7 @@ mod tests {
                 let least = (100.0 * range.least[side] / range.full).ceil() as usize;
                 assert!(reads[..least].iter().all(|&r| r == 0.0) && reads[least + 1] > 0.02 * range.full);
                 let most = reads[299];
-                assert!((most / range.full - 1.0).abs() < 1e-3, "at the rail, {most}");
+                assert!((most / range.full - 1.0).abs() < 1e-3, "saturated, {most}");
                 let saturated = reads.iter().position(|&r| r == most).unwrap();
                 assert!(saturated < [120, 170][side], "{saturated}");
             }

@@ -12,7 +12,7 @@
 //! | parts | flat resistance, rise with bend | gain, exponent |
 //! | slip | gain of this grasp | conductance of this grasp |
 //! | hysteresis | creep | unloading reads higher |
-//! | threshold, saturation | none backwards, none beyond a fold | silent below, at the rail above |
+//! | threshold, saturation | none backwards, none beyond a fold | silent below, saturated above |
 //! | drift | rest resistance of this grasp | conductance grows under load |
 //! | noise, counts | divider, converter | divider, amplifier, converter |
 //!

@@ -122,13 +122,13 @@ fn switches_take_away_no_more_than_their_own() {
     }
     let (shift, scatter) = spread(read(PhysicalLike { drift: true, ..off }, "curvature_right"), |a, b| a - b);
     assert!(shift.abs() < 0.4 && shift != 0.0 && scatter < 1e-5);
-    // The left is the measure of the asymmetry, and no threshold or rail is within reach of a forward bend.
+    // The left is the measure of the asymmetry, and a forward bend reaches neither threshold nor saturation.
     assert_eq!(read(PhysicalLike { asymmetry: true, ..off }, "curvature_left"), read(off, "curvature_left"));
     assert_eq!(read(PhysicalLike { threshold: true, saturation: true, ..off }, "curvature_right"), ideal);
-    // The threshold takes readings away and leaves the others; the rail cuts the peaks.
+    // The threshold takes readings away and leaves the others; saturation cuts the peaks.
     let full = read(off, "force_left");
-    let felt = read(PhysicalLike { threshold: true, ..off }, "force_left");
-    assert!(felt.iter().zip(&full).all(|(f, all)| if *all < 0.15 { *f == 0.0 } else { f == all }));
+    let sensed = read(PhysicalLike { threshold: true, ..off }, "force_left");
+    assert!(sensed.iter().zip(&full).all(|(f, all)| if *all < 0.15 { *f == 0.0 } else { f == all }));
     let cut = read(PhysicalLike { saturation: true, ..off }, "force_left");
     assert!(cut.iter().zip(&full).all(|(c, all)| (c - all.min(PhysicalLike::OFF.full_force as f32)).abs() < 1e-6));
 }

@@ -1,9 +1,8 @@
-//! Do hard cases stay numerically stable? A table of named cases, each with what must hold of it, run at every
-//! accuracy; and random scenes over wide ranges, each computed a second time with a quarter of the step, to count the
-//! answers that are silently wrong.
+//! Numerical stability: a table of hard cases with limits, run at every accuracy; and random scenes over wide ranges,
+//! each computed again with a quarter of the step, to count silently wrong answers.
 //!
-//! A case is one line in [`CASES`] and one function that measures. What it asserts is data: a measured value and its
-//! limit, so that the table can be printed, stored and tested alike.
+//! A case is one line in [`CASES`] and one function that measures. Its assertions are data, a measured value and its limit,
+//! so that the table can be printed, stored and tested alike.
 
 mod cases;
 mod random;
@@ -18,9 +17,9 @@ use serde::Serialize;
 /// Accuracy or step length of a case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CaseAccuracy {
-    /// One of the settings a user has.
+    /// Accuracy of a scene.
     Accuracy(Accuracy),
-    /// A step of its own (s).
+    /// Fixed step (s).
     Step(f64),
 }
 
@@ -33,7 +32,7 @@ impl CaseAccuracy {
         }
     }
 
-    /// The error that a step may have; zero where its length is given.
+    /// Error tolerance of a step; zero for a fixed step.
     pub fn tolerance(self) -> f64 {
         match self {
             Self::Accuracy(accuracy) => accuracy.tolerance().unwrap_or(0.0),
@@ -50,16 +49,16 @@ impl CaseAccuracy {
     }
 }
 
-/// Under what a case is measured.
+/// Conditions of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
     /// Accuracy or step length.
     pub setting: CaseAccuracy,
-    /// Every variant and the whole duration, rather than what a few seconds allow.
+    /// Every variant and the whole duration; otherwise a few seconds of CPU time.
     pub thorough: bool,
 }
 
-/// Steps that one run may take, thorough or not: ten minutes at draft.
+/// Largest number of steps of a run, thorough or not: ten minutes at draft.
 const MOST_STEPS: [f64; 2] = [9e4, 3e3];
 
 impl Conditions {
@@ -67,22 +66,22 @@ impl Conditions {
         self.setting.step()
     }
 
-    /// A duration (s), cut to what may be computed.
+    /// Duration (s), shortened to the largest number of steps.
     fn span(&self, seconds: f64) -> f64 {
         seconds.min(MOST_STEPS[usize::from(!self.thorough)] * self.h())
     }
 
-    /// All variants, or the first few of them.
+    /// All variants, or the first few.
     fn some_of<'a, T>(&self, all: &'a [T], quick: usize) -> &'a [T] {
         if self.thorough { all } else { &all[..quick.min(all.len())] }
     }
 }
 
-/// The settings a user has: the named steps, a tolerance that shows and one that hardly does. Coarsest first.
+/// Accuracies of the table: the named ones, and a coarse and a fine tolerance. Coarsest first.
 pub const ACCURACIES: [Accuracy; 5] =
     [Accuracy::Draft, Accuracy::Standard, Accuracy::Tolerance(1e-3), Accuracy::Tolerance(1e-5), Accuracy::Reference];
 
-/// Of these, as many as a few seconds allow.
+/// Accuracies of a quick run.
 pub const QUICK_ACCURACIES: &[Accuracy] = ACCURACIES.split_at(2).0;
 
 /// Limit of a measured value.
@@ -96,7 +95,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// True when a value keeps to it; nothing that is no number does.
+    /// True if the value is within the limit; NaN never is.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Self::AtMost(limit) => value <= limit,
@@ -104,7 +103,7 @@ impl Limit {
         }
     }
 
-    /// Share of the limit that a value uses; one is all of it.
+    /// Used share of the limit; 1 at the limit.
     fn used(self, value: f64) -> f64 {
         match self {
             Self::AtMost(limit) if limit > 0.0 => value / limit,
@@ -143,7 +142,7 @@ impl Measurement {
         Self { what: what.into(), measured, limit: Limit::AtLeast(limit) }
     }
 
-    /// True when the value keeps to its limit.
+    /// True if the value is within its limit.
     pub fn holds(&self) -> bool {
         self.limit.holds(self.measured)
     }
@@ -152,13 +151,13 @@ impl Measurement {
 /// Accuracies and steps that a case is run at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settings {
-    /// At every accuracy, and at further steps of its own (s).
+    /// Every accuracy, and further fixed steps (s).
     EveryAccuracyAnd(&'static [f64]),
-    /// Once: it does not depend on how finely anything is computed.
+    /// Once: the result does not depend on the accuracy.
     Once,
 }
 
-/// Measurements of a case, or the number that is not finite.
+/// Measurements of a case, or the body whose state is not finite.
 pub type Findings = Result<Vec<Measurement>, NotFinite>;
 
 /// A hard case.
@@ -183,7 +182,7 @@ pub struct CaseRow {
     pub claim: &'static str,
     /// The setting.
     pub setting: String,
-    /// All that was measured; the one that comes closest to its limit, or fails, is the first.
+    /// All measurements; the one closest to its limit, or beyond it, comes first.
     pub findings: Vec<Measurement>,
     /// Body whose state is not finite; none if all stayed finite.
     pub not_finite: Option<String>,
@@ -192,7 +191,7 @@ pub struct CaseRow {
 }
 
 impl Case {
-    /// The settings it is run at, out of the chosen accuracies.
+    /// Settings of the case for the chosen accuracies.
     pub fn settings(&self, accuracies: &[Accuracy], thorough: bool) -> Vec<CaseAccuracy> {
         /// Steps below this are for thorough runs (s).
         const FINE: f64 = 1e-3;
@@ -208,7 +207,7 @@ impl Case {
         }
     }
 
-    /// Runs it at one setting.
+    /// Runs the case at one setting.
     pub fn run(&self, setting: CaseAccuracy, thorough: bool) -> CaseRow {
         let name = if self.settings == Settings::Once { "any".to_owned() } else { setting.name() };
         let outcome = (self.measure)(&Conditions { setting, thorough });

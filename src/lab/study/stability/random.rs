@@ -1,8 +1,8 @@
-//! Random scenes over wide ranges: does every step converge, and is the answer right where it is not flagged?
+//! Random scenes over wide ranges: convergence of every step, and correctness of the answers without a flag.
 //!
-//! Each scene closes, holds and ends; then it is computed again with a quarter of the step. Where the two end apart,
-//! the first was wrong. Where no flag had been raised, it was *silently* wrong. Some scenes have no right answer: their
-//! end depends on a push of a micrometre at the start, however fine the step; these are counted apart.
+//! Each scene closes and holds; then it is computed again with a quarter of the step. If the results differ, the first is
+//! wrong, and *silently* wrong if no flag was raised. Some scenes have no right answer: their result depends on a shift of
+//! a micrometre at the start, at any step; these are counted separately.
 
 use glam::DVec3;
 use palpate_geometry::Primitive;
@@ -16,9 +16,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Duration of a scene (s): closing takes half a second at most, the rest is hold.
 const DURATION: f64 = 1.5;
-/// Joint angles farther apart than this are different answers (rad): one degree and a bit, of about eight at 1 bar.
+/// Largest difference of joint angles between equal answers (rad): about 1.1 degrees, of eight at 1 bar.
 const SAME_ANGLE: f64 = 0.02;
-/// Places farther apart than this are different answers (m).
+/// Largest distance of objects between equal answers (m).
 const SAME_PLACE: f64 = 2e-3;
 /// An object this far from its start, or this far below it, has left the hand; its position is ignored (m).
 const GONE: f64 = 0.15;
@@ -46,7 +46,7 @@ pub struct RandomScene {
 }
 
 impl RandomScene {
-    /// The scene that a seed and a number stand for.
+    /// Draws the scene of a seed and a number.
     pub fn draw(seed: u64, number: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(number);
@@ -72,7 +72,7 @@ impl RandomScene {
         scene.object.friction = Auto::Value(mu);
         scene.gripper.finger.damping_time = if one_in(5) { 0.0 } else { damping };
         scene.object.fixed = one_in(4);
-        // Mostly put down on a face; otherwise it topples by itself.
+        // Usually on a face; otherwise it topples.
         let lying = if one_in(2) { 90.0 } else { 0.0 };
         scene.object.rotation_deg = if one_in(5) { tumbled } else { [lying, 0.0, tumbled[2]] };
         scene.support.kind = if one_in(6) { SupportKind::Table } else { SupportKind::Pedestal };
@@ -89,7 +89,7 @@ impl RandomScene {
         Self { scene, object, h, torque, closing, jump }
     }
 
-    /// Steps it takes.
+    /// Number of steps.
     pub fn steps(&self) -> u64 {
         (DURATION / self.h).round() as u64
     }
@@ -101,7 +101,7 @@ impl RandomScene {
         Drive { torque: self.torque * rise * jump, ..Drive::default() }
     }
 
-    /// Computes it with a step (s), the object pushed aside at the start.
+    /// Computes the scene with a step (s), the object shifted by `push` (m) at the start.
     fn run(&self, h: f64, push: f64) -> Ran {
         let mut run = SteppedScene::new(&self.scene, Some(&self.object), h);
         run.shift_object(DVec3::new(push, push, 0.0));
@@ -152,12 +152,12 @@ struct Ran {
     /// Outer friction residual of every step.
     friction: Vec<f32>,
     static_residual: f64,
-    /// Farthest way in one step (m).
+    /// Largest displacement in one step (m).
     travel: f64,
     /// Speed of the object at the end (m/s).
     speed: f64,
     q: Vec<f64>,
-    /// Displacement of the object; absent where it is gone.
+    /// Displacement of the object; absent if it left the hand.
     place: Option<DVec3>,
 }
 
@@ -180,7 +180,7 @@ impl Default for Ran {
 }
 
 impl Ran {
-    /// True when two runs are the same answer.
+    /// True if two runs give the same answer.
     fn agrees(&self, other: &Self) -> bool {
         let angle = self.q.iter().zip(&other.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let place = match (self.place, other.place) {
@@ -204,7 +204,7 @@ struct Judged {
     coarse: Ran,
     fine_steps: u64,
     wrong: bool,
-    /// The end depends on a push of a micrometre, with the fine step too.
+    /// The result depends on a shift of a micrometre, with the fine step too.
     no_answer: bool,
 }
 
@@ -229,16 +229,16 @@ pub struct Flags {
     pub friction_residual: f64,
     /// Static residual at the end of the hold.
     pub static_residual: f64,
-    /// Farthest way of the object or a fingertip in one step (m).
+    /// Largest displacement of the object or a fingertip in one step (m).
     pub travel: f64,
 }
 
 impl Flags {
-    /// Suspects much.
+    /// Sensitive thresholds.
     pub const SHARP: Self = Self { friction_residual: 0.5, static_residual: 3e-3, travel: 8e-3 };
-    /// Criterion of a flag. Tuned on seed 1; see [`RandomReport::flags`] for its recall.
+    /// Chosen thresholds, tuned on seed 1; [`RandomReport::flags`] has their recall.
     pub const CHOSEN: Self = Self { friction_residual: 2.0, static_residual: 0.02, travel: 16e-3 };
-    /// Suspects little.
+    /// Insensitive thresholds.
     pub const BLUNT: Self = Self { friction_residual: 10.0, static_residual: 0.1, travel: 64e-3 };
 }
 
@@ -266,9 +266,9 @@ fn step_rows(judged: &[Judged]) -> Vec<StepRow> {
 pub struct FlagRow {
     /// The flag and its limit.
     pub flag: String,
-    /// Share of the wrong answers that it catches.
+    /// Share of the wrong answers that are flagged.
     pub recall: f64,
-    /// Share of the right answers that it suspects.
+    /// Share of the right answers that are flagged.
     pub false_alarms: f64,
 }
 
@@ -281,13 +281,13 @@ pub struct StepRow {
     pub scenes: usize,
     /// Answers that change with the step.
     pub wrong: usize,
-    /// Of these, answers that a push of a micrometre changes too.
+    /// Of these, answers that a shift of a micrometre changes too.
     pub no_answer: usize,
-    /// Wrong answers, other than those, that no flag was raised for.
+    /// Other wrong answers without a flag.
     pub silently_wrong: usize,
 }
 
-/// The longest steps of the rows (s): standard, draft, and beyond what a trial can have.
+/// Longest step of each row (s): standard, draft, and two beyond those of trials.
 const STEP_ROWS: [f64; 4] = [1.0 / 300.0, 1.0 / 150.0, 0.02, 0.06];
 
 /// Results of random scenes.
@@ -301,7 +301,7 @@ pub struct RandomReport {
     pub steps: u64,
     /// Steps of the finer computation.
     pub finer_steps: u64,
-    /// Scenes in which a number left the range.
+    /// Scenes with a value that is not finite.
     pub non_finite: usize,
     /// Steps that missed the solver's tolerance.
     pub missed_steps: u64,
@@ -311,13 +311,13 @@ pub struct RandomReport {
     pub newton_max: u32,
     /// Largest outer friction residual.
     pub friction_residual_max: f64,
-    /// Outer friction residual that one step in a hundred exceeds.
+    /// 99th percentile of the outer friction residual.
     pub friction_residual_p99: f64,
     /// Answers that change with the step.
     pub wrong: usize,
-    /// Of these, answers that a push of a micrometre changes too: no answer is right.
+    /// Of these, answers that a shift of a micrometre changes too: no answer is right.
     pub no_answer: usize,
-    /// Wrong answers, other than those, that no flag was raised for.
+    /// Other wrong answers without a flag.
     pub silently_wrong: usize,
     /// Numbers of the first of these.
     pub examples: Vec<u64>,
@@ -402,9 +402,9 @@ fn flag_rows(judged: &[Judged]) -> Vec<FlagRow> {
     rows
 }
 
-/// Computes random scenes, twice each, until they have taken `steps` steps together; `tell` receives how many of how
+/// Computes random scenes, twice each, until they have taken `steps` steps together; `progress` receives how many of how
 /// many scenes are done. The result does not depend on the number of threads.
-pub fn random_scenes(seed: u64, steps: u64, threads: usize, tell: &(dyn Fn(usize, usize) + Sync)) -> RandomReport {
+pub fn random_scenes(seed: u64, steps: u64, threads: usize, progress: &(dyn Fn(usize, usize) + Sync)) -> RandomReport {
     let (mut scenes, mut planned) = (0, 0);
     while planned < steps {
         planned += RandomScene::draw(seed, scenes).steps();
@@ -419,7 +419,7 @@ pub fn random_scenes(seed: u64, steps: u64, threads: usize, tell: &(dyn Fn(usize
                 return judged;
             }
             judged.push(Judged::new(seed, number));
-            tell(done.fetch_add(1, Ordering::Relaxed) + 1, scenes as usize);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, scenes as usize);
         }
     };
     let mut judged: Vec<Judged> = std::thread::scope(|scope| {

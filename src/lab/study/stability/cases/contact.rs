@@ -23,7 +23,7 @@ fn of_mass(shape: Primitive, mass: f64, friction: f64) -> ObjectModel {
 pub(super) fn squeezed_masses(conditions: &Conditions) -> Findings {
     let shapes = [Primitive::Sphere { radius: 0.02 }, Primitive::Cuboid { half: DVec3::splat(0.0175) }];
     let mut findings = Vec::new();
-    // Sideways, where only friction holds. What is heavy would swing on its skin for minutes.
+    // Sideways, held by friction alone. Heavy objects would swing on the skin for minutes.
     for (mass, pull) in [(1e-4, 0.05), (0.01, 0.05), (0.1, 0.05), (10.0, 0.0), (100.0, 0.0)] {
         for shape in conditions.some_of(&shapes, 1) {
             let scene = Scene::default();
@@ -87,7 +87,7 @@ fn light_stiff_scene() -> Scene {
     scene
 }
 
-pub(super) fn born_inside(conditions: &Conditions) -> Findings {
+pub(super) fn initial_overlap(conditions: &Conditions) -> Findings {
     let mut findings = Vec::new();
     for stiffer in conditions.some_of(&[1.0, 1000.0], 2) {
         let mut scene = bare(10);
@@ -113,7 +113,7 @@ pub(super) fn born_inside(conditions: &Conditions) -> Findings {
         findings.push(Measurement::at_most(format!("most energy over the first {at}"), most / start, 1.0 + 1e-9));
         findings.push(missed(&run));
     }
-    // A plate of 1 mm that the axis of the left finger has just come through: the finger goes back the way it came.
+    // The axis of the left finger has just crossed a 1 mm plate: the finger must return to its side.
     let mut scene = bare(10);
     scene.object.fixed = true;
     scene.gripper.mount.offset = [0.0508, 0.0, 0.0];
@@ -140,7 +140,7 @@ pub(super) fn thrown_object(conditions: &Conditions) -> Findings {
         scene.gripper.mount.grasp_depth = 0.05;
         let ball = of_mass(Primitive::Sphere { radius: 0.01 }, 1e-3, 0.6);
         let mut run = stepped(&scene, Some(&ball), conditions);
-        // Towards the left finger, whose skin is met after a few centimetres.
+        // Towards the left finger, a few centimetres away.
         run.throw_object(DVec3::X * -speed, DVec3::ZERO);
         let start = run.energy();
         let (mut most, mut farthest) = (0.0f64, 0.0f64);

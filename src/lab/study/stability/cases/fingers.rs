@@ -37,7 +37,7 @@ pub(super) fn twentyfold_actuation(conditions: &Conditions) -> Findings {
         }
         settled = settled.max(largest_of(&run));
     }
-    // Bellows a hundred times as stiff as the joint give way by 4 % under this torque.
+    // Bellows a hundred times as stiff as the joint yield by 4 % under this torque.
     Ok(vec![
         Measurement::at_most("largest joint angle at rest, over its limit", settled, 1.05),
         Measurement::at_most("largest joint angle on the way, over its limit", swing, 1.5),
@@ -55,8 +55,8 @@ pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
     run.state.q[..10].fill(-0.06);
     run.state.q[10..].fill(-0.05);
     let start = run.energy();
-    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows what an error of it in every
-    // joint is worth when the springs are at their tightest.
+    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows the energy of an equal error in
+    // every joint at the largest spring tension.
     let tightest: f64 = run.state.q.iter().map(|q| q.abs()).sum();
     let allowed = 1e-6 + conditions.setting.tolerance() * scene.gripper.finger.joint_stiffness() * tightest;
     let (mut before, mut largest) = (start, 0.0f64);
@@ -104,7 +104,7 @@ pub(super) fn explicit_step(_conditions: &Conditions) -> Findings {
     ])
 }
 
-/// Steps that missed the solver's tolerance: never, in any hard case.
+/// Number of steps that missed the solver's tolerance; zero in every hard case.
 pub(super) fn missed(run: &SteppedScene) -> Measurement {
     Measurement::at_most("steps that missed the tolerance", run.missed as f64, 0.0)
 }

@@ -10,7 +10,7 @@ use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::{Drive, SteppedScene};
 use palpate_sim::scene::{Scene, SupportKind};
 
-/// At every accuracy and no step besides.
+/// Every accuracy, no further steps.
 const EVERY: Settings = Settings::EveryAccuracyAnd(&[]);
 /// Further step lengths of the hard-contact cases (s).
 const WIDE: Settings = Settings::EveryAccuracyAnd(&[0.02, 2e-5]);
@@ -31,7 +31,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "passive swing",
-        claim: "bent, let go without damping, a ball in the way: no energy is gained",
+        claim: "bent and released without damping, against a ball: no energy is gained",
         settings: EVERY,
         measure: fingers::passive_swing,
     },
@@ -54,10 +54,10 @@ pub const CASES: &[Case] = &[
         measure: contact::light_stiff_sticky,
     },
     Case {
-        name: "born inside",
+        name: "initial overlap",
         claim: "an object that starts 10 mm inside a finger leaves no faster than the stored energy allows",
         settings: WIDE,
-        measure: contact::born_inside,
+        measure: contact::initial_overlap,
     },
     Case {
         name: "thrown object",
@@ -108,10 +108,10 @@ pub const CASES: &[Case] = &[
         measure: program::same_bytes,
     },
     Case {
-        name: "numbers that are none",
-        claim: "NaN and infinity are refused under every key of a scene, by its name",
+        name: "invalid numbers",
+        claim: "NaN and infinity are refused under every key of a scene, and the error names the key",
         settings: Settings::Once,
-        measure: program::numbers_that_are_none,
+        measure: program::invalid_numbers,
     },
 ];
 

@@ -23,7 +23,7 @@ pub(super) fn resting_masses(conditions: &Conditions) -> Findings {
         run.cover(conditions.span(10.0), |_| Drive::default())?;
         let moved = run.object_centre() - start;
         let carried: f64 = run.skin_forces().map(|force| force.normal).sum();
-        // As on a slope of one in ten, where only friction holds.
+        // As on a slope of 1:10, held by friction alone.
         let pull = Drive { object_force: DVec3::new(0.06, 0.08, 0.0) * weight, ..Drive::default() };
         run.cover(conditions.span(10.0), |_| pull)?;
         let early = run.object_centre();
@@ -69,7 +69,7 @@ pub(super) fn free_flight(conditions: &Conditions) -> Findings {
     let mut findings = Vec::new();
     for turn in [0.003, 3.0] {
         let mut run = stepped(&scene, Some(&brick), conditions);
-        // Slow enough to stay within the room in which it is drawn.
+        // Slow enough to stay within the drawn space.
         let (way, axis) = (DVec3::new(0.1, 0.0, 0.2) / span, DVec3::new(1.0, 1.0 / 30.0, 1.0 / 15.0));
         run.throw_object(way, axis * (turn / conditions.h()));
         let (start, (linear, angular)) = (run.object_centre(), run.object_momentum());

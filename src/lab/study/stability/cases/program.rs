@@ -38,7 +38,7 @@ pub(super) fn same_bytes(conditions: &Conditions) -> Findings {
     ])
 }
 
-pub(super) fn numbers_that_are_none(_conditions: &Conditions) -> Findings {
+pub(super) fn invalid_numbers(_conditions: &Conditions) -> Findings {
     let scene = Scene::default();
     let (mut tried, mut let_in, mut unnamed) = (0, 0, 0);
     for key in Scene::keys().iter().filter(|key| key.holds_fractions()) {
