@@ -474,7 +474,7 @@ fn zeros_are_taken_from_open_hands_alone() {
     desk.connect();
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar > Some(0.3)));
     desk.command(GripperCommand::Tare);
-    desk.until_said("bar is on: vent");
+    desk.until_said("bar: vent, let the fingers");
     desk.command(GripperCommand::Begin(TrialRequest {
         object: None,
         length_s: None,

@@ -138,7 +138,7 @@ fn what_is_no_store_is_refused_and_left_alone() {
     }
     let ran = run(folder.path(), &["grasp", "ball", "--store", "/proc/nowhere/trials.sqlite"]);
     assert_eq!(ran.code, Some(1));
-    assert!(ran.err.contains("cannot make the folder"), "{ran:?}");
+    assert!(ran.err.contains("cannot create the folder"), "{ran:?}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ use super::refined_run::RefinedRun;
 use crate::grasping::{FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
 use crate::recording::{Recorder, RecorderNotice};
-use palpate_sim::objects::EMPTY;
+use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
 use palpate_tactile::{Channel, SensorLayout};
@@ -257,7 +257,7 @@ impl Session {
         if let Err(cause) = self.load_object(&self.nominal.clone()) {
             let refused = self.nominal.clone();
             EMPTY.clone_into(&mut self.nominal.object.source);
-            self.refuse(refused, cause);
+            self.refuse(refused, &cause);
         }
         self.begin_round();
     }
@@ -265,7 +265,7 @@ impl Session {
     /// Grasps another scene; where it cannot be had, the current grasp continues.
     fn set_scene(&mut self, scene: Scene) {
         if let Err(cause) = self.load_object(&scene) {
-            return self.refuse(scene, cause);
+            return self.refuse(scene, &cause);
         }
         self.nominal = scene;
         if let Some(listener) = &mut self.listener {
@@ -279,8 +279,8 @@ impl Session {
         self.begin_round();
     }
 
-    fn refuse(&self, refused: Scene, cause: String) {
-        let refusal = Refusal { refused, kept: self.nominal.clone(), cause };
+    fn refuse(&self, refused: Scene, cause: &ObjectError) {
+        let refusal = Refusal { refused, kept: self.nominal.clone(), cause: cause.to_string() };
         self.outlets.notify(Notice::SceneRefused(Box::new(refusal)));
     }
 
@@ -298,7 +298,7 @@ impl Session {
         self.next_grasp_at = None;
         if let Err(cause) = self.load_object(&self.nominal.clone()) {
             // The file has changed for the worse since; the object as it was will do.
-            self.outlets.notify(Notice::Failed(cause));
+            self.outlets.notify(Notice::Failed(cause.to_string()));
         }
         let model = self.object.as_ref().and_then(|object| object.model.clone());
         self.status.finished = false;
@@ -370,8 +370,8 @@ impl Session {
         }
     }
 
-    /// Loads a scene's object, unless it is the one at hand. On failure, which comes as a sentence, that one stays.
-    fn load_object(&mut self, scene: &Scene) -> Result<(), String> {
+    /// Loads a scene's object, unless it is the present one, which stays on failure.
+    fn load_object(&mut self, scene: &Scene) -> Result<(), ObjectError> {
         let (source, options) = (scene.object.source.clone(), scene.load_options());
         let stamp = stamp_of(&source);
         let is_known = |o: &LoadedObject| o.source == source && o.options == options && o.stamp == stamp;
@@ -385,7 +385,7 @@ impl Session {
         self.outlets.loading.store(false, Ordering::Relaxed);
         self.status.loading = None;
         self.publish();
-        let model = loaded.map_err(|error| error.to_string())?.map(Arc::new);
+        let model = loaded?.map(Arc::new);
         self.object = Some(LoadedObject { source, options, stamp, model });
         self.sampler = None;
         Ok(())
