@@ -140,7 +140,7 @@ fn an_afternoon_by_keys_alone() {
     desk.until_told("export-2");
     // Too few to learn from: that is said, and what is missing.
     desk.press_with(Modifiers::COMMAND, Key::T);
-    desk.until_told("Training failed: 0 of the objects have");
+    desk.until_told("Training failed: training needs two objects");
 }
 
 #[test]
