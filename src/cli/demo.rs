@@ -18,8 +18,8 @@ use palpate_sim::objects::{EMPTY, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::file_name_of;
-use palpate_tactile::trial::SimulatedTrial;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::Channel;
+use palpate_tactile::trial::{SimulatedTrial, TrialId};
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -132,7 +132,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         let (scene, _) = sampler.draw_after(object.as_ref(), pose_seed, released.as_ref());
         let trial = grasp(&scene, object.as_ref(), pose_seed);
         let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
-        identification.begin_grasp(reader.channels().iter().enumerate())?;
+        identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
         for row in trial.frames().iter().map(|frame| reader.row(frame)) {
             identification.push(row.t_s, &row);
         }

@@ -159,7 +159,7 @@ impl Desk {
     }
 }
 
-fn store_calibrations(path: &Path, parts: &HiddenParts) {
+pub(crate) fn store_calibrations(path: &Path, parts: &HiddenParts) {
     let store = Store::open(path).unwrap();
     for (sensor, calibration) in calibrated(parts, 1).1 {
         store.calibrations().add(&calibration.record).unwrap();

@@ -66,7 +66,7 @@ impl Gripper for ReplayedGripper {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grasping::{GraspPlan, GraspRun, grasp};
+    use crate::grasping::grasp;
     use palpate_sim::scene::Scene;
     use palpate_store::{BoardChunk, BoardInfo, ImportedTrial, Store};
     use palpate_tactile::Signals;
@@ -92,10 +92,8 @@ mod tests {
         let simulated = grasp(&scene, None, 0);
         let id = store.insert(&simulated)?;
         let stored = store.load(id)?;
-        let plan = GraspPlan::simulated(&stored.header.scene);
-        let mut run = GraspRun::new(ReplayedGripper::new(stored.clone()), plan, stored.header.clone());
-        while run.next_frame().is_some() {}
-        assert!(run.frames() == simulated.frames() && !run.frames().is_empty());
+        let frames: Vec<_> = simulated.frames().iter().cloned().map(|f| (f.t, GripperEvent::Sampled(f))).collect();
+        assert!(events(stored) == frames && !frames.is_empty());
 
         let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: vec![Some(7.0)], line_bar: None };
         let gap = Gap { from_s: 0.02, to_s: 0.06, lost: Some(1), cause: String::new() };
