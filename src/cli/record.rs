@@ -161,7 +161,7 @@ fn progress_line(progress: &RecordProgress<'_>) -> String {
 }
 
 fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
-    let cadence = recorded.about.cadence;
+    let cadence = recorded.about.course.cadence;
     let report = Report {
         trial_id: recorded.id,
         flags: flaws(recorded.about.flags, object.as_deref()),
@@ -176,10 +176,10 @@ fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, j
         jitter_p95_ms: cadence.jitter_p95_ms,
         delay_p95_ms: cadence.delay_p95_ms,
         drift_ppm: cadence.drift_ppm,
-        reconnects: recorded.about.reconnects,
+        reconnects: recorded.about.course.reconnects,
         dropped: status.dropped,
-        format: recorded.about.detected.as_ref().map(|detected| detected.format.label().to_owned()),
-        channels: recorded.about.board.channels,
+        format: recorded.about.course.detected.as_ref().map(|detected| detected.format.label().to_owned()),
+        channels: recorded.about.course.board.channels,
         warnings: recorded.warnings,
     };
     if json {
@@ -194,7 +194,7 @@ fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, j
         say(format!("flagged       {}: {}", found.flag.label(), found.remark))?;
     }
     say(format!("samples       {} of {}", report.samples, report.channels.join(", ")))?;
-    if let Some(detected) = &recorded.about.detected {
+    if let Some(detected) = &recorded.about.course.detected {
         let speed = report.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
         say(format!("format        {}{speed}: {}", detected.format.label(), detected.why))?;
     }

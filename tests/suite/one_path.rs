@@ -125,13 +125,13 @@ impl Essence {
         let info = store.board_info(id).unwrap().unwrap();
         let trial = store.board_log(id).unwrap().unwrap();
         let [first, last] = [trial.readings.first(), trial.readings.last()].map(|reading| reading.unwrap().t_s);
-        let closing = trial.phases.first().unwrap().from_s;
+        let closing = trial.course.phases.first().unwrap().from_s;
         let steps = |seconds: f64| (seconds / 0.05).round() as i64;
         Self {
             flags: info.flags.iter().map(|found| found.flag).collect(),
             warnings: warnings.to_vec(),
-            channels: trial.board.channels.clone(),
-            phases: trial.phases.iter().map(|mark| (mark.phase, mark.line_bar)).collect(),
+            channels: trial.course.board.channels.clone(),
+            phases: trial.course.phases.iter().map(|mark| (mark.phase, mark.line_bar)).collect(),
             lead: steps(closing - first),
             span: steps(last - first),
         }

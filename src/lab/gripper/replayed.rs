@@ -32,7 +32,7 @@ impl ReplayedGripper {
 }
 
 fn events_of(log: BoardLog) -> Vec<GripperEvent> {
-    let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(log.board))];
+    let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(log.course.board))];
     timed.extend(log.gaps.into_iter().map(|gap| (gap.from_s.next_up(), DecodedEvent::Gap(gap))));
     timed.extend(log.readings.into_iter().map(|reading| (reading.t_s, DecodedEvent::Reading(reading))));
     timed.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -71,7 +71,7 @@ mod tests {
     use palpate_store::{BoardChunk, BoardInfo, ImportedTrial, Store};
     use palpate_tactile::Signals;
     use palpate_tactile::board::{Board, Gap, Reading};
-    use palpate_tactile::trial::TrialHeader;
+    use palpate_tactile::trial::{BoardCourse, TrialHeader};
 
     fn events(trial: Trial) -> Vec<(f64, GripperEvent)> {
         let mut gripper = ReplayedGripper::new(trial);
@@ -99,7 +99,10 @@ mod tests {
         let gap = Gap { from_s: 0.02, to_s: 0.06, lost: Some(1), cause: String::new() };
         let board = Board { channels: vec!["flexL".to_owned()], ..Board::default() };
         let readings = [0.0, 0.02, 0.06].map(reading);
-        let info = BoardInfo { board: board.clone(), ..BoardInfo::default() };
+        let info = BoardInfo {
+            course: BoardCourse { board: board.clone(), ..BoardCourse::default() },
+            ..BoardInfo::default()
+        };
         let id = store.begin_board(&TrialHeader::new("lemon", Scene::default()), &info)?;
         let chunk = BoardChunk { readings: readings.to_vec(), gaps: vec![gap.clone()], ..BoardChunk::default() };
         store.append_board(id, &info, &chunk)?;

@@ -71,7 +71,8 @@ impl Replay {
         let plan = GraspPlan::simulated(&trial.header.scene);
         Ok(match &mut trial.data {
             TrialData::Recorded(log) => {
-                let (serving, marks) = (store.calibrations().serving(Some(id), &[])?, std::mem::take(&mut log.phases));
+                let (serving, marks) =
+                    (store.calibrations().serving(Some(id), &[])?, std::mem::take(&mut log.course.phases));
                 Self::of_board(Box::new(ReplayedGripper::new(trial)), serving, marks.into(), model)
             }
             TrialData::Imported(signals) => {
