@@ -3,7 +3,7 @@
 
 use super::Failure;
 use super::recognise::{StageOne, load_model, named};
-use super::setup::{SceneArguments, open_store};
+use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
 use glam::Vec2;
 use palpate_geometry::drawing::Camera;
@@ -46,7 +46,7 @@ pub(super) struct DemoArguments {
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     grasps: u32,
     /// Probability at which to stop; 1 grasps up to the limit.
-    #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = parse_threshold)]
+    #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = within(0.0..=1.0))]
     threshold: f64,
     /// Recognition model (default: the shipped one).
     #[arg(long, value_name = "FILE")]
@@ -66,11 +66,6 @@ pub(super) struct DemoArguments {
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-fn parse_threshold(text: &str) -> Result<f64, String> {
-    let parsed = text.parse().ok().filter(|p: &f64| (0.0..=1.0).contains(p));
-    parsed.ok_or_else(|| "write a probability from 0 to 1, as in 0.9".to_owned())
 }
 
 /// Output of `--json`.

@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
     while let Some(row) = replay.next_row()? {
         let answer = answer(&replay);
         if arguments.json {
-            rows.push(report(&replay, row, answer));
+            rows.push(report(&replay, &row, answer));
             continue;
         }
         let (began, first_s) = *pace.get_or_insert((Instant::now(), row.t_s));
@@ -122,7 +122,7 @@ fn answer(replay: &Replay) -> Option<(String, f64)> {
     Some((identification.model().card.labels.classes[class].name.clone(), probability))
 }
 
-fn report(replay: &Replay, row: Row, answer: Option<(String, f64)>) -> RowReport {
+fn report(replay: &Replay, row: &Row, answer: Option<(String, f64)>) -> RowReport {
     let values = row.values.iter().map(|value| Some(*value).filter(|value| value.is_finite()));
     let (class, probability) = answer.unzip();
     RowReport {
