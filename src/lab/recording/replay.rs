@@ -46,7 +46,7 @@ pub struct Replay {
 
 /// Makes rows of events.
 enum RowReader {
-    Frames(FrameReader),
+    Frames(Box<FrameReader>),
     Signals,
     Board(Box<BoardReader>),
 }
@@ -84,7 +84,13 @@ impl Replay {
                 let more = identification.channels_on(gripper).unwrap_or_default();
                 let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, &more)?;
                 let names = reader.channels().iter().map(Channel::name).collect();
-                Self::of_rows(ReplayedGripper::new(trial), plan, RowReader::Frames(reader), names, identification)
+                Self::of_rows(
+                    ReplayedGripper::new(trial),
+                    plan,
+                    RowReader::Frames(Box::new(reader)),
+                    names,
+                    identification,
+                )
             }
         })
     }
