@@ -156,10 +156,6 @@ fn print(calibration: &Calibration) -> Result<(), Failure> {
         (SensorKind::Flex, Some(off)) => format!("{:+.2}", off.to_degrees()),
         (SensorKind::Pad, Some(off)) => format!("{:+.1}", 100.0 * off),
     };
-    let worst = match kind {
-        SensorKind::Flex => 3f64.to_radians(),
-        SensorKind::Pad => 0.1,
-    };
     let rows: Vec<Vec<String>> = calibration
         .record
         .points
@@ -169,41 +165,17 @@ fn print(calibration: &Calibration) -> Result<(), Failure> {
             let ohm = calibration.record.input.ohm(point.counts);
             let kilo = if ohm < 1e6 { format!("{:.2}", ohm * 1e-3) } else { "open".to_owned() };
             let shown = format!("{:.3}", kind.shown(point.stimulus));
-            vec![shown, format!("{:.1}", point.counts), kilo, residual(off), bar(off.unwrap_or(0.0) / worst)]
+            vec![shown, format!("{:.1}", point.counts), kilo, residual(off)]
         })
         .collect();
     let (stimulus, off) = match kind {
         SensorKind::Flex => ("angle [deg]", "residual [deg]"),
         SensorKind::Pad => ("load [kg]", "residual [%]"),
     };
-    table(&[stimulus, "counts", "kOhm", off, "     -  0  +"], &rows)?;
+    table(&[stimulus, "counts", "kOhm", off], &rows)?;
     say(calibration.summary())?;
     for warning in &calibration.warnings {
         warn(warning);
     }
     Ok(())
-}
-
-/// A residual as a bar to the left or right of the middle; a full bar is worth a warning.
-fn bar(share: f64) -> String {
-    const HALF: i32 = 8;
-    let at = (share.clamp(-1.0, 1.0) * f64::from(HALF)).round() as i32;
-    let cell = |place: i32| match place {
-        0 => '|',
-        place if (place > 0 && place <= at) || (place < 0 && place >= at) => '#',
-        _ => ' ',
-    };
-    (-HALF..=HALF).map(cell).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn residuals_stand_left_and_right_of_the_middle() {
-        assert_eq!(bar(0.0), "        |        ");
-        assert_eq!(bar(0.5), "        |####    ");
-        assert_eq!(bar(-9.0), "########|        ");
-    }
 }

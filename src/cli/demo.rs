@@ -3,7 +3,7 @@
 
 use super::Failure;
 use super::recognise::{StageOne, load_model, named};
-use super::setup::{SceneArguments, open_store};
+use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
 use glam::Vec2;
 use palpate_geometry::drawing::Camera;
@@ -18,8 +18,8 @@ use palpate_sim::objects::{EMPTY, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::file_name_of;
-use palpate_tactile::trial::SimulatedTrial;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::Channel;
+use palpate_tactile::trial::{SimulatedTrial, TrialId};
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -46,7 +46,7 @@ pub(super) struct DemoArguments {
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     grasps: u32,
     /// Probability at which to stop; 1 grasps up to the limit.
-    #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = parse_threshold)]
+    #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = within(0.0..=1.0))]
     threshold: f64,
     /// Recognition model (default: the shipped one).
     #[arg(long, value_name = "FILE")]
@@ -66,11 +66,6 @@ pub(super) struct DemoArguments {
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-fn parse_threshold(text: &str) -> Result<f64, String> {
-    let parsed = text.parse().ok().filter(|p: &f64| (0.0..=1.0).contains(p));
-    parsed.ok_or_else(|| "write a probability from 0 to 1, as in 0.9".to_owned())
 }
 
 /// Output of `--json`.
@@ -132,7 +127,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         let (scene, _) = sampler.draw_after(object.as_ref(), pose_seed, released.as_ref());
         let trial = grasp(&scene, object.as_ref(), pose_seed);
         let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
-        identification.begin_grasp(reader.channels().iter().enumerate())?;
+        identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
         for row in trial.frames().iter().map(|frame| reader.row(frame)) {
             identification.push(row.t_s, &row);
         }

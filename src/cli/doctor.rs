@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::link;
+use super::setup::within;
 use super::terminal::{note, say, say_json, table, typed_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::doctor::{
@@ -31,7 +32,7 @@ pub(super) struct DoctorArguments {
     /// Port, or file of captured bytes (default: the only likely port).
     port: Option<PathBuf>,
     /// How long to listen (s). Bend each finger and press each pad meanwhile to test the sensors.
-    #[arg(long, value_name = "S", default_value_t = USUAL_LISTEN_S, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = USUAL_LISTEN_S, value_parser = within(1.0..=600.0))]
     seconds: f64,
     /// Baud rate (default: try the usual ones).
     #[arg(long, value_name = "BAUD", value_parser = super::record::parse_baud)]
@@ -49,11 +50,6 @@ pub(super) struct DoctorArguments {
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|s| (1.0..=600.0).contains(s));
-    number.ok_or_else(|| "write a number of seconds from 1 to 600".to_owned())
 }
 
 /// Output of `--json`.

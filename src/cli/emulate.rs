@@ -1,7 +1,7 @@
 //! `palpate emulate`: emulates the gripper on a pseudo-terminal. Unix only.
 
 use super::Failure;
-use super::setup::SceneArguments;
+use super::setup::{SceneArguments, within};
 use super::terminal::{say, say_json};
 use palpate_device::emulator::{
     EmulatedFault, EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
@@ -33,7 +33,7 @@ pub(super) struct EmulateArguments {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
     channels: u8,
     /// Period of automatic grasps (s); 0: only a host drives the fingers.
-    #[arg(long, value_name = "S", default_value_t = 6.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 6.0, value_parser = within(0.0..=3600.0))]
     grasp_every: f64,
     /// Bench procedure, as text or a file: angle=30 hold=2; load=0.1kg hold=3; close empty. `-` reads steps from standard
     /// input.
@@ -52,19 +52,19 @@ pub(super) struct EmulateArguments {
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     without: Vec<Imperfection>,
     /// Highest pressure the board puts out (bar); 0: manual control box, the board refuses pressure commands.
-    #[arg(long, value_name = "BAR", default_value_t = 1.5, value_parser = pressure)]
+    #[arg(long, value_name = "BAR", default_value_t = 1.5, value_parser = within(0.0..=1.5))]
     max_bar: f64,
     /// Baud rate: a host with another rate reads garbage (default: any rate works, as on the native port).
     #[arg(long, value_name = "BAUD")]
     baud: Option<u32>,
     /// Silence after a host opens the port (s), as on the programming port, which restarts the board.
-    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = within(0.0..=3600.0))]
     boot: f64,
     /// Start of the board's 32-bit clock (µs); near 4294967295 it wraps soon.
     #[arg(long, value_name = "US", default_value_t = 0)]
     clock_start: u32,
     /// Speed of the emulation, as a factor of real time.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = within(0.01..=100.0))]
     speed: f64,
     /// Write every line of the board to FILE, before any fault corrupts it.
     #[arg(long, value_name = "FILE")]
@@ -97,23 +97,6 @@ fn after_help() -> String {
          --script \"angle=30 hold=2; close empty\"",
         fault_help()
     )
-}
-
-fn number(text: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| range.contains(number));
-    number.ok_or_else(|| format!("write a number from {} to {}", range.start(), range.end()))
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    number(text, 0.0..=3600.0)
-}
-
-fn pressure(text: &str) -> Result<f64, String> {
-    number(text, 0.0..=1.5)
-}
-
-fn speed(text: &str) -> Result<f64, String> {
-    number(text, 0.01..=100.0)
 }
 
 pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {

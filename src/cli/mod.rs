@@ -16,6 +16,7 @@ mod link;
 mod plan;
 mod recognise;
 mod record;
+mod replay;
 mod scene;
 mod setup;
 mod snapshot;
@@ -74,6 +75,8 @@ enum Command {
     Recognise(recognise::RecogniseArguments),
     /// Record a trial of the real gripper.
     Record(record::RecordArguments),
+    /// Replay a stored trial or captured bytes as the live gripper: rows and recognition.
+    Replay(replay::ReplayArguments),
     /// Draw a scene or a stored trial to a PNG file.
     Snapshot(snapshot::SnapshotArguments),
     /// Explain which effects a scene calls for, and what each costs and changes.
@@ -178,6 +181,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Evaluate(evaluate)) => evaluate::run(evaluate, store)?,
         Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,
         Some(Command::Record(record)) => record::run(record, store)?,
+        Some(Command::Replay(replay)) => replay::run(replay, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Plan(plan)) => plan::run(plan, store)?,

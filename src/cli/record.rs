@@ -3,7 +3,7 @@
 use super::Failure;
 use super::interrupt::stop_flag;
 use super::link;
-use super::setup::open_store;
+use super::setup::{open_store, within};
 use super::terminal::{say, say_json, table, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::serial::{Baud, LinkOptions, LinkState, LinkStatus, list_ports};
@@ -32,7 +32,7 @@ pub(super) struct RecordArguments {
     #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
     /// Duration (s) (default: until Ctrl+C, or as long as the programme takes).
-    #[arg(long, value_name = "N", value_parser = parse_seconds)]
+    #[arg(long, value_name = "N", value_parser = within(0.1..=86_400.0))]
     seconds: Option<f64>,
     /// Label: the object in the hand, or "empty". Without it the trial stays unlabelled, and out of data sets, until
     /// `palpate trials label`.
@@ -48,7 +48,7 @@ pub(super) struct RecordArguments {
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     baud: Option<Baud>,
     /// How long to wait while another program has the port (s).
-    #[arg(long, value_name = "S", default_value_t = link::USUAL_WAIT_S, value_parser = parse_wait)]
+    #[arg(long, value_name = "S", default_value_t = link::USUAL_WAIT_S, value_parser = within(0.0..=86_400.0))]
     wait: f64,
     /// End the trial when the board disappears, instead of waiting for it.
     #[arg(long)]
@@ -65,16 +65,6 @@ pub(super) struct RecordArguments {
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|s: &f64| (0.1..=86_400.0).contains(s));
-    seconds.ok_or_else(|| "write a number of seconds from 0.1 to 86400".to_owned())
-}
-
-fn parse_wait(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|s: &f64| (0.0..=86_400.0).contains(s));
-    seconds.ok_or_else(|| "write a number of seconds from 0 to 86400".to_owned())
 }
 
 pub(super) fn parse_baud(text: &str) -> Result<Baud, String> {
@@ -161,7 +151,7 @@ fn progress_line(progress: &RecordProgress<'_>) -> String {
 }
 
 fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
-    let cadence = recorded.about.cadence;
+    let cadence = recorded.about.course.cadence;
     let report = Report {
         trial_id: recorded.id,
         flags: flaws(recorded.about.flags, object.as_deref()),
@@ -176,10 +166,10 @@ fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, j
         jitter_p95_ms: cadence.jitter_p95_ms,
         delay_p95_ms: cadence.delay_p95_ms,
         drift_ppm: cadence.drift_ppm,
-        reconnects: recorded.about.reconnects,
+        reconnects: recorded.about.course.reconnects,
         dropped: status.dropped,
-        format: recorded.about.detected.as_ref().map(|detected| detected.format.label().to_owned()),
-        channels: recorded.about.board.channels,
+        format: recorded.about.course.detected.as_ref().map(|detected| detected.format.label().to_owned()),
+        channels: recorded.about.course.board.channels,
         warnings: recorded.warnings,
     };
     if json {
@@ -194,7 +184,7 @@ fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, j
         say(format!("flagged       {}: {}", found.flag.label(), found.remark))?;
     }
     say(format!("samples       {} of {}", report.samples, report.channels.join(", ")))?;
-    if let Some(detected) = &recorded.about.detected {
+    if let Some(detected) = &recorded.about.course.detected {
         let speed = report.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
         say(format!("format        {}{speed}: {}", detected.format.label(), detected.why))?;
     }

@@ -4,6 +4,7 @@ use super::Failure;
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use palpate_store::Store;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Scene and changes to it.
@@ -28,6 +29,14 @@ pub(super) struct SceneArguments {
     /// Set a key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
+}
+
+/// Parser of a number within a range.
+pub(super) fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("write a number from {} to {}", range.start(), range.end()))
+    }
 }
 
 fn parse_engine(text: &str) -> Result<EngineKind, String> {

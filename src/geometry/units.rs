@@ -1,9 +1,6 @@
 //! Conversions at the edges. Inside Palpate every quantity is SI (m, rad, N, Pa, s, kg); people and
 //! instruments speak degrees, bar, millimetres, grams and counts.
 
-/// Pascals in one bar.
-pub const PASCAL_PER_BAR: f64 = 1e5;
-
 /// Standard gravity (m/s²) (ISO 80000-3).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 

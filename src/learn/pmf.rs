@@ -81,17 +81,6 @@ impl Pmf {
         }
         Some(Self::from_weights(sum))
     }
-
-    /// Sums probabilities over groups of classes; `group_of` maps a class to its group, if any.
-    pub fn grouped(&self, groups: usize, group_of: impl Fn(usize) -> Option<usize>) -> Self {
-        let mut weights = vec![0.0; groups];
-        for (class, p) in self.0.iter().enumerate() {
-            if let Some(group) = group_of(class) {
-                weights[group] += p;
-            }
-        }
-        Self::from_weights(weights)
-    }
 }
 
 #[cfg(test)]
@@ -130,10 +119,8 @@ mod tests {
     }
 
     #[test]
-    fn temperature_and_groups() {
+    fn a_low_temperature_sharpens() {
         let pmf = Pmf::from_weights([0.8, 0.2]);
         assert!((pmf.at_temperature(0.5).probabilities()[0] - 0.64 / 0.68).abs() < 1e-9);
-        let grouped = Pmf::from_weights([0.5, 0.3, 0.2]).grouped(2, |class| [Some(0), Some(1), Some(0)][class]);
-        assert!((grouped.probabilities()[0] - 0.7).abs() < 1e-12);
     }
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Writes one row per reading.
 pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), CsvError> {
-    let channels = &trial.board.channels;
+    let channels = &trial.course.board.channels;
     write_file(path, |out| {
         let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();
         let after = ["line_pressure [bar]", "phase"].map(str::to_owned);
@@ -30,12 +30,12 @@ pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), CsvError> {
 }
 
 fn row(reading: &Reading, missing: String, trial: &BoardLog) -> Vec<String> {
-    let since = |t: f64| number(t - trial.began_s);
+    let since = |t: f64| number(t - trial.course.began_s);
     let mut fields = vec![since(reading.t_s), since(reading.arrived_s)];
     fields.push(reading.seq.map(|seq| seq.to_string()).unwrap_or_default());
     fields.push(missing);
     fields.extend(reading.counts.iter().map(|count| count.map(|count| count.to_string()).unwrap_or_default()));
-    let mark = trial.phases.iter().rev().find(|mark| mark.from_s <= reading.t_s);
+    let mark = trial.course.phases.iter().rev().find(|mark| mark.from_s <= reading.t_s);
     let bar = reading.line_bar.or_else(|| mark?.line_bar);
     fields.push(bar.map(number).unwrap_or_default());
     fields.push(mark.map(|PhaseMark { phase, .. }| phase.name().to_owned()).unwrap_or_default());

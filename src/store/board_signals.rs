@@ -42,22 +42,22 @@ impl Store {
     /// none for a trial of another kind.
     pub fn board_signals(&self, id: TrialId, asked: &[CalibrationId]) -> Result<Option<BoardSignals>, StoreError> {
         let Some(mut trial) = self.board_log(id)? else { return Ok(None) };
-        let began = trial.began_s;
+        let began = trial.course.began_s;
         for reading in &mut trial.readings {
             reading.t_s -= began;
         }
         let from = |phase: Phase, after: f64| {
-            let found = trial.phases.iter().find(|mark| mark.phase == phase && mark.from_s - began >= after);
+            let found = trial.course.phases.iter().find(|mark| mark.phase == phase && mark.from_s - began >= after);
             found.map(|mark| mark.from_s - began)
         };
         let closing_s = from(Phase::Close, f64::NEG_INFINITY);
         let release_s = from(Phase::Release, closing_s.unwrap_or(f64::NEG_INFINITY));
         let serving = self.calibrations().serving(Some(id), asked)?;
-        let readout = Readout::new(&trial.board, &serving.calibrations)
+        let readout = Readout::new(&trial.course.board, &serving.calibrations)
             .map_err(|cause| StoreError::BadInfo { id, cause: cause.to_string() })?;
         let mut derived = readout.derive(&trial.readings, closing_s);
         derived.warnings.extend(serving.warnings.iter().cloned());
-        let marks = trial.phases.iter().filter_map(|mark| Some((mark.from_s - began, mark.line_bar?)));
+        let marks = trial.course.phases.iter().filter_map(|mark| Some((mark.from_s - began, mark.line_bar?)));
         let commanded: Vec<(f64, f64)> = marks.collect();
         let reported: Vec<(f64, f64)> =
             trial.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();

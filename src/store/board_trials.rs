@@ -6,11 +6,9 @@ use super::store::{Store, insert_recorded, json, set_complete};
 use super::store_error::{StoreError, fault};
 use crate::labels::{FlagRemark, Sparkline};
 use palpate_sim::frame::Quality;
-use palpate_tactile::board::Detected;
-use palpate_tactile::board::{Board, Gap, Reading};
-use palpate_tactile::cadence::Cadence;
+use palpate_tactile::board::{Gap, Reading};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured, read_record};
-use palpate_tactile::trial::{BoardLog, PhaseMark, TrialHeader, TrialId};
+use palpate_tactile::trial::{BoardCourse, BoardLog, TrialHeader, TrialId};
 use rusqlite::{OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
 
@@ -20,18 +18,9 @@ use serde::{Deserialize, Serialize};
 pub struct BoardInfo {
     /// Name of the port.
     pub port: String,
-    /// Board.
-    pub board: Board,
-    /// Detected format of its lines.
-    pub detected: Option<Detected>,
-    /// Beginning of the trial, on the clock of the readings (s).
-    pub began_s: f64,
-    /// Timing of the board; all zero while recording.
-    pub cadence: Cadence,
-    /// Number of reconnections during the trial.
-    pub reconnects: u32,
-    /// Phases of the grasp, where known.
-    pub phases: Vec<PhaseMark>,
+    /// Board and course.
+    #[serde(flatten)]
+    pub course: BoardCourse,
     /// Time from the beginning to the last reading (s); zero in trials of early versions.
     pub seconds: f64,
     /// Flags, found when the recording ended.
@@ -124,9 +113,7 @@ impl Store {
             .prepare(sql)
             .and_then(|mut statement| statement.query_map([id], columns)?.collect())
             .map_err(|e| fault(self.path(), &e))?;
-        let BoardInfo { board, detected, began_s, cadence, reconnects, phases, .. } = about;
-        let (readings, gaps) = (Vec::new(), Vec::new());
-        let mut log = BoardLog { board, detected, began_s, cadence, reconnects, phases, readings, gaps };
+        let mut log = BoardLog { course: about.course, ..BoardLog::default() };
         for (chunk, readings, gaps, stored) in chunks {
             if !is_intact(stored, &[&readings, &gaps]) {
                 return Err(StoreError::Checksum { id, what: "readings", chunk });
@@ -137,7 +124,7 @@ impl Store {
         }
         // Earlier readings have no count for channels that appeared later.
         for reading in &mut log.readings {
-            reading.counts.resize(log.board.channels.len(), None);
+            reading.counts.resize(log.course.board.channels.len(), None);
         }
         Ok(Some(log))
     }

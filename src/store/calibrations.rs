@@ -49,29 +49,15 @@ pub struct Serving {
 
 const COLUMNS: &str = "id, uid, version, created, withdrawn, record";
 
-fn of_row(row: &Row<'_>) -> rusqlite::Result<(StoredRow, String)> {
-    let stored = StoredRow {
-        id: row.get(0)?,
-        uid: row.get(1)?,
-        version: row.get(2)?,
-        created: row.get(3)?,
-        withdrawn: row.get(4)?,
-    };
-    Ok((stored, row.get(5)?))
-}
-
-struct StoredRow {
-    id: CalibrationId,
-    uid: String,
-    version: i64,
-    created: String,
-    withdrawn: Option<String>,
-}
-
-fn read((row, record): (StoredRow, String)) -> Result<StoredCalibration, StoreError> {
-    let StoredRow { id, uid, version, created, withdrawn } = row;
-    let record = serde_json::from_str(&record).map_err(|e| StoreError::BadCalibration { id, cause: e.to_string() })?;
-    Ok(StoredCalibration { id, uid, version, created, withdrawn, record })
+/// A stored calibration; an error where its record cannot be read.
+fn of_row(row: &Row<'_>) -> rusqlite::Result<Result<StoredCalibration, StoreError>> {
+    let (id, uid, version) = (row.get(0)?, row.get(1)?, row.get(2)?);
+    let (created, withdrawn) = (row.get(3)?, row.get(4)?);
+    let record = serde_json::from_str(&row.get::<_, String>(5)?);
+    Ok(match record {
+        Ok(record) => Ok(StoredCalibration { id, uid, version, created, withdrawn, record }),
+        Err(error) => Err(StoreError::BadCalibration { id, cause: error.to_string() }),
+    })
 }
 
 /// Calibrations, mountings and tares of a store.
@@ -116,7 +102,7 @@ impl CalibrationRepository<'_> {
     pub fn get(&self, id: CalibrationId) -> Result<StoredCalibration, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE id = ?1");
         let found = self.store.connection.query_row(&sql, [id], of_row).optional().map_err(|e| self.store.fault(&e))?;
-        read(found.ok_or(StoreError::NoCalibration { id })?)
+        found.unwrap_or(Err(StoreError::NoCalibration { id }))
     }
 
     /// All calibrations, or those of one part, oldest first.
@@ -127,7 +113,7 @@ impl CalibrationRepository<'_> {
             .connection
             .prepare(&sql)
             .and_then(|mut statement| statement.query_map([part], of_row)?.collect());
-        rows.map_err(|e| self.store.fault(&e))?.into_iter().map(read).collect()
+        rows.map_err(|e| self.store.fault(&e))?.into_iter().collect()
     }
 
     /// Withdraws a calibration, so that it serves only where it is asked for, or restores it.

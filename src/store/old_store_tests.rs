@@ -57,7 +57,7 @@ fn it_is_updated_listed_and_loaded() -> Outcome {
 
     for (id, readings, bytes) in [(4, 161, 17_083), (5, 50, 4995)] {
         let trial = store.board_log(id)?.ok_or("of the board")?;
-        assert_eq!((trial.readings.len(), trial.gaps.len(), trial.board.channels.len()), (readings, 0, 4));
+        assert_eq!((trial.readings.len(), trial.gaps.len(), trial.course.board.channels.len()), (readings, 0, 4));
         assert_eq!(store.board_bytes(id)?.map(|bytes| bytes.len()), Some(bytes));
     }
     let reading = &store.board_log(4)?.ok_or("of the board")?.readings[58];

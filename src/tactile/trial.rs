@@ -121,9 +121,10 @@ pub struct SimulatedData {
     pub frames: Vec<Frame>,
 }
 
-/// Data of a trial of a real gripper, as its board sent them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BoardLog {
+/// Board and course of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct BoardCourse {
     /// Board.
     pub board: Board,
     /// Detected format of its lines.
@@ -136,6 +137,13 @@ pub struct BoardLog {
     pub reconnects: u32,
     /// Phases of the grasp, where known.
     pub phases: Vec<PhaseMark>,
+}
+
+/// Data of a trial of a real gripper, as its board sent them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoardLog {
+    /// Board and course.
+    pub course: BoardCourse,
     /// Readings, in order.
     pub readings: Vec<Reading>,
     /// Gaps: missing readings.

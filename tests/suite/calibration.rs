@@ -22,9 +22,7 @@ use palpate_tactile::calibration::Input;
 use palpate_tactile::calibration::{BendingZero, Calibration, Curve, Procedure, Readout, SensorKind};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use palpate_tactile::electronics::StripPart;
-use palpate_tactile::trial::PhaseMark;
-use palpate_tactile::trial::TrialHeader;
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader, TrialId};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
@@ -377,7 +375,10 @@ pub(crate) fn stored(
 ) -> TrialId {
     let header = TrialHeader::new(object, scene.clone());
     let phases = vec![PhaseMark { from_s: closing_s, phase: Phase::Close, line_bar: None }];
-    let about = BoardInfo { board: board.clone(), phases, ..BoardInfo::default() };
+    let about = BoardInfo {
+        course: BoardCourse { board: board.clone(), phases, ..BoardCourse::default() },
+        ..BoardInfo::default()
+    };
     let id = store.begin_board(&header, &about).unwrap();
     store.append_board(id, &about, &BoardChunk { readings, ..BoardChunk::default() }).unwrap();
     store.finish_board(id, &about, &[]).unwrap();

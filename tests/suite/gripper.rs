@@ -159,7 +159,7 @@ impl Desk {
     }
 }
 
-fn store_calibrations(path: &Path, parts: &HiddenParts) {
+pub(crate) fn store_calibrations(path: &Path, parts: &HiddenParts) {
     let store = Store::open(path).unwrap();
     for (sensor, calibration) in calibrated(parts, 1).1 {
         store.calibrations().add(&calibration.record).unwrap();
@@ -183,13 +183,13 @@ fn a_driven_trial_is_recorded_with_its_rest_and_its_phases() {
     desk.connect();
     let id = desk.trial(Control::Driven, false);
     let trial = desk.store().board_log(id).unwrap().unwrap();
-    let mark = |phase: Phase| trial.phases.iter().find(|mark| mark.phase == phase).unwrap().from_s;
+    let mark = |phase: Phase| trial.course.phases.iter().find(|mark| mark.phase == phase).unwrap().from_s;
     let (close, hold, release) = (mark(Phase::Close), mark(Phase::Hold), mark(Phase::Release));
     assert!((hold - close - 2.0).abs() < 0.15 && (release - hold - 1.0).abs() < 0.15, "{close} {hold} {release}");
     let first = trial.readings.first().unwrap().t_s;
     assert!((1.5..2.2).contains(&(close - first)), "{}", close - first);
     assert!(trial.readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 2e-3));
-    assert!(trial.gaps.is_empty() && trial.cadence.lost == 0);
+    assert!(trial.gaps.is_empty() && trial.course.cadence.lost == 0);
     let most = trial.readings.iter().filter_map(|reading| reading.line_bar).fold(0.0, f64::max);
     assert!((most - 1.0).abs() < 1e-9, "{most} bar");
     assert!(trial.readings.last().unwrap().line_bar < Some(0.01), "vented at the end");
@@ -221,7 +221,7 @@ fn stop_vents_ends_the_trial_and_says_so() {
     assert!(!ended.discarded && ended.warnings.iter().any(|text| text.contains("vented by the user")), "{ended:?}");
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     let released = |mark: &palpate_tactile::trial::PhaseMark| mark.phase == Phase::Release;
-    assert!(!desk.store().board_info(ended.id).unwrap().unwrap().phases.iter().any(released));
+    assert!(!desk.store().board_info(ended.id).unwrap().unwrap().course.phases.iter().any(released));
 }
 
 #[test]
@@ -396,9 +396,9 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
         let ended = desk.until(|view| view.trial.is_none() && view.ended.as_ref().is_some_and(|e| e.id == number));
         let store = desk.store();
         let trial = store.board_log(ended.ended.as_ref().unwrap().id).unwrap().unwrap();
-        let phases: Vec<Phase> = trial.phases.iter().map(|mark| mark.phase).collect();
+        let phases: Vec<Phase> = trial.course.phases.iter().map(|mark| mark.phase).collect();
         assert_eq!(phases, [Phase::Close, Phase::Hold, Phase::Release], "trial {number}");
-        let rest = trial.phases[0].from_s - trial.readings[0].t_s;
+        let rest = trial.course.phases[0].from_s - trial.readings[0].t_s;
         assert!((0.2..1.0).contains(&rest), "{rest} s of rest");
         assert!(trial.readings.windows(2).all(|pair| (pair[1].t_s - pair[0].t_s - 0.02).abs() < 2e-3));
         // It was heard from its closing on, though that was found out a little later.
@@ -420,7 +420,7 @@ fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     let trial = desk.store().board_log(id).unwrap().unwrap();
     // The refused step is the last that it was told.
-    let most = trial.phases.iter().filter_map(|mark| mark.line_bar).fold(0.0, f64::max);
+    let most = trial.course.phases.iter().filter_map(|mark| mark.line_bar).fold(0.0, f64::max);
     assert!((most - 0.55).abs() < 1e-9, "{most} bar");
     assert!(trial.readings.iter().all(|reading| reading.line_bar <= Some(0.501)));
     let rows = desk.rows.iter().filter(|row| row.grasp == 2);

@@ -1,21 +1,26 @@
 //! One path for every grasp: the same fault of the same emulated board, recorded as `palpate record` does and as the window
 //! does, leaves the same trial.
 
-use crate::calibration::parts;
-use crate::gripper::{Desk, FAST, scene};
+use crate::calibration::{capture, parts};
+use crate::gripper::{Desk, FAST, scene, store_calibrations};
+use crate::program::{json, refused, run};
 use crate::streams::Emulated;
 use palpate_device::emulator::{EmulatorSetup, HandPlan};
 use palpate_device::protocol::ConsoleLine;
-use palpate_device::serial::{LinkEvent, LinkStatus, SendError};
+use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, SendError, SerialLink};
+use palpate_lab::grasping::{FrameReader, Identification, grasp};
 use palpate_lab::gripper::{BoardStream, SerialGripper};
-use palpate_lab::recording::{TrialRequest, record};
+use palpate_lab::recording::{Replay, TrialRequest, record};
 use palpate_lab::workers::GripperCommand;
+use palpate_learn::{StopRule, Verdict, shipped_model};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
-use palpate_store::Store;
+use palpate_sim::scene::Scene;
 use palpate_store::labels::Flag;
+use palpate_store::{ImportedTrial, Store};
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{Control, TrialId};
+use palpate_tactile::{Channel, SensorLayout, Signals};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -120,13 +125,13 @@ impl Essence {
         let info = store.board_info(id).unwrap().unwrap();
         let trial = store.board_log(id).unwrap().unwrap();
         let [first, last] = [trial.readings.first(), trial.readings.last()].map(|reading| reading.unwrap().t_s);
-        let closing = trial.phases.first().unwrap().from_s;
+        let closing = trial.course.phases.first().unwrap().from_s;
         let steps = |seconds: f64| (seconds / 0.05).round() as i64;
         Self {
             flags: info.flags.iter().map(|found| found.flag).collect(),
             warnings: warnings.to_vec(),
-            channels: trial.board.channels.clone(),
-            phases: trial.phases.iter().map(|mark| (mark.phase, mark.line_bar)).collect(),
+            channels: trial.course.board.channels.clone(),
+            phases: trial.course.phases.iter().map(|mark| (mark.phase, mark.line_bar)).collect(),
             lead: steps(closing - first),
             span: steps(last - first),
         }
@@ -175,4 +180,67 @@ fn the_same_fault_leaves_the_same_trial_from_the_command_line_and_from_the_windo
         assert!(cut.warnings.iter().any(|text| text.contains(cause)), "{cut:?}");
         assert!(cut.span < sound.span && cut.lead.abs_diff(sound.lead) <= 1, "{cut:?}\n{sound:?}");
     }
+}
+
+/// Rows as text, because undefined values differ from themselves, and the last answer.
+fn played(mut replay: Replay) -> (Vec<String>, Option<Verdict>) {
+    let row = || replay.next_row().unwrap().map(|row| format!("{row:?}"));
+    let rows = std::iter::from_fn(row).collect();
+    (rows, replay.identification().verdict().cloned())
+}
+
+#[test]
+fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = Scene::default();
+    scene.object.source = "lemon".to_owned();
+    let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
+    let model = Arc::new(shipped_model().unwrap());
+    let mut live = Identification::new(Arc::clone(&model), StopRule::default());
+    let more = live.channels_on(&scene.gripper).unwrap();
+    let reader = FrameReader::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, &more).unwrap();
+    live.begin_grasp(reader.channels().iter().map(Channel::name).enumerate()).unwrap();
+    let rows: Vec<_> = trial.frames().iter().map(|frame| reader.row(frame)).collect();
+    for row in &rows {
+        live.push(row.t_s, row);
+    }
+    live.end_grasp();
+    let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
+    let id = store.insert(&trial).unwrap();
+    let (replayed, verdict) = played(Replay::of_trial(&store, id, model).unwrap());
+    assert!(verdict.is_some() && verdict.as_ref() == live.verdict());
+    assert_eq!(replayed, rows.iter().map(|row| format!("{row:?}")).collect::<Vec<_>>());
+    drop(store);
+    let told = json(folder.path(), &["replay", "1", "--json"]);
+    assert_eq!((told["rows"].as_array().unwrap().len(), &told["decided"]), (300, &"lemon".into()), "{}", told["pmf"]);
+    assert!(told["rows"][0]["class"].is_null() && told["rows"][299]["class"] == "lemon");
+    let text = run(folder.path(), &["replay", "1", "--speed", "0"]);
+    assert!(text.out.lines().count() == 301 && text.err.contains("recognised as lemon"), "{text:?}");
+    refused(folder.path(), &["replay", "9"], &["no trial 9"]);
+    refused(folder.path(), &["replay", "gone.bytes"], &["gone.bytes", "number of a trial"]);
+}
+
+#[test]
+fn captured_bytes_replay_as_the_trial_that_is_recorded_from_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let (at, bytes) = (folder.path(), folder.path().join("grasp.bytes"));
+    let parts = parts(1, false);
+    store_calibrations(&at.join("trials.sqlite"), &parts);
+    capture(&parts, "rest=2.5; close empty bar=0.8; rest=3", "", 12.0, &bytes);
+    json(at, &["record", "--port", "grasp.bytes", "--speed", "0", "--json"]);
+    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    let model = Arc::new(shipped_model().unwrap());
+    let options = LinkOptions { path: Some(bytes), replay_speed: f64::INFINITY, ..LinkOptions::default() };
+    let gripper = SerialGripper::new(Box::new(SerialLink::open(&options).unwrap()));
+    let from_bytes = played(Replay::of_capture(gripper, &store, Arc::clone(&model)).unwrap());
+    let from_trial = played(Replay::of_trial(&store, 1, Arc::clone(&model)).unwrap());
+    assert!(from_trial.0.len() > 500 && from_trial.1.is_some(), "{}", from_trial.0.len());
+    assert_eq!(from_bytes, from_trial);
+    // An imported trial has channels of its own.
+    let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
+    let (name, label) = ("1".to_owned(), "mug".to_owned());
+    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }]).unwrap();
+    let mut imported = Replay::of_trial(&store, 2, model).unwrap();
+    assert!(imported.why_off().is_some_and(|cause| cause.to_string().contains("curvature_left")));
+    assert_eq!(imported.next_row().unwrap().map(|row| row.values[0]), Some(1.0));
 }

@@ -180,7 +180,7 @@ fn a_board_that_does_not_come_back_leaves_a_gap_to_the_end() {
     let result = result(child);
     let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     let [gap] = &trial.gaps[..] else { panic!("{:?}", trial.gaps) };
-    assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.began_s >= 2.5, "{gap:?}");
+    assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.course.began_s >= 2.5, "{gap:?}");
     assert_eq!(gap.from_s, trial.readings.last().unwrap().t_s);
     assert!(result["warnings"].to_string().contains("interrupted"), "{result}");
 }
@@ -265,7 +265,7 @@ fn a_driven_grasp_tells_the_board_each_pressure_and_vents() {
     assert!(pressures.ends_with(&["P 0.30", "P 0.00"]) || pressures.contains(&"P 0.30"), "{said:?}");
     assert!(said.contains(&"K") && said.last() == Some(&"V"), "{said:?}");
     let trial = Store::open(&folder.path().join("trials.sqlite")).unwrap().board_log(1).unwrap().unwrap();
-    let phases: Vec<&str> = trial.phases.iter().map(|mark| mark.phase.name()).collect();
+    let phases: Vec<&str> = trial.course.phases.iter().map(|mark| mark.phase.name()).collect();
     assert!(phases.contains(&"close") && phases.contains(&"hold"), "{phases:?}");
 }
 

@@ -15,7 +15,7 @@ use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Store};
 use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::calibration::{Input, Point, Record, SensorKind, plan};
-use palpate_tactile::trial::{PhaseMark, TrialHeader};
+use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -56,7 +56,7 @@ fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32
     let header = TrialHeader::new(object, Scene::default());
     let mark = |from_s, phase| PhaseMark { from_s, phase, line_bar: None };
     let phases = vec![mark(0.0, Phase::Close), mark(2.0, Phase::Release)];
-    let about = BoardInfo { phases, ..BoardInfo::default() };
+    let about = BoardInfo { course: BoardCourse { phases, ..BoardCourse::default() }, ..BoardInfo::default() };
     // Grasps of one object differ by a few per cent, trials of different objects not alike.
     let spread = 1.0 + 0.05 * (f64::from(number * 7919 % 97) / 48.0 - 1.0);
     let reading = |k: u32| {

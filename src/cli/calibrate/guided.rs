@@ -3,6 +3,7 @@
 
 use super::super::Failure;
 use super::super::link;
+use super::super::setup::within;
 use super::super::terminal::{note, typed_lines, warn};
 use super::CalibrateArguments;
 use palpate_device::protocol::DecodedEvent;
@@ -30,7 +31,7 @@ pub(super) struct LiveArguments {
     auto: bool,
     /// Pads only: then record an empty close of this duration, to measure how bending shifts the zero. The strip of the same
     /// finger must be calibrated.
-    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    #[arg(long, value_name = "S", value_parser = within(1.0..=600.0))]
     pub(super) empty_close: Option<f64>,
 }
 
@@ -42,11 +43,6 @@ impl LiveArguments {
             Err(format!("{name} has no effect: the points come from a file. Leave it out, or add --empty-close").into())
         })
     }
-}
-
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|s: &f64| (1.0..=600.0).contains(s));
-    seconds.ok_or_else(|| "write a number of seconds from 1 to 600".to_owned())
 }
 
 /// How long to wait for the first readings (s).

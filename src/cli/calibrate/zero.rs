@@ -1,6 +1,7 @@
 //! Zeros: `palpate calibrate tare` stores the present ones, `palpate calibrate drift` shows those of stored trials.
 
 use super::super::Failure;
+use super::super::setup::within;
 use super::super::terminal::{say, say_json, table, warn};
 use super::guided;
 use palpate_store::{Store, StoredTare};
@@ -17,7 +18,7 @@ pub(super) struct TareArguments {
     #[arg(long, value_name = "PORT|FILE")]
     port: Option<PathBuf>,
     /// Duration of the measurement at rest (s).
-    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = within(0.3..=60.0))]
     seconds: f64,
     /// Print the zeros without storing them.
     #[arg(long)]
@@ -35,11 +36,6 @@ pub(super) struct DriftArguments {
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|s: &f64| (0.3..=60.0).contains(s));
-    seconds.ok_or_else(|| "write a number of seconds from 0.3 to 60".to_owned())
 }
 
 /// Output of `tare --json`.

@@ -80,7 +80,7 @@ fn show_board(store: &Store, id: TrialId, header: TrialHeader, log: BoardLog, js
         object: header.object,
         version: header.version,
         samples: log.readings.len(),
-        duration_s: log.readings.last().map_or(0.0, |last| last.t_s - log.began_s),
+        duration_s: log.readings.last().map_or(0.0, |last| last.t_s - log.course.began_s),
         about: store.board_info(id)?.unwrap_or_default(),
         gaps: log.gaps,
         warnings: header.warnings,
@@ -95,14 +95,14 @@ fn show_board(store: &Store, id: TrialId, header: TrialHeader, log: BoardLog, js
     say(format!("trial {id}: {} (real gripper on {})", shown_name(&report.object), report.about.port))?;
     print_labels(&report.labels)?;
     say(format!("{} samples over {:.2} s, recorded by Palpate {}", report.samples, report.duration_s, report.version))?;
-    say(format!("channels {}", report.about.board.channels.join(", ")))?;
-    if let Some(detected) = &report.about.detected {
+    say(format!("channels {}", report.about.course.board.channels.join(", ")))?;
+    if let Some(detected) = &report.about.course.detected {
         say(format!("format {}: {}", detected.format.label(), detected.why))?;
     }
-    let (line, bad_lines) = (cadence_line(&report.about.cadence), report.about.cadence.bad_lines);
-    say(format!("{line}, {bad_lines} bad lines, {} reconnects", report.about.reconnects))?;
+    let (line, bad_lines) = (cadence_line(&report.about.course.cadence), report.about.course.cadence.bad_lines);
+    say(format!("{line}, {bad_lines} bad lines, {} reconnects", report.about.course.reconnects))?;
     for gap in &report.gaps {
-        let since = |t: f64| t - report.about.began_s;
+        let since = |t: f64| t - report.about.course.began_s;
         let lost = gap.lost.map_or_else(|| "an unknown number of".to_owned(), |lost| lost.to_string());
         say(format!("gap {:.2} s to {:.2} s, {lost} readings: {}", since(gap.from_s), since(gap.to_s), gap.cause))?;
     }

@@ -44,11 +44,6 @@ impl BoardReply {
             _ => Self::Other(text.to_owned()),
         }
     }
-
-    /// True where the fingers no longer follow the commanded pressure.
-    pub fn ends_control(&self) -> bool {
-        matches!(self, Self::Refused { .. } | Self::Vented { .. })
-    }
 }
 
 impl fmt::Display for BoardReply {
@@ -81,7 +76,6 @@ mod tests {
             assert_eq!(format!("# {reply}"), line);
             let handshake = line.starts_with("# tactile-gripper");
             assert_eq!(matches!(reply, BoardReply::Other(_)), handshake, "{line}");
-            assert_eq!(reply.ends_control(), line.starts_with("# refused") || line.starts_with("# vent"), "{line}");
         }
     }
 

@@ -131,13 +131,9 @@ impl Identification {
 
     /// Begins another grasp of the same object, on a gripper whose rows have these channels in these columns; rows follow
     /// with [`Self::push`].
-    pub fn begin_grasp<'a>(
-        &mut self,
-        columns: impl IntoIterator<Item = (usize, &'a Channel)>,
-    ) -> Result<(), IdentifyError> {
+    pub fn begin_grasp(&mut self, columns: impl IntoIterator<Item = (usize, String)>) -> Result<(), IdentifyError> {
         self.closed = true;
-        let named: BTreeMap<String, usize> =
-            columns.into_iter().map(|(place, channel)| (channel.name(), place)).collect();
+        let named: BTreeMap<String, usize> = columns.into_iter().map(|(place, name)| (name, place)).collect();
         let wanted = &self.model.card.channels;
         self.columns = wanted.iter().filter_map(|name| named.get(name).copied()).collect();
         let found: Vec<String> = wanted.iter().filter(|name| named.contains_key(*name)).cloned().collect();

@@ -3,6 +3,8 @@
 
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Phase};
+use palpate_tactile::board::Reading;
+use palpate_tactile::calibration::SensorEstimate;
 use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors};
 
 /// One sample: a value per channel, in the channel's unit; NaN where it is undefined.
@@ -16,6 +18,16 @@ pub struct Row {
     pub phase: Option<Phase>,
     /// A value per channel.
     pub values: Box<[f32]>,
+}
+
+impl Row {
+    /// The row of a board's reading: these derived channels, then so many counts of the board.
+    pub fn of_reading(reading: &Reading, estimate: &SensorEstimate, channels: &[Channel], counts: usize) -> Self {
+        let derived = channels.iter().map(|channel| estimate.of(channel).map_or(f32::NAN, |value| value as f32));
+        let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
+        let values = derived.chain((0..counts).map(count)).collect();
+        Self { t_s: reading.t_s, line_bar: reading.line_bar.unwrap_or(f64::NAN), phase: None, values }
+    }
 }
 
 /// Reads frames of a simulated gripper as rows.

@@ -11,10 +11,10 @@ use palpate_sim::scene::{Effect, Scene, Setting};
 use palpate_tactile::trial::{SimulatedData, SimulatedTrial, Trial, TrialHeader};
 use std::time::Duration;
 
-/// A simulated or replayed grasp in progress, sample by sample.
+/// A simulated grasp in progress, sample by sample.
 #[derive(Clone, Debug)]
-pub struct GraspRun<G> {
-    gripper: G,
+pub struct GraspRun {
+    gripper: SimulatedGripper,
     controller: GraspController,
     header: TrialHeader,
     frames: Vec<Frame>,
@@ -24,21 +24,16 @@ pub struct GraspRun<G> {
 }
 
 /// Sets up a simulated grasp. `seed` is recorded; it does not change the scene.
-pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimulatedGripper> {
+pub fn prepare(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun {
     prepare_with(scene, object, seed, Refinement::None)
 }
 
 /// Sets up the same grasp computed more finely, sampled at the same times: the error of the other is estimated from it.
-pub fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun<SimulatedGripper> {
+pub fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> GraspRun {
     prepare_with(scene, object, seed, Refinement::Refined)
 }
 
-fn prepare_with(
-    scene: &Scene,
-    object: Option<&ObjectModel>,
-    seed: u64,
-    refinement: Refinement,
-) -> GraspRun<SimulatedGripper> {
+fn prepare_with(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refinement: Refinement) -> GraspRun {
     let (mut simulation, placement) = SimRun::refined(scene, object, refinement);
     let mut warnings = object.map(|o| o.warnings.clone()).unwrap_or_default();
     warnings.extend(placement.warnings);
@@ -47,7 +42,8 @@ fn prepare_with(
     let header = TrialHeader { seed, warnings, ..TrialHeader::new(object.map_or("empty", |o| &o.name), scene.clone()) };
     let actuation_hz = f64::from(scene.timing.actuation_hz);
     let gripper = SimulatedGripper::new(simulation, placement.world_from_gripper, actuation_hz);
-    GraspRun::new(gripper, GraspPlan::simulated(scene), header)
+    let controller = GraspController::new(GraspPlan::simulated(scene), gripper.now_s());
+    GraspRun { gripper, controller, header, frames: Vec::new(), finished: false, failed: false }
 }
 
 /// Sets up and runs a simulated grasp to its end.
@@ -80,20 +76,14 @@ fn programme_warnings(scene: &Scene) -> Vec<String> {
     warnings
 }
 
-impl<G: Gripper> GraspRun<G> {
-    /// A grasp about to begin.
-    pub fn new(gripper: G, plan: GraspPlan, header: TrialHeader) -> Self {
-        let controller = GraspController::new(plan, gripper.now_s());
-        Self { gripper, controller, header, frames: Vec::new(), finished: false, failed: false }
-    }
-
+impl GraspRun {
     /// Header of the trial so far.
     pub fn header(&self) -> &TrialHeader {
         &self.header
     }
 
     /// The gripper.
-    pub fn gripper_mut(&mut self) -> &mut G {
+    pub fn gripper_mut(&mut self) -> &mut SimulatedGripper {
         &mut self.gripper
     }
 
@@ -139,9 +129,7 @@ impl<G: Gripper> GraspRun<G> {
         }
         Ok(None)
     }
-}
 
-impl GraspRun<SimulatedGripper> {
     /// The trial so far, without its samples.
     pub fn begun(&self) -> SimulatedTrial {
         let simulation = self.gripper.run();

@@ -32,7 +32,7 @@ impl ReplayedGripper {
 }
 
 fn events_of(log: BoardLog) -> Vec<GripperEvent> {
-    let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(log.board))];
+    let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(log.course.board))];
     timed.extend(log.gaps.into_iter().map(|gap| (gap.from_s.next_up(), DecodedEvent::Gap(gap))));
     timed.extend(log.readings.into_iter().map(|reading| (reading.t_s, DecodedEvent::Reading(reading))));
     timed.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -66,12 +66,12 @@ impl Gripper for ReplayedGripper {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grasping::{GraspPlan, GraspRun, grasp};
+    use crate::grasping::grasp;
     use palpate_sim::scene::Scene;
     use palpate_store::{BoardChunk, BoardInfo, ImportedTrial, Store};
     use palpate_tactile::Signals;
     use palpate_tactile::board::{Board, Gap, Reading};
-    use palpate_tactile::trial::TrialHeader;
+    use palpate_tactile::trial::{BoardCourse, TrialHeader};
 
     fn events(trial: Trial) -> Vec<(f64, GripperEvent)> {
         let mut gripper = ReplayedGripper::new(trial);
@@ -92,16 +92,17 @@ mod tests {
         let simulated = grasp(&scene, None, 0);
         let id = store.insert(&simulated)?;
         let stored = store.load(id)?;
-        let plan = GraspPlan::simulated(&stored.header.scene);
-        let mut run = GraspRun::new(ReplayedGripper::new(stored.clone()), plan, stored.header.clone());
-        while run.next_frame().is_some() {}
-        assert!(run.frames() == simulated.frames() && !run.frames().is_empty());
+        let frames: Vec<_> = simulated.frames().iter().cloned().map(|f| (f.t, GripperEvent::Sampled(f))).collect();
+        assert!(events(stored) == frames && !frames.is_empty());
 
         let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: vec![Some(7.0)], line_bar: None };
         let gap = Gap { from_s: 0.02, to_s: 0.06, lost: Some(1), cause: String::new() };
         let board = Board { channels: vec!["flexL".to_owned()], ..Board::default() };
         let readings = [0.0, 0.02, 0.06].map(reading);
-        let info = BoardInfo { board: board.clone(), ..BoardInfo::default() };
+        let info = BoardInfo {
+            course: BoardCourse { board: board.clone(), ..BoardCourse::default() },
+            ..BoardInfo::default()
+        };
         let id = store.begin_board(&TrialHeader::new("lemon", Scene::default()), &info)?;
         let chunk = BoardChunk { readings: readings.to_vec(), gaps: vec![gap.clone()], ..BoardChunk::default() };
         store.append_board(id, &info, &chunk)?;

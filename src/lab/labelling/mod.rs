@@ -20,5 +20,5 @@ mod sparkline;
 
 pub use disagreement::{Disagreement, disagreements};
 pub use flags::{Observed, flags_of};
-pub use segmentation::{LOOK_BACK_S, PRE_ROLL_S, SegmentEvent, Segmenter};
+pub use segmentation::{PRE_ROLL_S, SegmentEvent, Segmenter};
 pub use sparkline::{decimated, sparkline};

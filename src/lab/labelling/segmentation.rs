@@ -17,9 +17,6 @@ use std::collections::VecDeque;
 /// Time before the start of a grasp that belongs to its trial (s): the sensors are zeroed in this window.
 pub const PRE_ROLL_S: f64 = 0.5;
 
-/// Length of the reading buffer needed for the pre-roll (s): a start is detected up to half a second late.
-pub const LOOK_BACK_S: f64 = PRE_ROLL_S + 1.0;
-
 /// Length of a tick (s); in slower streams, each reading is a tick.
 const TICK_S: f64 = 0.02;
 /// Window for the rest value, as start and end before the present (s).

@@ -93,7 +93,7 @@ fn a_beginning_is_told_in_time_for_its_pre_roll() {
     for reading in stream(50.0, 10.0, &[3.0], 300.0) {
         for event in segmenter.push(&reading) {
             if let SegmentEvent::Began { from_s } = event {
-                assert!(reading.t_s - from_s < LOOK_BACK_S, "at {} from {from_s}", reading.t_s);
+                assert!(reading.t_s - from_s < PRE_ROLL_S + 1.0, "at {} from {from_s}", reading.t_s);
             }
         }
     }

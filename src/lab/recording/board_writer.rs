@@ -8,7 +8,7 @@ use palpate_store::{BoardChunk, BoardInfo, Serving, Store, StoreError, check_spa
 use palpate_tactile::board::{Gap, Sensor};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
-use palpate_tactile::trial::{PhaseMark, TrialHeader, TrialId};
+use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader, TrialId};
 
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
 const BYTES_PER_S: f64 = 400e3;
@@ -67,9 +67,12 @@ impl BoardWriter {
         let status = &plan.status;
         let about = BoardInfo {
             port: format!("{}, {}", status.port.path.display(), status.port.title),
-            board: status.board.clone(),
-            detected: status.detected.clone(),
-            began_s: plan.began_s,
+            course: BoardCourse {
+                board: status.board.clone(),
+                detected: status.detected.clone(),
+                began_s: plan.began_s,
+                ..BoardCourse::default()
+            },
             ..BoardInfo::default()
         };
         Ok(Self {
@@ -111,7 +114,7 @@ impl BoardWriter {
                 self.lost += gap.lost.unwrap_or(0);
                 self.add_gap(gap);
             }
-            LinkEvent::Decoded(DecodedEvent::Board(board)) => self.about.board = board,
+            LinkEvent::Decoded(DecodedEvent::Board(board)) => self.about.course.board = board,
             LinkEvent::Decoded(DecodedEvent::Reply(_)) => {}
         }
     }
@@ -123,7 +126,7 @@ impl BoardWriter {
 
     /// Notes a change of the control box.
     pub(super) fn mark(&mut self, mark: PhaseMark) {
-        self.about.phases.push(mark);
+        self.about.course.phases.push(mark);
     }
 
     /// Writes what waits.
@@ -143,10 +146,10 @@ impl BoardWriter {
         self.close(status);
         self.flush(store)?;
         let (before, reconnects) = &self.before;
-        self.about.reconnects = status.reconnects - reconnects;
-        self.about.detected.clone_from(&status.detected);
-        self.about.seconds = self.newest_s.map_or(0.0, |newest| (newest - self.about.began_s).max(0.0));
-        self.about.cadence = Cadence {
+        self.about.course.reconnects = status.reconnects - reconnects;
+        self.about.course.detected.clone_from(&status.detected);
+        self.about.seconds = self.newest_s.map_or(0.0, |newest| (newest - self.about.course.began_s).max(0.0));
+        self.about.course.cadence = Cadence {
             samples: self.samples,
             lost: self.lost,
             gaps: self.gaps,
@@ -184,20 +187,20 @@ impl BoardWriter {
         });
         let readings = decimated(&trial.readings);
         self.about.flags = flags_of(&Observed {
-            board: &self.about.board,
+            board: &self.about.course.board,
             readings: &readings,
             gaps: &trial.gaps,
             interruptions: &self.interruptions,
-            cadence: &self.about.cadence,
-            phases: &self.about.phases,
+            cadence: &self.about.course.cadence,
+            phases: &self.about.course.phases,
             calibrations: &serving.calibrations,
         });
-        self.about.sparkline = sparkline(&self.about.board, &readings);
+        self.about.sparkline = sparkline(&self.about.course.board, &readings);
         Ok(())
     }
 
     fn warnings(&self, status: &LinkStatus) -> Vec<String> {
-        let cadence = &self.about.cadence;
+        let cadence = &self.about.course.cadence;
         let mut warnings: Vec<String> =
             self.interruptions.iter().map(|cause| format!("interrupted: {cause}")).collect();
         if cadence.samples == 0 {
@@ -208,9 +211,9 @@ impl BoardWriter {
             warnings.push(format!("{lost} reading(s) are missing for certain, in {gaps} gap(s)"));
         }
         warnings.extend(status.wiring_remarks());
-        let assumed = Sensor::ALL.iter().any(|sensor| self.about.board.channel_of(*sensor).is_none());
+        let assumed = Sensor::ALL.iter().any(|sensor| self.about.course.board.channel_of(*sensor).is_none());
         if assumed && cadence.samples > 0 {
-            let names = self.about.board.channels.join(", ");
+            let names = self.about.course.board.channels.join(", ");
             warnings.push(format!("the board has not all of flexL, flexR, fsrL, fsrR, but {names}"));
         }
         warnings

@@ -6,6 +6,7 @@ mod board_writer;
 mod recent;
 mod record;
 mod recorder;
+mod replay;
 #[cfg(test)]
 mod tests;
 
@@ -14,3 +15,5 @@ pub use board_writer::{BoardTrialPlan, RecordedTrial};
 pub use recent::RecentEvents;
 pub use record::{RecordError, RecordProgress, Recording, record};
 pub use recorder::{BoardTrialEnd, Recorder, RecorderNotice};
+pub(crate) use replay::REST_S;
+pub use replay::{Replay, ReplayError};

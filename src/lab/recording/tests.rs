@@ -65,7 +65,7 @@ fn a_trial_keeps_every_reading_every_gap_and_every_byte() -> Result<(), Box<dyn 
     let mut store = Store::open(&path)?;
     let recorded = record(&mut store, &bytes)?;
     let trial = store.board_log(recorded.id)?.ok_or("it is one of a board")?;
-    assert_eq!((trial.readings.len(), trial.cadence.samples, trial.cadence.lost), (299, 299, 101));
+    assert_eq!((trial.readings.len(), trial.course.cadence.samples, trial.course.cadence.lost), (299, 299, 101));
     let lost: Vec<Option<u64>> = trial.gaps.iter().map(|gap| gap.lost).collect();
     assert_eq!(lost, [Some(1), Some(100)]);
     assert!(trial.gaps[1].cause.contains("unplugged"));
@@ -99,9 +99,9 @@ fn trials_of_a_board_are_merged_and_exported() -> Result<(), Box<dyn std::error:
     assert_eq!(all.board_log(2)?, here.board_log(id)?);
     assert_eq!(all.board_bytes(2)?, here.board_bytes(id)?);
     let mut trial = all.board_log(2)?.ok_or("it is one of a board")?;
-    trial.began_s = 1.0;
+    trial.course.began_s = 1.0;
     let phase = palpate_sim::gripper::Phase::Close;
-    trial.phases.push(PhaseMark { from_s: 2.0, phase, line_bar: Some(0.05) });
+    trial.course.phases.push(PhaseMark { from_s: 2.0, phase, line_bar: Some(0.05) });
     write_board_csv(&at("trial.csv"), &trial)?;
     let text = std::fs::read_to_string(at("trial.csv"))?;
     let rows: Vec<&str> = text.lines().collect();

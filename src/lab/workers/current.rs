@@ -2,7 +2,6 @@
 
 use super::refined_run::RefinedRun;
 use crate::grasping::{FrameReader, GraspRun};
-use crate::gripper::SimulatedGripper;
 use crate::picture::Stage;
 use glam::DVec3;
 use palpate_sim::frame::{Frame, Plan};
@@ -11,7 +10,7 @@ use std::sync::Arc;
 
 /// The grasp that is going on.
 pub(super) struct Current {
-    pub(super) run: GraspRun<SimulatedGripper>,
+    pub(super) run: GraspRun,
     /// Runs along for the error band, where one is wanted.
     pub(super) refined_run: Option<RefinedRun>,
     pub(super) plan: Arc<Plan>,

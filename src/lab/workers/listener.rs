@@ -50,9 +50,9 @@ impl Listener {
 
     /// Begins a grasp whose rows have these channels in these columns. Returns once per scene the
     /// reason why nothing is recognised; `place` names the scene or gripper in it.
-    pub(super) fn begin_grasp<'a>(
+    pub(super) fn begin_grasp(
         &mut self,
-        columns: impl IntoIterator<Item = (usize, &'a Channel)>,
+        columns: impl IntoIterator<Item = (usize, String)>,
         place: &str,
     ) -> Option<String> {
         let begun = self.identification.begin_grasp(columns);

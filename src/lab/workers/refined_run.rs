@@ -1,7 +1,6 @@
 //! Refined run of a watched grasp: the same grasp with finer steps, in parallel, for the numerical error band.
 
 use crate::grasping::{ErrorBand, GraspRun, prepare_refined};
-use crate::gripper::SimulatedGripper;
 use glam::DVec3;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
@@ -9,7 +8,7 @@ use palpate_tactile::Sensors;
 
 /// Simulation with finer steps that advances sample by sample with the watched grasp.
 pub(super) struct RefinedRun {
-    run: GraspRun<SimulatedGripper>,
+    run: GraspRun,
     band: ErrorBand,
 }
 

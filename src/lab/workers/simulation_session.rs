@@ -337,11 +337,9 @@ impl Session {
             recorder.begin(begun.clone());
             self.recorder_busy = true;
         }
-        if let Some(warning) = self
-            .listener
-            .as_mut()
-            .and_then(|listener| listener.begin_grasp(reader.channels().iter().enumerate(), "in this scene"))
-        {
+        if let Some(warning) = self.listener.as_mut().and_then(|listener| {
+            listener.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), "in this scene")
+        }) {
             self.outlets.notify(Notice::Warning(warning));
         }
         self.grasp += 1;

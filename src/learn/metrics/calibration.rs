@@ -108,15 +108,6 @@ impl<'a> Forecasts<'a> {
         self.mean(|row| -row.probabilities[row.truth].clamp(PROBABILITY_FLOOR, 1.0).ln())
     }
 
-    /// Brier score (Brier, Monthly Weather Review 78:1, 1950): mean squared distance between the probabilities and
-    /// the truth, summed over classes; 0 is perfect, 2 is certainty of the wrong class.
-    pub fn brier(&self) -> f64 {
-        self.mean(|row| {
-            let target = |class| if class == row.truth { 1.0 } else { 0.0 };
-            row.probabilities.iter().enumerate().map(|(class, p)| (p - target(class)).powi(2)).sum()
-        })
-    }
-
     /// Share of trials whose truth is among the `k` likeliest classes, lower class numbers first among equals.
     pub fn top_k_accuracy(&self, k: usize) -> f64 {
         self.mean(|row| f64::from(u8::from(row.rank() < k)))
@@ -183,7 +174,7 @@ mod tests {
 
     #[test]
     fn scores_agree_with_scikit_learn() {
-        // log_loss(y, p, labels=[0,1,2]); brier_score_loss(y, p, labels=[0,1,2], scale_by_half=False)
+        // log_loss(y, p, labels=[0,1,2])
         // [top_k_accuracy_score(y, p, k=k, labels=[0,1,2]) for k in (1, 2)]
         // conf = p.max(1); hit = p.argmax(1) == y; o = np.argsort(conf, kind="stable")
         // for n in (10, 4, 3): sum(len(i) * abs(conf[i].mean() - hit[i].mean()) for i in np.array_split(o, n)) / len(y)
@@ -191,7 +182,6 @@ mod tests {
         let forecasts = Forecasts::new(&TRUTH, &rows).expect("valid rows");
         for (got, expected) in [
             (forecasts.negative_log_likelihood(), 0.8465458167605494),
-            (forecasts.brier(), 0.47482),
             (forecasts.top_k_accuracy(1), 0.6),
             (forecasts.top_k_accuracy(2), 0.9),
             (forecasts.calibration_error(10), 0.396),
@@ -218,7 +208,7 @@ mod tests {
         let rows = vec![vec![0.0, 1.0]];
         let forecasts = Forecasts::new(&[0], &rows).expect("a valid row");
         assert!((forecasts.negative_log_likelihood() + PROBABILITY_FLOOR.ln()).abs() < 1e-12);
-        assert_eq!((forecasts.brier(), forecasts.calibration_error(CALIBRATION_BINS)), (2.0, 1.0));
+        assert_eq!(forecasts.calibration_error(CALIBRATION_BINS), 1.0);
         let certain = vec![vec![1.0]];
         let forecasts = Forecasts::new(&[0], &certain).expect("a valid row");
         assert_eq!((forecasts.negative_log_likelihood(), forecasts.calibration_error(0)), (0.0, 0.0));
@@ -249,7 +239,7 @@ mod tests {
             let backwards = forecasts.at(&(0..rows.len()).rev().collect::<Vec<_>>()).expect("valid trials");
             let error = forecasts.calibration_error(bins);
             prop_assert!((0.0..=1.0).contains(&error) && (error - backwards.calibration_error(bins)).abs() < 1e-12);
-            prop_assert!((0.0..=2.0).contains(&forecasts.brier()) && forecasts.negative_log_likelihood() > 0.0);
+            prop_assert!(forecasts.negative_log_likelihood() > 0.0);
             prop_assert_eq!(forecasts.top_k_accuracy(3), 1.0);
             prop_assert!(forecasts.top_k_accuracy(1) <= forecasts.top_k_accuracy(2));
             // One bin compares mean confidence with accuracy; finer bins can only find more.

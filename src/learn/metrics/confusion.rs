@@ -73,17 +73,6 @@ impl Confusion {
         Some(Self { rows })
     }
 
-    /// The counts of two test sets together, say of two splits; `None` if they differ in the number of classes.
-    pub fn joined(mut self, other: &Self) -> Option<Self> {
-        if self.classes() != other.classes() {
-            return None;
-        }
-        for (count, more) in self.rows.iter_mut().flatten().zip(other.rows.iter().flatten()) {
-            *count = count.saturating_add(*more);
-        }
-        Some(self)
-    }
-
     /// Number of classes.
     pub fn classes(&self) -> usize {
         self.rows.len()
@@ -242,14 +231,6 @@ mod tests {
         assert_eq!(Confusion::of(2, &[0, 1], &[Some(0)]), None);
         assert!(Confusion::try_from(vec![vec![1, 0]]).is_ok());
         assert!(Confusion::try_from(vec![vec![1, 0], vec![1, 0]]).is_err());
-    }
-
-    #[test]
-    fn test_sets_join() {
-        let twice = four_classes().joined(&four_classes()).expect("same classes");
-        assert_eq!(twice.trials(), 24);
-        assert_eq!(twice.macro_f1(), four_classes().macro_f1());
-        assert_eq!(twice.joined(&Confusion { rows: Vec::new() }), None);
     }
 
     proptest! {

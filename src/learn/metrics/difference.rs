@@ -1,8 +1,7 @@
 //! Significance tests of the difference between recognisers; every p-value is two-sided.
 
-use super::{Interval, LEVEL};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
+use statrs::distribution::{Binomial, DiscreteCDF};
 
 /// McNemar's exact test (Psychometrika 12:153, 1947): two models on one test set.
 ///
@@ -39,46 +38,6 @@ impl McNemar {
         let fewer = u64::from(self.only_first.min(self.only_second));
         Binomial::new(0.5, disagreed).map_or(1.0, |fair| (2.0 * fair.cdf(fewer)).min(1.0))
     }
-}
-
-/// Outcome of [`corrected_t`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SplitTest {
-    /// Mean difference over splits with its interval.
-    pub difference: Interval,
-    /// Corrected standard error of the mean; t is the mean over it.
-    pub standard_error: f64,
-    /// Chance, for equally good methods, of a mean difference at least as large.
-    pub p_value: f64,
-}
-
-/// Corrected resampled t test of two methods over random splits (Nadeau and Bengio, Machine Learning 52:239, 2003).
-///
-/// Splits share training data, so their differences d are not independent, and the plain t test finds differences
-/// where there are none. With k splits and n2 test trials for n1 training trials the corrected statistic is
-///
-///   t = mean(d) / sqrt((1 / k + n2 / n1) s²),   s² = sum (d - mean(d))² / (k - 1),   k - 1 degrees of freedom
-///
-/// `differences` holds one number per split: average over seeds within a split first, since other seeds on the same
-/// split are no further split. `test_to_train` is n2 / n1. Where all differences are equal the interval has no width
-/// and p is 0, or 1 if they are all zero. `None` for fewer than two splits or numbers that are not finite.
-pub fn corrected_t(differences: &[f64], test_to_train: f64) -> Option<SplitTest> {
-    let splits = differences.len() as f64;
-    let freedom = splits - 1.0;
-    if freedom < 1.0 || !(0.0..f64::INFINITY).contains(&test_to_train) {
-        return None;
-    }
-    let mean = differences.iter().sum::<f64>() / splits;
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / freedom;
-    let standard_error = ((1.0 / splits + test_to_train) * variance).sqrt();
-    if !mean.is_finite() || !standard_error.is_finite() {
-        return None;
-    }
-    let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
-    let half_width = student.inverse_cdf(0.5 + 0.5 * LEVEL) * standard_error;
-    let p_value = if mean == 0.0 { 1.0 } else { 2.0 * student.sf(mean.abs() / standard_error) };
-    let difference = Interval { estimate: mean, low: mean - half_width, high: mean + half_width };
-    Some(SplitTest { difference, standard_error, p_value })
 }
 
 /// Holm's step-down adjustment (Scandinavian Journal of Statistics 6:65, 1979) of the p-values of a family of tests.
@@ -134,75 +93,6 @@ mod tests {
     }
 
     #[test]
-    fn student_agrees_with_scipy() -> Result<(), statrs::distribution::StudentsTError> {
-        // [(v, t.ppf(0.975, v), [2 * t.sf(x, v) for x in (0.001, 0.5, 2, 6, 40)]) for v in (1, 2, 4, 9, 49)]
-        for (freedom, quantile, p_values) in [
-            (
-                1.0,
-                12.706204736174694,
-                [0.9993633804398159, 0.7048327646991335, 0.2951672353008665, 0.10513691342250688, 0.015912179824051624],
-            ),
-            (
-                2.0,
-                4.302652729749462,
-                [0.9992928933955901, 2.0 / 3.0, 0.18350341907227397, 0.02667147321542477, 0.0006244146721847406],
-            ),
-            (
-                4.0,
-                2.7764451051977934,
-                [0.99925000015625, 0.6433299631818633, 0.11611652351681556, 0.00388253704696051, 2.3340163226e-6],
-            ),
-            (
-                9.0,
-                2.262157162798205,
-                [0.9992239303259733, 0.6290712998260263, 0.07655282377070101, 0.00020249932206764, 1.8982998e-11],
-            ),
-            (
-                49.0,
-                2.0095752371292392,
-                [0.99920617576564, 0.6193131862101314, 0.05105914825741809, 2.3404303906210619e-7, 0.0],
-            ),
-        ] {
-            let student = StudentsT::new(0.0, 1.0, freedom)?;
-            assert!((student.inverse_cdf(0.975) - quantile).abs() < 1e-10 * quantile, "{freedom}");
-            for (x, expected) in [0.001, 0.5, 2.0, 6.0, 40.0].into_iter().zip(p_values) {
-                assert!((2.0 * student.sf(x) - expected).abs() < 1e-10, "{freedom} {x}");
-            }
-        }
-        Ok(())
-    }
-
-    #[test]
-    fn corrected_t_agrees_with_scipy() {
-        // x = np.array([0.031, 0.012, -0.004, 0.025, 0.018]); k = len(x)
-        // se = np.sqrt((1 / k + 0.25) * x.var(ddof=1))
-        // 2 * t.sf(x.mean() / se, k - 1); t.interval(0.95, k - 1, x.mean(), se)
-        let test = corrected_t(&[0.031, 0.012, -0.004, 0.025, 0.018], 0.25).expect("five splits");
-        for (got, expected) in [
-            (test.difference.estimate, 0.0164),
-            (test.difference.low, -0.008678078075049792),
-            (test.difference.high, 0.041478078075049794),
-            (test.standard_error, 0.009032441530394758),
-            (test.p_value, 0.1435965032112287),
-        ] {
-            assert!((got - expected).abs() < 1e-10, "{got} {expected}");
-        }
-    }
-
-    #[test]
-    fn equal_differences_and_missing_splits() {
-        let none = corrected_t(&[0.0; 3], 0.25).expect("three splits");
-        assert_eq!((none.p_value, none.difference), (1.0, Interval { estimate: 0.0, low: 0.0, high: 0.0 }));
-        let always = corrected_t(&[0.5; 4], 0.25).expect("four splits");
-        assert!(always.p_value == 0.0 && always.difference.excludes_zero());
-        assert_eq!(corrected_t(&[], 0.25), None);
-        assert_eq!(corrected_t(&[0.1], 0.25), None);
-        assert_eq!(corrected_t(&[0.1, f64::NAN], 0.25), None);
-        assert_eq!(corrected_t(&[0.1, 0.2], -1.0), None);
-        assert_eq!(corrected_t(&[0.1, 0.2], f64::NAN), None);
-    }
-
-    #[test]
     fn holm_agrees_with_statsmodels() {
         // multipletests([0.01, 0.04, 0.03, 0.005, 0.5], method="holm")[1]
         let adjusted = holm(&[0.01, 0.04, 0.03, 0.005, 0.5]);
@@ -226,13 +116,6 @@ mod tests {
                     prop_assert!(p > other || adjusted[i] <= adjusted[j]);
                 }
             }
-        }
-
-        #[test]
-        fn the_interval_excludes_zero_just_when_p_is_small(differences in prop::collection::vec(-1.0..2.0_f64, 2..12)) {
-            let test = corrected_t(&differences, 0.25).expect("two splits");
-            let undecided = (test.p_value - 0.05).abs() < 1e-9;
-            prop_assert!(undecided || test.difference.excludes_zero() == (test.p_value < 0.05));
         }
 
         #[test]

@@ -21,9 +21,4 @@ impl Interval {
     pub fn holds(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
-
-    /// True if zero lies outside: the sign of a difference is significant.
-    pub fn excludes_zero(&self) -> bool {
-        !self.holds(0.0)
-    }
 }

@@ -1,9 +1,9 @@
 //! Scores of a recogniser, their confidence intervals, and tests for differences between recognisers.
 //!
 //! - [`Confusion`] counts decisions: accuracy, precision, recall, F1.
-//! - [`Forecasts`] scores probabilities: calibration error, log-likelihood, Brier score, top-k accuracy.
+//! - [`Forecasts`] scores probabilities: calibration error, log-likelihood, top-k accuracy.
 //! - [`Bootstrap`] puts an [`Interval`] around any of these, or around the difference of two models on the same trials.
-//! - [`McNemar`], [`corrected_t`] and [`holm`] test differences: on one test set, across splits, and many at a time.
+//! - [`McNemar`] and [`holm`] test differences: on one test set, and many at a time.
 //!
 //! Objects and decisions are class numbers from zero, trials are indices of the slices passed in. Nothing here panics or
 //! returns NaN: undefined numbers are `None`.
@@ -17,5 +17,5 @@ mod interval;
 pub use bootstrap::Bootstrap;
 pub use calibration::{CALIBRATION_BINS, Confident, Forecasts, PROBABILITY_FLOOR, ReliabilityPoint};
 pub use confusion::{ClassScores, Confusion, Scores};
-pub use difference::{McNemar, SplitTest, corrected_t, holm};
+pub use difference::{McNemar, holm};
 pub use interval::{Interval, LEVEL};

@@ -48,11 +48,6 @@ impl Input {
         positive(fixed_ohm) && positive(gain) && positive(self.reference_volt) && self.full_scale >= 1
     }
 
-    /// Voltage at the pin (V).
-    pub fn volts(&self, counts: f64) -> f64 {
-        self.share(counts) * self.reference_volt
-    }
-
     /// Resistance of the sensor (ohm).
     pub fn ohm(&self, counts: f64) -> f64 {
         self.divider.ohm(self.share(counts))
@@ -122,7 +117,6 @@ mod tests {
     fn equal_resistors_share_the_voltage() {
         for input in inputs() {
             assert_eq!(input.counts(input.divider.fixed_ohm), 2048.0);
-            assert_eq!(input.volts(2048.0), 1.65);
             assert!((input.ohm(2048.0) - input.divider.fixed_ohm).abs() < 1e-9);
         }
         // 25 kOhm below 47 kOhm: 25 / 72 of 4096.

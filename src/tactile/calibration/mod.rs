@@ -35,7 +35,7 @@ pub use flex_curve::FlexCurve;
 pub use input::{Input, RangeEnd};
 pub use pad_curve::{ACTIVE_AREA, BendingZero, PadCurve};
 pub use point::{Point, SensorKind};
-pub use procedure::{Procedure, Settling, Unsettled, plan};
+pub use procedure::{Procedure, Unsettled, plan};
 pub use readout::{Derived, Readout, SensorEstimate};
 pub use record::{Calibration, Curve, Record};
 pub use straight_line::StraightLine;

@@ -287,11 +287,6 @@ impl BendingZero {
         self.knots.last().map_or(0.0, |last| last.0)
     }
 
-    /// Its points: curvature (1/m) and conductance (S).
-    pub fn knots(&self) -> &[(f64, f64)] {
-        &self.knots
-    }
-
     /// True where its numbers are possible: what comes from a file may be anything.
     pub(super) fn is_possible(&self) -> bool {
         let finite = self.knots.iter().all(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite());

@@ -18,24 +18,13 @@ use crate::board::{Board, Reading, Sensor};
 use crate::electronics::Divider;
 use std::collections::VecDeque;
 
-/// Criterion for a settled reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settling {
-    /// Length of the window that is averaged (s).
-    pub window_s: f64,
-    /// Readings that it must hold.
-    pub least: usize,
-    /// Difference between its two halves that is let pass, beyond what noise explains (counts).
-    pub creep_counts: f64,
-}
-
-impl Default for Settling {
-    /// A second: two and a half times the late part of a strip's bend lasts about 0.4 s, and 50 readings halve the
-    /// noise of 2 counts to a third of a count.
-    fn default() -> Self {
-        Self { window_s: 1.0, least: 10, creep_counts: 1.0 }
-    }
-}
+/// Length of the window that is averaged (s): two and a half times the late part of a strip's bend, which lasts about
+/// 0.4 s; 50 readings reduce the noise of 2 counts to a third of a count.
+const WINDOW_S: f64 = 1.0;
+/// Readings that the window must hold.
+const LEAST_READINGS: usize = 10;
+/// Difference between its two halves that passes, beyond what noise explains (counts).
+const CREEP_COUNTS: f64 = 1.0;
 
 /// Reason why no point can be taken yet.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -82,13 +71,10 @@ pub struct Procedure {
     record: Record,
     /// Remaining stimuli, next one first.
     left: VecDeque<f64>,
-    settling: Settling,
     /// Time (s) and counts of the last readings.
     window: VecDeque<(f64, f64)>,
     /// Readings since the last point that had no number.
     silent: usize,
-    /// Reason why the last requested point was not taken.
-    refusal: Option<Unsettled>,
     /// The user has entered the resistor beside the sensor.
     resistor_is_given: bool,
 }
@@ -108,10 +94,8 @@ impl Procedure {
             column: board.channel_of(sensor)?,
             record: Record { part, kind, input, points: Vec::new(), bending: None, note: String::new() },
             left: plan(kind).into(),
-            settling: Settling::default(),
             window: VecDeque::new(),
             silent: 0,
-            refusal: None,
             resistor_is_given: resistor_ohm.is_some(),
         })
     }
@@ -188,7 +172,7 @@ impl Procedure {
         }
         self.silent = 0;
         self.window.push_back((reading.t_s, f64::from(counts)));
-        while self.window.front().is_some_and(|(t, _)| *t < reading.t_s - self.settling.window_s) {
+        while self.window.front().is_some_and(|(t, _)| *t < reading.t_s - WINDOW_S) {
             self.window.pop_front();
         }
     }
@@ -200,14 +184,13 @@ impl Procedure {
 
     /// Mean, spread and number of the last readings, where they have settled; the stimulus is still open.
     pub fn settled(&self) -> Result<Point, Unsettled> {
-        let Settling { window_s, least, creep_counts } = self.settling;
         let have_s = self.window.back().map_or(0.0, |last| last.0) - self.window.front().map_or(0.0, |first| first.0);
         // A window is full when one more period would be too much.
-        let full = 0.95 * window_s;
-        if self.silent > least {
+        let full = 0.95 * WINDOW_S;
+        if self.silent > LEAST_READINGS {
             return Err(Unsettled::Silent);
         }
-        if have_s < full || self.window.len() < least {
+        if have_s < full || self.window.len() < LEAST_READINGS {
             return Err(Unsettled::TooShort { have_s, need_s: full });
         }
         let counts: Vec<f64> = self.window.iter().map(|(_, counts)| *counts).collect();
@@ -220,7 +203,7 @@ impl Procedure {
         // The spread within each half is noise; that between them is not.
         let spread = 0.5 * (deviation(earlier) + deviation(later));
         let by = mean(later) - mean(earlier);
-        if by.abs() > creep_counts + 3.0 * spread * (2.0 / earlier.len() as f64).sqrt() {
+        if by.abs() > CREEP_COUNTS + 3.0 * spread * (2.0 / earlier.len() as f64).sqrt() {
             return Err(Unsettled::Moving { by });
         }
         let counts = mean(&counts);
@@ -244,9 +227,7 @@ impl Procedure {
     /// Takes the settled reading as that of an angle (rad) or force (N); readings for the next point begin anew. What
     /// was next in the plan is done with it. A reading that has not settled is refused, and nothing changes.
     pub fn take(&mut self, stimulus: f64) -> Result<Point, Unsettled> {
-        let settled = self.settled();
-        self.refusal = settled.err();
-        let point = Point { stimulus, ..settled? };
+        let point = Point { stimulus, ..self.settled()? };
         self.record.points.push(point);
         // It was measured from the rest that the points had shown.
         self.record.bending = None;
@@ -255,20 +236,13 @@ impl Procedure {
         Ok(point)
     }
 
-    /// Reason why the last requested point was not taken; none after a point was taken, skipped or undone.
-    pub fn last_refusal(&self) -> Option<Unsettled> {
-        self.refusal
-    }
-
     /// Leaves out what was next in the plan.
     pub fn skip(&mut self) {
-        self.refusal = None;
         self.left.pop_front();
     }
 
     /// Takes the last point back and puts it next in the plan.
     pub fn undo(&mut self) -> Option<Point> {
-        self.refusal = None;
         let point = self.record.points.pop()?;
         self.left.push_front(point.stimulus);
         self.record.bending = None;
@@ -348,12 +322,10 @@ mod tests {
         let creeping = |t: f64| (500.0 - 100.0 * (-t / 0.4).exp()) as f32;
         feed(&mut procedure, 10.0, 1.2, creeping);
         assert!(matches!(procedure.settled(), Err(Unsettled::Moving { by }) if by > 5.0), "{:?}", procedure.settled());
-        // A refused point stays the last refusal until another action.
-        let refused = procedure.take(1.0);
-        assert!(refused.is_err() && procedure.last_refusal() == refused.err() && procedure.record().points.is_empty());
+        assert!(procedure.take(1.0).is_err() && procedure.record().points.is_empty());
         feed(&mut procedure, 20.0, 3.5, creeping);
         assert!(procedure.settled().is_ok_and(|point| (point.counts - 500.0).abs() < 0.5));
-        assert!(procedure.take(1.0).is_ok() && procedure.last_refusal().is_none());
+        assert!(procedure.take(1.0).is_ok());
         // Noise of four counts is no movement.
         feed(&mut procedure, 30.0, 2.0, |t| {
             700.0 + if ((t * 50.0).round() as u32).is_multiple_of(2) { 4.0 } else { -4.0 }

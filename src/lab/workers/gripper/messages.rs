@@ -52,8 +52,6 @@ pub enum GripperCommand {
     SetModel(Option<Arc<Model>>),
     /// Probability from which a class counts as certain.
     SetThreshold(f64),
-    /// Maximum number of grasps per object.
-    SetGrasps(u32),
     /// Start over with another object; earlier grasps no longer count.
     AnotherObject,
     /// Begin a trial.

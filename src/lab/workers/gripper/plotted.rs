@@ -39,10 +39,8 @@ impl Plotted {
 
     /// The row of a reading: derived channels, then counts of the board.
     pub(super) fn row(&self, reading: &Reading, estimate: &SensorEstimate, line_bar: Option<f64>) -> Row {
-        let derived = self.channels.iter().map(|channel| estimate.of(channel).map_or(f32::NAN, |value| value as f32));
-        let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
-        let values = derived.chain((0..self.counts).map(count)).collect();
-        Row { t_s: reading.t_s, line_bar: line_bar.unwrap_or(f64::NAN), phase: None, values }
+        let row = Row::of_reading(reading, estimate, &self.channels, self.counts);
+        Row { line_bar: line_bar.unwrap_or(f64::NAN), ..row }
     }
 
     /// Adds a row; returns the rows to plot.

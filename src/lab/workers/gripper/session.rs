@@ -228,12 +228,6 @@ impl GripperSession {
                     listener.set_threshold(threshold);
                 }
             }
-            GripperCommand::SetGrasps(grasps) => {
-                self.grasps = grasps.max(1);
-                if let Some(listener) = &mut self.listener {
-                    listener.set_most_grasps(self.grasps);
-                }
-            }
             GripperCommand::AnotherObject => self.start_over(),
             GripperCommand::Begin(request) => self.begin(request, None),
             GripperCommand::Watch(request) => self.watching = request,

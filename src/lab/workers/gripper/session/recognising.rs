@@ -27,6 +27,7 @@ impl GripperSession {
         let place = "on the gripper: the model needs sensors that are not calibrated";
         let calibrated = connection.readout.channels();
         let columns = self.channels.iter().enumerate().filter(|(_, channel)| calibrated.contains(channel));
+        let columns = columns.map(|(place, channel)| (place, channel.name()));
         if let Some(warning) = listener.begin_grasp(columns, place) {
             self.outlets.notify(Notice::Warning(warning));
         }

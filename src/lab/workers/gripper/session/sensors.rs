@@ -2,6 +2,7 @@
 
 use super::{Connection, GripperSession, open};
 use crate::gripper::Gripper;
+use crate::recording::REST_S;
 use crate::workers::Notice;
 use crate::workers::gripper::calibrating::{Calibrating, CalibrationCommand, CalibrationPlan};
 use crate::workers::gripper::crosstalk::{Crossing, CrosstalkCommand, CrosstalkView};
@@ -12,8 +13,6 @@ use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Readings before the closing from which the zeros are taken (s).
-const REST_S: f64 = 0.6;
 /// Readings older than this are stale (s).
 const STALE_S: f64 = 2.0;
 

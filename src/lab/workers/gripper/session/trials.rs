@@ -145,7 +145,7 @@ impl GripperSession {
                     if !discarded {
                         self.outlets.notify(Notice::Stored(trial.id));
                     }
-                    let cadence = cadence_line(&trial.about.cadence);
+                    let cadence = cadence_line(&trial.about.course.cadence);
                     let warnings = trial.warnings;
                     self.ended = Some(Arc::new(EndedTrial { id: trial.id, request, discarded, warnings, cadence }));
                     self.publish();

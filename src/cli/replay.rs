@@ -1,0 +1,145 @@
+//! `palpate replay`: plays a stored trial or captured bytes as the live gripper: rows and recognition.
+
+use super::Failure;
+use super::recognise::{StageOne, load_model, named};
+use super::setup::open_store;
+use super::terminal::{note, say, say_json};
+use palpate_device::serial::{LinkOptions, SerialLink};
+use palpate_lab::grasping::Row;
+use palpate_lab::gripper::SerialGripper;
+use palpate_lab::recording::Replay;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Arguments of `palpate replay`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate replay 1
+  palpate replay 1 --speed 0 > rows.csv
+  palpate replay grasp.bytes --model mine.safetensors --json
+
+See also: palpate help store")]
+pub(super) struct ReplayArguments {
+    /// Number of a stored trial, or file of captured bytes.
+    #[arg(value_name = "TRIAL|FILE")]
+    source: PathBuf,
+    /// Recognition model (default: the shipped one).
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Speed, as a multiple of the original; 0: as fast as possible.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    speed: f64,
+    /// Print one JSON object instead of text, as fast as possible.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One row, with the most likely class so far.
+#[derive(Serialize)]
+struct RowReport {
+    t_s: f64,
+    line_bar: Option<f64>,
+    phase: Option<&'static str>,
+    values: BTreeMap<String, Option<f32>>,
+    class: Option<String>,
+    probability: Option<f64>,
+}
+
+/// Output of `--json`.
+#[derive(Serialize)]
+struct Report {
+    rows: Vec<RowReport>,
+    /// Most likely class of the last grasp.
+    decided: Option<String>,
+    stage_one: Option<StageOne>,
+    pmf: BTreeMap<String, f64>,
+    /// Reason why nothing was recognised.
+    not_recognised: Option<String>,
+}
+
+pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let model = Arc::new(load_model(arguments.model.as_deref())?);
+    let store = open_store(store)?;
+    let mut replay = match arguments.source.to_str().and_then(|text| text.parse().ok()) {
+        Some(id) => Replay::of_trial(&store, id, model)?,
+        None => {
+            let replay_speed = f64::INFINITY;
+            let options = LinkOptions { path: Some(arguments.source.clone()), replay_speed, ..LinkOptions::default() };
+            if !arguments.source.is_file() {
+                let name = arguments.source.display();
+                return Err(format!("\"{name}\" is neither the number of a trial nor a file of captured bytes").into());
+            }
+            Replay::of_capture(SerialGripper::new(Box::new(SerialLink::open(&options)?)), &store, model)?
+        }
+    };
+    let (mut rows, mut header, mut pace) = (Vec::new(), Vec::new(), None);
+    while let Some(row) = replay.next_row()? {
+        let answer = answer(&replay);
+        if arguments.json {
+            rows.push(report(&replay, &row, answer));
+            continue;
+        }
+        let (began, first_s) = *pace.get_or_insert((Instant::now(), row.t_s));
+        let due = Duration::try_from_secs_f64((row.t_s - first_s) / arguments.speed).unwrap_or_default();
+        std::thread::sleep(due.saturating_sub(began.elapsed()));
+        if header != replay.channels() {
+            header = replay.channels().to_vec();
+            say(format!("t_s,line_pressure [bar],phase,{},class,probability", header.join(",")))?;
+        }
+        print(&row, answer)?;
+    }
+    let identification = replay.identification();
+    let not_recognised = match (identification.verdict(), replay.why_off()) {
+        (Some(_), _) => None,
+        (None, Some(cause)) => Some(cause.to_string()),
+        (None, None) => Some("no grasp was found".to_owned()),
+    };
+    let decided = answer(&replay);
+    if arguments.json {
+        let verdict = identification.verdict();
+        return say_json(&Report {
+            rows,
+            decided: decided.map(|(class, _)| class),
+            stage_one: verdict.and_then(|verdict| StageOne::of(verdict, &identification.model().card.labels)),
+            pmf: verdict.map(|verdict| named(identification.model(), &verdict.pmf)).unwrap_or_default(),
+            not_recognised,
+        });
+    }
+    match (decided, not_recognised) {
+        (Some((class, probability)), None) => note(&format!("recognised as {class} ({:.0} %)", 100.0 * probability)),
+        (_, cause) => note(&format!("no recognition: {}", cause.unwrap_or_default())),
+    }
+    Ok(())
+}
+
+/// The most likely class of the running or last grasp.
+fn answer(replay: &Replay) -> Option<(String, f64)> {
+    let identification = replay.identification();
+    let (class, probability) = identification.verdict()?.pmf.top();
+    Some((identification.model().card.labels.classes[class].name.clone(), probability))
+}
+
+fn report(replay: &Replay, row: &Row, answer: Option<(String, f64)>) -> RowReport {
+    let values = row.values.iter().map(|value| Some(*value).filter(|value| value.is_finite()));
+    let (class, probability) = answer.unzip();
+    RowReport {
+        t_s: row.t_s,
+        line_bar: Some(row.line_bar).filter(|bar| bar.is_finite()),
+        phase: row.phase.map(|phase| phase.name()),
+        values: replay.channels().iter().cloned().zip(values).collect(),
+        class,
+        probability,
+    }
+}
+
+fn print(row: &Row, answer: Option<(String, f64)>) -> Result<(), Failure> {
+    let number = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
+    let mut cells = vec![number(row.t_s), number(row.line_bar), row.phase.map_or("", |phase| phase.name()).to_owned()];
+    cells.extend(row.values.iter().map(|value| if value.is_finite() { value.to_string() } else { String::new() }));
+    let (class, probability) = answer.map_or_else(Default::default, |(class, p)| (class, format!("{p:.3}")));
+    cells.extend([class, probability]);
+    say(cells.join(","))
+}

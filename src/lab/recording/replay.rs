@@ -1,0 +1,254 @@
+//! Replay of a stored trial or of captured bytes: the rows and the recognition of the live gripper, event by event.
+
+use super::recent::RecentEvents;
+use crate::grasping::{FrameReader, GraspController, GraspPlan, Identification, IdentifyError, Row};
+use crate::gripper::{Gripper, GripperError, GripperEvent, ReplayedGripper, SerialGripper};
+use crate::labelling::{SegmentEvent, Segmenter};
+use palpate_device::protocol::DecodedEvent;
+use palpate_device::serial::LinkEvent;
+use palpate_learn::{Model, StopRule};
+use palpate_sim::gripper::Phase;
+use palpate_sim::scene::Scene;
+use palpate_store::{Serving, Store, StoreError};
+use palpate_tactile::board::{Board, Reading};
+use palpate_tactile::calibration::Readout;
+use palpate_tactile::trial::{Control, PhaseMark, TrialData, TrialId};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, whole_fingers};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Readings before the closing from which the zeros are taken (s).
+pub(crate) const REST_S: f64 = 0.6;
+/// Longest wait for captured bytes.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// A trial that cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The store.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The gripper of the trial does not fit the layout of its rows.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+}
+
+/// A replay in progress.
+pub struct Replay {
+    gripper: Box<dyn Gripper>,
+    controller: GraspController,
+    reader: RowReader,
+    channels: Vec<String>,
+    identification: Identification,
+    off: Option<IdentifyError>,
+}
+
+/// Makes rows of events.
+enum RowReader {
+    Frames(Box<FrameReader>),
+    Signals,
+    Board(Box<BoardReader>),
+}
+
+/// Makes rows of readings, with zeros from the rest before each closing.
+struct BoardReader {
+    serving: Serving,
+    readout: Readout,
+    recent: RecentEvents,
+    /// Commanded line pressure (bar).
+    line_bar: Option<f64>,
+    /// Phases of the trial that are still to come.
+    marks: VecDeque<PhaseMark>,
+    /// Detects the phases where the trial has none.
+    segmenter: Option<Segmenter>,
+}
+
+impl Replay {
+    /// Replays a stored trial of any source.
+    pub fn of_trial(store: &Store, id: TrialId, model: Arc<Model>) -> Result<Self, ReplayError> {
+        let mut trial = store.load(id)?;
+        let plan = GraspPlan::simulated(&trial.header.scene);
+        Ok(match &mut trial.data {
+            TrialData::Recorded(log) => {
+                let (serving, marks) =
+                    (store.calibrations().serving(Some(id), &[])?, std::mem::take(&mut log.course.phases));
+                Self::of_board(Box::new(ReplayedGripper::new(trial)), serving, marks.into(), model)
+            }
+            TrialData::Imported(signals) => {
+                let names = signals.channels.clone();
+                Self::of_rows(ReplayedGripper::new(trial), plan, RowReader::Signals, names, identification(model))
+            }
+            TrialData::Simulated(_) => {
+                let (gripper, identification) = (&trial.header.scene.gripper, identification(model));
+                let more = identification.channels_on(gripper).unwrap_or_default();
+                let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, &more)?;
+                let names = reader.channels().iter().map(Channel::name).collect();
+                Self::of_rows(
+                    ReplayedGripper::new(trial),
+                    plan,
+                    RowReader::Frames(Box::new(reader)),
+                    names,
+                    identification,
+                )
+            }
+        })
+    }
+
+    /// Replays captured bytes, read by the calibrations of the mounted parts.
+    pub fn of_capture(gripper: SerialGripper, store: &Store, model: Arc<Model>) -> Result<Self, ReplayError> {
+        let serving = store.calibrations().serving(None, &[])?;
+        Ok(Self::of_board(Box::new(gripper), serving, VecDeque::new(), model))
+    }
+
+    fn of_board(gripper: Box<dyn Gripper>, serving: Serving, marks: VecDeque<PhaseMark>, model: Arc<Model>) -> Self {
+        let segmenter = marks.is_empty().then(|| Segmenter::new(&Board::default()));
+        let (readout, recent) = (Readout::default(), RecentEvents::default());
+        let reader = BoardReader { serving, readout, recent, line_bar: None, marks, segmenter };
+        Self {
+            controller: untimed(gripper.now_s()),
+            gripper,
+            reader: RowReader::Board(Box::new(reader)),
+            channels: whole_fingers().iter().map(Channel::name).collect(),
+            identification: identification(model),
+            off: None,
+        }
+    }
+
+    /// Samples with their channels: one grasp from the first to the last.
+    fn of_rows(
+        gripper: ReplayedGripper,
+        plan: GraspPlan,
+        reader: RowReader,
+        channels: Vec<String>,
+        mut identification: Identification,
+    ) -> Self {
+        let off = identification.begin_grasp(channels.iter().cloned().enumerate()).err();
+        let controller = GraspController::new(plan, gripper.now_s());
+        Self { gripper: Box::new(gripper), controller, reader, channels, identification, off }
+    }
+
+    /// The channels of its rows.
+    pub fn channels(&self) -> &[String] {
+        &self.channels
+    }
+
+    /// The recogniser's answers so far.
+    pub fn identification(&self) -> &Identification {
+        &self.identification
+    }
+
+    /// Reason why nothing is recognised.
+    pub fn why_off(&self) -> Option<&IdentifyError> {
+        self.off.as_ref()
+    }
+
+    /// The next row; none after the last.
+    pub fn next_row(&mut self) -> Result<Option<Row>, GripperError> {
+        loop {
+            let row = match (self.gripper.next_event(PATIENCE)?, &self.reader) {
+                (GripperEvent::Sampled(frame), RowReader::Frames(reader)) => reader.row(&frame),
+                (GripperEvent::Signals { t_s, values }, _) => {
+                    Row { t_s, line_bar: f64::NAN, phase: None, values: values.into() }
+                }
+                (GripperEvent::Board(event), _) => match self.take_event(&event) {
+                    Some(row) => row,
+                    None => continue,
+                },
+                (GripperEvent::Tick | GripperEvent::Sampled(_), _) => continue,
+                (GripperEvent::Finished, _) => {
+                    self.identification.end_grasp();
+                    return Ok(None);
+                }
+            };
+            self.recognise(&row);
+            return Ok(Some(row));
+        }
+    }
+
+    fn recognise(&mut self, row: &Row) {
+        if let Some(closing_s) = self.controller.closing_s().filter(|closing_s| row.t_s >= *closing_s) {
+            self.identification.push(row.t_s - closing_s, row);
+        }
+    }
+
+    fn take_event(&mut self, event: &LinkEvent) -> Option<Row> {
+        let RowReader::Board(reader) = &mut self.reader else { return None };
+        reader.recent.push(event);
+        match event {
+            LinkEvent::Decoded(DecodedEvent::Board(board)) => {
+                reader.set_board(board);
+                self.channels.truncate(whole_fingers().len());
+                self.channels.extend(board.channels.iter().cloned());
+                None
+            }
+            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
+                let (began, marks) = reader.phases_until(reading);
+                if began {
+                    self.controller = untimed(reading.t_s);
+                }
+                for mark in marks {
+                    match self.controller.observe_phase(&mark) {
+                        Some(Phase::Close) => self.begin_grasp(mark.from_s, reading.t_s),
+                        Some(Phase::Release) => self.identification.end_grasp(),
+                        Some(Phase::Hold) | None => {}
+                    }
+                }
+                let RowReader::Board(reader) = &self.reader else { return None };
+                Some(reader.row(reading))
+            }
+            LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Reply(_)) | LinkEvent::Captured(_) => None,
+        }
+    }
+
+    /// Begins to recognise a grasp, with the readings from its closing to the present one.
+    fn begin_grasp(&mut self, closing_s: f64, now_s: f64) {
+        let RowReader::Board(reader) = &mut self.reader else { return };
+        let rest = reader.recent.between(closing_s - REST_S, closing_s);
+        reader.readout = reader.readout.clone().with_zero(reader.readout.zero_from(&rest));
+        let calibrated: Vec<String> = reader.readout.channels().iter().map(Channel::name).collect();
+        let columns = self.channels.iter().cloned().enumerate().filter(|(_, name)| calibrated.contains(name));
+        self.identification.start_over();
+        self.off = self.identification.begin_grasp(columns).err();
+        let rows: Vec<Row> =
+            reader.recent.between(closing_s, now_s).iter().map(|reading| reader.row(reading)).collect();
+        rows.iter().for_each(|row| self.recognise(row));
+    }
+}
+
+impl BoardReader {
+    fn set_board(&mut self, board: &Board) {
+        // Calibrations that do not fit this board give no values; its counts still do.
+        self.readout = Readout::new(board, &self.serving.calibrations).unwrap_or_default();
+        if let Some(segmenter) = &mut self.segmenter {
+            segmenter.set_board(board);
+        }
+    }
+
+    /// Whether a trial began, and the phases that began, up to this reading.
+    fn phases_until(&mut self, reading: &Reading) -> (bool, Vec<PhaseMark>) {
+        let due = self.marks.iter().take_while(|mark| mark.from_s <= reading.t_s).count();
+        let mut marks: Vec<PhaseMark> = self.marks.drain(..due).collect();
+        self.line_bar = marks.last().map_or(self.line_bar, |mark| mark.line_bar);
+        let events = self.segmenter.as_mut().map(|segmenter| segmenter.push(reading)).unwrap_or_default();
+        let began = events.iter().any(|event| matches!(event, SegmentEvent::Began { .. }));
+        marks.extend(events.into_iter().filter_map(|event| match event {
+            SegmentEvent::Phase(mark) => Some(mark),
+            SegmentEvent::Began { .. } | SegmentEvent::Ended { .. } => None,
+        }));
+        (began, marks)
+    }
+
+    fn row(&self, reading: &Reading) -> Row {
+        let row = Row::of_reading(reading, &self.readout.estimate(reading), &whole_fingers(), reading.counts.len());
+        Row { line_bar: reading.line_bar.or(self.line_bar).unwrap_or(f64::NAN), ..row }
+    }
+}
+
+fn untimed(now_s: f64) -> GraspController {
+    GraspController::new(GraspPlan::recorded(&Scene::default(), Control::Free), now_s)
+}
+
+fn identification(model: Arc<Model>) -> Identification {
+    Identification::new(model, StopRule::default())
+}
