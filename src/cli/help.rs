@@ -99,7 +99,7 @@ mod tests {
     fn commands(text: &str) -> Vec<String> {
         let command = |line: &str| {
             let line = line.trim_start().strip_prefix("parallel ").unwrap_or(line.trim_start());
-            let line = line.split(" #").next()?.split(" | ").next()?.split(" :::").next()?;
+            let line = line.split(" #").next()?.split(" | ").next()?.split(" > ").next()?.split(" :::").next()?;
             (line == "palpate" || line.starts_with("palpate ")).then(|| line.trim().to_owned())
         };
         text.lines().filter_map(command).collect()
