@@ -90,7 +90,8 @@ fn print(report: &Report, store: &Path) -> Result<(), Failure> {
     say(format!("poses         {} redrawn because the open fingers had no room", collection.redrawn))?;
     if collection.unsound > 0 {
         say(format!(
-            "unsound       {} trials did not converge in every step; they are marked, and data sets exclude them",
+            "unsound       {} trials did not converge in every step or did not come to rest; they are marked, \
+             and data sets exclude them",
             collection.unsound
         ))?;
     }

@@ -66,7 +66,7 @@ impl DataArguments {
         }
         let left_out = data.about.left_out;
         if left_out > 0 {
-            warn(&format!("{left_out} trial(s) excluded: they diverged or did not converge"));
+            warn(&format!("{left_out} trial(s) excluded: they diverged, did not converge or did not come to rest"));
         }
         Ok(data)
     }

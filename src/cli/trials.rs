@@ -76,7 +76,7 @@ enum TrialsCommand {
         /// Divide force by the convex hull of the contacts, as the paper does.
         #[arg(long)]
         hull: bool,
-        /// Include trials that diverged or did not converge.
+        /// Include trials that diverged, did not converge or did not come to rest.
         #[arg(long)]
         unsound: bool,
     },
@@ -219,7 +219,10 @@ fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
         return Ok(kept);
     }
     let list: Vec<String> = left_out.iter().map(ToString::to_string).collect();
-    let text = format!("trial {} excluded: diverged or did not converge (--unsound includes it)", list.join(", "));
+    let text = format!(
+        "trial {} excluded: diverged, did not converge or did not come to rest (--unsound includes it)",
+        list.join(", ")
+    );
     if kept.is_empty() {
         return Err(text.into());
     }

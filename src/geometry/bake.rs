@@ -51,11 +51,15 @@ pub enum BakeError {
 /// Nodes beyond this are refused: 32 MB and some ten seconds.
 const MOST_NODES: usize = 8_000_000;
 
-/// Lattice left around the solid (cells), so that contacts are found inside the lattice.
-const MARGIN: f64 = 3.0;
+/// Distance from the solid (m) up to which the lattice holds exact values: the ends of contact springs are this thick at
+/// most, so that what they touch is never the lattice's own border.
+const REACH: f64 = 4e-3;
 
-/// Exact distances are computed within this many cells of the surface; beyond, a lattice this much coarser gives a
-/// lower bound. Most nodes of a 60 mm body are beyond, so that baking takes a third of the time.
+/// Cells beyond that reach, for interpolation.
+const MARGIN: f64 = 2.0;
+
+/// Farther away than that, a lattice this much coarser gives a lower bound. Most nodes of a 60 mm body are that far,
+/// which saves most of the time.
 const STRIDE: usize = 4;
 
 /// A lattice spacing (m) that keeps 0.75 mm where it can, six cells across the thinnest extent, and no more than
@@ -72,7 +76,7 @@ pub fn bake(parts: &[SolidPart], cell: f64) -> Result<DistanceGrid, BakeError> {
     if parts.is_empty() || size.max_element() <= 0.0 || !size.is_finite() {
         return Err(BakeError::NothingSolid);
     }
-    let box_around = solid.grown(MARGIN * cell);
+    let box_around = solid.grown(REACH + MARGIN * cell);
     let counts = (box_around.size() / cell).ceil() + DVec3::ONE;
     let nodes = counts.x * counts.y * counts.z;
     if nodes.is_nan() || nodes > MOST_NODES as f64 {
@@ -123,7 +127,7 @@ fn mesh_distances(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<f32> {
     };
     let coarse = CoarseLattice::new(grid, |p| unsigned(p, f64::from(f32::MAX)));
     let inside = inside_by_winding(grid, mesh);
-    let band = STRIDE as f64 * grid.cell;
+    let band = REACH + MARGIN * grid.cell;
     let [_, ny, nz] = grid.size;
     (0..grid.values.len())
         .into_par_iter()

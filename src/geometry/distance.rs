@@ -34,6 +34,15 @@ impl DistanceField {
         }
     }
 
+    /// Signed distance (m) and outward unit normal near the surface, smooth where the solid is.
+    #[inline]
+    pub fn surface(&self, p: DVec3) -> (f64, DVec3) {
+        match self {
+            Self::Primitive { .. } => (self.distance(p), self.normal(p)),
+            Self::Grid(grid) => grid.surface(p),
+        }
+    }
+
     /// Outward unit normal of the level set through a point.
     #[inline]
     pub fn normal(&self, p: DVec3) -> DVec3 {
@@ -41,7 +50,7 @@ impl DistanceField {
             Self::Primitive { shape, shape_from_solid } => {
                 shape_from_solid.rotation.inverse() * shape.gradient(shape_from_solid.point(p))
             }
-            Self::Grid(grid) => grid.normal(p),
+            Self::Grid(grid) => grid.surface(p).1,
         }
     }
 
@@ -80,7 +89,7 @@ impl DistanceGrid {
         self.origin + DVec3::from_array(index.map(|i| i as f64)) * self.cell
     }
 
-    /// Signed distance; outside the lattice the distance to the solid's bounding box, a lower bound.
+    /// Signed distance; outside the lattice a lower bound.
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
         match self.corner_values(p) {
@@ -89,22 +98,60 @@ impl DistanceGrid {
                 let far = lerp(lerp(c[4], c[5], t.z), lerp(c[6], c[7], t.z), t.y);
                 lerp(near, far, t.x)
             }
-            None => self.solid.distance(p),
+            None => self.distance_outside(p),
         }
     }
 
-    /// Unit gradient of the interpolated field.
+    /// The distance at the border less the way to it, or that to the solid's box, if that is more.
+    #[cold]
+    fn distance_outside(&self, p: DVec3) -> f64 {
+        let to_box = self.solid.distance(p);
+        if !p.is_finite() {
+            return to_box;
+        }
+        let span = DVec3::from_array(self.size.map(|n| (n - 1) as f64)) * self.cell;
+        let border = p.clamp(self.origin, self.origin + span * (1.0 - 1e-12));
+        let inside = border.max(self.origin + 1e-9 * self.cell).min(self.origin + span - 1e-9 * self.cell);
+        match self.corner_values(inside) {
+            Some(_) => to_box.max(self.distance(inside) - (p - inside).length()),
+            None => to_box,
+        }
+    }
+
+    /// Distance and its unit gradient from a quadratic B-spline through 27 nodes. Both are continuous, where the gradient
+    /// of a trilinear interpolation jumps from cell to cell, which a contact feels as an edge.
     #[inline]
-    pub fn normal(&self, p: DVec3) -> DVec3 {
-        let Some((c, t)) = self.corner_values(p) else {
-            return (p - p.clamp(self.solid.min, self.solid.max)).normalize_or(DVec3::Z);
-        };
-        let along_z = |base: usize| c[base + 1] - c[base];
-        let at_z = |base: usize| lerp(c[base], c[base + 1], t.z);
-        let x = lerp(at_z(4) - at_z(0), at_z(6) - at_z(2), t.y);
-        let y = lerp(at_z(2) - at_z(0), at_z(6) - at_z(4), t.x);
-        let z = lerp(lerp(along_z(0), along_z(2), t.y), lerp(along_z(4), along_z(6), t.y), t.x);
-        DVec3::new(x, y, z).normalize_or(DVec3::Z)
+    pub fn surface(&self, p: DVec3) -> (f64, DVec3) {
+        let u = (p - self.origin) / self.cell;
+        let last = DVec3::from_array(self.size.map(|n| n as f64 - 1.5));
+        if !(u.cmpge(DVec3::splat(0.5)).all() && u.cmplt(last).all()) {
+            let outward = (p - p.clamp(self.solid.min, self.solid.max)).normalize_or(DVec3::Z);
+            return (self.distance(p), outward);
+        }
+        let nearest = u.round();
+        let t = u - nearest;
+        // Weights of the three nodes along an axis, and their slopes.
+        let weights =
+            |t: f64| ([0.5 * (0.5 - t).powi(2), 0.75 - t * t, 0.5 * (0.5 + t).powi(2)], [t - 0.5, -2.0 * t, t + 0.5]);
+        let ((wx, dx), (wy, dy), (wz, dz)) = (weights(t.x), weights(t.y), weights(t.z));
+        let row = self.size[2];
+        let sheet = row * self.size[1];
+        let base = (nearest.x as usize - 1) * sheet + (nearest.y as usize - 1) * row + nearest.z as usize - 1;
+        let (mut distance, mut gradient) = (0.0, DVec3::ZERO);
+        for i in 0..3 {
+            for j in 0..3 {
+                let from = base + i * sheet + j * row;
+                let nodes = &self.values[from..from + 3];
+                let (mut value, mut slope) = (0.0, 0.0);
+                for k in 0..3 {
+                    value += wz[k] * f64::from(nodes[k]);
+                    slope += dz[k] * f64::from(nodes[k]);
+                }
+                distance += wx[i] * wy[j] * value;
+                gradient += DVec3::new(dx[i] * wy[j] * value, wx[i] * dy[j] * value, wx[i] * wy[j] * slope);
+            }
+        }
+        (distance, gradient.normalize_or(DVec3::Z))
     }
 
     /// The eight values around a point (z fastest, then y, then x) and where in the cell it lies.

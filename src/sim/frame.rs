@@ -87,6 +87,9 @@ pub struct Quality {
     /// Largest torque at any joint that neither springs nor contacts account for at the end of the hold, as a share
     /// of the actuation torque. Far from zero means the grasp had not come to rest.
     pub static_residual: f64,
+    /// Changes of a finger's force by more than 50 mN from one sample to the next, later than half a second into the
+    /// hold, where nothing is commanded: the finger with more of them.
+    pub hold_changes: u32,
     /// Place and time of the imbalance; absent where every step reached its tolerance.
     pub imbalance: Option<Imbalance>,
 }
@@ -105,22 +108,42 @@ pub struct Imbalance {
 }
 
 impl Quality {
-    /// True when the trial may be learned from: every number was finite and every step reached its tolerance.
+    /// True when the trial may be learned from: every number was finite, every step reached its tolerance, and the hold
+    /// came to rest.
     pub fn is_sound(&self) -> bool {
-        self.finite && self.converged
+        self.finite && self.converged && !self.is_restless()
     }
 
-    /// Describes why a trial did not converge, in a sentence.
+    /// True when the hold did not come to rest: forces kept changing, or do not balance at its end.
+    pub fn is_restless(&self) -> bool {
+        self.hold_changes >= RESTLESS_CHANGES || self.static_residual > RESTLESS_RESIDUAL
+    }
+
+    /// Describes why a trial is not sound, in a sentence.
     pub fn misses(&self) -> Option<String> {
         let (missed, steps) = (self.unconverged_steps, self.steps);
         let place = |imbalance: &Imbalance| {
             let Imbalance { first_tick, first_s, worst_at, .. } = imbalance;
             format!(", the first at {first_s:.3} s (tick {first_tick}), worst at {worst_at}")
         };
-        let place = self.imbalance.as_ref().map(place).unwrap_or_default();
-        (!self.converged).then(|| format!("{missed} of {steps} steps missed the solver's tolerance{place}"))
+        if !self.converged {
+            let place = self.imbalance.as_ref().map(place).unwrap_or_default();
+            return Some(format!("{missed} of {steps} steps missed the solver's tolerance{place}"));
+        }
+        let (changes, residual) = (self.hold_changes, 100.0 * self.static_residual);
+        self.is_restless().then(|| {
+            format!(
+                "the hold did not come to rest: {changes} changes of force above 50 mN, {residual:.0} % of the torque \
+                 unbalanced at its end"
+            )
+        })
     }
 }
+
+/// Changes of force in the hold from which on it counts as restless.
+const RESTLESS_CHANGES: u32 = 5;
+/// Static residual above which the hold has not come to rest.
+const RESTLESS_RESIDUAL: f64 = 0.2;
 
 impl Default for Quality {
     fn default() -> Self {
@@ -137,6 +160,7 @@ impl Default for Quality {
             newton_max: 0,
             friction_residual: 0.0,
             static_residual: 0.0,
+            hold_changes: 0,
             imbalance: None,
         }
     }

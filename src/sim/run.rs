@@ -1,7 +1,7 @@
 //! A simulation on its clock: actuation ticks and samples in order. Identical scenes give identical frames.
 
 use crate::frame::{Frame, Plan, Quality};
-use crate::gripper::{Phase, Programme};
+use crate::gripper::{Phase, Programme, Side};
 use crate::objects::ObjectModel;
 #[cfg(feature = "rapier")]
 use crate::physics::RapierSimulation;
@@ -31,6 +31,38 @@ pub struct SimRun {
     reported: Option<u32>,
     phase: Phase,
     static_residual: Option<f64>,
+    hold: HoldWatch,
+}
+
+/// Counts changes of force while nothing is commanded.
+#[derive(Clone, Debug)]
+struct HoldWatch {
+    /// Taxels of a finger.
+    taxels: usize,
+    /// Time of the first sample of the hold (s).
+    since: Option<f64>,
+    /// Normal force on each finger in the last sample (N).
+    force: [f64; 2],
+    changes: [u32; 2],
+}
+
+/// After this much of the hold (s) what was pushed has settled.
+const SETTLED_AFTER: f64 = 0.5;
+/// Change of a finger's force (N) from one sample to the next that counts.
+const CHANGE: f64 = 0.05;
+
+impl HoldWatch {
+    fn note(&mut self, frame: &Frame) {
+        let force = Side::BOTH.map(|side| frame.normal_force(side, self.taxels));
+        if frame.phase != Phase::Hold {
+            self.since = None;
+        } else if frame.t - *self.since.get_or_insert(frame.t) > SETTLED_AFTER {
+            for side in Side::BOTH.map(Side::index) {
+                self.changes[side] += u32::from((force[side] - self.force[side]).abs() > CHANGE);
+            }
+        }
+        self.force = force;
+    }
 }
 
 /// The engine of the scene.
@@ -84,8 +116,10 @@ impl SimRun {
     /// Sets up a scene with a refinement.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let (engine, placement) = EngineRun::new(scene, object, refinement);
-        let rig = Self { engine, reported: None, phase: Phase::Close, static_residual: None };
-        (rig, placement)
+        let taxels = scene.gripper.taxels().count();
+        let hold = HoldWatch { taxels, since: None, force: [0.0; 2], changes: [0; 2] };
+        let run = Self { engine, reported: None, phase: Phase::Close, static_residual: None, hold };
+        (run, placement)
     }
 
     /// Runs a programme from here to the end of the trial and returns the samples.
@@ -141,7 +175,9 @@ impl SimRun {
             let ticks = until(clock.ticks_per_sample).min(until(clock.ticks_per_actuation));
             self.engine.get_mut().advance_by(ticks)?;
             if self.engine.get().tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
-                return Ok(SimEvent::Sampled(self.engine.get().frame()));
+                let frame = self.engine.get().frame();
+                self.hold.note(&frame);
+                return Ok(SimEvent::Sampled(frame));
             }
         }
     }
@@ -161,6 +197,7 @@ impl SimRun {
         if let Some(at_hold) = self.static_residual {
             quality.static_residual = at_hold;
         }
+        quality.hold_changes = self.hold.changes[0].max(self.hold.changes[1]);
         quality
     }
 
@@ -175,6 +212,7 @@ impl SimRun {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::TaxelLoad;
 
     #[test]
     fn samples_and_actuation_interleave_on_the_clock() {
@@ -197,5 +235,24 @@ mod tests {
         assert_eq!(samples.len(), 30);
         assert_eq!(samples[0].0, 0);
         assert!((samples[0].1 - 1.0 / 75.0).abs() < 1e-15 && (samples[29].1 - 0.4).abs() < 1e-15);
+    }
+
+    #[test]
+    fn changes_of_force_count_once_the_hold_has_settled() {
+        let mut watch = HoldWatch { taxels: 10, since: None, force: [0.0; 2], changes: [0; 2] };
+        let mut push = |phase, k: u32, left: f32| {
+            let taxels = vec![TaxelLoad { taxel: 3, normal: left, along: 0.0, across: 0.0 }];
+            let t = f64::from(k) / 75.0;
+            let frame = Frame { sample: k, t, line_bar: 1.0, phase, q: vec![], world_from_object: None, taxels };
+            watch.note(&frame);
+            watch.changes
+        };
+        // 0.8 N on and off, in every phase.
+        let force = |k: u32| if k.is_multiple_of(2) { 0.8 } else { 0.0 };
+        assert_eq!((0..30).map(|k| push(Phase::Close, k, force(k))).last(), Some([0, 0]));
+        assert_eq!((30..68).map(|k| push(Phase::Hold, k, force(k))).last(), Some([0, 0]), "within half a second");
+        assert_eq!((68..78).map(|k| push(Phase::Hold, k, force(k))).last(), Some([10, 0]));
+        assert_eq!((78..98).map(|k| push(Phase::Hold, k, 0.8 + 0.002 * (k as f32))).last().map(|c| c[1]), Some(0));
+        assert_eq!((98..130).map(|k| push(Phase::Release, k, force(k))).last().map(|c| c[0] <= 11), Some(true));
     }
 }

@@ -87,6 +87,11 @@ def palpate(program, scene, settings=(), accuracy="draft"):
     return q[every - 1 :: every], force[every - 1 :: every], report["cpu_ms"]
 
 
+def slanted(cosine):
+    """Stiffness of a taxel along a normal at this cosine to its axis, as a share of that along the axis."""
+    return 1 / (cosine**2 + (1 - cosine**2) * CONTACT / SHEAR)
+
+
 def rms_deg(a, b):
     return float(np.degrees(np.sqrt(np.mean((a - b) ** 2))))
 

@@ -59,9 +59,9 @@ class Scene:
     def contacts(self, y, along, starts):
         """Where each taxel touches, the ball, the normal there, normal force; all (taxels, ..).
 
-        A taxel is a strand: its ball is pushed back along the strand's axis until it just touches, by x, and stores
-        k x^2 / 2. A motion v of the surfaces changes x by -n.v / c, c the cosine between axis and normal, so that the
-        force along the normal is k x / c.
+        A taxel is a strand: its ball is pushed back by c x along the normal, c the cosine between axis and normal and x the
+        way along the axis until it just touches. The strand gives way along its axis with k and sideways with k / 3, in
+        series along the normal: 1 / k_n = c^2 / k + 3 (1 - c^2) / k, and the force along the normal is k_n c x.
         """
         axis = quarter_turn(along[SEGMENT])
         foot = starts[SEGMENT] + along[SEGMENT] * ALONG[:, None]
@@ -74,8 +74,8 @@ class Scene:
         centre = ahead - half_chord
         pushed = np.where(aside < reach**2, np.maximum(m.AHEAD - centre, 0.0), 0.0)
         normal = (foot + axis * centre[:, None] - ball) / reach
-        cosine = np.maximum(half_chord / reach, 0.25)
-        return ball, normal, m.CONTACT * pushed / cosine
+        cosine = np.maximum(half_chord / reach, 0.02)
+        return ball, normal, m.CONTACT * pushed * cosine * m.slanted(cosine)
 
     def rate(self, _t, y):
         q, qd = y[: m.N], y[m.N : 2 * m.N]

@@ -213,8 +213,8 @@ fn the_bench_reports_rows() {
     // Finer is nearer to the truth, and costs more steps.
     let row = |accuracy: &str| rows.iter().find(|r| r["scene"] == "sphere_fixed" && r["accuracy"] == accuracy).unwrap();
     let off = |accuracy: &str| row(accuracy)["error"]["curvature_per_m"].as_f64().unwrap();
-    assert!(off("draft") > off("standard") && off("standard") > off("1e-4") && off("1e-4") > off("1e-5"));
-    assert!(row("1e-5")["step_s"].as_f64().unwrap() < row("1e-3")["step_s"].as_f64().unwrap());
+    assert!(off("draft") > off("standard") && off("standard") > off("1e-5"));
+    assert!(row("1e-5")["step_s"].as_f64().unwrap() < row("3e-4")["step_s"].as_f64().unwrap());
 }
 
 #[test]

@@ -158,9 +158,9 @@ fn scene_settings_reach_the_simulation() {
     bench.harness.run_steps(3);
     bench.harness.get_by_label("fixed in place").click();
     bench.until(|s| s.scene.object.fixed);
-    bench.harness.get_by_role_and_label(Role::ComboBox, "time step").click();
+    bench.harness.get_by_role_and_label(Role::ComboBox, "accuracy").click();
     bench.harness.run_steps(3);
-    bench.harness.get_by_label("draft, 1/150 s").click();
+    bench.harness.get_by_label("draft, 1e-3").click();
     bench.until(|s| s.scene.solver.accuracy == Accuracy::Draft);
     bench.harness.get_by_label("Defaults").click();
     let back = bench.until(|s| !s.scene.object.fixed);
@@ -172,17 +172,17 @@ fn turning_the_accuracy_dial_moves_both_numbers() {
     let mut bench = whole_window();
     bench.harness.get_by_label("Scene").click();
     bench.harness.run_steps(2);
-    assert!(bench.harness.query_by_role(Role::Slider).is_none(), "no tolerance at a fixed step");
-    // Held in place: a free object may slip one way or the other, and its error then does not shrink with the step.
+    assert!(bench.harness.query_by_role(Role::Slider).is_none(), "a name needs no slider");
+    // Held in place: a free object may slip one way or the other, and its error then does not shrink with the tolerance.
     bench.harness.get_by_role_and_label(Role::ComboBox, "held").click();
     bench.harness.run_steps(3);
     bench.harness.get_by_label("fixed in place").click();
     bench.until(|s| s.scene.object.fixed);
     let standard = measured(&mut bench);
-    bench.harness.get_by_role_and_label(Role::ComboBox, "time step").click();
+    bench.harness.get_by_role_and_label(Role::ComboBox, "accuracy").click();
     bench.harness.run_steps(3);
-    bench.harness.get_by_label("by tolerance").click();
-    bench.until(|s| s.scene.solver.accuracy == Accuracy::Tolerance(1e-4));
+    bench.harness.get_by_label("own tolerance").click();
+    bench.until(|s| s.scene.solver.accuracy == Accuracy::Tolerance(1e-5));
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_role_and_label(Role::Slider, "tolerance").is_some());
     let tolerance = measured(&mut bench);

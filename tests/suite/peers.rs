@@ -97,7 +97,7 @@ fn balls_are_held_as_mujoco_and_scipy_hold_them() {
         let (scene, trial) = palpate(name);
         let ours = squeeze(&scene, frame_at(&trial, HELD));
         let [scipy, mujoco] = ["scipy", "mujoco"].map(|peer| stored(&format!("{peer}_{name}")));
-        for (rows, most) in [(&scipy, 0.001), (&mujoco, 0.005)] {
+        for (rows, most) in [(&scipy, 0.001), (&mujoco, 0.025)] {
             let theirs = row_at(rows, HELD).force;
             assert!((ours / theirs - 1.0).abs() < most, "{name}: {ours} N, the other {theirs} N");
         }

@@ -59,7 +59,7 @@ fn a_trial_that_misses_its_tolerance_says_where_and_when() {
     assert!(imbalance.worst_excess > 1.0, "{imbalance:?}");
     assert!((imbalance.first_tick as f64 / 300.0 - imbalance.first_s).abs() < 1e-9, "{imbalance:?}");
     let found = trial.header.warnings.iter().find(|w| w.contains("missed the solver's tolerance")).unwrap();
-    let steps = format!("{} of 1200 steps", quality.unconverged_steps);
+    let steps = format!("{} of {} steps", quality.unconverged_steps, quality.steps);
     let tick = format!("(tick {})", imbalance.first_tick);
     for part in [&steps, &tick, &imbalance.worst_at] {
         assert!(found.contains(part.as_str()), "{found}");

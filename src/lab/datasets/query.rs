@@ -65,7 +65,8 @@ pub enum DatasetError {
     },
     /// Trials match, but none is sound.
     #[error(
-        "no matching trial{about} is usable: {left_out} diverged or did not converge; `palpate trials show` says where"
+        "no matching trial{about} is usable: {left_out} diverged, did not converge or did not come to rest; \
+         `palpate trials show` says where"
     )]
     Unsound {
         /// The query.
@@ -174,8 +175,8 @@ impl DatasetQuery {
         about
     }
 
-    /// Reads the data set of all labelled trials that match. Trials that diverged or did not converge are left out and
-    /// counted. `progress` gets the number of trials read and their total.
+    /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
+    /// rest are left out and counted. `progress` gets the number of trials read and their total.
     pub fn read(
         &self,
         store: &Store,
@@ -314,7 +315,8 @@ fn known_properties(row: &TrialRow) -> Option<(String, String)> {
     row.properties.clone().or_else(of_catalogue)
 }
 
-/// Reads the signals of a trial: its own channels if imported, calibrated ones if recorded, those of the view if simulated.
+/// Reads the signals of a trial: its own channels if imported, calibrated ones if recorded, those of the view if
+/// simulated.
 fn signals_of(store: &Store, row: &TrialRow, view: &SensorView) -> Result<(Signals, Origin), DatasetError> {
     if row.source == TrialSource::Recorded {
         return Ok((board_signals(store, row.id, view)?, Origin::Recorded));
@@ -347,15 +349,15 @@ fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<Signal
 }
 
 impl SensorView {
-    /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it differs
-    /// between classes only by residues of integrators and dampers.
+    /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it
+    /// differs between classes only by residues of integrators and dampers.
     pub fn signals(&self, trial: &SimulatedTrial) -> Result<Signals, LayoutError> {
         let layout = SensorLayout::named(&self.layout)?;
         let sensors = Sensors::new(&layout, &trial.header.scene.gripper, PressureArea::Participation)?;
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
-        // Poses of different objects may share a seed; their noise must not. FNV-1a of the name: changing it would change
-        // every data set with noisy sensors.
+        // Poses of different objects may share a seed; their noise must not. FNV-1a of the name: changing it would
+        // change every data set with noisy sensors.
         let seed = trial
             .header
             .object

@@ -1,15 +1,15 @@
 //! How far a simulated grasp may be from the exact solution of its own equations: a band about every channel, estimated
 //! from a refined run that computes the same grasp more finely.
 //!
-//! A refined run of named steps is close to the truth, see [`Solver::refined`](palpate_sim::scene::Solver::refined), so that
-//! the difference from it is the error. Where errors shrink by a factor r from a simulation to its refined run, as under a
-//! tolerance, the simulation's error is the difference times 1 / (1 - r): r = 1/2 for Euler at half the step, 1/4 for
-//! SDIRK2 at a tenth of the tolerance. The difference passes through zero where the error need not, so that a band takes
-//! the largest estimate within a tenth of a second on either side, and a factor for what the theory leaves out. How often
-//! it covers the truth is measured by a test.
+//! Where errors shrink by a factor r from a simulation to its refined run, the simulation's error is the difference
+//! times 1 / (1 - r): r = 1/4 for SDIRK2 at a tenth of the tolerance, 1/2 for rapier at half the step. Fixed steps of
+//! Euler have a refined run that is close to the truth, so that the difference from it is the error; see
+//! [`Solver::refined`](palpate_sim::scene::Solver::refined). The difference passes through zero where the error need
+//! not, so that a band takes the largest estimate within a tenth of a second on either side, and a factor for what the
+//! theory leaves out. How often it covers the truth is measured by a test.
 //!
-//! Where a free object may as well slip one way as the other, simulation and refined run may end in different grasps; the
-//! band then is as wide as these are apart, and does not shrink with the step.
+//! Where a free object may as well slip one way as the other, simulation and refined run may end in different grasps;
+//! the band then is as wide as these are apart, and does not shrink with the step.
 //!
 //! The band knows only the error of integration. How far the equations are from a real gripper is another question.
 
@@ -42,11 +42,10 @@ const SAFETY_BESIDE_THE_TRUTH: f64 = 1.5;
 impl ErrorBand {
     /// A band without samples, for as many channels.
     pub fn new(scene: &Scene, channels: usize) -> Self {
-        let named = scene.solver.accuracy.tolerance().is_none();
         let factor = match (scene.solver.engine, scene.solver.method()) {
-            (EngineKind::Palpate, _) if named => SAFETY_BESIDE_THE_TRUTH,
             (EngineKind::Palpate, IntegrationMethod::Sdirk2) => SAFETY / (1.0 - 0.25),
-            (EngineKind::Palpate, IntegrationMethod::Euler) | (EngineKind::Rapier, _) => SAFETY / (1.0 - 0.5),
+            (EngineKind::Palpate, IntegrationMethod::Euler) => SAFETY_BESIDE_THE_TRUTH,
+            (EngineKind::Rapier, _) => SAFETY / (1.0 - 0.5),
         };
         Self { factor, t_s: Vec::new(), estimates: vec![Vec::new(); channels] }
     }
@@ -178,7 +177,7 @@ mod tests {
             let off = if k == 20 { 0.25 } else { 0.0 };
             band.push(f64::from(k) / 75.0, &[Some(1.0 + off)], &[Some(1.0)]);
         }
-        let want = 0.25 * SAFETY_BESIDE_THE_TRUTH;
+        let want = f64::from((0.25 * SAFETY / (1.0 - 0.25)) as f32);
         for (sample, near) in [(12, false), (13, true), (20, true), (27, true), (28, false)] {
             assert_eq!(band.half_width(0, sample), Some(if near { want } else { 0.0 }), "{sample}");
         }
@@ -203,8 +202,8 @@ mod tests {
         }
     }
 
-    /// How a band stands to the truth, a grasp at a tolerance of 1e-6: samples that it covers, all of them, and the sums
-    /// of the squares of half-widths and errors, as shares of the largest reading of their channel.
+    /// How a band stands to the truth, a grasp at a tolerance of 1e-6: samples that it covers, all of them, and the
+    /// sums of the squares of half-widths and errors, as shares of the largest reading of their channel.
     fn covered(scene: &Scene, object: &ObjectModel, truth: &SimulatedTrial) -> [f64; 4] {
         let sensors = sensors(scene);
         let trial = grasp(scene, Some(object), 0);

@@ -213,7 +213,7 @@ mod tests {
         assert_eq!(trial.frames().len(), 300);
         assert!(trial.header.warnings.is_empty(), "{:?}", trial.header.warnings);
         let Quality { finite, converged, steps, static_residual, .. } = trial.data.quality;
-        assert!(finite && converged && steps == 1200);
+        assert!(finite && converged && (320..600).contains(&steps), "{steps} steps");
         assert!(static_residual < 1e-3, "{static_residual}");
     }
 

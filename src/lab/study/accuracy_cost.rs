@@ -59,7 +59,7 @@ mod tests {
             scene.solver.accuracy = accuracy;
             accuracy_cost(&scene, Some(&ball), &|| false).expect("not cancelled").error
         };
-        let dial = [Accuracy::Draft, Accuracy::Standard, Accuracy::Tolerance(1e-4), Accuracy::Tolerance(1e-5)];
+        let dial = [Accuracy::Draft, Accuracy::Standard, Accuracy::Tolerance(1e-5), Accuracy::Reference];
         let errors = dial.map(&mut at);
         for pair in errors.windows(2) {
             assert!(pair[1].curvature_per_m < 0.9 * pair[0].curvature_per_m, "{errors:?}");

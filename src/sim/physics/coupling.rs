@@ -8,10 +8,9 @@ use super::contact::{Acting, Against};
 use super::model::PhysicsModel;
 use super::workspace::{Spatial, Workspace};
 
-/// Gives the rows of the right finger room for the block, or takes it back.
-pub(super) fn prepare_coupling(model: &PhysicsModel, ws: &mut Workspace) {
-    let n = model.chain.joints;
-    ws.hessian.begin_rows(n..2 * n, if ws.fingers_meet { 0 } else { n });
+/// Couples the fingers, or takes them apart.
+pub(super) fn prepare_coupling(ws: &mut Workspace) {
+    ws.hessian.couple(ws.fingers_meet);
 }
 
 /// Fills the block.

@@ -4,16 +4,21 @@
 //! touches something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels;
 //! rays that are as thick as the gaps between contact springs do not.
 //!
-//! With the rest position of the ball's centre at s and the touch at t, the contact spring is compressed by x = s - t
-//! along its axis u, and by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. A
-//! relative motion v of the surfaces changes x by -n . v / c, whatever the shape of the surface. The contact spring
-//! stores the energy U(x) of its law, so that it presses along n with U'(x) / c: the pressure in the contact spring on
-//! the slanted surface it meets, which is larger than its own section by 1 / c. The same force, as a function of the
-//! compression along n, is that of a contact spring of stiffness k / c² and length c H, since U depends on k H² and x /
-//! H alone. That is what a contact is given.
+//! With the rest position of the ball's centre at s and the touch at t, the spring would have to give way by x = s - t
+//! along its axis u, or by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. Rubber
+//! gives way along its axis with the stiffness k of its law, and sideways with G / E of that, k / 3. Of all ways that
+//! keep the ball outside, the one of least energy shares the load between both, which are springs in series along n:
 //!
-//! It matters: a contact spring pressed along n by the force of its axial compression alone is the gradient of no
-//! energy. Fingers that swing then gain energy while they press, and what they hold rings and wanders.
+//! ```text
+//! 1 / k_n = c² / k + (1 - c²) / (k / 3)          force k_n c x along n
+//! ```
+//!
+//! Head-on this is the law itself; a spring that grazes an edge leans on it with its side, and slips off without a
+//! jump. A spring that could not give way sideways would press with k x / c, thrown off and springing back step by
+//! step, without end.
+//!
+//! Distances, normals and arms are those of the layout in the workspace, which is ahead of the state; see
+//! [`super::step`].
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
 use super::effects::FingerContact;
@@ -23,6 +28,7 @@ use super::state::State;
 use super::workspace::{Spatial, Workspace};
 use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
 use glam::{DMat3, DVec3};
+use palpate_geometry::Pose;
 
 /// Gaps up to this are contacts in waiting even when nothing moves (m).
 const STILL_MARGIN: f64 = 2e-4;
@@ -39,34 +45,44 @@ struct Hit {
     normal: DVec3,
     /// Counterpart that is met.
     point: DVec3,
-    /// Cosine between the spring's axis and the surface normal, c: from [`LEAST_COSINE`] to one.
+    /// Cosine between the spring's axis and the surface normal, c: from zero to one.
     cosine: f64,
 }
 
-/// Encounter of a ray with a surface.
-enum Met {
-    /// Coming from outside.
-    InFront(Hit),
-    /// Its foot has come through; the ball about it overlaps the surface by -`gap` (m).
-    Behind { gap: f64 },
+/// Place where a ray meets a surface.
+struct Touch {
+    /// Way of the ball from the foot (m).
+    way: f64,
+    /// Centre of the ball there.
+    centre: DVec3,
+    /// Distance of the ball from the surface (m), about zero, or negative where the foot's own ball overlaps it.
+    gap: f64,
+    normal: DVec3,
+    /// Cosine between the spring's axis and the normal; negative where the surface looks the way that the spring does.
+    cosine: f64,
 }
 
-/// A contact spring that grazes the surface more than this (75 degrees off) is taken to meet it so: its pressure stays
-/// finite, and its force vanishes with the compression along the normal.
-const LEAST_COSINE: f64 = 0.25;
+/// Cosine below which a spring is taken to meet a surface at this one: lengths along the normal stay finite.
+const LEAST_COSINE: f64 = 0.02;
 
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
 pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Workspace) {
     workspace.contacts.clear();
     let h = workspace.step.h;
-    let object = model.body.as_ref().map(|body| Solid::new(body, state));
+    let object = model.body.as_ref().map(|body| Solid::new(body, &workspace.body));
     let (linear, angular) = state.body_velocity(model);
     let fronts = fronts_of_near_fingers(model, workspace);
+    let pose = object.as_ref().map(|solid| (solid.object_from_gripper, solid.centre));
+    workspace.clearances.follow(model, &workspace.segments, pose);
+    let farthest = margin(h, state.fastest(model));
     for finger in 0..2 {
         let first_link = finger * (model.chain.joints + 1);
         for j in 0..=model.chain.joints {
             let link = first_link + j;
             let segment = workspace.segments[link];
+            if fronts.is_none() && workspace.clearances.of_link(link) > farthest {
+                continue;
+            }
             let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
             let reach = model.springs.reach[j] + model.springs.radius;
             let link_velocity = workspace.spatial[link];
@@ -83,9 +99,14 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
                 fronts.may_meet(model, finger, (&segment, model.chain.lengths[j]), margin).then_some(margin)
             });
             if near_object.is_none() && !near_world && against_finger.is_none() {
+                let to_object = object.as_ref().map_or(f64::INFINITY, |o| o.distance(middle));
+                let to_world =
+                    if model.environment.is_empty() { f64::INFINITY } else { model.environment.distance(middle) };
+                workspace.clearances.note_link(link, to_object.min(to_world) - reach);
                 continue;
             }
             let near = Near {
+                solid: object.as_ref(),
                 object: near_object.map(|o| (o, against_object)),
                 world: near_world.then_some(against_world),
                 finger: against_finger,
@@ -108,10 +129,26 @@ fn margin(h: f64, speed: f64) -> f64 {
 
 /// Counterparts within reach of one segment, and the reach.
 struct Near<'a> {
+    /// The object, near or not.
+    solid: Option<&'a Solid<'a>>,
     object: Option<(&'a Solid<'a>, f64)>,
     world: Option<f64>,
     /// The other finger.
     finger: Option<f64>,
+}
+
+impl Near<'_> {
+    /// Largest reach (m).
+    fn farthest(&self) -> f64 {
+        self.object.map_or(0.0, |(_, margin)| margin).max(self.world.unwrap_or(0.0))
+    }
+
+    /// Distance of a point from object and world (m), or a lower bound of it, near or not: what is noted for later must
+    /// hold when the other one has come near.
+    fn distance(&self, model: &PhysicsModel, p: DVec3) -> f64 {
+        let to_object = self.solid.map_or(f64::INFINITY, |solid| solid.distance(p));
+        if model.environment.is_empty() { to_object } else { to_object.min(model.environment.distance(p)) }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -127,6 +164,10 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
     let local_axes = segment_axes(&plane, &place.segment);
     for k in model.springs.of_segment(place.segment_index) {
         let spring = &model.springs.all[k];
+        let site = place.finger * model.springs.all.len() + k;
+        if near.finger.is_none() && workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest() {
+            continue;
+        }
         let (foot, axis) = spring.ray(&place.segment);
         let ray = Ray {
             foot: plane.point(foot, spring.across),
@@ -134,6 +175,13 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             radius: model.springs.radius,
             rest: spring.height - model.springs.radius,
         };
+        if near.finger.is_none() {
+            let clearance = near.distance(model, ray.foot);
+            workspace.clearances.note_spring(site, place.link, clearance);
+            if clearance > spring.height + near.farthest() {
+                continue;
+            }
+        }
         let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, margin));
         let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
         let (mut hit, mut against) = match (on_object, on_world) {
@@ -155,7 +203,6 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
         }
         let Some(hit) = hit else { continue };
         workspace.fingers_meet |= matches!(against, Against::Finger(_));
-        let site = place.finger * model.springs.all.len() + k;
         let mu = match against {
             Against::Object => model.pad_friction.on_object,
             Against::World => model.pad_friction.on_world,
@@ -165,9 +212,17 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             Against::Finger(_) => in_series(spring.stiffness, spring.height),
             _ => (spring.stiffness, spring.height),
         };
-        let shear = local_axes * state.shear[site];
+        let shear = local_axes * state.touched.shear[site];
         let shear_stiffness = SHEAR_SHARE * stiffness;
-        let (stiffness, height) = (stiffness / (hit.cosine * hit.cosine), height * hit.cosine);
+        // Axial and sideways compliance in series, along the normal.
+        let squared = hit.cosine * hit.cosine;
+        let compliance = squared + (1.0 - squared) / SHEAR_SHARE;
+        // Its bottom is its rest length whichever way it gives; two pads that shear past each other have none.
+        let height = match against {
+            Against::Finger(_) => height * compliance / hit.cosine.max(LEAST_COSINE),
+            Against::Object | Against::World => height,
+        };
+        let stiffness = stiffness / compliance;
         workspace.contacts.push(Contact {
             site: site as u32,
             acting: Acting::Segment(place.link as u32),
@@ -223,8 +278,8 @@ struct Solid<'a> {
 }
 
 impl<'a> Solid<'a> {
-    fn new(body: &'a Body, state: &State) -> Self {
-        Self { body, object_from_gripper: state.body.matrix().transpose(), centre: state.body.position }
+    fn new(body: &'a Body, pose: &Pose) -> Self {
+        Self { body, object_from_gripper: pose.matrix().transpose(), centre: pose.position }
     }
 
     #[inline]
@@ -263,40 +318,47 @@ impl Ray {
         let foot = solid.local(self.foot);
         let axis = solid.object_from_gripper * self.axis;
         let field = &solid.body.field;
-        let (distance, normal) = (|p| field.distance(p), |p| field.normal(p));
-        let hit = match self.trace(foot, axis, margin, distance, normal)? {
-            Met::InFront(hit) => hit,
-            Met::Behind { gap } => self.trace_back(foot, axis, gap, distance, normal),
+        let (distance, surface) = (|p| field.distance(p), |p| field.surface(p));
+        let touch = self.trace((foot, axis), margin, distance, surface)?;
+        let passed = touch.cosine < FROM_BEHIND && touch.way == 0.0;
+        let hit = if passed {
+            self.trace_back((foot, axis), touch.gap, distance, surface)
+        } else {
+            self.pressed(&touch, touch.cosine, margin)?
         };
         let to_gripper = solid.object_from_gripper.transpose();
         Some(Hit {
-            compression: hit.compression,
             normal: to_gripper * hit.normal,
-            cosine: hit.cosine,
             point: to_gripper * (hit.point - solid.body.centre) + solid.centre,
+            ..hit
         })
     }
 
     fn cast_environment(&self, model: &PhysicsModel, margin: f64) -> Option<Hit> {
         let environment = &model.environment;
-        let (distance, normal) = (|p| environment.distance(p), |p| environment.normal(p));
-        let met = self.trace(self.foot, self.axis, margin, distance, normal)?;
-        Some(self.in_front_or_pushed(met))
+        let surface = |p| (environment.distance(p), environment.normal(p));
+        let touch = self.trace((self.foot, self.axis), margin, |p| environment.distance(p), surface)?;
+        self.pressed(&touch, touch.cosine.max(0.0), margin)
     }
 
     fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
-        let met = self.trace(self.foot, self.axis, margin, |p| other.distance(p), |p| other.normal(p))?;
-        Some(self.in_front_or_pushed(met))
+        let surface = |p| (other.distance(p), other.normal(p));
+        let touch = self.trace((self.foot, self.axis), margin, |p| other.distance(p), surface)?;
+        self.pressed(&touch, touch.cosine.max(0.0), margin)
     }
 
-    /// A table or the front of a finger has no far side to go back through: it pushes along the contact spring.
-    fn in_front_or_pushed(&self, met: Met) -> Hit {
-        match met {
-            Met::InFront(hit) => hit,
-            Met::Behind { gap } => {
-                Hit { compression: self.rest - gap, normal: -self.axis, point: self.foot, cosine: 1.0 }
-            }
-        }
+    /// A contact spring pressed by what it meets. A table, a pedestal or a finger is too thick to be passed: where one
+    /// looks the way that the spring does, the spring leans on it with its side, at a cosine of zero.
+    #[inline]
+    fn pressed(&self, touch: &Touch, cosine: f64, margin: f64) -> Option<Hit> {
+        // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
+        let compression = (self.rest - touch.way) * cosine - touch.gap;
+        (compression > -margin).then(|| Hit {
+            compression,
+            normal: touch.normal,
+            point: touch.centre - touch.normal * (self.radius + touch.gap),
+            cosine: cosine.max(0.0),
+        })
     }
 
     /// The foot has come through a thin body: the contact spring is compressed down to where it went in, and pushes
@@ -304,11 +366,10 @@ impl Ray {
     #[cold]
     fn trace_back(
         &self,
-        foot: DVec3,
-        axis: DVec3,
+        (foot, axis): (DVec3, DVec3),
         mut gap: f64,
         distance: impl Fn(DVec3) -> f64,
-        normal: impl Fn(DVec3) -> DVec3,
+        surface: impl Fn(DVec3) -> (f64, DVec3),
     ) -> Hit {
         let mut back = 0.0;
         for _ in 0..MOST_STEPS {
@@ -319,24 +380,24 @@ impl Ray {
             gap = distance(foot - axis * back) - self.radius;
         }
         let centre = foot - axis * back;
-        let surface_normal = normal(centre);
-        let cosine = (-surface_normal.dot(axis)).max(LEAST_COSINE);
-        let point = centre - surface_normal * (self.radius + gap);
-        Hit { compression: (self.rest + back) * cosine - gap, normal: surface_normal, point, cosine }
+        let (away, normal) = surface(centre);
+        let gap = away - self.radius;
+        let cosine = (-normal.dot(axis)).max(LEAST_COSINE);
+        let point = centre - normal * (self.radius + gap);
+        Hit { compression: (self.rest + back) * cosine - gap, normal, point, cosine }
     }
 
-    /// Sphere tracing from `foot` along `axis`, both in the frame of the distance.
+    /// Sphere tracing along a path given by its foot and axis, both in the frame of the distance.
     #[inline]
     fn trace(
         &self,
-        foot: DVec3,
-        axis: DVec3,
+        (foot, axis): (DVec3, DVec3),
         margin: f64,
         distance: impl Fn(DVec3) -> f64,
-        normal: impl Fn(DVec3) -> DVec3,
-    ) -> Option<Met> {
+        surface: impl Fn(DVec3) -> (f64, DVec3),
+    ) -> Option<Touch> {
         let limit = self.rest + margin;
-        let mut t = 0.0;
+        let mut way = 0.0;
         let mut gap = distance(foot) - self.radius;
         if gap > limit {
             return None;
@@ -345,38 +406,30 @@ impl Ray {
             if gap < CLOSE {
                 break;
             }
-            t += gap;
-            if t > limit {
+            way += gap;
+            if way > limit {
                 return None;
             }
-            gap = distance(foot + axis * t) - self.radius;
+            gap = distance(foot + axis * way) - self.radius;
         }
-        let centre = foot + axis * t;
-        let surface_normal = normal(centre);
-        let cosine = -surface_normal.dot(axis);
-        if cosine < FROM_BEHIND && t == 0.0 {
-            return Some(Met::Behind { gap });
-        }
-        // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
-        let compression = (self.rest - t) * cosine - gap;
-        let point = centre - surface_normal * (self.radius + gap);
-        let cosine = cosine.max(LEAST_COSINE);
-        (compression > -margin).then_some(Met::InFront(Hit { compression, normal: surface_normal, point, cosine }))
+        let centre = foot + axis * way;
+        let (away, normal) = surface(centre);
+        Some(Touch { way, centre, gap: away - self.radius, normal, cosine: -normal.dot(axis) })
     }
 }
 
 /// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
 fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
-    let h = workspace.step.h;
+    let (h, pose) = (workspace.step.h, workspace.body);
     let environment = &model.environment;
-    if environment.distance(state.body.position) > body.radius + margin {
+    if environment.distance(pose.position) > body.radius + margin {
         return;
     }
-    let gripper_from_object = state.body.matrix();
-    let place = |p: DVec3| gripper_from_object * (p - body.centre) + state.body.position;
+    let gripper_from_object = pose.matrix();
+    let place = |p: DVec3| gripper_from_object * (p - body.centre) + pose.position;
     let first_site = 2 * model.springs.all.len();
     let mut touch = |site: usize, compression: f64, normal: DVec3, point: DVec3| {
-        let shear = state.shear[site];
+        let shear = state.touched.shear[site];
         workspace.contacts.push(Contact {
             site: site as u32,
             acting: Acting::Object,
@@ -410,10 +463,11 @@ fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace
     }
     let first_rim = first_site + model.resting_points();
     for (k, p) in environment.rim().iter().enumerate() {
-        let local = gripper_from_object.transpose() * (*p - state.body.position) + body.centre;
+        let local = gripper_from_object.transpose() * (*p - pose.position) + body.centre;
         let gap = body.field.distance(local);
         if gap < margin {
-            let out_of_object = gripper_from_object * body.field.normal(local);
+            let (gap, normal) = body.field.surface(local);
+            let out_of_object = gripper_from_object * normal;
             touch(first_rim + k, -gap, -out_of_object, *p);
         }
     }

@@ -86,16 +86,14 @@ fn contact_and_limit_impulses(model: &PhysicsModel, state: &State, ws: &mut Work
 /// M in the place of the Hessian.
 fn fill_inertia(model: &PhysicsModel, ws: &mut Workspace) {
     let n = model.chain.joints;
+    ws.hessian.couple(false);
     for k in 0..2 * n {
         let matrix = &ws.finger_matrix[(k / n) * n * n + (k % n) * n..];
-        let (first, row) = ws.hessian.row_mut(k);
-        let own = k - k % n - first;
-        row[..own].fill(0.0);
-        row[own..].copy_from_slice(&matrix[..=k % n]);
+        ws.hessian.row_mut(k, k - k % n).copy_from_slice(&matrix[..=k % n]);
     }
     if let Some(body) = model.free_body() {
         for a in 0..6 {
-            ws.hessian.row_mut(2 * n + a).1.fill(0.0);
+            ws.hessian.row_mut(2 * n + a, 0).fill(0.0);
         }
         for a in 0..3 {
             *ws.hessian.at_mut(2 * n + a, 2 * n + a) = body.mass;

@@ -19,6 +19,7 @@
 
 mod balance;
 mod chain;
+mod clearances;
 #[cfg(test)]
 mod closed_form;
 mod contact;
@@ -33,6 +34,7 @@ mod engine;
 mod environment;
 mod explicit;
 mod finger_pair;
+mod hessian;
 mod integrator;
 mod model;
 mod placement;
@@ -41,7 +43,6 @@ mod rapier_engine;
 #[cfg(feature = "rapier")]
 mod resting;
 mod simulation;
-mod skyline;
 mod solve;
 mod state;
 mod step;

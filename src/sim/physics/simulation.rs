@@ -68,7 +68,7 @@ impl Simulation {
         let state = State::new(&model, &placement);
         // No step can be longer than from sample to sample; a finer simulation takes more.
         let longest = f64::from(clock.ticks_per_sample) * clock.step() / f64::from(parts);
-        let stepper = Stepper::new(&model, &state, solver.method(), solver.accuracy.tolerance(), longest);
+        let stepper = Stepper::new(&model, &state, solver.method(), solver.step_tolerance(), longest);
         let simulation = Self {
             state,
             workspace: Workspace::new(&model),
@@ -219,6 +219,7 @@ impl Simulation {
             newton_max: totals.newton_max,
             friction_residual: totals.friction_residual,
             static_residual: self.static_residual(),
+            hold_changes: 0, // counted by the run, which knows the hold
             imbalance: self.imbalance.clone(),
         }
     }

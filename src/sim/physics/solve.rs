@@ -13,7 +13,7 @@
 use super::contact::{Acting, Against, Contact};
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::model::PhysicsModel;
-use super::workspace::{Block, PerLink, Spatial, Workspace};
+use super::workspace::{Block, PerLink, PlanarBlock, Spatial, Workspace};
 use glam::DVec3;
 
 /// Statistics of a minimisation.
@@ -54,7 +54,10 @@ const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
     let mut report = SolveReport::default();
     let mut passes = 0;
-    prepare_coupling(model, ws);
+    prepare_coupling(ws);
+    for k in 0..ws.weights.len() {
+        ws.weights[k] = 1.0 / diagonal(model, ws, k);
+    }
     multiply_by_a(model, ws, velocity, Product::OfVelocity);
     relative_velocities(model, velocity, ws, Product::OfVelocity);
     loop {
@@ -228,7 +231,7 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
             let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
             let from_contacts = ws.columns[k].dot(&beyond) + limit;
             ws.gradient[k] += from_contacts;
-            contact_size += from_contacts * from_contacts / diagonal(model, ws, k);
+            contact_size += from_contacts * from_contacts * ws.weights[k];
         }
         // The rigid base half carries contacts too, which move the object only.
         on_object = on_object.plus(&ws.wrenches[finger * (n + 1)].object.scaled(-1.0));
@@ -237,12 +240,12 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
         let wrench = [on_object.linear.to_array(), on_object.angular.to_array()];
         for (i, w) in wrench.iter().flatten().enumerate() {
             ws.gradient[2 * n + i] += w;
-            contact_size += w * w / diagonal(model, ws, 2 * n + i);
+            contact_size += w * w * ws.weights[2 * n + i];
         }
     }
     let (mut gradient, mut momentum, mut known) = (0.0, 0.0, 0.0);
     for k in 0..ws.gradient.len() {
-        let weight = 1.0 / diagonal(model, ws, k);
+        let weight = ws.weights[k];
         gradient += ws.gradient[k] * ws.gradient[k] * weight;
         momentum += ws.a_velocity[k] * ws.a_velocity[k] * weight;
         known += ws.rhs[k] * ws.rhs[k] * weight;
@@ -282,27 +285,33 @@ fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Work
     let n = model.chain.joints;
     let couples = model.free_body().is_some();
     for finger in 0..2 {
-        let mut beyond = Block::ZERO;
+        let mut beyond = PlanarBlock::default();
         let mut beyond_object = Block::ZERO;
         for i in (0..n).rev() {
             let k = finger * n + i;
-            let link = &ws.blocks[finger * (n + 1) + i + 1];
-            beyond.add(&link.object);
-            beyond.add(&link.world);
-            if ws.fingers_meet {
-                beyond.add(&link.met);
+            let link = finger * (n + 1) + i + 1;
+            if ws.loaded[link] {
+                let block = &ws.blocks[link];
+                beyond.add(&block.object);
+                beyond.add(&block.world);
+                if ws.fingers_meet {
+                    beyond.add(&block.met);
+                }
             }
-            let moved = beyond.times(&ws.columns[k]);
-            let (first, row) = ws.hessian.row_mut(k);
-            let row = &mut row[finger * n - first..];
-            let matrix = &ws.finger_matrix[finger * n * n + i * n..];
-            for j in 0..=i {
-                row[j] = matrix[j] + ws.columns[finger * n + j].dot(&moved);
+            let column = &ws.columns[k];
+            let moved = beyond.times(column);
+            let row = ws.hessian.row_mut(k, finger * n);
+            let matrix = &ws.finger_matrix[finger * n * n + i * n..][..=i];
+            let columns = &ws.columns[finger * n..][..=i];
+            for ((row, matrix), column) in row.iter_mut().zip(matrix).zip(columns) {
+                *row = matrix + (column.linear.x * moved[0] + column.linear.z * moved[1] + column.angular.y * moved[2]);
             }
             row[i] += ws.step.h * ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).1;
             if couples {
-                beyond_object.add(&link.object);
-                let moved = beyond_object.times(&ws.columns[k]);
+                if ws.loaded[link] {
+                    beyond_object.add(&ws.blocks[link].object);
+                }
+                let moved = beyond_object.times(column);
                 let column = [moved.linear.to_array(), moved.angular.to_array()];
                 for (a, value) in column.iter().flatten().enumerate() {
                     *ws.hessian.at_mut(2 * n + a, k) = -value;
@@ -327,12 +336,17 @@ fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Work
 
 /// Sums contact Hessians per segment; returns the sum that acts on the object.
 fn sum_blocks(ws: &mut Workspace) -> Block {
-    for block in &mut ws.blocks {
-        *block = PerLink::all(Block::ZERO);
+    for (block, loaded) in ws.blocks.iter_mut().zip(&mut ws.loaded) {
+        if std::mem::take(loaded) {
+            *block = PerLink::all(Block::ZERO);
+        }
     }
     let mut on_object = Block::ZERO;
     for contact in &ws.contacts {
         let hessian = contact.hessian(ws.step);
+        if let Acting::Segment(link) = contact.acting {
+            ws.loaded[link as usize] = true;
+        }
         match (contact.acting, contact.against) {
             (Acting::Segment(link), Against::Object) => {
                 ws.blocks[link as usize].object.add_at(&hessian, contact.arm);
@@ -342,12 +356,13 @@ fn sum_blocks(ws: &mut Workspace) -> Block {
             }
             (Acting::Segment(link), Against::Finger(other)) => {
                 ws.blocks[link as usize].world.add_at(&hessian, contact.arm);
+                ws.loaded[other as usize] = true;
                 ws.blocks[other as usize].met.add_at(&hessian, contact.arm);
             }
             (Acting::Object, _) => on_object.add_at(&hessian, contact.arm),
         }
     }
-    for block in &ws.blocks {
+    for (block, _) in ws.blocks.iter().zip(&ws.loaded).filter(|(_, loaded)| **loaded) {
         on_object.add(&block.object);
     }
     on_object

@@ -3,7 +3,6 @@
 use super::effects::went_on;
 use super::model::PhysicsModel;
 use super::placement::Placement;
-use crate::gripper::SegmentPose;
 use glam::{DQuat, DVec3};
 use palpate_geometry::Pose;
 
@@ -17,10 +16,8 @@ pub struct State {
     pub velocity: Vec<f64>,
     /// The object's centre of mass and the axes of its frame, in the gripper frame.
     pub(super) body: Pose,
-    /// Shear of the skin (m), in the axes of the segment (or of the gripper, for the object on its support).
-    pub(super) shear: Vec<DVec3>,
-    /// Normal impulse in the last step (N s).
-    pub(super) lag: Vec<f64>,
+    /// Contacts of the last step.
+    pub(super) touched: ContactMemory,
     /// Length of that step (s); zero before the first.
     pub(super) lag_h: f64,
     /// Pressure in the chambers, and in the line that filled them last (bar), where chambers lag behind the line.
@@ -28,6 +25,65 @@ pub struct State {
     pub(super) filled_from_bar: f64,
     /// Angle by which each joint has crept (rad); empty where joints do not.
     pub(super) crept: Vec<f64>,
+}
+
+/// Shear of the skin and normal impulse at each place of contact: zero wherever nothing was touched.
+#[derive(Debug, PartialEq)]
+pub(super) struct ContactMemory {
+    /// Shear (m), in the axes of the segment (or of the gripper, for the object on its support).
+    pub(super) shear: Vec<DVec3>,
+    /// Normal impulse (N s).
+    pub(super) impulses: Vec<f64>,
+    /// Places that were touched: the others are neither cleared nor copied.
+    places: Vec<u32>,
+}
+
+/// With the room that later contacts need.
+impl Clone for ContactMemory {
+    fn clone(&self) -> Self {
+        let mut places = Vec::with_capacity(self.shear.len());
+        places.extend_from_slice(&self.places);
+        Self { shear: self.shear.clone(), impulses: self.impulses.clone(), places }
+    }
+}
+
+impl ContactMemory {
+    fn new(places: usize) -> Self {
+        Self { shear: vec![DVec3::ZERO; places], impulses: vec![0.0; places], places: Vec::with_capacity(places) }
+    }
+
+    /// Forgets everything.
+    pub(super) fn clear(&mut self) {
+        for place in self.places.drain(..) {
+            self.shear[place as usize] = DVec3::ZERO;
+            self.impulses[place as usize] = 0.0;
+        }
+    }
+
+    /// Remembers a place of contact.
+    pub(super) fn remember(&mut self, place: u32, shear: DVec3, impulse: f64) {
+        self.shear[place as usize] = shear;
+        self.impulses[place as usize] = impulse;
+        self.places.push(place);
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.clear();
+        for place in &other.places {
+            self.remember(*place, other.shear[*place as usize], other.impulses[*place as usize]);
+        }
+    }
+
+    /// Goes on in a straight line, by `share` of the way from `start` to here. Impulses stay.
+    fn go_on_from(&mut self, start: &Self, share: f64) {
+        for place in self.places.iter().map(|place| *place as usize) {
+            // Newly touched skin has no shear yet.
+            if self.impulses[place] > 0.0 && start.impulses[place] > 0.0 {
+                let now = self.shear[place];
+                self.shear[place] = now + (now - start.shear[place]) * share;
+            }
+        }
+    }
 }
 
 impl State {
@@ -44,8 +100,7 @@ impl State {
             q: vec![0.0; model.joint_count()],
             velocity: vec![0.0; model.unknowns()],
             body,
-            shear: vec![DVec3::ZERO; model.sites()],
-            lag: vec![0.0; model.sites()],
+            touched: ContactMemory::new(model.sites()),
             lag_h: 0.0,
             chamber_bar: 0.0,
             filled_from_bar: 0.0,
@@ -63,12 +118,11 @@ impl State {
 
     /// Becomes another state of the same model, without allocating.
     pub(super) fn copy_from(&mut self, other: &Self) {
-        let Self { q, velocity, body, shear, lag, lag_h, chamber_bar, filled_from_bar, crept } = other;
+        let Self { q, velocity, body, touched, lag_h, chamber_bar, filled_from_bar, crept } = other;
         self.q.copy_from_slice(q);
         self.velocity.copy_from_slice(velocity);
         self.body = *body;
-        self.shear.copy_from_slice(shear);
-        self.lag.copy_from_slice(lag);
+        self.touched.copy_from(touched);
         self.lag_h = *lag_h;
         self.chamber_bar = *chamber_bar;
         self.filled_from_bar = *filled_from_bar;
@@ -97,44 +151,31 @@ impl State {
             let spin = axes * (body.inverse_inertia * (axes.transpose() * momentum));
             self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
         }
-        for (site, (now, before)) in self.shear.iter_mut().zip(&start.shear).enumerate() {
-            // Newly touched skin has no shear yet.
-            if self.lag[site] > 0.0 && start.lag[site] > 0.0 {
-                *now += (*now - *before) * share;
-            }
-        }
-    }
-
-    /// Distance between two states: the largest difference of joint angles and of the object's orientation (rad), of
-    /// fingertips and of the object's position as shares of a finger's length. The segments are scratch memory.
-    pub(super) fn distance(
-        &self,
-        other: &Self,
-        model: &PhysicsModel,
-        own_segments: &mut [SegmentPose],
-        other_segments: &mut [SegmentPose],
-    ) -> f64 {
-        let n = model.chain.joints;
-        let length: f64 = model.chain.lengths.iter().sum();
-        let mut largest = self.q.iter().zip(&other.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        for finger in 0..2 {
-            let joints = finger * n..(finger + 1) * n;
-            let own = model.chain.bend(&self.q[joints.clone()], own_segments);
-            let tip = model.chain.bend(&other.q[joints], other_segments);
-            largest = largest.max((own - tip).length() / length);
-        }
-        if model.free_body().is_some() {
-            let turn = rotation_vector(self.body.rotation * other.body.rotation.inverse());
-            let way = self.body.position - other.body.position;
-            largest = largest.max(way.length() / length).max(turn.length());
-        }
-        largest
+        self.touched.go_on_from(&start.touched, share);
     }
 
     /// Normal impulse to expect at a place of contact in a step of `h` (s): that of the last step, at the same force.
     pub(super) fn expected_impulse(&self, site: usize, h: f64) -> f64 {
         // Steps of equal length give a factor of exactly one.
-        if self.lag_h > 0.0 { self.lag[site] * (h / self.lag_h) } else { 0.0 }
+        if self.lag_h > 0.0 { self.touched.impulses[site] * (h / self.lag_h) } else { 0.0 }
+    }
+
+    /// Bound of the relative speed of a finger's axis and the object (m/s).
+    pub(super) fn fastest(&self, model: &PhysicsModel) -> f64 {
+        let n = model.chain.joints;
+        let length: f64 = model.chain.lengths.iter().sum();
+        let mut fastest = 0.0f64;
+        for rates in self.velocity[..2 * n].chunks_exact(n) {
+            let (mut tip, mut beyond) = (0.0, length + model.skin.thickness);
+            for (rate, l) in rates.iter().zip(&model.chain.lengths) {
+                beyond -= l;
+                tip += rate.abs() * beyond;
+            }
+            fastest = fastest.max(tip);
+        }
+        let (linear, angular) = self.body_velocity(model);
+        let object = model.free_body().map_or(0.0, |body| linear.length() + angular.length() * body.radius);
+        fastest + object
     }
 
     /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.

@@ -13,10 +13,10 @@ use super::stepper::Stepper;
 use super::workspace::Workspace;
 use crate::gripper::SegmentPose;
 use crate::objects::ObjectModel;
-use crate::scene::{Accuracy, Scene};
+use crate::scene::{Accuracy, Scene, Solver};
 use glam::DVec3;
 
-/// IntegrationMethod of a step.
+/// Method of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stepping {
     /// The convex step that grasps are made of.
@@ -35,7 +35,7 @@ pub struct SteppedScene {
     pub(super) ws: Workspace,
     /// Length of a step (s).
     pub h: f64,
-    /// IntegrationMethod of integration.
+    /// Method of integration.
     pub stepping: Stepping,
     /// Steps taken.
     pub steps: u64,
@@ -77,9 +77,9 @@ impl SteppedScene {
     /// The same at an accuracy that a user may set: `h` (s) is its tick, which a tolerance divides.
     pub fn at(scene: &Scene, object: Option<&ObjectModel>, h: f64, accuracy: Accuracy) -> Self {
         let mut own = Self::new(scene, object, h);
-        let method = scene.solver.integrator.method(accuracy);
-        let divided = |tolerance| Stepper::new(&own.model, &own.state, method, Some(tolerance), h);
-        own.stepper = accuracy.tolerance().map(divided);
+        let solver = Solver { accuracy, ..scene.solver.clone() };
+        let divided = |tolerance| Stepper::new(&own.model, &own.state, solver.method(), Some(tolerance), h);
+        own.stepper = solver.step_tolerance().map(divided);
         own
     }
 
@@ -213,9 +213,9 @@ impl SteppedScene {
         self.model.chain.bend(&vec![0.0; n], &mut segments);
         let mut inertia = vec![0.0; n * n];
         self.model.chain.inertia(&segments, &mut inertia);
-        let mut factor = super::skyline::Skyline::new(vec![0; n]);
+        let mut factor = super::hessian::Hessian::new(0, n);
         for (i, row) in inertia.chunks_exact(n).enumerate() {
-            factor.row_mut(i).1.copy_from_slice(&row[..=i]);
+            factor.row_mut(i, 0).copy_from_slice(&row[..=i]);
         }
         factor.factorise();
         let mut x: Vec<f64> = (0..n).map(|i| if i % 2 == 0 { 1.0 } else { -0.9 }).collect();

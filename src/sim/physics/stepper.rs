@@ -1,24 +1,26 @@
 //! From one tick to the next: one step, or as many as a tolerance takes.
 //!
-//! Under a tolerance every step is taken twice, whole and as two halves, after CENIC (Kurtz and Castro 2025, arXiv
-//! 2511.08771): their distance, over 2^p - 1 for a method of order p, estimates the error of the halves, which are
-//! kept. A step whose error is too large is taken again, shorter. The wanted length is carried on to the next step and
-//! over ticks; no step crosses a tick that is waited for, so that samples and actuation stay where they are.
+//! After CENIC (Kurtz and Castro 2025, arXiv 2511.08771) steps over a convex contact model are chosen by their error.
+//! Every step comes with an estimate of it, which costs nothing (see [`Integrator`]); a step whose error is too large
+//! is taken again, shorter. The wanted length is carried on to the next step and over ticks; no step crosses a tick
+//! that is waited for, so that samples and actuation stay where they are. Fingers swing after each change of pressure
+//! as they did after the last one, so the length that did then is tried first.
 //!
 //! The error is the largest of: joint angles and turn of the object (rad), fingertips and position of the object as
 //! shares of the finger's length. Velocities and forces do not enter: at an impact they jump, and no step is short
 //! enough for a jump. Energy does: a second stage that continues along the slope of the first can be thrown into the
 //! skin and come out of it faster than it went in, with angles that agree. So what a step gains beyond the work done on
-//! it counts as error too, as the angle by which joints as bent as these would have to be off for it.
+//! it counts as error too, as the angle by which joints as bent as these would have to be off for it. Fingers that
+//! close slowly, with far less energy in their motion than in their bend, gain nothing, and nothing is computed. A step
+//! that is still too wrong at the least length is taken by Euler, which damps what it cannot resolve.
 
 use super::energy::{mechanical_energy, work_done};
 use super::integrator::{Integrator, Surroundings};
 use super::model::PhysicsModel;
 use super::solve::Unbalanced;
 use super::state::State;
-use super::step::{NotFinite, StepReport};
+use super::step::{Drive, NotFinite, StepReport};
 use super::workspace::Workspace;
-use crate::gripper::SegmentPose;
 use crate::scene::IntegrationMethod;
 
 /// Takes steps and counts them.
@@ -56,11 +58,12 @@ struct Control {
     longest: f64,
     /// No step is made shorter because of its error (s).
     least: f64,
-    /// The step taken whole.
-    whole: State,
-    /// The state at its beginning.
+    /// The state at the beginning of the step.
     origin: State,
-    segments: [Vec<SegmentPose>; 2],
+    /// Inputs of the last step, and the length that was accepted when they last changed (s).
+    drive: Drive,
+    after_change: f64,
+    changed: bool,
     /// Scratch for energies, so that the forces of the last step stay intact.
     aside: Workspace,
 }
@@ -69,11 +72,15 @@ struct Control {
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// The next step is planned to have this share of the tolerance's error, to the power of 1 / (p + 1).
 const SAFETY: f64 = 0.9;
+/// Motion with less than this share of the energy of bent joints is not guarded.
+const SLOW: f64 = 0.1;
 /// Energy (J) that the longest step may always gain: for rounding, where nothing is bent.
 const UNFELT_GAIN: f64 = 1e-9;
 /// A step becomes at most this much longer than the one before it, and at most this much shorter.
 const FASTEST_GROWTH: f64 = 4.0;
 const FASTEST_SHRINKING: f64 = 0.2;
+/// The first step after a change of inputs is at most this much longer than after the change before.
+const AFTER_CHANGE_GROWTH: f64 = 1.2;
 
 impl Stepper {
     /// Under a tolerance no step is longer than `longest` (s), and the shortest is a share of it.
@@ -89,9 +96,10 @@ impl Stepper {
             wanted: longest,
             longest,
             least: longest * LEAST_SHARE,
-            whole: state.clone(),
             origin: state.clone(),
-            segments: [(); 2].map(|()| vec![SegmentPose::default(); model.chain.joints + 1]),
+            drive: Drive::default(),
+            after_change: longest,
+            changed: false,
             aside: Workspace::new(model),
         });
         Self { integrator: Integrator::new(method, state), control, totals: Totals::default() }
@@ -111,10 +119,11 @@ impl Stepper {
     ) -> Result<StepReport, NotFinite> {
         let Self { integrator, control, totals } = self;
         let Some(control) = control else {
-            let report = integrator.advance(within, state, span)?;
+            let report = integrator.advance(within, state, span)?.report;
             totals.add(&report, span, integrator.solves());
             return Ok(report);
         };
+        control.note_drive(within.drive);
         let mut left = span;
         loop {
             let h = control.next_length(left);
@@ -155,7 +164,16 @@ impl Control {
         }
     }
 
-    /// Takes a step whole and in halves; `None` where it must be taken again, shorter, from the state it began in.
+    /// Plans a shorter step where the inputs have changed.
+    fn note_drive(&mut self, drive: &Drive) {
+        self.changed |= self.drive != *drive;
+        if self.changed {
+            self.drive = *drive;
+            self.wanted = self.wanted.min(self.after_change);
+        }
+    }
+
+    /// Takes a step; `None` where it must be taken again, shorter, from the state it began in.
     fn attempt(
         &mut self,
         integrator: &mut Integrator,
@@ -165,50 +183,40 @@ impl Control {
         totals: &mut Totals,
     ) -> Result<Option<StepReport>, NotFinite> {
         self.origin.copy_from(state);
-        let stages = integrator.solves();
         let shortest = h <= self.least * (1.0 + 1e-9);
-        let both = self.take_twice(integrator, within, state, h);
-        let (report, error) = match both {
-            Ok(taken) => taken,
-            Err(cause) if shortest => return Err(cause),
-            Err(_) => (StepReport::default(), f64::INFINITY),
+        let taken = integrator.advance(within, state, h).ok();
+        totals.solves += integrator.solves();
+        let error = match taken {
+            Some(taken) if taken.error <= self.tolerance => taken.error.max(self.gain(within, state, h)),
+            Some(taken) => taken.error,
+            None => f64::INFINITY,
         };
-        let ratio =
-            if error < self.tolerance { error.max(self.gain(within, state, h)) } else { error } / self.tolerance;
-        if ratio > 1.0 && !shortest {
-            state.copy_from(&self.origin);
-            self.wanted = (h * Self::factor(ratio, integrator.order())).max(self.least);
-            totals.rejected += 1;
-            totals.solves += 3 * stages;
-            totals.newton += u64::from(report.newton_iterations);
-            return Ok(None);
-        }
-        totals.missed += u64::from(ratio > 1.0);
-        totals.add(&report, h, 3 * stages);
-        let planned = h * Self::factor(ratio, integrator.order());
+        let ratio = error / self.tolerance;
+        let planned = (h * Self::factor(ratio, integrator.order())).max(self.least);
+        let report = match taken {
+            Some(taken) if ratio <= 1.0 => taken.report,
+            _ => {
+                state.copy_from(&self.origin);
+                totals.newton += taken.map_or(0, |taken| u64::from(taken.report.newton_iterations));
+                if !shortest {
+                    self.wanted = planned;
+                    totals.rejected += 1;
+                    return Ok(None);
+                }
+                totals.missed += 1;
+                totals.solves += 1;
+                within.step(state, h)?
+            }
+        };
+        totals.add(&report, h, 0);
         // A step cut short by a tick is no measure of the possible length.
         let cut = h < self.wanted;
-        self.wanted = if cut { planned.max(self.wanted) } else { planned }.max(self.least);
+        if self.changed && !cut {
+            self.after_change = planned.min(h * AFTER_CHANGE_GROWTH);
+        }
+        self.changed = false;
+        self.wanted = if cut { planned.max(self.wanted) } else { planned };
         Ok(Some(report))
-    }
-
-    /// Leaves the halves in `state`; returns how they went, and their estimated error.
-    fn take_twice(
-        &mut self,
-        integrator: &mut Integrator,
-        within: &mut Surroundings<'_>,
-        state: &mut State,
-        h: f64,
-    ) -> Result<(StepReport, f64), NotFinite> {
-        self.whole.copy_from(state);
-        let whole = integrator.advance(within, &mut self.whole, h)?;
-        let first = integrator.advance(within, state, 0.5 * h)?;
-        let second = integrator.advance(within, state, 0.5 * h)?;
-        let [own, other] = &mut self.segments;
-        let distance = state.distance(&self.whole, within.model, own, other);
-        let halves = first.followed_by(&second);
-        let newton_iterations = halves.newton_iterations + whole.newton_iterations;
-        Ok((StepReport { newton_iterations, ..halves }, distance / (2f64.powi(integrator.order()) - 1.0)))
     }
 
     /// Energy from nowhere in a step of `h` (s), as the error (rad) by which joints as bent as these would have to be
@@ -217,13 +225,19 @@ impl Control {
     /// allows.
     fn gain(&mut self, within: &Surroundings<'_>, state: &State, h: f64) -> f64 {
         let model = within.model;
+        let share = h / self.longest;
+        let bent: f64 = state.q.iter().zip(&self.origin.q).map(|(a, b)| a.abs().max(b.abs())).sum();
+        let strained = model.chain.stiffness * bent * share;
+        // A holds inertia and more.
+        let moving: f64 = 0.5 * state.velocity.iter().zip(&within.ws.a_velocity).map(|(v, p)| v * p).sum::<f64>();
+        let elastic: f64 = 0.5 * model.chain.stiffness * self.origin.q.iter().map(|q| q * q).sum::<f64>();
+        if moving <= SLOW * elastic {
+            return 0.0;
+        }
         let before = mechanical_energy(model, &self.origin, &mut self.aside);
         let work = work_done(model, within.drive, &self.origin, state, &mut self.aside);
         let gain = mechanical_energy(model, state, &mut self.aside).total - before.total - work;
-        let bent: f64 = state.q.iter().zip(&self.origin.q).map(|(a, b)| a.abs().max(b.abs())).sum();
-        let share = h / self.longest;
-        let worth = model.chain.stiffness * bent * share + before.spin;
-        (gain - UNFELT_GAIN * share).max(0.0) / worth.max(f64::MIN_POSITIVE)
+        (gain - UNFELT_GAIN * share).max(0.0) / (strained + before.spin).max(f64::MIN_POSITIVE)
     }
 
     /// Growth factor of the next step from the error over the tolerance: errors grow with h^(p + 1).

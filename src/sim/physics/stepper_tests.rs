@@ -39,7 +39,7 @@ fn bent_after(scene: &Scene, method: IntegrationMethod, h: f64, stretches: &[(f6
         let drive = Drive { torque: *torque, ..Drive::default() };
         for _ in 0..(duration / h).round() as usize {
             let mut within = Surroundings { model: &model, ws: &mut ws, drive: &drive };
-            assert!(integrator.advance(&mut within, &mut state, h).expect("finite").converged);
+            assert!(integrator.advance(&mut within, &mut state, h).expect("finite").report.converged);
         }
     }
     state.q[4]
@@ -96,7 +96,9 @@ fn a_bend_follows_its_closed_form_as_closely_as_the_tolerance_asks() {
                 error < 0.6 * before.0 && steps > before.1,
                 "{method:?} at {tolerance:e}: {error} after {before:?}"
             );
-            assert_eq!(stepper.totals.missed, 0);
+            // Joints without mass jump to their rate in the first step, which an estimate made of velocities takes for an
+            // error, however short the step.
+            assert!(stepper.totals.missed <= 1, "{}", stepper.totals.missed);
             before = (error, steps);
         }
     }
@@ -229,7 +231,9 @@ fn a_tolerance_that_cannot_be_met_is_counted() {
     }
     let quality = simulation.quality();
     assert!(quality.missed_steps > 0, "{quality:?}");
-    assert!(quality.least_step_s <= 1.001 / 50.0 / 1024.0 && quality.solves > 6 * quality.steps);
+    assert!(
+        quality.least_step_s <= 1.001 / 50.0 / 1024.0 && quality.solves >= 2 * quality.steps + quality.missed_steps
+    );
 }
 
 proptest! {
@@ -252,7 +256,7 @@ proptest! {
         let quality = simulation.quality();
         prop_assert!(quality.converged && quality.missed_steps == 0, "{quality:?}");
         prop_assert!(quality.steps >= seen.len() as u64);
-        let stages = if euler { 3 } else { 6 };
+        let stages = if euler { 1 } else { 2 };
         prop_assert_eq!(quality.solves, stages * (quality.steps + quality.rejected_steps));
         prop_assert!(seen.iter().flatten().all(|q| q.abs() < 0.5));
     }

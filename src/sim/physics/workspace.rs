@@ -1,10 +1,12 @@
 //! Scratch memory of a step: allocated once, overwritten every step, never saved.
 
+use super::clearances::Clearances;
 use super::contact::{Contact, ContactStep};
+use super::hessian::Hessian;
 use super::model::PhysicsModel;
-use super::skyline::Skyline;
 use crate::gripper::SegmentPose;
 use glam::{DMat3, DVec2, DVec3};
+use palpate_geometry::Pose;
 
 /// Velocity of a rigid body: of the point at the reference, and angular.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,6 +70,40 @@ impl Block {
     }
 }
 
+/// The numbers of a block that joints see: they move in the plane y = 0 and turn about y.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PlanarBlock {
+    xx: f64,
+    xz: f64,
+    zz: f64,
+    yx: f64,
+    yz: f64,
+    yy: f64,
+}
+
+impl PlanarBlock {
+    #[inline]
+    pub(super) fn add(&mut self, block: &Block) {
+        self.xx += block.linear.x_axis.x;
+        self.xz += block.linear.x_axis.z;
+        self.zz += block.linear.z_axis.z;
+        self.yx += block.mixed.x_axis.y;
+        self.yz += block.mixed.z_axis.y;
+        self.yy += block.angular.y_axis.y;
+    }
+
+    /// Forces along x and z and the torque about y.
+    #[inline]
+    pub(super) fn times(&self, x: &Spatial) -> [f64; 3] {
+        let (lx, lz, ay) = (x.linear.x, x.linear.z, x.angular.y);
+        [
+            self.xx * lx + self.xz * lz + self.yx * ay,
+            self.xz * lx + self.zz * lz + self.yz * ay,
+            self.yx * lx + self.yz * lz + self.yy * ay,
+        ]
+    }
+}
+
 /// Sums over the contacts of one segment: against the object, which couples to it, against the world or the other
 /// finger, and from the other finger.
 #[derive(Clone, Copy, Debug)]
@@ -91,6 +127,9 @@ pub struct Workspace {
     /// Length of the step that is being taken, or was taken last.
     pub(super) step: ContactStep,
     // layout
+    /// Joint angles and pose of the object that geometry is taken from.
+    pub(super) q: Vec<f64>,
+    pub(super) body: Pose,
     /// Segments of both fingers in their planes.
     pub(super) segments: Vec<SegmentPose>,
     /// Point about which spatial velocities are taken: the object's centre of mass (m).
@@ -111,17 +150,22 @@ pub struct Workspace {
     /// Momentum and known impulses, r: without contact A v = r.
     pub(super) rhs: Vec<f64>,
     // contacts
+    pub(super) clearances: Clearances,
     pub(super) contacts: Vec<Contact>,
     /// True while any of them is between the fingers.
     pub(super) fingers_meet: bool,
     pub(super) wrenches: Vec<PerLink<Spatial>>,
     pub(super) blocks: Vec<PerLink<Block>>,
+    /// Segments whose blocks are not zero.
+    pub(super) loaded: Vec<bool>,
+    /// One over the diagonal of A.
+    pub(super) weights: Vec<f64>,
     // Newton
     pub(super) gradient: Vec<f64>,
     pub(super) direction: Vec<f64>,
     pub(super) a_velocity: Vec<f64>,
     pub(super) a_direction: Vec<f64>,
-    pub(super) hessian: Skyline,
+    pub(super) hessian: Hessian,
     /// Forces of the contacts between the fingers on each segment of the right finger per unit rate of each joint of
     /// the left one, `N x (N + 1)`.
     pub(super) coupling: Vec<Spatial>,
@@ -131,9 +175,10 @@ impl Workspace {
     /// Memory for a step of the model; its length is set as it is taken.
     pub fn new(model: &PhysicsModel) -> Self {
         let (n, links, unknowns) = (model.chain.joints, model.link_count(), model.unknowns());
-        let first = |i: usize| if i >= n && i < 2 * n { n } else { 0 };
         Self {
             step: ContactStep { h: 0.0, ..model.contact },
+            q: vec![0.0; 2 * n],
+            body: Pose::IDENTITY,
             segments: vec![SegmentPose::default(); links],
             reference: DVec3::ZERO,
             columns: vec![Spatial::default(); 2 * n],
@@ -144,15 +189,18 @@ impl Workspace {
             finger_matrix: vec![0.0; 2 * n * n],
             body_inertia: DMat3::ZERO,
             rhs: vec![0.0; unknowns],
+            clearances: Clearances::new(model),
             contacts: Vec::with_capacity(model.sites()),
             fingers_meet: false,
             wrenches: vec![PerLink::all(Spatial::default()); links],
             blocks: vec![PerLink::all(Block::ZERO); links],
+            loaded: vec![false; links],
+            weights: vec![0.0; unknowns],
             gradient: vec![0.0; unknowns],
             direction: vec![0.0; unknowns],
             a_velocity: vec![0.0; unknowns],
             a_direction: vec![0.0; unknowns],
-            hessian: Skyline::new((0..unknowns).map(first).collect()),
+            hessian: Hessian::new(n, unknowns - 2 * n),
             coupling: vec![Spatial::default(); n * (n + 1)],
         }
     }

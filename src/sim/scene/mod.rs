@@ -152,9 +152,9 @@ pub struct Support {
 pub struct Solver {
     /// Physics engine.
     pub engine: EngineKind,
-    /// A named time step, or a tolerance to which steps are chosen.
+    /// Tolerance to which steps are chosen, by name or as a number.
     pub accuracy: Accuracy,
-    /// IntegrationMethod of integration.
+    /// Method of integration.
     pub integrator: Integrator,
     /// Newton stops when the scaled gradient falls below this share of the forces at play.
     pub tolerance: f64,
@@ -209,17 +209,19 @@ impl Solver {
         self.integrator.method(self.accuracy)
     }
 
-    /// Settings of the refined run for the error estimate: a tenth of a tolerance. Named steps have a tolerance beside
-    /// them, since Euler damps the ringing of the fingers at one step and at half of it alike: these agree more closely
-    /// than either with the truth.
+    /// Estimated error that steps are chosen by; `None` where Euler takes the fixed steps of a named accuracy.
+    pub fn step_tolerance(&self) -> Option<f64> {
+        match self.method() {
+            IntegrationMethod::Sdirk2 => Some(self.accuracy.step_tolerance()),
+            IntegrationMethod::Euler => self.accuracy.tolerance(),
+        }
+    }
+
+    /// Settings of the refined run for the error estimate: a tenth of the tolerance.
     #[must_use]
     pub fn refined(&self) -> Self {
-        let (accuracy, integrator) = match self.accuracy {
-            Accuracy::Draft | Accuracy::Standard => (Accuracy::Tolerance(1e-4), Integrator::Auto),
-            Accuracy::Reference => (Accuracy::Tolerance(1e-6), Integrator::Auto),
-            Accuracy::Tolerance(tolerance) => (Accuracy::Tolerance(0.1 * tolerance), self.integrator),
-        };
-        Self { accuracy, integrator, ..self.clone() }
+        let accuracy = Accuracy::Tolerance(0.1 * self.accuracy.step_tolerance());
+        Self { accuracy, integrator: Integrator::Auto, ..self.clone() }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Accuracy: a named time step or a tolerance, with its measured cost and error.
+//! Accuracy: a tolerance by name or as a number, with its measured cost and error.
 
 use super::choice;
 use crate::app::actions::Actions;
@@ -9,7 +9,7 @@ use palpate_lab::workers::Command;
 use palpate_sim::scene::{Accuracy, Integrator, Scene};
 
 /// First tolerance.
-const FIRST_TOLERANCE: f64 = 1e-4;
+const FIRST_TOLERANCE: f64 = 1e-5;
 /// Range of the slider. Above it, the longest step is the time between samples; below it, a grasp takes longer to compute
 /// than it lasts.
 const SLIDER: std::ops::RangeInclusive<f64> = 1e-7..=1e-2;
@@ -27,12 +27,12 @@ fn steps_row(ui: &mut Ui, scene: &mut Scene) {
     let accuracy = &mut scene.solver.accuracy;
     let tolerance = accuracy.tolerance().unwrap_or(FIRST_TOLERANCE);
     let all = [
-        (Accuracy::Draft, "draft, 1/150 s"),
-        (Accuracy::Standard, "standard, 1/300 s"),
-        (Accuracy::Reference, "reference, 1/9600 s"),
-        (Accuracy::Tolerance(tolerance), "by tolerance"),
+        (Accuracy::Draft, "draft, 1e-3"),
+        (Accuracy::Standard, "standard, 1e-4"),
+        (Accuracy::Reference, "reference, 1e-6"),
+        (Accuracy::Tolerance(tolerance), "own tolerance"),
     ];
-    choice(ui, "time step", accuracy, &all);
+    choice(ui, "accuracy", accuracy, &all);
 }
 
 fn tolerance_row(ui: &mut Ui, scene: &mut Scene) {

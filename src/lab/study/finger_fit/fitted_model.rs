@@ -5,7 +5,7 @@ use super::least_squares::Problem;
 use super::observation::{Observation, Track};
 use palpate_sim::gripper::{GripperModel, Phase, TorquePoint};
 use palpate_sim::run::{SimEvent, SimRun};
-use palpate_sim::scene::{Effect, Scene, Setting, Timing};
+use palpate_sim::scene::{Accuracy, Effect, Scene, Setting, Timing};
 use palpate_tactile::{Sensors, Signals};
 
 /// Actuation rate of the fitted model (Hz). At 50 Hz, commands of a control box would be 10 ms late on average, which
@@ -146,6 +146,8 @@ fn shown(seen: &Observation, gripper: GripperModel) -> Result<Signals, FingerFit
     let lag = gripper.actuation.filling_time > 0.0;
     let mut scene = Scene { gripper, ..seen.scene.clone() };
     scene.timing = Timing { sample_hz: SAMPLE_HZ, actuation_hz: COMMAND_HZ, duration_s: seen.duration() + 0.1 };
+    // Errors of steps would be taken for the finger's, and differences between two fingers would jump with their number.
+    scene.solver.accuracy = Accuracy::Reference;
     // A small lag stays in: `auto` would switch it off and make the residuals jump.
     scene.effects.set(Effect::PneumaticLag, if lag { Setting::On } else { Setting::Off });
     let sensors = Sensors::whole_fingers(&scene.gripper);

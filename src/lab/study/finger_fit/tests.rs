@@ -4,7 +4,7 @@ use super::*;
 use crate::grasping::grasp;
 use palpate_sim::gripper::{Side, TorquePoint};
 use palpate_sim::objects::ObjectModel;
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{Accuracy, Scene};
 use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::calibration::{Calibration, Input, Point, Readout, Record, SensorKind, plan};
 use palpate_tactile::electronics::{Converter, FlexStrip, ForcePad, PadPart, StripPart};
@@ -46,7 +46,10 @@ fn block() -> ObjectModel {
 fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
     let layout = SensorLayout::named("C1+F").expect("in the catalogue");
     let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
-    sensors.signals(grasp(scene, object, 0).frames())
+    // A real gripper makes no numerical errors.
+    let mut exact = scene.clone();
+    exact.solver.accuracy = Accuracy::Reference;
+    sensors.signals(grasp(&exact, object, 0).frames())
 }
 
 fn observed(name: &str, signals: Signals, scene: &Scene, object: Option<ObjectModel>) -> Observation {

@@ -35,7 +35,7 @@ impl CaseAccuracy {
     /// Error tolerance of a step; zero for a fixed step.
     pub fn tolerance(self) -> f64 {
         match self {
-            Self::Accuracy(accuracy) => accuracy.tolerance().unwrap_or(0.0),
+            Self::Accuracy(accuracy) => accuracy.step_tolerance(),
             Self::Step(_) => 0.0,
         }
     }

@@ -2,6 +2,7 @@
 
 mod contact;
 mod fingers;
+mod holds;
 mod motion;
 mod program;
 
@@ -88,6 +89,12 @@ pub const CASES: &[Case] = &[
         claim: "0.1 g .. 100 kg on the pedestal, pulled at as on a slope, sink as far as set in the scene and do not creep",
         settings: EVERY,
         measure: motion::resting_masses,
+    },
+    Case {
+        name: "grazing holds",
+        claim: "thin objects lying down, edges, corners, pedestal rim and fingertips met sideways: the hold comes to rest",
+        settings: EVERY,
+        measure: holds::grazing_holds,
     },
     Case {
         name: "long hold",
