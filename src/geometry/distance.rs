@@ -38,19 +38,11 @@ impl DistanceField {
     #[inline]
     pub fn surface(&self, p: DVec3) -> (f64, DVec3) {
         match self {
-            Self::Primitive { .. } => (self.distance(p), self.normal(p)),
-            Self::Grid(grid) => grid.surface(p),
-        }
-    }
-
-    /// Outward unit normal of the level set through a point.
-    #[inline]
-    pub fn normal(&self, p: DVec3) -> DVec3 {
-        match self {
             Self::Primitive { shape, shape_from_solid } => {
-                shape_from_solid.rotation.inverse() * shape.gradient(shape_from_solid.point(p))
+                let local = shape_from_solid.point(p);
+                (shape.distance(local), shape_from_solid.rotation.inverse() * shape.gradient(local))
             }
-            Self::Grid(grid) => grid.surface(p).1,
+            Self::Grid(grid) => grid.surface(p),
         }
     }
 

@@ -211,9 +211,14 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     assert!(verdict.is_some() && verdict.as_ref() == live.verdict());
     assert_eq!(replayed, rows.iter().map(|row| format!("{row:?}")).collect::<Vec<_>>());
     drop(store);
-    let told = json(folder.path(), &["replay", "1", "--json"]);
-    assert_eq!((told["rows"].as_array().unwrap().len(), &told["decided"]), (300, &"lemon".into()), "{}", told["pmf"]);
-    assert!(told["rows"][0]["class"].is_null() && told["rows"][299]["class"] == "lemon");
+    let played = json(folder.path(), &["replay", "1", "--json"]);
+    assert_eq!(
+        (played["rows"].as_array().unwrap().len(), &played["decided"]),
+        (300, &"lemon".into()),
+        "{}",
+        played["pmf"]
+    );
+    assert!(played["rows"][0]["class"].is_null() && played["rows"][299]["class"] == "lemon");
     let text = run(folder.path(), &["replay", "1", "--speed", "0"]);
     assert!(text.out.lines().count() == 301 && text.err.contains("recognised as lemon"), "{text:?}");
     refused(folder.path(), &["replay", "9"], &["no trial 9"]);

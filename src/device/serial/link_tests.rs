@@ -95,7 +95,7 @@ fn lines_go_to_the_board_and_its_remarks_come_back() {
     let start = Instant::now();
     while link.send("P 0.55").is_err() && start.elapsed() < Duration::from_secs(5) {}
     let mut received = [0; 7];
-    emulated.board.read_exact(&mut received).expect("is told");
+    emulated.board.read_exact(&mut received).expect("receives the command");
     assert_eq!(&received, b"P 0.55\n");
     emulated.board.write_all(b"# ok p=0.55\n").expect("writes");
     let said = |events: &[LinkEvent]| {

@@ -74,7 +74,10 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
     let fronts = fronts_of_near_fingers(model, workspace);
     let pose = object.as_ref().map(|solid| (solid.object_from_gripper, solid.centre));
     workspace.clearances.follow(model, &workspace.segments, pose);
-    let farthest = margin(h, state.fastest(model));
+    // No segment is farther from its axis than this.
+    let reach = model.springs.reach.iter().copied().fold(0.0, f64::max);
+    let turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
+    let farthest = margin(h, state.fastest(model) + turning * reach);
     for finger in 0..2 {
         let first_link = finger * (model.chain.joints + 1);
         for j in 0..=model.chain.joints {

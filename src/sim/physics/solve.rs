@@ -49,8 +49,8 @@ impl Unbalanced {
 /// A gradient this small compared with nothing at all counts as zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 
-/// Minimises over `velocity`, starting from it. Needs the workspace's dynamics and contacts; leaves each contact's
-/// relative velocity at the solution.
+/// Minimises over `velocity`, starting from it. Needs the workspace's dynamics, and contacts with their relative
+/// velocities at the start; leaves those at the solution.
 pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
     let mut report = SolveReport::default();
     let mut passes = 0;
@@ -59,7 +59,6 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
         ws.weights[k] = 1.0 / diagonal(model, ws, k);
     }
     multiply_by_a(model, ws, velocity, Product::OfVelocity);
-    relative_velocities(model, velocity, ws, Product::OfVelocity);
     loop {
         let size = fill_gradient(model, q, velocity, ws);
         let allowed = ABSOLUTE_TOLERANCE + model.tolerance * size.forces;
