@@ -1,7 +1,7 @@
 //! Signed distance to a solid (m), negative inside: in closed form for one primitive, otherwise from a baked grid.
 
 use super::{Bounds, Pose, Primitive};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
 /// Signed distance of a solid, as contact detection reads it. Points are in the solid's own frame.
@@ -11,8 +11,10 @@ pub enum DistanceField {
     Primitive {
         /// The shape, centred in its own frame.
         shape: Primitive,
-        /// From the solid's frame to the shape's.
-        shape_from_solid: Pose,
+        /// Rotation from the solid's axes to the shape's.
+        axes: DMat3,
+        /// Origin of the solid's frame in the shape's (m).
+        origin: DVec3,
     },
     /// Anything else, sampled.
     Grid(Arc<DistanceGrid>),
@@ -21,7 +23,8 @@ pub enum DistanceField {
 impl DistanceField {
     /// A primitive placed in the solid's frame.
     pub fn primitive(shape: Primitive, solid_from_shape: &Pose) -> Self {
-        Self::Primitive { shape, shape_from_solid: solid_from_shape.inverse() }
+        let shape_from_solid = solid_from_shape.inverse();
+        Self::Primitive { shape, axes: shape_from_solid.matrix(), origin: shape_from_solid.position }
     }
 
     /// Signed distance (m). Near the surface it is the distance; farther away it may be a lower bound, which is
@@ -29,7 +32,7 @@ impl DistanceField {
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
         match self {
-            Self::Primitive { shape, shape_from_solid } => shape.distance(shape_from_solid.point(p)),
+            Self::Primitive { shape, axes, origin } => shape.distance(*axes * p + *origin),
             Self::Grid(grid) => grid.distance(p),
         }
     }
@@ -38,9 +41,9 @@ impl DistanceField {
     #[inline]
     pub fn surface(&self, p: DVec3) -> (f64, DVec3) {
         match self {
-            Self::Primitive { shape, shape_from_solid } => {
-                let local = shape_from_solid.point(p);
-                (shape.distance(local), shape_from_solid.rotation.inverse() * shape.gradient(local))
+            Self::Primitive { shape, axes, origin } => {
+                let local = *axes * p + *origin;
+                (shape.distance(local), axes.transpose() * shape.gradient(local))
             }
             Self::Grid(grid) => grid.surface(p),
         }
@@ -48,11 +51,10 @@ impl DistanceField {
 
     /// Radius (m) of a ball about `centre` that holds the solid.
     pub fn radius_about(&self, centre: DVec3) -> f64 {
-        let (bounds, place) = match self {
-            Self::Primitive { shape, shape_from_solid } => (shape.bounds(), *shape_from_solid),
-            Self::Grid(grid) => (grid.solid, Pose::IDENTITY),
+        let (bounds, c) = match self {
+            Self::Primitive { shape, axes, origin } => (shape.bounds(), *axes * centre + *origin),
+            Self::Grid(grid) => (grid.solid, centre),
         };
-        let c = place.point(centre);
         (bounds.max - c).abs().max((bounds.min - c).abs()).length()
     }
 }
@@ -84,14 +86,16 @@ impl DistanceGrid {
     /// Signed distance; outside the lattice a lower bound.
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
-        match self.corner_values(p) {
-            Some((c, t)) => {
-                let near = lerp(lerp(c[0], c[1], t.z), lerp(c[2], c[3], t.z), t.y);
-                let far = lerp(lerp(c[4], c[5], t.z), lerp(c[6], c[7], t.z), t.y);
-                lerp(near, far, t.x)
-            }
-            None => self.distance_outside(p),
-        }
+        self.interpolated(p).unwrap_or_else(|| self.distance_outside(p))
+    }
+
+    /// Distance by trilinear interpolation, inside the lattice (m).
+    #[inline]
+    fn interpolated(&self, p: DVec3) -> Option<f64> {
+        let (c, t) = self.corner_values(p)?;
+        let near = lerp(lerp(c[0], c[1], t.z), lerp(c[2], c[3], t.z), t.y);
+        let far = lerp(lerp(c[4], c[5], t.z), lerp(c[6], c[7], t.z), t.y);
+        Some(lerp(near, far, t.x))
     }
 
     /// The distance at the border less the way to it, or that to the solid's box, if that is more.
@@ -104,10 +108,7 @@ impl DistanceGrid {
         let span = DVec3::from_array(self.size.map(|n| (n - 1) as f64)) * self.cell;
         let border = p.clamp(self.origin, self.origin + span * (1.0 - 1e-12));
         let inside = border.max(self.origin + 1e-9 * self.cell).min(self.origin + span - 1e-9 * self.cell);
-        match self.corner_values(inside) {
-            Some(_) => to_box.max(self.distance(inside) - (p - inside).length()),
-            None => to_box,
-        }
+        self.interpolated(inside).map_or(to_box, |distance| to_box.max(distance - (p - inside).length()))
     }
 
     /// Distance and its unit gradient from a quadratic B-spline through 27 nodes. Both are continuous, where the gradient
@@ -120,15 +121,15 @@ impl DistanceGrid {
             let outward = (p - p.clamp(self.solid.min, self.solid.max)).normalize_or(DVec3::Z);
             return (self.distance(p), outward);
         }
-        let nearest = u.round();
-        let t = u - nearest;
+        let nearest = [u.x, u.y, u.z].map(|u| (u + 0.5) as usize);
+        let t = u - DVec3::from_array(nearest.map(|i| i as f64));
         // Weights of the three nodes along an axis, and their slopes.
         let weights =
             |t: f64| ([0.5 * (0.5 - t).powi(2), 0.75 - t * t, 0.5 * (0.5 + t).powi(2)], [t - 0.5, -2.0 * t, t + 0.5]);
         let ((wx, dx), (wy, dy), (wz, dz)) = (weights(t.x), weights(t.y), weights(t.z));
         let row = self.size[2];
         let sheet = row * self.size[1];
-        let base = (nearest.x as usize - 1) * sheet + (nearest.y as usize - 1) * row + nearest.z as usize - 1;
+        let base = (nearest[0] - 1) * sheet + (nearest[1] - 1) * row + nearest[2] - 1;
         let (mut distance, mut gradient) = (0.0, DVec3::ZERO);
         for i in 0..3 {
             for j in 0..3 {
@@ -160,8 +161,13 @@ impl DistanceGrid {
         let row = self.size[2];
         let sheet = row * self.size[1];
         let base = i * sheet + j * row + k;
-        let at = |offset: usize| f64::from(self.values[base + offset]);
-        Some(([at(0), at(1), at(row), at(row + 1), at(sheet), at(sheet + 1), at(sheet + row), at(sheet + row + 1)], t))
+        let two = |from: usize| match self.values[from..] {
+            [a, b, ..] => [f64::from(a), f64::from(b)],
+            _ => [f64::INFINITY; 2],
+        };
+        let ([a, b], [c, d]) = (two(base), two(base + row));
+        let ([e, f], [g, h]) = (two(base + sheet), two(base + sheet + row));
+        Some(([a, b, c, d, e, f, g, h], t))
     }
 }
 

@@ -38,7 +38,7 @@ fn torque_on_joint(ws: &Workspace, contact: &Contact, k: usize, n: usize) -> Opt
     };
     let (normal, tangential) = contact.force(ws.step);
     let linear = (contact.normal * normal + tangential) * sign;
-    Some(ws.columns[k].dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
+    Some(ws.columns[k % n].of(k / n).dot(&Spatial { linear, angular: contact.arm.cross(linear) }))
 }
 
 /// True when a segment lies beyond joint `k` (counted over both fingers of `n` joints).

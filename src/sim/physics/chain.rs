@@ -10,6 +10,7 @@
 //! A cross product here is the generalised force of a planar force f at r from a joint that turns x into y... in
 //! the finger plane theta grows from "along" towards "inward", so that it reads r.y f.x - r.x f.y.
 
+use super::hessian::Lanes;
 use crate::gripper::{Finger, Pad, SegmentPose, bend};
 use glam::DVec2;
 
@@ -65,21 +66,28 @@ impl ChainModel {
         segments[j].point(0.5 * self.lengths[j], 0.0)
     }
 
-    /// Fills the inertia matrix M (N x N, both triangles) for the current layout.
-    pub(super) fn inertia(&self, segments: &[SegmentPose], m: &mut [f64]) {
+    /// Fills the inertia matrices M of both fingers (N x N, both triangles) for the current layout.
+    pub(super) fn inertia(&self, fingers: [&[SegmentPose]; 2], m: &mut [Lanes]) {
         let n = self.joints;
+        let lanes = |of: &dyn Fn(&[SegmentPose]) -> DVec2| {
+            let [left, right] = fingers.map(of);
+            [Lanes::new([left.x, right.x]), Lanes::new([left.y, right.y])]
+        };
         // Composite of the segments from the tip inward: mass, first and second moment about the plane's origin.
-        let (mut mass, mut first, mut second) = (0.0, DVec2::ZERO, 0.0);
+        let (mut mass, mut first, mut second) = (0.0, [Lanes::ZERO; 2], Lanes::ZERO);
         for i in (0..n).rev() {
             let link = i + 1;
-            let centre = self.centre(segments, link);
+            let [x, y] = lanes(&|segments| self.centre(segments, link));
             mass += self.masses[link];
-            first += centre * self.masses[link];
-            second += centre.length_squared() * self.masses[link] + self.inertias[link];
-            let p_i = segments[link].start;
+            first = [first[0] + x * self.masses[link], first[1] + y * self.masses[link]];
+            second += (x * x + y * y) * self.masses[link] + self.inertias[link];
+            let [x, y] = lanes(&|segments| segments[link].start);
+            // second - (p_i + p_j) . first + mass p_i . p_j
+            let at_i = second - (x * first[0] + y * first[1]);
+            let per_j = [x * mass - first[0], y * mass - first[1]];
             for j in 0..=i {
-                let p_j = segments[j + 1].start;
-                let value = second - (p_i + p_j).dot(first) + mass * p_i.dot(p_j);
+                let [x, y] = lanes(&|segments| segments[j + 1].start);
+                let value = at_i + (x * per_j[0] + y * per_j[1]);
                 m[i * n + j] = value;
                 m[j * n + i] = value;
             }
@@ -159,6 +167,14 @@ mod tests {
         energy
     }
 
+    /// Inertia of the left finger, checked to be that of the right one too.
+    fn inertia_of_one(model: &ChainModel, segments: &[SegmentPose]) -> Vec<f64> {
+        let mut lanes = vec![Lanes::ZERO; model.joints * model.joints];
+        model.inertia([segments, segments], &mut lanes);
+        assert!(lanes.iter().all(|lanes| lanes.to_array()[0] == lanes.to_array()[1]));
+        lanes.iter().map(|lanes| lanes.to_array()[0]).collect()
+    }
+
     #[test]
     fn inertia_gives_the_kinetic_energy() {
         let model = chain(7);
@@ -166,8 +182,7 @@ mod tests {
         let qd: Vec<f64> = (0..7).map(|i| (f64::from(i) * 1.7).sin()).collect();
         let mut segments = vec![SegmentPose::default(); 8];
         model.bend(&q, &mut segments);
-        let mut m = vec![0.0; 49];
-        model.inertia(&segments, &mut m);
+        let m = inertia_of_one(&model, &segments);
         let quadratic: f64 =
             (0..7).flat_map(|i| (0..7).map(move |j| (i, j))).map(|(i, j)| 0.5 * qd[i] * m[i * 7 + j] * qd[j]).sum();
         let direct = kinetic_energy(&model, &q, &qd);
@@ -184,8 +199,7 @@ mod tests {
         let momentum = |q: &[f64]| -> Vec<f64> {
             let mut segments = vec![SegmentPose::default(); n + 1];
             model.bend(q, &mut segments);
-            let mut m = vec![0.0; n * n];
-            model.inertia(&segments, &mut m);
+            let m = inertia_of_one(&model, &segments);
             (0..n).map(|i| (0..n).map(|j| m[i * n + j] * qd[j]).sum()).collect()
         };
         let step = 1e-6;

@@ -13,9 +13,30 @@ pub(super) struct Clearances {
     /// Clearance of each segment and of each contact spring's foot, plus the way gone when it was computed (m).
     links: Vec<f64>,
     springs: Vec<f64>,
+    /// Clearance between the fingers, plus the way that they had gone towards each other then, and that way now (m).
+    fingers: f64,
+    fingers_way: f64,
     segments: Vec<SegmentPose>,
     object: (DMat3, DVec3),
+    /// Way that any point of the object has gone, at most (m).
+    object_way: f64,
+    resting: Nearby,
 }
+
+/// Places where the object may rest on its support soon.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Nearby {
+    /// Resting points of the object.
+    pub(super) points: Vec<u32>,
+    /// Points of the pedestal's rim.
+    pub(super) rim: Vec<u32>,
+    /// Gap below which these are all, at the way of the object then (m).
+    gap: f64,
+    way: f64,
+}
+
+/// Way of the object for which nearby places are collected ahead (m).
+const COLLECTED_AHEAD: f64 = 2e-3;
 
 impl Clearances {
     pub(super) fn new(model: &PhysicsModel) -> Self {
@@ -23,8 +44,12 @@ impl Clearances {
             ways: vec![0.0; model.link_count()],
             links: vec![f64::NEG_INFINITY; model.link_count()],
             springs: vec![f64::NEG_INFINITY; 2 * model.springs.all.len()],
+            fingers: f64::NEG_INFINITY,
+            fingers_way: 0.0,
             segments: vec![SegmentPose::default(); model.link_count()],
             object: (DMat3::IDENTITY, DVec3::ZERO),
+            object_way: 0.0,
+            resting: Nearby { gap: f64::NEG_INFINITY, ..Nearby::default() },
         }
     }
 
@@ -40,15 +65,19 @@ impl Clearances {
             turned = change.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
             moved = (place - self.object.1).length();
             (self.object, centre) = ((axes, place), place);
+            self.object_way += moved + turned * model.body.as_ref().map_or(0.0, |body| body.radius);
         }
+        let mut farthest = [0.0f64; 2];
         for (link, (now, before)) in segments.iter().zip(&mut self.segments).enumerate() {
             let lever = model.chain.lengths[link % links] + depth;
             let from_centre = model.planes[link / links].point(now.start, 0.0) - centre;
             let arm = from_centre.length() + lever + model.skin.width;
             let own = (now.start - before.start).length() + (now.along - before.along).length() * lever;
             self.ways[link] += own + moved + turned * arm;
+            farthest[link / links] = farthest[link / links].max(own);
             *before = *now;
         }
+        self.fingers_way += farthest[0] + farthest[1];
     }
 
     /// Least clearance of a segment at present (m).
@@ -59,6 +88,28 @@ impl Clearances {
 
     pub(super) fn note_link(&mut self, link: usize, clearance: f64) {
         self.links[link] = clearance + self.ways[link];
+    }
+
+    /// Places that are closer than `gap` (m), and some more; `collect` finds those closer than what it is given.
+    #[inline]
+    pub(super) fn resting(&mut self, gap: f64, collect: impl FnOnce(f64, &mut Nearby)) -> &Nearby {
+        let gone = self.object_way - self.resting.way;
+        if gap + gone > self.resting.gap {
+            self.resting.points.clear();
+            self.resting.rim.clear();
+            (self.resting.gap, self.resting.way) = (gap + COLLECTED_AHEAD, self.object_way);
+            collect(gap + COLLECTED_AHEAD, &mut self.resting);
+        }
+        &self.resting
+    }
+
+    /// Least clearance between the fingers at present (m).
+    pub(super) fn of_fingers(&self) -> f64 {
+        self.fingers - self.fingers_way
+    }
+
+    pub(super) fn note_fingers(&mut self, clearance: f64) {
+        self.fingers = clearance + self.fingers_way;
     }
 
     /// Least distance of a contact spring's foot from everything at present (m).

@@ -3,6 +3,7 @@
 
 use super::contact::SHEAR_SHARE;
 use super::detect::detect;
+use super::hessian::Lanes;
 use super::step::{Drive, lay_out, step};
 use super::{PhysicsModel, Placement, SteppedScene};
 use crate::gripper::{Finger, PadLaw};
@@ -105,8 +106,9 @@ fn lowest_modes(model: &PhysicsModel) -> [f64; 2] {
     let n = model.chain.joints;
     let mut segments = vec![crate::gripper::SegmentPose::default(); n + 1];
     model.chain.bend(&vec![0.0; n], &mut segments);
-    let mut m = vec![0.0; n * n];
-    model.chain.inertia(&segments, &mut m);
+    let mut m = vec![Lanes::ZERO; n * n];
+    model.chain.inertia([&segments, &segments], &mut m);
+    let m: Vec<f64> = m.iter().map(|lanes| lanes.to_array()[0]).collect();
     let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
     let times_m = |x: &[f64]| -> Vec<f64> { m.chunks_exact(n).map(|row| dot(row, x)).collect() };
     let mut found: Vec<(Vec<f64>, f64)> = Vec::new();

@@ -176,6 +176,10 @@ impl Contact {
     pub(super) fn lag_mismatch(&self, step: ContactStep) -> (f64, f64) {
         let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
         let truth = self.mu * gamma;
+        if self.limit <= 0.0 {
+            // Without friction force, however much there should be.
+            return (truth, truth);
+        }
         let used = self.force(step).1.length() * step.h;
         let slips = used >= self.limit * (1.0 - 1e-9);
         let mismatch = if slips { (used - truth).abs() } else { (used - truth).max(0.0) };

@@ -25,7 +25,7 @@ pub(super) fn fill_coupling(model: &PhysicsModel, ws: &mut Workspace) {
         let (left, right) = (acting.min(against) as usize, acting.max(against) as usize - (n + 1));
         let hessian = contact.hessian(ws.step);
         for i in 0..left {
-            let linear = hessian * ws.columns[i].linear_at(contact.arm);
+            let linear = hessian * ws.columns[i].of(0).linear_at(contact.arm);
             let wrench = Spatial { linear, angular: contact.arm.cross(linear) };
             let sum = &mut ws.coupling[i * (n + 1) + right];
             *sum = sum.plus(&wrench);
@@ -35,7 +35,7 @@ pub(super) fn fill_coupling(model: &PhysicsModel, ws: &mut Workspace) {
         let mut beyond = Spatial::default();
         for j in (0..n).rev() {
             beyond = beyond.plus(&ws.coupling[i * (n + 1) + j + 1]);
-            *ws.hessian.at_mut(n + j, i) = -ws.columns[n + j].dot(&beyond);
+            *ws.hessian.at_mut(n + j, i) = -ws.columns[j].of(1).dot(&beyond);
         }
     }
 }

@@ -71,13 +71,16 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
     let h = workspace.step.h;
     let object = model.body.as_ref().map(|body| Solid::new(body, &workspace.body));
     let (linear, angular) = state.body_velocity(model);
-    let fronts = fronts_of_near_fingers(model, workspace);
     let pose = object.as_ref().map(|solid| (solid.object_from_gripper, solid.centre));
     workspace.clearances.follow(model, &workspace.segments, pose);
     // No segment is farther from its axis than this.
     let reach = model.springs.reach.iter().copied().fold(0.0, f64::max);
     let turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
-    let farthest = margin(h, state.fastest(model) + turning * reach);
+    let fastest = state.fastest(model) + turning * reach;
+    let farthest = margin(h, fastest);
+    workspace.fingers_meet = false;
+    let may_meet = workspace.clearances.of_fingers() <= margin(h, 2.0 * fastest);
+    let fronts = if may_meet { fronts_of_near_fingers(model, workspace) } else { None };
     for finger in 0..2 {
         let first_link = finger * (model.chain.joints + 1);
         for j in 0..=model.chain.joints {
@@ -94,17 +97,15 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let against_world = margin(h, speed);
             let object_speed = linear.length() + object.as_ref().map_or(0.0, |o| angular.length() * o.body.radius);
             let against_object = margin(h, speed + object_speed);
-            let near_object = object.as_ref().filter(|o| o.distance(middle) < reach + against_object);
-            let near_world =
-                !model.environment.is_empty() && model.environment.distance(middle) < reach + against_world;
+            let to_object = object.as_ref().map_or(f64::INFINITY, |o| o.distance(middle));
+            let to_world = model.environment.distance(middle);
+            let near_object = object.as_ref().filter(|_| to_object < reach + against_object);
+            let near_world = to_world < reach + against_world;
             let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
                 let margin = margin(workspace.step.h, speed + fastest[1 - finger]);
                 fronts.may_meet(model, finger, (&segment, model.chain.lengths[j]), margin).then_some(margin)
             });
             if near_object.is_none() && !near_world && against_finger.is_none() {
-                let to_object = object.as_ref().map_or(f64::INFINITY, |o| o.distance(middle));
-                let to_world =
-                    if model.environment.is_empty() { f64::INFINITY } else { model.environment.distance(middle) };
                 workspace.clearances.note_link(link, to_object.min(to_world) - reach);
                 continue;
             }
@@ -113,6 +114,7 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
                 object: near_object.map(|o| (o, against_object)),
                 world: near_world.then_some(against_world),
                 finger: against_finger,
+                least_to_world: to_world - reach,
             };
             detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment });
         }
@@ -138,6 +140,8 @@ struct Near<'a> {
     world: Option<f64>,
     /// The other finger.
     finger: Option<f64>,
+    /// Distance of the whole segment from the world, at least (m).
+    least_to_world: f64,
 }
 
 impl Near<'_> {
@@ -146,11 +150,14 @@ impl Near<'_> {
         self.object.map_or(0.0, |(_, margin)| margin).max(self.world.unwrap_or(0.0))
     }
 
-    /// Distance of a point from object and world (m), or a lower bound of it, near or not: what is noted for later must
-    /// hold when the other one has come near.
-    fn distance(&self, model: &PhysicsModel, p: DVec3) -> f64 {
+    /// Distances of a point of the segment from the object and from the nearer of object and world (m), or lower bounds,
+    /// near or not: what is noted for later must hold when the other one has come near.
+    fn distances(&self, model: &PhysicsModel, p: DVec3) -> (f64, f64) {
         let to_object = self.solid.map_or(f64::INFINITY, |solid| solid.distance(p));
-        if model.environment.is_empty() { to_object } else { to_object.min(model.environment.distance(p)) }
+        if self.least_to_world >= to_object {
+            return (to_object, to_object);
+        }
+        (to_object, to_object.min(model.environment.distance(p)))
     }
 }
 
@@ -178,14 +185,14 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             radius: model.springs.radius,
             rest: spring.height - model.springs.radius,
         };
+        let (to_object, clearance) = near.distances(model, ray.foot);
         if near.finger.is_none() {
-            let clearance = near.distance(model, ray.foot);
             workspace.clearances.note_spring(site, place.link, clearance);
             if clearance > spring.height + near.farthest() {
                 continue;
             }
         }
-        let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, margin));
+        let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
         let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
         let (mut hit, mut against) = match (on_object, on_world) {
             (Some(object), Some(world)) if world.compression > object.compression => (Some(world), Against::World),
@@ -249,7 +256,6 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
 /// Protrusion of the fingers towards each other, and the fastest segment of each (m/s); `None` where no segment of
 /// one can come near the other within the step, or where they pass through each other.
 fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Option<(Fronts, [f64; 2])> {
-    workspace.fingers_meet = false;
     if model.finger_contact == FingerContact::Never {
         return None;
     }
@@ -265,7 +271,9 @@ fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Op
         (0..links).map(speed).fold(0.0, f64::max)
     });
     let fronts = Fronts::new(model, &workspace.segments);
-    fronts.are_near(model, margin(workspace.step.h, fastest[0] + fastest[1])).then_some((fronts, fastest))
+    let clearance = fronts.clearance(model);
+    workspace.clearances.note_fingers(clearance);
+    (clearance < margin(workspace.step.h, fastest[0] + fastest[1])).then_some((fronts, fastest))
 }
 
 /// Axes in which a pad's shear is remembered: along the segment, across it, inward. Columns, in the gripper frame.
@@ -317,12 +325,17 @@ const MOST_STEPS: usize = 32;
 const FROM_BEHIND: f64 = -0.7;
 
 impl Ray {
-    fn cast_solid(&self, solid: &Solid<'_>, margin: f64) -> Option<Hit> {
+    /// `distance` is that of the foot from the object (m).
+    fn cast_solid(&self, solid: &Solid<'_>, distance: f64, margin: f64) -> Option<Hit> {
+        if distance - self.radius > self.rest + margin {
+            return None;
+        }
         let foot = solid.local(self.foot);
         let axis = solid.object_from_gripper * self.axis;
         let field = &solid.body.field;
+        let gap = distance - self.radius;
         let (distance, surface) = (|p| field.distance(p), |p| field.surface(p));
-        let touch = self.trace((foot, axis), margin, distance, surface)?;
+        let touch = self.trace((foot, axis), gap, margin, distance, surface)?;
         let passed = touch.cosine < FROM_BEHIND && touch.way == 0.0;
         let hit = if passed {
             self.trace_back((foot, axis), touch.gap, distance, surface)
@@ -340,13 +353,15 @@ impl Ray {
     fn cast_environment(&self, model: &PhysicsModel, margin: f64) -> Option<Hit> {
         let environment = &model.environment;
         let surface = |p| (environment.distance(p), environment.normal(p));
-        let touch = self.trace((self.foot, self.axis), margin, |p| environment.distance(p), surface)?;
+        let gap = environment.distance(self.foot) - self.radius;
+        let touch = self.trace((self.foot, self.axis), gap, margin, |p| environment.distance(p), surface)?;
         self.pressed(&touch, touch.cosine.max(0.0), margin)
     }
 
     fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
         let surface = |p| (other.distance(p), other.normal(p));
-        let touch = self.trace((self.foot, self.axis), margin, |p| other.distance(p), surface)?;
+        let gap = other.distance(self.foot) - self.radius;
+        let touch = self.trace((self.foot, self.axis), gap, margin, |p| other.distance(p), surface)?;
         self.pressed(&touch, touch.cosine.max(0.0), margin)
     }
 
@@ -390,18 +405,19 @@ impl Ray {
         Hit { compression: (self.rest + back) * cosine - gap, normal, point, cosine }
     }
 
-    /// Sphere tracing along a path given by its foot and axis, both in the frame of the distance.
+    /// Sphere tracing along a path given by its foot and axis, both in the frame of the distance. `gap` is that at the
+    /// foot, or a lower bound of it (m).
     #[inline]
     fn trace(
         &self,
         (foot, axis): (DVec3, DVec3),
+        mut gap: f64,
         margin: f64,
         distance: impl Fn(DVec3) -> f64,
         surface: impl Fn(DVec3) -> (f64, DVec3),
     ) -> Option<Touch> {
         let limit = self.rest + margin;
         let mut way = 0.0;
-        let mut gap = distance(foot) - self.radius;
         if gap > limit {
             return None;
         }
@@ -431,13 +447,14 @@ fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace
     let gripper_from_object = pose.matrix();
     let place = |p: DVec3| gripper_from_object * (p - body.centre) + pose.position;
     let first_site = 2 * model.springs.all.len();
+    let (contacts, reference) = (&mut workspace.contacts, workspace.reference);
     let mut touch = |site: usize, compression: f64, normal: DVec3, point: DVec3| {
         let shear = state.touched.shear[site];
-        workspace.contacts.push(Contact {
+        contacts.push(Contact {
             site: site as u32,
             acting: Acting::Object,
             against: Against::World,
-            arm: point - workspace.reference,
+            arm: point - reference,
             normal,
             compression,
             law: PadLaw::Linear,
@@ -451,27 +468,32 @@ fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             change: DVec3::ZERO,
         });
     };
-    // Height above the highest surface, as a plane in the object's frame: three products per corner.
-    let up = gripper_from_object.transpose() * environment.up();
-    let base = environment.height_above_top(place(DVec3::ZERO));
-    for (k, ball) in body.resting.0.iter().enumerate() {
-        if base + up.dot(ball.centre) - ball.radius < margin {
-            let centre = place(ball.centre);
-            let gap = environment.distance(centre) - ball.radius;
-            if gap < margin {
-                let normal = environment.normal(centre);
-                touch(first_site + k, -gap, normal, centre - normal * ball.radius);
-            }
+    let local = |p: DVec3| gripper_from_object.transpose() * (p - pose.position) + body.centre;
+    let nearby = workspace.clearances.resting(margin, |gap, nearby| {
+        // Height above the highest surface, as a plane in the object's frame: three products per point.
+        let up = gripper_from_object.transpose() * environment.up();
+        let base = environment.height_above_top(place(DVec3::ZERO));
+        let balls = body.resting.0.iter().zip(0..);
+        nearby.points.extend(balls.filter_map(|(b, k)| (base + up.dot(b.centre) - b.radius < gap).then_some(k)));
+        let rim = environment.rim().iter().zip(0..);
+        nearby.rim.extend(rim.filter_map(|(p, k)| (body.field.distance(local(*p)) < gap).then_some(k)));
+    });
+    for k in nearby.points.iter().map(|k| *k as usize) {
+        let ball = &body.resting.0[k];
+        let centre = place(ball.centre);
+        let gap = environment.distance(centre) - ball.radius;
+        if gap < margin {
+            let normal = environment.normal(centre);
+            touch(first_site + k, -gap, normal, centre - normal * ball.radius);
         }
     }
     let first_rim = first_site + model.resting_points();
-    for (k, p) in environment.rim().iter().enumerate() {
-        let local = gripper_from_object.transpose() * (*p - pose.position) + body.centre;
-        let gap = body.field.distance(local);
-        if gap < margin {
-            let (gap, normal) = body.field.surface(local);
+    for k in nearby.rim.iter().map(|k| *k as usize) {
+        let p = environment.rim()[k];
+        if body.field.distance(local(p)) < margin {
+            let (gap, normal) = body.field.surface(local(p));
             let out_of_object = gripper_from_object * normal;
-            touch(first_rim + k, -gap, -out_of_object, *p);
+            touch(first_rim + k, -gap, -out_of_object, p);
         }
     }
 }

@@ -28,9 +28,9 @@ pub(super) fn mechanical_energy(model: &PhysicsModel, state: &State, ws: &mut Wo
     let (mut total, mut spin) = (0.0, 0.0);
     for finger in 0..2 {
         let rates = &state.velocity[finger * n..(finger + 1) * n];
-        let matrix = &ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
         for i in 0..n {
-            let row: f64 = matrix[i * n..(i + 1) * n].iter().zip(rates).map(|(a, b)| a * b).sum();
+            let row = &ws.finger_matrix[i * n..(i + 1) * n];
+            let row: f64 = row.iter().zip(rates).map(|(a, b)| a.as_array()[finger] * b).sum();
             total += 0.5 * rates[i] * row;
             let q = state.q[finger * n + i];
             if let Some(relaxation) = &model.relaxation {

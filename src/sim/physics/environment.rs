@@ -1,7 +1,7 @@
 //! Fixed environment of the gripper: table and pedestal, in the gripper frame.
 
 use crate::scene::{Support, SupportKind};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use palpate_geometry::{Pose, Primitive};
 use std::f64::consts::TAU;
 
@@ -28,7 +28,9 @@ struct Plane {
 #[derive(Clone, Debug)]
 struct Pedestal {
     shape: Primitive,
-    shape_from_gripper: Pose,
+    /// Rotation from the gripper's axes to the shape's, and the gripper's origin there.
+    axes: DMat3,
+    origin: DVec3,
     rim: Vec<DVec3>,
 }
 
@@ -46,9 +48,11 @@ impl Environment {
                 let r = support.radius;
                 gripper_from_world.point(DVec3::new(r * cos, r * sin, support.height))
             });
+            let shape_from_gripper = gripper_from_shape.inverse();
             Pedestal {
                 shape: Primitive::Cylinder { radius: support.radius, half_length },
-                shape_from_gripper: gripper_from_shape.inverse(),
+                axes: shape_from_gripper.matrix(),
+                origin: shape_from_gripper.position,
                 rim: rim.collect(),
             }
         });
@@ -65,7 +69,7 @@ impl Environment {
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let table = self.table.map_or(f64::INFINITY, |plane| plane.up.dot(p) - plane.offset);
         match &self.pedestal {
-            Some(column) => table.min(column.shape.distance(column.shape_from_gripper.point(p))),
+            Some(column) => table.min(column.shape.distance(column.axes * p + column.origin)),
             None => table,
         }
     }
@@ -76,9 +80,9 @@ impl Environment {
         let table = self.table.map_or(f64::INFINITY, |plane| plane.up.dot(p) - plane.offset);
         match &self.pedestal {
             Some(column) => {
-                let local = column.shape_from_gripper.point(p);
+                let local = column.axes * p + column.origin;
                 if column.shape.distance(local) < table {
-                    column.shape_from_gripper.rotation.inverse() * column.shape.gradient(local)
+                    column.axes.transpose() * column.shape.gradient(local)
                 } else {
                     up
                 }

@@ -10,6 +10,7 @@
 
 use super::contact::ContactStep;
 use super::detect::detect;
+use super::hessian::Lanes;
 use super::model::PhysicsModel;
 use super::solve::{Product, fill_gradient, relative_velocities, segment_velocities};
 use super::state::State;
@@ -87,13 +88,15 @@ fn contact_and_limit_impulses(model: &PhysicsModel, state: &State, ws: &mut Work
 fn fill_inertia(model: &PhysicsModel, ws: &mut Workspace) {
     let n = model.chain.joints;
     ws.hessian.couple(false);
-    for k in 0..2 * n {
-        let matrix = &ws.finger_matrix[(k / n) * n * n + (k % n) * n..];
-        ws.hessian.row_mut(k, k - k % n).copy_from_slice(&matrix[..=k % n]);
+    for i in 0..n {
+        ws.hessian.row_mut(i).copy_from_slice(&ws.finger_matrix[i * n..][..=i]);
+        ws.hessian.border_mut(i).fill(Lanes::ZERO);
     }
     if let Some(body) = model.free_body() {
         for a in 0..6 {
-            ws.hessian.row_mut(2 * n + a, 0).fill(0.0);
+            for b in 0..=a {
+                *ws.hessian.at_mut(2 * n + a, 2 * n + b) = 0.0;
+            }
         }
         for a in 0..3 {
             *ws.hessian.at_mut(2 * n + a, 2 * n + a) = body.mass;

@@ -49,9 +49,9 @@ impl Fronts {
         front(model, segment.0, segment.1) + self.0[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
     }
 
-    /// True where any of one finger may come within `margin` (m) of any of the other.
-    pub(super) fn are_near(&self, model: &PhysicsModel, margin: f64) -> bool {
-        self.0[0] + self.0[1] + margin > 2.0 * model.planes[0].half_gap
+    /// Clearance between the fingers, seen from the side (m).
+    pub(super) fn clearance(&self, model: &PhysicsModel) -> f64 {
+        2.0 * model.planes[0].half_gap - self.0[0] - self.0[1]
     }
 }
 

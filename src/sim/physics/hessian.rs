@@ -5,25 +5,35 @@
 //! third block couples them, and the matrix is dense.
 
 /// One number of each finger.
-type Lanes = [f64; 2];
+pub(super) type Lanes = wide::f64x2;
 
 /// Lower triangle of a symmetric matrix: `block` rows of each finger, then the border.
 #[derive(Clone, Debug)]
 pub(super) struct Hessian {
     block: usize,
     size: usize,
-    /// Row-major, `size` columns; entries right of the diagonal are not used.
+    /// Rows of the blocks; entries right of the diagonal are not used.
+    rows: Vec<Lanes>,
+    /// The border's rows over the blocks, column by column.
+    border: Vec<Lanes>,
+    /// Row-major, `size` columns: the border's own block, and while the fingers are coupled everything.
     values: Vec<f64>,
     /// True while the fingers are coupled.
     dense: bool,
-    /// Factor of the blocks, row by row, and the border's rows over them; diagonals inverted.
-    factor: Vec<Lanes>,
-    /// A column of the factor, contiguous.
-    column: Vec<Lanes>,
+    /// Columns of the factor of the blocks, each with zeros up to its diagonal.
+    columns: Vec<Lanes>,
+    /// One over the diagonal of the factor.
+    inverses: Vec<Lanes>,
+    /// The fingers' part of a solution.
+    solution: Vec<Lanes>,
 }
 
 /// Pivots that rounding made non-positive are raised to this, so that the direction computed stays finite and downhill.
 const LEAST_PIVOT: f64 = 1e-300;
+
+/// Number of joints of the default finger and of unknowns of a free object, for which loops are unrolled.
+const USUAL_JOINTS: usize = 10;
+const FREE_OBJECT: usize = 6;
 
 impl Hessian {
     /// Zeros for two fingers of `block` joints and `border` unknowns of the object.
@@ -32,10 +42,13 @@ impl Hessian {
         Self {
             block,
             size,
+            rows: vec![Lanes::ZERO; block * block],
+            border: vec![Lanes::ZERO; block * border],
             values: vec![0.0; size * size],
-            dense: block == 0,
-            factor: vec![[0.0; 2]; (block + border) * block],
-            column: vec![[0.0; 2]; block + border],
+            dense: false,
+            columns: vec![Lanes::ZERO; block * block],
+            inverses: vec![Lanes::ZERO; block],
+            solution: vec![Lanes::ZERO; block],
         }
     }
 
@@ -44,64 +57,100 @@ impl Hessian {
         self.dense = fingers;
     }
 
-    /// Row `i` of the lower triangle from column `from` on.
+    /// Row `i` of both fingers' blocks up to the diagonal.
     #[inline]
-    pub(super) fn row_mut(&mut self, i: usize, from: usize) -> &mut [f64] {
-        &mut self.values[i * self.size + from..=i * self.size + i]
+    pub(super) fn row_mut(&mut self, i: usize) -> &mut [Lanes] {
+        &mut self.rows[i * self.block..][..=i]
     }
 
+    /// The border's entries over column `i` of both blocks.
+    #[inline]
+    pub(super) fn border_mut(&mut self, i: usize) -> &mut [Lanes] {
+        let border = self.size - 2 * self.block;
+        &mut self.border[i * border..][..border]
+    }
+
+    /// An entry of the border's own block or, while the fingers are coupled, of the block between them.
     #[inline]
     pub(super) fn at_mut(&mut self, i: usize, j: usize) -> &mut f64 {
-        debug_assert!(j <= i && (self.dense || i >= 2 * self.block || i / self.block == j / self.block), "({i}, {j})");
+        debug_assert!(j <= i && (j >= 2 * self.block || self.dense && i >= self.block && j < self.block), "({i}, {j})");
         &mut self.values[i * self.size + j]
     }
 
     /// Replaces the matrix by its factor L.
     pub(super) fn factorise(&mut self) {
         if self.dense {
+            self.scatter();
             factorise_dense(&mut self.values, self.size, 0);
             return;
         }
-        let (n, size) = (self.block, self.size);
-        let border = size - 2 * n;
+        match (self.block, self.size - 2 * self.block) {
+            (USUAL_JOINTS, FREE_OBJECT) => self.factorise_arrow::<USUAL_JOINTS, FREE_OBJECT>(),
+            (USUAL_JOINTS, 0) => self.factorise_arrow::<USUAL_JOINTS, 0>(),
+            _ => self.factorise_arrow::<0, 0>(),
+        }
+    }
+
+    /// `N` is the number of joints and `B` of unknowns in the border, or zero where only the program that runs knows.
+    fn factorise_arrow<const N: usize, const B: usize>(&mut self) {
+        let (n, b) = if N > 0 { (N, B) } else { (self.block, self.size - 2 * self.block) };
+        let (rows, columns) = (&mut self.rows[..n * n], &mut self.columns[..n * n]);
+        let inverses = &mut self.inverses[..n];
         for i in 0..n {
-            let (left, right) = (&self.values[i * size..][..=i], &self.values[(n + i) * size + n..][..=i]);
-            for ((lanes, l), r) in self.factor[i * n..].iter_mut().zip(left).zip(right) {
-                *lanes = [*l, *r];
+            let row = &mut rows[i * n..][..n];
+            for k in 0..i {
+                let column = &mut columns[k * n..][..n];
+                let value = row[k] * inverses[k];
+                column[i] = value;
+                for j in k + 1..=i {
+                    row[j] -= value * column[j];
+                }
             }
+            inverses[i] = Lanes::ONE / row[i].max(Lanes::splat(LEAST_PIVOT)).sqrt();
         }
-        for b in 0..border {
-            let row = &self.values[(2 * n + b) * size..][..2 * n];
-            let (left, right) = row.split_at(n);
-            for ((lanes, l), r) in self.factor[(n + b) * n..].iter_mut().zip(left).zip(right) {
-                *lanes = [*l, *r];
-            }
+        if b == 0 {
+            return;
         }
+        let border = &mut self.border[..n * b];
         for k in 0..n {
-            let pivot = self.factor[k * n + k];
-            let inverse = pivot.map(|pivot| 1.0 / pivot.max(LEAST_PIVOT).sqrt());
-            self.factor[k * n + k] = inverse;
-            for (row, column) in self.factor.chunks_exact_mut(n).zip(&mut self.column).skip(k + 1) {
-                row[k] = times(row[k], inverse);
-                *column = row[k];
+            let (upper, rest) = border.split_at_mut((k + 1) * b);
+            let values = &mut upper[k * b..][..b];
+            for value in values.iter_mut() {
+                *value *= inverses[k];
             }
-            let column = &self.column[k + 1..n];
-            for (i, row) in self.factor.chunks_exact_mut(n).enumerate().skip(k + 1) {
-                let l = row[k];
-                for (x, c) in row[k + 1..n.min(i + 1)].iter_mut().zip(column) {
-                    *x = [x[0] - l[0] * c[0], x[1] - l[1] * c[1]];
+            let column = &columns[k * n..][..n];
+            for (entries, l) in rest.chunks_exact_mut(b).zip(&column[k + 1..]) {
+                for i in 0..b {
+                    entries[i] -= values[i] * *l;
                 }
             }
         }
-        for a in 0..border {
-            let row_a = &self.factor[(n + a) * n..][..n];
-            for b in 0..=a {
-                let row_b = &self.factor[(n + b) * n..][..n];
-                let sum = row_a.iter().zip(row_b).fold([0.0; 2], |s, (x, y)| [s[0] + x[0] * y[0], s[1] + x[1] * y[1]]);
-                self.values[(2 * n + a) * size + 2 * n + b] -= sum[0] + sum[1];
+        let size = 2 * n + b;
+        for i in 0..b {
+            for j in 0..=i {
+                let column = border.chunks_exact(b);
+                let sum = column.fold(Lanes::ZERO, |sum, values| sum + values[i] * values[j]);
+                self.values[(2 * n + i) * size + 2 * n + j] -= sum.reduce_add();
             }
         }
         factorise_dense(&mut self.values, size, 2 * n);
+    }
+
+    /// Copies the blocks to the dense matrix.
+    fn scatter(&mut self) {
+        let (n, size) = (self.block, self.size);
+        let mut put = |i: usize, j: usize, lanes: Lanes| {
+            let [left, right] = lanes.to_array();
+            let values = &mut self.values;
+            let i = if i < n { [i, n + i] } else { [n + i, n + i] };
+            (values[i[0] * size + j], values[i[1] * size + n + j]) = (left, right);
+        };
+        for (i, row) in self.rows.chunks_exact(n).enumerate() {
+            row[..=i].iter().enumerate().for_each(|(j, lanes)| put(i, j, *lanes));
+        }
+        for (j, column) in self.border.chunks_exact((size - 2 * n).max(1)).enumerate() {
+            column.iter().enumerate().for_each(|(i, lanes)| put(n + i, j, *lanes));
+        }
     }
 
     /// Solves L L' x = b in place.
@@ -111,48 +160,69 @@ impl Hessian {
             solve_upper(&self.values, self.size, 0, x);
             return;
         }
-        let (n, size) = (self.block, self.size);
+        match (self.block, self.size - 2 * self.block) {
+            (USUAL_JOINTS, FREE_OBJECT) => self.solve_arrow::<USUAL_JOINTS, FREE_OBJECT>(x),
+            (USUAL_JOINTS, 0) => self.solve_arrow::<USUAL_JOINTS, 0>(x),
+            _ => self.solve_arrow::<0, 0>(x),
+        }
+    }
+
+    fn solve_arrow<const N: usize, const B: usize>(&mut self, x: &mut [f64]) {
+        let (n, b) = if N > 0 { (N, B) } else { (self.block, self.size - 2 * self.block) };
+        let size = 2 * n + b;
         let (fingers, object) = x.split_at_mut(2 * n);
-        let y = &mut self.column;
-        for (i, y) in y[..n].iter_mut().enumerate() {
-            *y = [fingers[i], fingers[n + i]];
+        let y = &mut self.solution[..n];
+        for (i, y) in y.iter_mut().enumerate() {
+            *y = Lanes::new([fingers[i], fingers[n + i]]);
         }
         for k in 0..n {
-            y[k] = times(y[k], self.factor[k * n + k]);
-            let value = y[k];
-            for (y, row) in y[..n].iter_mut().zip(self.factor.chunks_exact(n)).skip(k + 1) {
-                let l = row[k];
-                *y = [y[0] - l[0] * value[0], y[1] - l[1] * value[1]];
+            let value = y[k] * self.inverses[k];
+            for (y, l) in y.iter_mut().zip(&self.columns[k * n..][..n]) {
+                *y -= value * *l;
+            }
+            y[k] = value;
+        }
+        if b > 0 {
+            let border = &self.border[..n * b];
+            for (column, y) in border.chunks_exact(b).zip(y.iter()) {
+                for (x, l) in object.iter_mut().zip(column) {
+                    *x -= (*l * *y).reduce_add();
+                }
+            }
+            solve_lower(&self.values, size, 2 * n, object);
+            solve_upper(&self.values, size, 2 * n, object);
+            for (column, y) in border.chunks_exact(b).zip(y.iter_mut()) {
+                for (x, l) in object.iter().zip(column) {
+                    *y -= *l * Lanes::splat(*x);
+                }
             }
         }
-        for (row, x) in self.factor[n * n..].chunks_exact(n).zip(object.iter_mut()) {
-            let sum = row.iter().zip(&y[..n]).fold([0.0; 2], |s, (l, y)| [s[0] + l[0] * y[0], s[1] + l[1] * y[1]]);
-            *x -= sum[0] + sum[1];
+        for k in (0..n).rev() {
+            let column = &self.columns[k * n..][..n];
+            let beyond = column.iter().zip(y.iter()).fold(Lanes::ZERO, |sum, (l, y)| sum + *l * *y);
+            // The column's own entry is zero.
+            y[k] = (y[k] - beyond) * self.inverses[k];
         }
-        solve_lower(&self.values, size, 2 * n, object);
-        solve_upper(&self.values, size, 2 * n, object);
-        for (row, x) in self.factor[n * n..].chunks_exact(n).zip(object.iter()) {
-            for (y, l) in y[..n].iter_mut().zip(row) {
-                *y = [y[0] - l[0] * x, y[1] - l[1] * x];
-            }
-        }
-        for i in (0..n).rev() {
-            let row = &self.factor[i * n..][..=i];
-            y[i] = times(y[i], row[i]);
-            let value = y[i];
-            for (y, l) in y[..i].iter_mut().zip(row) {
-                *y = [y[0] - l[0] * value[0], y[1] - l[1] * value[1]];
-            }
-        }
-        for (i, y) in y[..n].iter().enumerate() {
-            (fingers[i], fingers[n + i]) = (y[0], y[1]);
+        for (i, y) in y.iter().enumerate() {
+            [fingers[i], fingers[n + i]] = y.to_array();
         }
     }
 }
 
+/// Product of the N x N matrices of both fingers with the rates of their joints: `put` takes each entry of it. Leaves the
+/// rates in `factors`.
 #[inline]
-fn times(a: Lanes, b: Lanes) -> Lanes {
-    [a[0] * b[0], a[1] * b[1]]
+pub(super) fn multiply(matrices: &[Lanes], rates: &[f64], factors: &mut [Lanes], mut put: impl FnMut(usize, f64)) {
+    let n = factors.len();
+    for (i, factor) in factors.iter_mut().enumerate() {
+        *factor = Lanes::new([rates[i], rates[n + i]]);
+    }
+    for (i, row) in matrices.chunks_exact(n).enumerate() {
+        let sum = row.iter().zip(factors.iter()).fold(Lanes::ZERO, |sum, (a, x)| sum + *a * *x);
+        let [left, right] = sum.to_array();
+        put(i, left);
+        put(n + i, right);
+    }
 }
 
 /// Factorises the part of a matrix from row and column `from` on.
@@ -208,8 +278,12 @@ mod tests {
             matrix.couple(coupled);
             for (i, row) in dense.iter().enumerate() {
                 for (j, value) in row.iter().enumerate().take(i + 1) {
-                    if coupled || i == 4 || i / 2 == j / 2 {
-                        *matrix.at_mut(i, j) = *value;
+                    match (i, j) {
+                        (4, 4) => *matrix.at_mut(4, 4) = *value,
+                        (4, 0 | 1) => matrix.border_mut(j)[0] = Lanes::new([*value, dense[4][j + 2]]),
+                        (0 | 1, _) => matrix.row_mut(i)[j] = Lanes::new([*value, dense[i + 2][j + 2]]),
+                        (2 | 3, 0 | 1) if coupled => *matrix.at_mut(i, j) = *value,
+                        _ => (),
                     }
                 }
             }

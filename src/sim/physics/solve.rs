@@ -12,8 +12,9 @@
 
 use super::contact::{Acting, Against, Contact};
 use super::coupling::{fill_coupling, prepare_coupling};
+use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
-use super::workspace::{Block, PerLink, PlanarBlock, Spatial, Workspace};
+use super::workspace::{Block, LinkBlocks, Planar, PlanarBlock, Spatial, Workspace};
 use glam::DVec3;
 
 /// Statistics of a minimisation.
@@ -49,6 +50,9 @@ impl Unbalanced {
 /// A gradient this small compared with nothing at all counts as zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 
+/// A gradient this small, as a share of the forces, gives slip limits that are better than what lagging costs them.
+const ENOUGH_FOR_LIMITS: f64 = 1e-3;
+
 /// Minimises over `velocity`, starting from it. Needs the workspace's dynamics, and contacts with their relative
 /// velocities at the start; leaves those at the solution.
 pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
@@ -66,11 +70,11 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
             report.unbalanced = Some(farthest_from_balance(model, ws, allowed));
             return report;
         }
-        if size.gradient <= allowed {
-            if passes == model.relag_passes {
-                report.converged = true;
-                return report;
-            }
+        if size.gradient <= allowed && passes == model.relag_passes {
+            report.converged = true;
+            return report;
+        }
+        if size.gradient <= allowed.max(ENOUGH_FOR_LIMITS * size.forces) && passes < model.relag_passes {
             passes += 1;
             let step = ws.step;
             for contact in &mut ws.contacts {
@@ -120,13 +124,7 @@ fn multiply_by_a(model: &PhysicsModel, ws: &mut Workspace, x: &[f64], which: Pro
         Product::OfVelocity => &mut ws.a_velocity,
         Product::OfDirection => &mut ws.a_direction,
     };
-    for finger in 0..2 {
-        let matrix = &ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
-        let part = &x[finger * n..(finger + 1) * n];
-        for (row, out) in matrix.chunks_exact(n).zip(&mut out[finger * n..(finger + 1) * n]) {
-            *out = row.iter().zip(part).map(|(a, b)| a * b).sum();
-        }
-    }
+    multiply(&ws.finger_matrix, &x[..2 * n], &mut ws.rates, |k, value| out[k] = value);
     if let Some(body) = model.free_body() {
         let linear = object_part(x, 2 * n).linear * body.mass;
         let angular = ws.body_inertia * object_part(x, 2 * n).angular;
@@ -170,13 +168,13 @@ pub(super) fn relative_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Work
 /// Velocity of each segment for joint rates `x`, about the reference point.
 pub(super) fn segment_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Workspace) {
     let n = model.chain.joints;
-    for finger in 0..2 {
-        let mut velocity = Spatial::default();
-        ws.spatial[finger * (n + 1)] = velocity;
-        for i in 0..n {
-            velocity = velocity.plus(&ws.columns[finger * n + i].scaled(x[finger * n + i]));
-            ws.spatial[finger * (n + 1) + i + 1] = velocity;
-        }
+    let (left, right) = ws.spatial.split_at_mut(n + 1);
+    let mut velocity = Planar::default();
+    (left[0], right[0]) = (Spatial::default(), Spatial::default());
+    for (i, column) in ws.columns.iter().enumerate() {
+        let rates = Lanes::new([x[i], x[n + i]]);
+        velocity = velocity.plus(&Planar(column.0.map(|lanes| lanes * rates)));
+        (left[i + 1], right[i + 1]) = (velocity.of(0), velocity.of(1));
     }
 }
 
@@ -188,52 +186,44 @@ pub(super) struct Size {
 
 pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
     let n = model.chain.joints;
-    let mut on_object = Spatial::default();
-    for wrench in &mut ws.wrenches {
-        *wrench = PerLink::all(Spatial::default());
-    }
+    let (mut on_object, mut by_fingers) = (Spatial::default(), [Spatial::default(); 2]);
+    ws.loads.fill([Planar::default(); 2]);
+    let place = |link: u32| (link as usize / (n + 1), link as usize % (n + 1));
     for contact in &ws.contacts {
         let linear = contact.gradient(ws.step, contact.velocity);
-        let wrench = Spatial { linear, angular: contact.arm.cross(linear) };
-        match (contact.acting, contact.against) {
-            (Acting::Segment(link), Against::Object) => {
-                let sum = &mut ws.wrenches[link as usize].object;
-                *sum = sum.plus(&wrench);
+        let load = Spatial { linear, angular: contact.arm.cross(linear) };
+        match contact.acting {
+            Acting::Segment(link) => {
+                let (finger, segment) = place(link);
+                ws.loads[segment][0].add_to(finger, &load);
+                match contact.against {
+                    Against::Object => by_fingers[finger] = by_fingers[finger].plus(&load),
+                    Against::World => (),
+                    Against::Finger(other) => {
+                        let (finger, segment) = place(other);
+                        ws.loads[segment][1].add_to(finger, &load.scaled(-1.0));
+                    }
+                }
             }
-            (Acting::Segment(link), Against::World) => {
-                let sum = &mut ws.wrenches[link as usize].world;
-                *sum = sum.plus(&wrench);
-            }
-            (Acting::Segment(link), Against::Finger(other)) => {
-                let sum = &mut ws.wrenches[link as usize].world;
-                *sum = sum.plus(&wrench);
-                let back = &mut ws.wrenches[other as usize].met;
-                *back = back.plus(&wrench.scaled(-1.0));
-            }
-            (Acting::Object, _) => on_object = on_object.plus(&wrench),
+            Acting::Object => on_object = on_object.plus(&load),
         }
     }
+    on_object = on_object.plus(&by_fingers[0].plus(&by_fingers[1]).scaled(-1.0));
     for ((g, a), r) in ws.gradient.iter_mut().zip(&ws.a_velocity).zip(&ws.rhs) {
         *g = a - r;
     }
     let mut contact_size = 0.0;
-    for finger in 0..2 {
-        let mut beyond = Spatial::default();
-        for i in (0..n).rev() {
-            let k = finger * n + i;
-            let link = &ws.wrenches[finger * (n + 1) + i + 1];
-            beyond = beyond.plus(&link.object).plus(&link.world);
-            if ws.fingers_meet {
-                beyond = beyond.plus(&link.met);
-            }
-            on_object = on_object.plus(&link.object.scaled(-1.0));
+    let mut beyond = Planar::default();
+    for i in (0..n).rev() {
+        let [own, met] = &ws.loads[i + 1];
+        beyond = beyond.plus(own).plus(met);
+        let from_contacts = ws.columns[i].dot(&beyond).to_array();
+        for (k, from_contacts) in [i, n + i].into_iter().zip(from_contacts) {
             let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
-            let from_contacts = ws.columns[k].dot(&beyond) + limit;
-            ws.gradient[k] += from_contacts;
-            contact_size += from_contacts * from_contacts * ws.weights[k];
+            let load = from_contacts + limit;
+            ws.gradient[k] += load;
+            contact_size += load * load * ws.weights[k];
         }
-        // The rigid base half carries contacts too, which move the object only.
-        on_object = on_object.plus(&ws.wrenches[finger * (n + 1)].object.scaled(-1.0));
     }
     if model.free_body().is_some() {
         let wrench = [on_object.linear.to_array(), on_object.angular.to_array()];
@@ -267,7 +257,7 @@ fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
     let n = model.chain.joints;
     if k < 2 * n {
         let (finger, i) = (k / n, k % n);
-        ws.finger_matrix[finger * n * n + i * n + i]
+        ws.finger_matrix[i * n + i].as_array()[finger]
     } else {
         let mass = model.body.as_ref().map_or(1.0, |body| body.mass);
         match k - 2 * n {
@@ -283,38 +273,35 @@ fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Work
     let on_object = sum_blocks(ws);
     let n = model.chain.joints;
     let couples = model.free_body().is_some();
-    for finger in 0..2 {
-        let mut beyond = PlanarBlock::default();
-        let mut beyond_object = Block::ZERO;
-        for i in (0..n).rev() {
-            let k = finger * n + i;
+    let h = ws.step.h;
+    let mut beyond = PlanarBlock::default();
+    let mut beyond_object = [Block::ZERO; 2];
+    for i in (0..n).rev() {
+        for (finger, beyond_object) in beyond_object.iter_mut().enumerate() {
             let link = finger * (n + 1) + i + 1;
             if ws.loaded[link] {
-                let block = &ws.blocks[link];
-                beyond.add(&block.object);
-                beyond.add(&block.world);
+                let LinkBlocks { object, world, met } = &ws.blocks[link];
+                beyond.add_to(finger, object);
+                beyond.add_to(finger, world);
                 if ws.fingers_meet {
-                    beyond.add(&block.met);
+                    beyond.add_to(finger, met);
                 }
+                beyond_object.add(object);
             }
-            let column = &ws.columns[k];
-            let moved = beyond.times(column);
-            let row = ws.hessian.row_mut(k, finger * n);
-            let matrix = &ws.finger_matrix[finger * n * n + i * n..][..=i];
-            let columns = &ws.columns[finger * n..][..=i];
-            for ((row, matrix), column) in row.iter_mut().zip(matrix).zip(columns) {
-                *row = matrix + (column.linear.x * moved[0] + column.linear.z * moved[1] + column.angular.y * moved[2]);
-            }
-            row[i] += ws.step.h * ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).1;
-            if couples {
-                if ws.loaded[link] {
-                    beyond_object.add(&ws.blocks[link].object);
-                }
-                let moved = beyond_object.times(column);
-                let column = [moved.linear.to_array(), moved.angular.to_array()];
-                for (a, value) in column.iter().flatten().enumerate() {
-                    *ws.hessian.at_mut(2 * n + a, k) = -value;
-                }
+        }
+        let column = &ws.columns[i];
+        let moved = beyond.times(column);
+        let row = ws.hessian.row_mut(i);
+        let matrix = &ws.finger_matrix[i * n..][..=i];
+        for ((row, matrix), column) in row.iter_mut().zip(matrix).zip(&ws.columns) {
+            *row = *matrix + column.dot(&moved);
+        }
+        let limit = |k: usize| h * h * model.chain.limit_torque(q[k] + h * velocity[k]).1;
+        row[i] += Lanes::new([limit(i), limit(n + i)]);
+        if couples {
+            let [left, right] = [0, 1].map(|finger| beyond_object[finger].times(&column.of(finger)).to_array());
+            for ((entry, left), right) in ws.hessian.border_mut(i).iter_mut().zip(left).zip(right) {
+                *entry = Lanes::new([-left, -right]);
             }
         }
     }
@@ -337,7 +324,7 @@ fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Work
 fn sum_blocks(ws: &mut Workspace) -> Block {
     for (block, loaded) in ws.blocks.iter_mut().zip(&mut ws.loaded) {
         if std::mem::take(loaded) {
-            *block = PerLink::all(Block::ZERO);
+            *block = LinkBlocks::ZERO;
         }
     }
     let mut on_object = Block::ZERO;

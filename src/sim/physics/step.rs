@@ -3,10 +3,11 @@
 use super::chain::turning;
 use super::contact::Acting;
 use super::detect::{detect, segment_axes};
+use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
 use super::solve::{Product, Unbalanced, minimise, relative_velocities, segment_velocities};
 use super::state::State;
-use super::workspace::{Spatial, Workspace};
+use super::workspace::Workspace;
 use glam::{DQuat, DVec2, DVec3};
 
 /// Statistics of a step.
@@ -155,11 +156,9 @@ fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Works
         let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
         model.chain.bend(&ws.q[finger * n..(finger + 1) * n], segments);
         // Turning "along" towards "inward" is a rotation about along x inward = -sign y.
-        let angular = DVec3::new(0.0, -plane.sign, 0.0);
-        for (i, segment) in segments.iter().skip(1).enumerate() {
-            let joint = plane.point(segment.start, 0.0);
-            let linear = angular.cross(ws.reference - joint);
-            ws.columns[finger * n + i] = Spatial { linear, angular };
+        for (column, segment) in ws.columns.iter_mut().zip(segments.iter().skip(1)) {
+            let arm = ws.reference - plane.point(segment.start, 0.0);
+            column.set(finger, [-plane.sign * arm.z, plane.sign * arm.x, -plane.sign]);
         }
     }
 }
@@ -167,36 +166,40 @@ fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Works
 /// Fills A and r.
 pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     let (n, h) = (model.chain.joints, ws.step.h);
-    for finger in 0..2 {
+    let (left, right) = ws.segments.split_at(n + 1);
+    if model.finger_inertia {
+        model.chain.inertia([left, right], &mut ws.finger_matrix);
+    } else {
+        ws.finger_matrix.fill(Lanes::ZERO);
+    }
+    let mut diagonal = h * model.chain.damping + h * h * model.chain.stiffness;
+    for (finger, segments) in [left, right].into_iter().enumerate() {
         let joints = finger * n..(finger + 1) * n;
-        let segments = &ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
-        let matrix = &mut ws.finger_matrix[finger * n * n..(finger + 1) * n * n];
         let sign = model.planes[finger].sign;
         let in_plane = |v: DVec3| DVec2::new(sign * v.x, -v.z);
         let gravity = in_plane(model.finger_gravity);
         let pull = in_plane(drive.tip_force[finger]);
         let tip = segments[n].point(model.chain.lengths[n], 0.0);
-        let (q, qd) = (&state.q[joints.clone()], &state.velocity[joints.clone()]);
-        let rates = if model.finger_inertia {
-            model.chain.inertia(segments, matrix);
-            qd
-        } else {
-            matrix.fill(0.0);
-            &ws.still
-        };
+        let q = &state.q[joints.clone()];
+        let rates = if model.finger_inertia { &state.velocity[joints.clone()] } else { &ws.still };
         model.chain.bias(segments, (rates, h), gravity, &mut ws.accelerations, &mut ws.bias);
         let rhs = &mut ws.rhs[joints.clone()];
-        for (i, row) in matrix.chunks_exact(n).enumerate() {
-            let momentum: f64 = row.iter().zip(qd).map(|(a, b)| a * b).sum();
-            let load = drive.torque + turning(tip - segments[i + 1].start, pull);
-            rhs[i] = momentum + h * (load - model.chain.stiffness * q[i] - ws.bias[i]);
-        }
         for i in 0..n {
-            matrix[i * n + i] += h * model.chain.damping + h * h * model.chain.stiffness;
+            let load = drive.torque + turning(tip - segments[i + 1].start, pull);
+            rhs[i] = h * (load - model.chain.stiffness * q[i] - ws.bias[i]);
         }
         if let Some(relaxation) = &model.relaxation {
-            relaxation.soften(h, q, &state.crept[joints], matrix, rhs);
+            let lost = relaxation.soften(h, q, &state.crept[joints], rhs);
+            if finger == 1 {
+                diagonal -= lost;
+            }
         }
+    }
+    if model.finger_inertia {
+        multiply(&ws.finger_matrix, &state.velocity[..2 * n], &mut ws.rates, |k, momentum| ws.rhs[k] += momentum);
+    }
+    for entry in ws.finger_matrix.iter_mut().step_by(n + 1) {
+        *entry += diagonal;
     }
     if let Some(body) = model.free_body() {
         let (linear, angular) = state.body_velocity(model);
@@ -219,10 +222,12 @@ pub(super) fn remember_contacts(model: &PhysicsModel, state: &mut State, ws: &Wo
     state.lag_h = ws.step.h;
     let (mut mismatch, mut total) = (0.0, 0.0);
     for contact in &ws.contacts {
-        let shear = match contact.acting {
-            Acting::Segment(link) => segment_axes_of(model, ws, link).transpose() * contact.final_shear(ws.step),
-            Acting::Object => contact.final_shear(ws.step),
-        };
+        let mut shear = contact.final_shear(ws.step);
+        if let Acting::Segment(link) = contact.acting
+            && shear != DVec3::ZERO
+        {
+            shear = segment_axes_of(model, ws, link).transpose() * shear;
+        }
         let v_n = contact.normal.dot(contact.velocity);
         state.touched.remember(contact.site, shear, contact.normal_impulse(ws.step, v_n).0);
         let (missed, truth) = contact.lag_mismatch(ws.step);

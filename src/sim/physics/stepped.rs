@@ -4,6 +4,7 @@
 use super::balance::static_residual;
 use super::contact::{Acting, Against};
 use super::explicit::explicit_step;
+use super::hessian::{Hessian, Lanes};
 use super::integrator::Surroundings;
 use super::model::PhysicsModel;
 use super::placement::Placement;
@@ -211,18 +212,19 @@ impl SteppedScene {
         let n = self.model.chain.joints;
         let mut segments = vec![SegmentPose::default(); n + 1];
         self.model.chain.bend(&vec![0.0; n], &mut segments);
-        let mut inertia = vec![0.0; n * n];
-        self.model.chain.inertia(&segments, &mut inertia);
-        let mut factor = super::hessian::Hessian::new(0, n);
+        let mut inertia = vec![Lanes::ZERO; n * n];
+        self.model.chain.inertia([&segments, &segments], &mut inertia);
+        let mut factor = Hessian::new(n, 0);
         for (i, row) in inertia.chunks_exact(n).enumerate() {
-            factor.row_mut(i, 0).copy_from_slice(&row[..=i]);
+            factor.row_mut(i).copy_from_slice(&row[..=i]);
         }
         factor.factorise();
-        let mut x: Vec<f64> = (0..n).map(|i| if i % 2 == 0 { 1.0 } else { -0.9 }).collect();
+        // Both fingers alike.
+        let mut x: Vec<f64> = (0..2 * n).map(|k| if (k % n).is_multiple_of(2) { 1.0 } else { -0.9 }).collect();
         let mut largest = 0.0;
         for _ in 0..300 {
             factor.solve(&mut x);
-            largest = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            largest = x[..n].iter().map(|x| x * x).sum::<f64>().sqrt();
             x.iter_mut().for_each(|x| *x /= largest);
         }
         (self.model.chain.stiffness * largest).sqrt()

@@ -2,7 +2,7 @@
 
 use super::clearances::Clearances;
 use super::contact::{Contact, ContactStep};
-use super::hessian::Hessian;
+use super::hessian::{Hessian, Lanes};
 use super::model::PhysicsModel;
 use crate::gripper::SegmentPose;
 use glam::{DMat3, DVec2, DVec3};
@@ -22,6 +22,11 @@ impl Spatial {
 
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self { linear: self.linear + other.linear, angular: self.angular + other.angular }
+    }
+
+    pub(super) fn to_array(self) -> [f64; 6] {
+        let ([a, b, c], [d, e, f]) = (self.linear.to_array(), self.angular.to_array());
+        [a, b, c, d, e, f]
     }
 
     /// Power of a wrench on a body with this velocity.
@@ -70,55 +75,95 @@ impl Block {
     }
 }
 
-/// The numbers of a block that joints see: they move in the plane y = 0 and turn about y.
+/// Motion of both fingers in the plane y = 0, or a load on them: along x, along z, about y.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Planar(pub(super) [Lanes; 3]);
+
+impl Planar {
+    #[inline]
+    pub(super) fn set(&mut self, finger: usize, [x, z, turn]: [f64; 3]) {
+        for (lanes, value) in self.0.iter_mut().zip([x, z, turn]) {
+            lanes.as_mut_array()[finger] = value;
+        }
+    }
+
+    /// Of one finger, in space.
+    #[inline]
+    pub(super) fn of(&self, finger: usize) -> Spatial {
+        let [x, z, turn] = self.0.map(|lanes| lanes.to_array()[finger]);
+        Spatial { linear: DVec3::new(x, 0.0, z), angular: DVec3::new(0.0, turn, 0.0) }
+    }
+
+    /// Adds a load in space on one finger, less what the joints do not see.
+    #[inline]
+    pub(super) fn add_to(&mut self, finger: usize, load: &Spatial) {
+        for (lanes, value) in self.0.iter_mut().zip([load.linear.x, load.linear.z, load.angular.y]) {
+            lanes.as_mut_array()[finger] += value;
+        }
+    }
+
+    #[inline]
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        Self([self.0[0] + other.0[0], self.0[1] + other.0[1], self.0[2] + other.0[2]])
+    }
+
+    /// Power of a load at this motion.
+    #[inline]
+    pub(super) fn dot(&self, load: &Self) -> Lanes {
+        self.0[0] * load.0[0] + self.0[1] * load.0[1] + self.0[2] * load.0[2]
+    }
+}
+
+/// The numbers of a block of each finger that joints see.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PlanarBlock {
-    xx: f64,
-    xz: f64,
-    zz: f64,
-    yx: f64,
-    yz: f64,
-    yy: f64,
+    xx: Lanes,
+    xz: Lanes,
+    zz: Lanes,
+    yx: Lanes,
+    yz: Lanes,
+    yy: Lanes,
 }
 
 impl PlanarBlock {
     #[inline]
-    pub(super) fn add(&mut self, block: &Block) {
-        self.xx += block.linear.x_axis.x;
-        self.xz += block.linear.x_axis.z;
-        self.zz += block.linear.z_axis.z;
-        self.yx += block.mixed.x_axis.y;
-        self.yz += block.mixed.z_axis.y;
-        self.yy += block.angular.y_axis.y;
+    pub(super) fn add_to(&mut self, finger: usize, block: &Block) {
+        let Self { xx, xz, zz, yx, yz, yy } = self;
+        for (lanes, value) in [xx, xz, zz, yx, yz, yy].into_iter().zip([
+            block.linear.x_axis.x,
+            block.linear.x_axis.z,
+            block.linear.z_axis.z,
+            block.mixed.x_axis.y,
+            block.mixed.z_axis.y,
+            block.angular.y_axis.y,
+        ]) {
+            lanes.as_mut_array()[finger] += value;
+        }
     }
 
-    /// Forces along x and z and the torque about y.
     #[inline]
-    pub(super) fn times(&self, x: &Spatial) -> [f64; 3] {
-        let (lx, lz, ay) = (x.linear.x, x.linear.z, x.angular.y);
-        [
-            self.xx * lx + self.xz * lz + self.yx * ay,
-            self.xz * lx + self.zz * lz + self.yz * ay,
-            self.yx * lx + self.yz * lz + self.yy * ay,
-        ]
+    pub(super) fn times(&self, motion: &Planar) -> Planar {
+        let [x, z, turn] = motion.0;
+        Planar([
+            self.xx * x + self.xz * z + self.yx * turn,
+            self.xz * x + self.zz * z + self.yz * turn,
+            self.yx * x + self.yz * z + self.yy * turn,
+        ])
     }
 }
 
-/// Sums over the contacts of one segment: against the object, which couples to it, against the world or the other
-/// finger, and from the other finger.
+/// Hessians summed over the contacts of one segment: against the object, which couples to it, against the world or the
+/// other finger, and from the other finger.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PerLink<T> {
-    pub(super) object: T,
-    pub(super) world: T,
-    /// Found by the other finger's contact springs. Kept apart, so that both fingers add up alike and mirrored scenes
-    /// stay so.
-    pub(super) met: T,
+pub(super) struct LinkBlocks {
+    pub(super) object: Block,
+    pub(super) world: Block,
+    /// Found by the other finger's contact springs; kept apart as in [`Workspace::loads`].
+    pub(super) met: Block,
 }
 
-impl<T: Copy> PerLink<T> {
-    pub(super) fn all(value: T) -> Self {
-        Self { object: value, world: value, met: value }
-    }
+impl LinkBlocks {
+    pub(super) const ZERO: Self = Self { object: Block::ZERO, world: Block::ZERO, met: Block::ZERO };
 }
 
 /// Scratch memory; see the fields for what each stage leaves.
@@ -134,8 +179,8 @@ pub struct Workspace {
     pub(super) segments: Vec<SegmentPose>,
     /// Point about which spatial velocities are taken: the object's centre of mass (m).
     pub(super) reference: DVec3,
-    /// Velocity of everything beyond a joint per unit of its rate, about the reference.
-    pub(super) columns: Vec<Spatial>,
+    /// Velocity of everything beyond a joint of each finger per unit of its rate, about the reference.
+    pub(super) columns: Vec<Planar>,
     /// Velocity of each segment.
     pub(super) spatial: Vec<Spatial>,
     // dynamics
@@ -143,8 +188,10 @@ pub struct Workspace {
     pub(super) bias: Vec<f64>,
     /// Rates of a finger without inertia, as its bias forces see them: zero.
     pub(super) still: Vec<f64>,
-    /// A = M + h C + h² K of both fingers, one N x N matrix after the other.
-    pub(super) finger_matrix: Vec<f64>,
+    /// Joint rates of both fingers, as factors of a product.
+    pub(super) rates: Vec<Lanes>,
+    /// A = M + h C + h² K of both fingers, N x N.
+    pub(super) finger_matrix: Vec<Lanes>,
     /// Inertia of the object in the gripper frame (kg m²).
     pub(super) body_inertia: DMat3,
     /// Momentum and known impulses, r: without contact A v = r.
@@ -154,8 +201,10 @@ pub struct Workspace {
     pub(super) contacts: Vec<Contact>,
     /// True while any of them is between the fingers.
     pub(super) fingers_meet: bool,
-    pub(super) wrenches: Vec<PerLink<Spatial>>,
-    pub(super) blocks: Vec<PerLink<Block>>,
+    /// Load of contacts on each of the N + 1 segments of both fingers, found by its own contact springs and by those of
+    /// the other finger. Kept apart, so that both fingers add up alike and mirrored scenes stay so.
+    pub(super) loads: Vec<[Planar; 2]>,
+    pub(super) blocks: Vec<LinkBlocks>,
     /// Segments whose blocks are not zero.
     pub(super) loaded: Vec<bool>,
     /// One over the diagonal of A.
@@ -181,19 +230,20 @@ impl Workspace {
             body: Pose::IDENTITY,
             segments: vec![SegmentPose::default(); links],
             reference: DVec3::ZERO,
-            columns: vec![Spatial::default(); 2 * n],
+            columns: vec![Planar::default(); n],
             spatial: vec![Spatial::default(); links],
             accelerations: vec![DVec2::ZERO; n + 1],
             bias: vec![0.0; n],
             still: vec![0.0; n],
-            finger_matrix: vec![0.0; 2 * n * n],
+            rates: vec![Lanes::ZERO; n],
+            finger_matrix: vec![Lanes::ZERO; n * n],
             body_inertia: DMat3::ZERO,
             rhs: vec![0.0; unknowns],
             clearances: Clearances::new(model),
             contacts: Vec::with_capacity(model.sites()),
             fingers_meet: false,
-            wrenches: vec![PerLink::all(Spatial::default()); links],
-            blocks: vec![PerLink::all(Block::ZERO); links],
+            loads: vec![[Planar::default(); 2]; n + 1],
+            blocks: vec![LinkBlocks::ZERO; links],
             loaded: vec![false; links],
             weights: vec![0.0; unknowns],
             gradient: vec![0.0; unknowns],

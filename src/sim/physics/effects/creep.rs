@@ -61,14 +61,13 @@ impl Relaxation {
     }
 
     /// Turns joints that were gathered with their whole stiffness k into joints that creep: `rhs` loses
-    /// h s k (a e - q), each diagonal entry of the N x N `matrix` h s k (h - b).
-    pub(in crate::physics) fn soften(&self, h: f64, q: &[f64], crept: &[f64], matrix: &mut [f64], rhs: &mut [f64]) {
+    /// h s k (a e - q). Returns what each diagonal entry of the matrix loses, h s k (h - b).
+    pub(in crate::physics) fn soften(&self, h: f64, q: &[f64], crept: &[f64], rhs: &mut [f64]) -> f64 {
         let (a, b) = self.course(h);
-        let n = q.len();
-        for i in 0..n {
-            rhs[i] += h * self.stiffness * (q[i] - a * (q[i] - crept[i]));
-            matrix[i * n + i] -= h * self.stiffness * (h - b);
+        for ((rhs, q), crept) in rhs.iter_mut().zip(q).zip(crept) {
+            *rhs += h * self.stiffness * (q - a * (q - crept));
         }
+        h * self.stiffness * (h - b)
     }
 
     /// Angle of the dashpot (rad) after a step that began at joint angle `q` and moved with `rate`.
@@ -108,9 +107,8 @@ mod tests {
             let finger = Finger { creep_share: share, creep_time: time, ..Finger::default() };
             let k = finger.joint_stiffness();
             for h in [1e-6, 1e-3, 1.0, 1e3] {
-                let mut matrix = [h * h * k];
-                Relaxation::new(&finger).soften(h, &[0.0], &[0.0], &mut matrix, &mut [0.0]);
-                assert!(matrix[0] >= h * h * k * (1.0 - share) * (1.0 - 1e-12), "share {share}, time {time}, h {h}");
+                let diagonal = h * h * k - Relaxation::new(&finger).soften(h, &[0.0], &[0.0], &mut [0.0]);
+                assert!(diagonal >= h * h * k * (1.0 - share) * (1.0 - 1e-12), "share {share}, time {time}, h {h}");
             }
         }
     }
