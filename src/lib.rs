@@ -14,7 +14,7 @@
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` |
 //! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` |
 //! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` |
-//! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file) | `geometry` |
+//! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` |
 //! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` |
 //! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `learn` `device` `store` `lab` `render` |
 //!
@@ -73,6 +73,7 @@
 //! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
 //! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
+//! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
 //!
 //! # What is deliberately absent

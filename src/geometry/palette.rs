@@ -198,6 +198,37 @@ impl Trace {
     }
 }
 
+/// Colour of a series of a figure, by its number; from [`SERIES_COLOURS`] on they repeat.
+pub const fn series_colour(number: usize, theme: Theme) -> Rgb {
+    match theme {
+        Theme::Dark => SERIES_DARK[number % SERIES_COLOURS],
+        Theme::Light => SERIES_LIGHT[number % SERIES_COLOURS],
+    }
+}
+
+/// Number of different series colours.
+pub const SERIES_COLOURS: usize = 7;
+
+/// After Okabe and Ito: blue, vermilion, green, purple, amber, sky, grey; shifted as those of [`Trace`].
+const SERIES_DARK: [Rgb; SERIES_COLOURS] = [
+    Rgb(61, 155, 214),
+    Rgb(230, 112, 38),
+    Rgb(0, 158, 115),
+    Rgb(214, 132, 178),
+    Rgb(230, 159, 0),
+    Rgb(120, 200, 245),
+    Rgb(152, 162, 174),
+];
+const SERIES_LIGHT: [Rgb; SERIES_COLOURS] = [
+    Rgb(0, 114, 178),
+    Rgb(213, 94, 0),
+    Rgb(0, 128, 93),
+    Rgb(174, 82, 134),
+    Rgb(168, 112, 0),
+    Rgb(43, 140, 196),
+    Rgb(90, 98, 108),
+];
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,6 +266,10 @@ mod tests {
             for trace in Trace::ALL {
                 let contrast = trace.colour(theme).contrast(c.background);
                 assert!(contrast >= 3.0, "{theme:?} {trace:?}: {contrast}");
+            }
+            for number in 0..SERIES_COLOURS {
+                let contrast = series_colour(number, theme).contrast(c.background);
+                assert!(contrast >= 3.0, "{theme:?} series {number}: {contrast}");
             }
         }
     }

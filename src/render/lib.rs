@@ -16,6 +16,7 @@
 //! | 3 | `passes` | one file for each kind of item, beside its shader of the same name |
 //! | 4 | `renderer` | draws a list into its own texture ([`Renderer`]) |
 //! | 5 | `picture` | pixels in memory, PNG ([`Picture`]) |
+//! | 6 | `figure` | figures with axes as SVG and as pixels ([`figure_svg`], [`figure_picture`]), without a graphics card |
 //!
 //! # Example
 //!
@@ -32,6 +33,7 @@
 //! ```
 
 mod blit;
+mod figure;
 mod frame;
 mod gpu;
 mod passes;
@@ -43,6 +45,7 @@ mod targets;
 mod text;
 
 pub use blit::Blit;
+pub use figure::{FigureError, figure_picture, figure_svg};
 pub use gpu::{DriverChoice, Gpu, GpuError, describe_adapter, wanted_limits};
 pub use picture::{Picture, PictureError};
 pub use renderer::Renderer;

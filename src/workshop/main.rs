@@ -5,6 +5,7 @@
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
+//! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README, from the stored results in `assets/studies` |
 //! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
 //!
 //! Dimensions are real-world ones, chosen to match the names of the paper's objects, whose sizes it does not publish.
@@ -19,10 +20,11 @@ mod tools;
 
 use clap::{Parser, Subcommand};
 use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
+use palpate_lab::study::generated_sections;
 use palpate_sim::objects::{ShapeClass, SizeClass};
 use palpate_store::Store;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tools::Parts;
 
 /// How the physics sees an object.
@@ -83,6 +85,8 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
+    /// Write the tables of the manual and the README from the stored results of studies.
+    Tables,
     /// Feed random bytes to the protocol decoder and check its events.
     Fuzz {
         /// Duration (s).
@@ -108,7 +112,19 @@ fn main() -> Result<(), Failure> {
             report(format_args!("{count} thumbnails in {}", out.display()));
         }
         Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
+        Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,
+    }
+    Ok(())
+}
+
+fn write_tables() -> Result<(), Failure> {
+    for section in generated_sections()? {
+        let path = Path::new(section.document);
+        let without = || format!("\"{}\" has no section \"{}\"", section.document, section.name);
+        let text = section.put_into(&std::fs::read_to_string(path)?).ok_or_else(without)?;
+        std::fs::write(path, text)?;
+        report(format_args!("{} in {}", section.name, section.document));
     }
     Ok(())
 }

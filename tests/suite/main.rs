@@ -19,6 +19,7 @@
 //! - `training`: training on labelled trials of the board, in the window.
 //! - `desk`: a labelling afternoon in the window, by keys alone.
 //! - `one_path`: the same fault recorded from the command line and from the window.
+//! - `studies`: stored results of studies, and what is made from them.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -56,5 +57,6 @@ mod scripted;
 mod serial;
 mod store;
 mod streams;
+mod studies;
 mod training;
 mod trust;

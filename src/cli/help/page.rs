@@ -59,7 +59,9 @@ fn blocks(markdown: &str) -> Vec<Block> {
     let mut lines = markdown.lines().peekable();
     let mut starts_block = true;
     while let Some(line) = lines.next() {
-        if line.starts_with("```") {
+        if line.starts_with("<!--") {
+            // Marks a generated section.
+        } else if line.starts_with("```") {
             blocks.push(Block::Code(lines.by_ref().take_while(|l| !l.starts_with("```")).map(str::to_owned).collect()));
         } else if line.starts_with('#') {
             blocks.push(Block::Heading(line.trim_start_matches('#').trim().to_owned()));
@@ -176,6 +178,7 @@ palpate grasp
 | a | b |
 |---|---|
 | long cell of several words | x |
+<!-- comment -->
 ";
 
     #[test]

@@ -4,9 +4,11 @@
 //! ordinary screen.
 
 mod camera;
+mod figure;
 mod overlay;
 
 pub use camera::{Camera, StandardView};
+pub use figure::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 pub use overlay::{Align, Overlay, Shape2};
 
 use crate::SurfaceMesh;

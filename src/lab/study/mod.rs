@@ -4,11 +4,14 @@ mod accuracy_cost;
 mod comparison;
 mod effects;
 mod finger_fit;
+mod generated;
 mod labelled_training;
 mod network_cost;
 mod physics_cost;
+mod result_file;
 mod search;
 pub mod stability;
+mod stored_study;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
@@ -17,10 +20,13 @@ pub use finger_fit::{
     Course, Estimate, FingerFit, FingerFitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
     RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
 };
+pub use generated::generated_sections;
 pub use labelled_training::{
     HELD_BACK, JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage,
     labelled_classes,
 };
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
+pub use result_file::{ResultFile, ResultFileError, program};
 pub use search::{SearchRow, search};
+pub use stored_study::{GeneratedSection, StoredStudy, markdown_table};

@@ -1,0 +1,292 @@
+//! Results of long studies, written as units of work finish: a study that was stopped or killed goes on where it
+//! stopped.
+//!
+//! The file is JSON, a line for what is computed and one for each finished unit. A line that a crash cut off is left out
+//! and computed again. Results that another plan or another physics computed are refused, never mixed.
+
+use super::effects::Measuring;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::Side;
+use palpate_sim::scene::{Accuracy, Scene};
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Finished units of a study by name, in memory and, where it has one, in a file.
+#[derive(Debug)]
+pub struct ResultFile<U> {
+    file: Option<(PathBuf, File)>,
+    units: BTreeMap<String, U>,
+    cpu_s: f64,
+}
+
+/// What is computed; a file with another first line is refused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Header {
+    study: String,
+    /// Version of the program, and a fingerprint of its physics.
+    program: String,
+    plan: serde_json::Value,
+}
+
+/// A finished unit: its line in the file.
+#[derive(Serialize, Deserialize)]
+struct Line<U> {
+    unit: String,
+    /// CPU time that it took (s).
+    cpu_s: f64,
+    result: U,
+}
+
+/// Error of a result file.
+#[derive(Debug, thiserror::Error)]
+pub enum ResultFileError {
+    /// The file cannot be read or written.
+    #[error("cannot {attempt} the results in \"{path}\": {cause}", path = path.display())]
+    File {
+        /// What was attempted.
+        attempt: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Cause.
+        cause: io::Error,
+    },
+    /// The file holds something else.
+    #[error(
+        "\"{path}\" holds results of {difference}, which cannot be continued: delete it or choose another --out",
+        path = path.display()
+    )]
+    Other {
+        /// The file.
+        path: PathBuf,
+        /// What differs.
+        difference: String,
+    },
+    /// A result cannot be written as JSON.
+    #[error("a result cannot be written as JSON: {cause}")]
+    Unwritable {
+        /// Cause.
+        cause: serde_json::Error,
+    },
+}
+
+impl<U: Serialize + DeserializeOwned> ResultFile<U> {
+    /// Results in memory only, for measurements that take seconds.
+    pub fn in_memory() -> Self {
+        Self { file: None, units: BTreeMap::new(), cpu_s: 0.0 }
+    }
+
+    /// Opens the file of a study, or starts it. `plan` is everything else that its results depend on.
+    pub fn open(path: &Path, study: &str, plan: &impl Serialize) -> Result<Self, ResultFileError> {
+        let plan = serde_json::to_value(plan).map_err(|cause| ResultFileError::Unwritable { cause })?;
+        let header = Header { study: study.to_owned(), program: program(), plan };
+        let failed = |attempt| move |cause| ResultFileError::File { attempt, path: path.to_owned(), cause };
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(failed("create a folder for"))?;
+        }
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => String::new(),
+            Err(cause) => return Err(failed("read")(cause)),
+        };
+        // What a crash left of a line is no result.
+        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+        let mut results = Self::in_memory();
+        let mut lines = whole.lines();
+        if let Some(first) = lines.next() {
+            let found = serde_json::from_str::<Header>(first);
+            let difference =
+                found.map_or_else(|_| Some("another program".to_owned()), |found| header.difference(&found));
+            if let Some(difference) = difference {
+                return Err(ResultFileError::Other { path: path.to_owned(), difference });
+            }
+            // A damaged line is computed again.
+            for line in lines.filter_map(|line| serde_json::from_str::<Line<U>>(line).ok()) {
+                results.keep(line);
+            }
+        }
+        let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed("open"))?;
+        if whole.len() < text.len() {
+            file.set_len(whole.len() as u64).map_err(failed("mend"))?;
+        }
+        if whole.is_empty() {
+            let line = serde_json::to_string(&header).map_err(|cause| ResultFileError::Unwritable { cause })?;
+            writeln!(file, "{line}").map_err(failed("write"))?;
+        }
+        results.file = Some((path.to_owned(), file));
+        Ok(results)
+    }
+
+    fn keep(&mut self, line: Line<U>) {
+        self.cpu_s += line.cpu_s;
+        self.units.insert(line.unit, line.result);
+    }
+
+    /// Adds a finished unit, which took `cpu_s` seconds of CPU time, and writes it.
+    pub fn add(&mut self, unit: &str, result: U, cpu_s: f64) -> Result<(), ResultFileError> {
+        let line = Line { unit: unit.to_owned(), cpu_s, result };
+        if let Some((path, file)) = &mut self.file {
+            let mut text = serde_json::to_string(&line).map_err(|cause| ResultFileError::Unwritable { cause })?;
+            text.push('\n');
+            let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
+            written.map_err(|cause| ResultFileError::File { attempt: "write", path: path.clone(), cause })?;
+        }
+        self.keep(line);
+        Ok(())
+    }
+
+    /// Result of a unit, where it is finished.
+    pub fn get(&self, unit: &str) -> Option<&U> {
+        self.units.get(unit)
+    }
+
+    /// Finished units by name.
+    pub fn units(&self) -> &BTreeMap<String, U> {
+        &self.units
+    }
+
+    /// CPU time of all finished units (h).
+    pub fn cpu_hours(&self) -> f64 {
+        self.cpu_s / 3600.0
+    }
+}
+
+impl<U: Serialize + DeserializeOwned + Send + Sync> ResultFile<U> {
+    /// Computes the units that are missing, in parallel, each in one thread: `work` gets a unit and returns its result,
+    /// `None` where it was cancelled. Returns true when all units are finished.
+    pub fn complete<W: Sync>(
+        &mut self,
+        units: &[(String, W)],
+        how: &Measuring<'_>,
+        work: impl Fn(&W) -> Option<U> + Sync,
+    ) -> Result<bool, ResultFileError> {
+        let missing: Vec<&(String, W)> = units.iter().filter(|(name, _)| self.get(name).is_none()).collect();
+        let done = AtomicUsize::new(units.len() - missing.len());
+        (how.progress)(done.load(Ordering::Relaxed), units.len());
+        let file = Mutex::new(self);
+        let one = |(name, unit): &&(String, W)| {
+            if how.cancelled.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            let start = cpu_time::ThreadTime::now();
+            let Some(result) = work(unit) else { return Ok(false) };
+            let cpu_s = start.elapsed().as_secs_f64();
+            // Another thread panicked, and so does this call.
+            let Ok(mut file) = file.lock() else { return Ok(false) };
+            file.add(name, result, cpu_s)?;
+            (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, units.len());
+            Ok(true)
+        };
+        let all = || missing.par_iter().map(one).try_reduce(|| true, |a, b| Ok(a && b));
+        // Falls back to rayon's global pool if no threads can be started.
+        match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
+            Ok(pool) => pool.install(all),
+            Err(_none) => all(),
+        }
+    }
+}
+
+impl Header {
+    /// What differs from this in another header.
+    fn difference(&self, other: &Self) -> Option<String> {
+        if self.study != other.study {
+            Some(format!("the study {}", other.study))
+        } else if self.program != other.program {
+            Some(format!("another version ({}, this is {})", other.program, self.program))
+        } else if self.plan != other.plan {
+            Some("other settings".to_owned())
+        } else {
+            None
+        }
+    }
+}
+
+/// Version of the program with a fingerprint of its physics: grasps of two builds differ where it does.
+pub fn program() -> String {
+    let mut scene = Scene::default();
+    scene.object.source = "syringe".to_owned();
+    scene.solver.accuracy = Accuracy::Draft;
+    let frames = scene.load_object().map(|object| crate::grasping::grasp(&scene, object.as_ref(), 0).data.frames);
+    let bits = frames.unwrap_or_default().iter().fold(FNV_OFFSET, |hash, frame| {
+        joints(frame).fold(hash, |hash, q| (hash ^ u64::from(q.to_bits())).wrapping_mul(FNV_PRIME))
+    });
+    format!("{}, physics {:08x}", env!("CARGO_PKG_VERSION"), bits as u32 ^ (bits >> 32) as u32)
+}
+
+/// Fowler-Noll-Vo hash, over words.
+const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+const FNV_PRIME: u64 = 0x100_0000_01b3;
+
+/// Joint angles in single precision.
+fn joints(frame: &Frame) -> impl Iterator<Item = f32> {
+    [Side::Left, Side::Right].into_iter().flat_map(|side| frame.joints(side).iter().map(|q| *q as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    type TestResult = Result<(), Box<dyn std::error::Error>>;
+
+    fn squares(file: &mut ResultFile<u64>, most: u64, stop_at: Option<u64>) -> Result<(bool, usize), ResultFileError> {
+        let units: Vec<(String, u64)> = (0..most).map(|n| (format!("unit {n}"), n)).collect();
+        let (cancelled, computed) = (AtomicBool::new(false), AtomicUsize::new(0));
+        let how = Measuring { threads: 1, cancelled: &cancelled, progress: &|done, of| assert!(done <= of) };
+        let finished = file.complete(&units, &how, |n| {
+            if stop_at == Some(*n) {
+                cancelled.store(true, Ordering::Relaxed);
+                return None;
+            }
+            computed.fetch_add(1, Ordering::Relaxed);
+            Some(n * n)
+        })?;
+        Ok((finished, computed.into_inner()))
+    }
+
+    #[test]
+    fn a_study_goes_on_where_it_stopped_or_crashed() -> TestResult {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("new/squares.jsonl");
+        let mut file = ResultFile::open(&path, "squares", &5)?;
+        assert_eq!(squares(&mut file, 5, Some(3))?, (false, 3));
+        drop(file);
+        // A crash in the middle of a line.
+        let mut text = std::fs::read_to_string(&path)?;
+        text.push_str("{\"unit\":\"unit 3\",\"cpu_");
+        std::fs::write(&path, &text)?;
+        let mut file = ResultFile::open(&path, "squares", &5)?;
+        assert_eq!((file.units().len(), file.get("unit 2"), file.get("unit 3")), (3, Some(&4), None));
+        assert_eq!(squares(&mut file, 5, None)?, (true, 2));
+        let mut file = ResultFile::open(&path, "squares", &5)?;
+        assert_eq!(squares(&mut file, 5, None)?, (true, 0));
+        assert_eq!(file.get("unit 4"), Some(&16));
+        file.add("later", 1, 7200.0)?;
+        assert!(ResultFile::<u64>::open(&path, "squares", &5)?.cpu_hours() > 2.0);
+        Ok(())
+    }
+
+    #[test]
+    fn results_of_something_else_are_refused() -> TestResult {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("squares.jsonl");
+        ResultFile::<u64>::open(&path, "squares", &5)?;
+        let refused = |study: &str, plan: u32| {
+            ResultFile::<u64>::open(&path, study, &plan).map(|_| ()).expect_err("refused").to_string()
+        };
+        assert!(refused("cubes", 5).contains("the study squares"));
+        assert!(refused("squares", 6).contains("other settings, which cannot be continued: delete it"));
+        let text = std::fs::read_to_string(&path)?.replace("physics ", "physics x");
+        std::fs::write(&path, text)?;
+        assert!(refused("squares", 5).contains("another version"), "{}", refused("squares", 5));
+        std::fs::write(&path, "name,value\n")?;
+        assert!(refused("squares", 5).contains("another program"));
+        Ok(())
+    }
+}

@@ -1,0 +1,313 @@
+//! Layout of a figure: title, plots beside each other, each with its legend and axes, and the note.
+
+use super::FigureError;
+use super::canvas::{Canvas, Text};
+use super::labels::{Box2, NEAR, Wanted, place};
+use palpate_geometry::drawing::{Align, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
+use palpate_geometry::palette::series_colour;
+use plotters::prelude::DrawingBackend;
+use std::ops::RangeInclusive;
+
+/// Sizes of text (points per em).
+const TITLE: f64 = 15.0;
+const PLOT_TITLE: f64 = 13.0;
+const SMALL: f64 = 11.0;
+/// Margin of the figure and room between plots (points).
+const MARGIN: f64 = 14.0;
+const BETWEEN: f64 = 26.0;
+/// Height of a line of small text.
+const LINE: f64 = 15.0;
+/// Radius of a marker.
+const RADIUS: f64 = 3.25;
+/// Length of a line in the legend.
+const SAMPLE: f64 = 20.0;
+
+pub(super) fn draw<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    figure: &Figure,
+    [width, height]: [f64; 2],
+) -> Result<(), FigureError> {
+    let mut top = MARGIN;
+    if !figure.title.is_empty() {
+        top += TITLE;
+        let colour = canvas.colours.text;
+        canvas.text(&Text { text: &figure.title, at: [MARGIN, top], align: Align::Left, size: TITLE, colour })?;
+        top += 10.0;
+    }
+    let mut bottom = height - MARGIN;
+    for line in figure.note.lines().rev() {
+        let colour = canvas.colours.quiet_text;
+        canvas.text(&Text { text: line, at: [MARGIN, bottom], align: Align::Left, size: SMALL, colour })?;
+        bottom -= LINE;
+    }
+    let count = figure.plots.len().max(1) as f64;
+    let each = (width - 2.0 * MARGIN - (count - 1.0) * BETWEEN) / count;
+    // Legends of all plots take the same height, so that their axes are in line.
+    let rows = figure.plots.iter().map(|plot| Ok(legend_rows(canvas, plot, each)?.len()));
+    let rows = rows.collect::<Result<Vec<usize>, FigureError>>()?.into_iter().max().unwrap_or(0);
+    for (n, plot) in figure.plots.iter().enumerate() {
+        let left = MARGIN + n as f64 * (each + BETWEEN);
+        draw_plot(canvas, plot, [[left, top], [left + each, bottom]], rows)?;
+    }
+    Ok(())
+}
+
+/// Series of the legend in rows that fit.
+fn legend_rows<'a, B: DrawingBackend>(
+    canvas: &Canvas<B>,
+    plot: &'a Plot,
+    width: f64,
+) -> Result<Vec<Vec<(&'a DataSeries, f64)>>, FigureError> {
+    let mut rows: Vec<Vec<(&DataSeries, f64)>> = Vec::new();
+    let mut used = f64::INFINITY;
+    for series in plot.series.iter().filter(|series| !series.name.is_empty()) {
+        let needed = SAMPLE + 6.0 + canvas.width(&series.name, SMALL)? + 12.0;
+        if used + needed > width {
+            rows.push(Vec::new());
+            used = 0.0;
+        }
+        if let Some(row) = rows.last_mut() {
+            row.push((series, needed));
+        }
+        used += needed;
+    }
+    Ok(rows)
+}
+
+fn draw_plot<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    plot: &Plot,
+    [[left, top], [right, bottom]]: Box2,
+    legend_height: usize,
+) -> Result<(), FigureError> {
+    let (text, quiet) = (canvas.colours.text, canvas.colours.quiet_text);
+    let mut y = top;
+    if !plot.title.is_empty() {
+        y += PLOT_TITLE;
+        canvas.text(&Text { text: &plot.title, at: [left, y], align: Align::Left, size: PLOT_TITLE, colour: text })?;
+        y += 6.0;
+    }
+    for (n, row) in legend_rows(canvas, plot, right - left)?.into_iter().enumerate() {
+        let middle = y + (n as f64 + 0.5) * LINE;
+        let mut x = left;
+        for (series, width) in row {
+            draw_sample(canvas, series, [x, middle])?;
+            let at = [x + SAMPLE + 6.0, middle + 0.34 * SMALL];
+            canvas.text(&Text { text: &series.name, at, align: Align::Left, size: SMALL, colour: text })?;
+            x += width;
+        }
+    }
+    y += legend_height as f64 * LINE + 6.0;
+    // The title of the vertical axis stands above it, where it can be read without turning the head.
+    y += SMALL;
+    canvas.text(&Text { text: &plot.y.title, at: [left, y], align: Align::Left, size: SMALL, colour: quiet })?;
+    y += 7.0;
+
+    let [x_bounds, y_bounds] = plot.bounds();
+    let y_marks = plot.y.marks(&y_bounds);
+    let widths = y_marks.iter().map(|(_, mark)| canvas.width(mark, SMALL)).collect::<Result<Vec<f64>, _>>()?;
+    let axis = left + widths.into_iter().fold(0.0, f64::max) + 6.0;
+    let low = bottom - 2.0 * LINE - 6.0;
+    if axis + 10.0 > right || y + 10.0 > low {
+        return Ok(()); // too small for axes
+    }
+    let frame = Frame { room: [[axis, y], [right, low]], x: x_bounds, y: y_bounds };
+    draw_axes(canvas, plot, &frame, &y_marks)?;
+    let middle = [0.5 * (axis + right), bottom];
+    canvas.text(&Text { text: &plot.x.title, at: middle, align: Align::Centre, size: SMALL, colour: quiet })?;
+    for series in &plot.series {
+        draw_series(canvas, plot, &frame, series)?;
+    }
+    draw_labels(canvas, plot, &frame)
+}
+
+/// Axes on the page.
+struct Frame {
+    room: Box2,
+    x: RangeInclusive<f64>,
+    y: RangeInclusive<f64>,
+}
+
+impl Frame {
+    /// Place of coordinates on the page.
+    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let share = |range: &RangeInclusive<f64>, c: f64| (c - range.start()) / (range.end() - range.start());
+        let [low, high] = self.room;
+        [low[0] + share(&self.x, x) * (high[0] - low[0]), high[1] - share(&self.y, y) * (high[1] - low[1])]
+    }
+
+    /// Place of values of a plot; `None` outside of the axes.
+    fn of(&self, plot: &Plot, at: [f64; 2]) -> Option<[f64; 2]> {
+        let place = plot.place(at)?;
+        (self.x.contains(&place[0]) && self.y.contains(&place[1])).then(|| self.at(place))
+    }
+}
+
+fn draw_axes<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    plot: &Plot,
+    frame: &Frame,
+    y_marks: &[(f64, String)],
+) -> Result<(), FigureError> {
+    let [[left, top], [right, bottom]] = frame.room;
+    let (quiet, border) = (canvas.colours.quiet_text, canvas.colours.border);
+    let faint = border.mix(canvas.colours.background, 0.55);
+    let mut last_end = f64::NEG_INFINITY;
+    for (at, mark) in plot.x.marks(&frame.x) {
+        let [x, _] = frame.at([at, *frame.y.start()]);
+        if mark.is_empty() {
+            canvas.path(&[[x, bottom], [x, bottom + 3.0]], 0.75, border)?;
+            continue;
+        }
+        canvas.path(&[[x, top], [x, bottom]], 0.5, faint)?;
+        let half = 0.5 * canvas.width(&mark, SMALL)?;
+        if x - half > last_end {
+            let at = [x, bottom + LINE];
+            canvas.text(&Text { text: &mark, at, align: Align::Centre, size: SMALL, colour: quiet })?;
+            last_end = x + half + 4.0;
+        }
+    }
+    for (at, mark) in y_marks {
+        let [_, y] = frame.at([*frame.x.start(), *at]);
+        if mark.is_empty() {
+            canvas.path(&[[left - 3.0, y], [left, y]], 0.75, border)?;
+            continue;
+        }
+        canvas.path(&[[left, y], [right, y]], 0.5, faint)?;
+        let at = [left - 6.0, y + 0.34 * SMALL];
+        canvas.text(&Text { text: mark, at, align: Align::Right, size: SMALL, colour: quiet })?;
+    }
+    canvas.path(&[[left, top], [left, bottom], [right, bottom]], 1.0, border)?;
+    for line in &plot.references {
+        let axis: &PlotAxis = if line.horizontal { &plot.y } else { &plot.x };
+        let Some(at) = axis.coordinate(line.at) else { continue };
+        let range = if line.horizontal { &frame.y } else { &frame.x };
+        if !range.contains(&at) {
+            continue;
+        }
+        let (x_first, y_first) = (*frame.x.start(), *frame.y.start());
+        if line.horizontal {
+            let [_, y] = frame.at([x_first, at]);
+            dashes(canvas, [left, y], [right, y])?;
+            let at = [right - 2.0, y - 4.0];
+            canvas.text(&Text { text: &line.text, at, align: Align::Right, size: SMALL, colour: quiet })?;
+        } else {
+            let [x, _] = frame.at([at, y_first]);
+            dashes(canvas, [x, top], [x, bottom])?;
+            let at = [x + 4.0, top + SMALL];
+            canvas.text(&Text { text: &line.text, at, align: Align::Left, size: SMALL, colour: quiet })?;
+        }
+    }
+    Ok(())
+}
+
+/// A dashed line, level or upright.
+fn dashes<B: DrawingBackend>(canvas: &mut Canvas<B>, from: [f64; 2], to: [f64; 2]) -> Result<(), FigureError> {
+    const DASH: f64 = 5.0;
+    const GAP: f64 = 4.0;
+    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+    let colour = canvas.colours.quiet_text;
+    let at = |s: f64| [0, 1].map(|k| from[k] + (to[k] - from[k]) * (s / length));
+    let mut s = 0.0;
+    while s < length {
+        canvas.path(&[at(s), at((s + DASH).min(length))], 0.9, colour)?;
+        s += DASH + GAP;
+    }
+    Ok(())
+}
+
+fn line_width(line: LineStyle) -> Option<f64> {
+    match line {
+        LineStyle::None => None,
+        LineStyle::Thin => Some(1.25),
+        LineStyle::Bold => Some(3.0),
+    }
+}
+
+/// Line and marker of a series in the legend.
+fn draw_sample<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    series: &DataSeries,
+    [x, y]: [f64; 2],
+) -> Result<(), FigureError> {
+    let colour = series_colour(series.colour, canvas.theme);
+    if let Some(width) = line_width(series.line) {
+        canvas.path(&[[x, y], [x + SAMPLE, y]], width, colour)?;
+    }
+    canvas.marker(series.marker, [x + 0.5 * SAMPLE, y], RADIUS, colour)
+}
+
+fn draw_series<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    plot: &Plot,
+    frame: &Frame,
+    series: &DataSeries,
+) -> Result<(), FigureError> {
+    let colour = series_colour(series.colour, canvas.theme);
+    let spread_colour = colour.mix(canvas.colours.background, 0.45);
+    for point in &series.points {
+        let Some([low, high]) = point.spread else { continue };
+        let ends = [low, high].map(|y| {
+            let place = plot.place([point.at[0], y])?;
+            // A bar that leaves the axes ends there.
+            Some(frame.at([place[0], place[1].clamp(*frame.y.start(), *frame.y.end())]))
+        });
+        if let [Some(low), Some(high)] = ends {
+            canvas.path(&[low, high], 1.0, spread_colour)?;
+        }
+    }
+    let places: Vec<[f64; 2]> = series.points.iter().filter_map(|point| frame.of(plot, point.at)).collect();
+    if let Some(width) = line_width(series.line) {
+        canvas.path(&places, width, colour)?;
+    }
+    for place in places {
+        canvas.marker(series.marker, place, RADIUS, colour)?;
+    }
+    Ok(())
+}
+
+/// Labels of all points. Those of later series are placed first.
+fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &Frame) -> Result<(), FigureError> {
+    const SIZE: f64 = SMALL - 0.5;
+    let around = |[x, y]: [f64; 2], radius: f64| [[x - radius, y - radius], [x + radius, y + radius]];
+    let mut obstacles: Vec<Box2> = Vec::new();
+    let mut wanted = Vec::new();
+    let mut texts = Vec::new();
+    for series in plot.series.iter().rev() {
+        let places: Vec<Option<[f64; 2]>> = series.points.iter().map(|point| frame.of(plot, point.at)).collect();
+        if series.marker != Marker::None {
+            obstacles.extend(places.iter().flatten().map(|place| around(*place, RADIUS + 1.5)));
+        }
+        let known: Vec<[f64; 2]> = places.iter().flatten().copied().collect();
+        if let Some(width) = line_width(series.line) {
+            obstacles.extend(known.windows(2).flat_map(|pair| along(pair[0], pair[1])).map(|at| around(at, width)));
+        }
+        for (point, place) in series.points.iter().zip(places).filter(|(point, _)| !point.label.is_empty()) {
+            let Some(at) = place else { continue };
+            wanted.push(Wanted { at, size: [canvas.width(&point.label, SIZE)?, SIZE + 1.5] });
+            texts.push((point.label.as_str(), series.colour));
+        }
+    }
+    for ((label, place), (text, colour)) in wanted.iter().zip(place(&wanted, &obstacles, frame.room)).zip(texts) {
+        let Some([low, high]) = place else { continue };
+        let nearest = [0, 1].map(|k| label.at[k].clamp(low[k], high[k]));
+        let distance = (nearest[0] - label.at[0]).hypot(nearest[1] - label.at[1]);
+        let colour = series_colour(colour, canvas.theme);
+        if distance > NEAR {
+            let share = RADIUS / distance;
+            let from = [0, 1].map(|k| label.at[k] + (nearest[k] - label.at[k]) * share);
+            canvas.path(&[from, nearest], 0.6, canvas.colours.quiet_text)?;
+        }
+        let colour = colour.mix(canvas.colours.text, 0.45);
+        let at = [0.5 * (low[0] + high[0]), high[1] - 0.24 * SIZE];
+        canvas.text(&Text { text, at, align: Align::Centre, size: SIZE, colour })?;
+    }
+    Ok(())
+}
+
+/// Places along a line, for labels to avoid.
+fn along(from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
+    const EVERY: f64 = 4.0;
+    let pieces = ((to[0] - from[0]).hypot(to[1] - from[1]) / EVERY).ceil().max(1.0);
+    (0..pieces as usize).map(|n| [0, 1].map(|k| from[k] + (to[k] - from[k]) * (n as f64 / pieces))).collect()
+}
