@@ -1,17 +1,19 @@
-//! A figure: plots side by side, as plain data. Drawn to files by `palpate-render`, and by the window.
+//! A figure: plots beside each other, as plain data. Drawn to files by `palpate-render`, and by the window.
 //!
 //! Colours are numbers into [`series_colour`](crate::palette::series_colour), so that a series has the same colour in
 //! every theme.
 
 use std::ops::RangeInclusive;
 
-/// A figure: plots side by side.
+/// A figure: plots beside each other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Figure {
     /// Title, above all plots.
     pub title: String,
-    /// The plots, from left to right.
+    /// The plots, from left to right, row by row.
     pub plots: Vec<Plot>,
+    /// Plots in a row; all of them where zero.
+    pub columns: usize,
     /// Remark below all plots, such as the command that repeats the measurement.
     pub note: String,
 }

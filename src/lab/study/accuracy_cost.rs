@@ -1,6 +1,7 @@
 //! Cost and error of an accuracy: CPU time of one grasp, and its remaining error.
 
-use crate::grasping::{ErrorBand, ErrorNorms, prepare, prepare_refined};
+use super::timed_grasp::timed_grasp;
+use crate::grasping::{ErrorBand, ErrorNorms, prepare_refined};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Sensors;
@@ -24,15 +25,7 @@ pub fn accuracy_cost(
     cancelled: &dyn Fn() -> bool,
 ) -> Option<AccuracyCost> {
     let sensors = Sensors::whole_fingers(&scene.gripper);
-    let mut run = prepare(scene, object, 0);
-    let start = cpu_time::ThreadTime::now();
-    while run.next_frame().is_some() {
-        if cancelled() {
-            return None;
-        }
-    }
-    let cpu = start.elapsed().as_secs_f64();
-    let trial = run.finish(scene);
+    let (trial, cpu) = timed_grasp(scene, object, cancelled)?;
     let mut refined = prepare_refined(scene, object, 0);
     let mut band = ErrorBand::new(scene, sensors.channels().len());
     for frame in trial.frames() {

@@ -12,6 +12,7 @@ mod result_file;
 mod search;
 pub mod stability;
 mod stored_study;
+mod timed_grasp;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};

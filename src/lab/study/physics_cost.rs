@@ -4,7 +4,8 @@
 //! Times are CPU times of the thread, not wall-clock times, and medians of several runs, so that other load on the
 //! machine has little influence. Compare them on one machine; do not assert them in a test.
 
-use crate::grasping::{ErrorNorms, grasp, prepare};
+use super::timed_grasp::{timed_grasp, truth_of};
+use crate::grasping::{ErrorNorms, grasp};
 use glam::DVec3;
 use palpate_geometry::Primitive;
 use palpate_sim::objects::{ObjectError, ObjectModel};
@@ -49,15 +50,9 @@ pub struct CostRow {
     pub error: Option<ErrorNorms>,
 }
 
-/// A tolerance far below the accuracies compared with it: at 1e-7 the error in curvature is some 1e-4 1/m, a hundredth
-/// of that of steps of 1/300 s.
-const TRUTH: Accuracy = Accuracy::Tolerance(1e-7);
-
 /// Reference grasp of a scene, against which errors are measured.
 pub fn physics_truth(bench: &BenchScene) -> SimulatedTrial {
-    let mut scene = bench.scene();
-    scene.solver.accuracy = TRUTH;
-    grasp(&scene, Some(&bench.object), 0)
+    grasp(&truth_of(&bench.scene()), Some(&bench.object), 0)
 }
 
 impl BenchScene {
@@ -99,11 +94,10 @@ pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: 
     let mut times = Vec::new();
     let mut last = None;
     for _ in 0..runs.max(1) {
-        let mut run = prepare(&scene, Some(&bench.object), 0);
-        let start = cpu_time::ThreadTime::now();
-        while run.next_frame().is_some() {}
-        times.push(start.elapsed().as_secs_f64());
-        last = Some(run.finish(&scene));
+        if let Some((trial, seconds)) = timed_grasp(&scene, Some(&bench.object), &|| false) {
+            times.push(seconds);
+            last = Some(trial);
+        }
     }
     times.sort_by(f64::total_cmp);
     let median = times[times.len() / 2];

@@ -8,7 +8,7 @@ use super::effects::Measuring;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::{Accuracy, Scene};
-use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -160,22 +160,22 @@ impl<U: Serialize + DeserializeOwned> ResultFile<U> {
 impl<U: Serialize + DeserializeOwned + Send + Sync> ResultFile<U> {
     /// Computes the units that are missing, in parallel, each in one thread: `work` gets a unit and returns its result,
     /// `None` where it was cancelled. Returns true when all units are finished.
-    pub fn complete<W: Sync>(
+    pub fn complete<W: Sync, E: From<ResultFileError> + Send>(
         &mut self,
         units: &[(String, W)],
         how: &Measuring<'_>,
-        work: impl Fn(&W) -> Option<U> + Sync,
-    ) -> Result<bool, ResultFileError> {
+        work: impl Fn(&W) -> Result<Option<U>, E> + Sync,
+    ) -> Result<bool, E> {
         let missing: Vec<&(String, W)> = units.iter().filter(|(name, _)| self.get(name).is_none()).collect();
         let done = AtomicUsize::new(units.len() - missing.len());
         (how.progress)(done.load(Ordering::Relaxed), units.len());
         let file = Mutex::new(self);
-        let one = |(name, unit): &&(String, W)| {
+        let one = |(name, unit): &(String, W)| {
             if how.cancelled.load(Ordering::Relaxed) {
                 return Ok(false);
             }
             let start = cpu_time::ThreadTime::now();
-            let Some(result) = work(unit) else { return Ok(false) };
+            let Some(result) = work(unit)? else { return Ok(false) };
             let cpu_s = start.elapsed().as_secs_f64();
             // Another thread panicked, and so does this call.
             let Ok(mut file) = file.lock() else { return Ok(false) };
@@ -183,7 +183,10 @@ impl<U: Serialize + DeserializeOwned + Send + Sync> ResultFile<U> {
             (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, units.len());
             Ok(true)
         };
-        let all = || missing.par_iter().map(one).try_reduce(|| true, |a, b| Ok(a && b));
+        // Each thread takes the next unit, so that those that stand first, the long ones, are not left for the end.
+        let next = AtomicUsize::new(0);
+        let take = |_: usize| one(missing[next.fetch_add(1, Ordering::Relaxed)]);
+        let all = || (0..missing.len()).into_par_iter().map(take).try_reduce(|| true, |a, b| Ok(a && b));
         // Falls back to rayon's global pool if no threads can be started.
         match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
             Ok(pool) => pool.install(all),
@@ -242,10 +245,10 @@ mod tests {
         let finished = file.complete(&units, &how, |n| {
             if stop_at == Some(*n) {
                 cancelled.store(true, Ordering::Relaxed);
-                return None;
+                return Ok::<_, ResultFileError>(None);
             }
             computed.fetch_add(1, Ordering::Relaxed);
-            Some(n * n)
+            Ok(Some(n * n))
         })?;
         Ok((finished, computed.into_inner()))
     }

@@ -40,14 +40,19 @@ pub(super) fn draw<B: DrawingBackend>(
         canvas.text(&Text { text: line, at: [MARGIN, bottom], align: Align::Left, size: SMALL, colour })?;
         bottom -= LINE;
     }
-    let count = figure.plots.len().max(1) as f64;
-    let each = (width - 2.0 * MARGIN - (count - 1.0) * BETWEEN) / count;
-    // Legends of all plots take the same height, so that their axes are in line.
-    let rows = figure.plots.iter().map(|plot| Ok(legend_rows(canvas, plot, each)?.len()));
-    let rows = rows.collect::<Result<Vec<usize>, FigureError>>()?.into_iter().max().unwrap_or(0);
-    for (n, plot) in figure.plots.iter().enumerate() {
-        let left = MARGIN + n as f64 * (each + BETWEEN);
-        draw_plot(canvas, plot, [[left, top], [left + each, bottom]], rows)?;
+    let columns = if figure.columns == 0 { figure.plots.len().max(1) } else { figure.columns };
+    let rows = figure.plots.len().div_ceil(columns).max(1);
+    let share = |room: f64, parts: usize| (room - (parts as f64 - 1.0) * BETWEEN) / parts as f64;
+    let each = [share(width - 2.0 * MARGIN, columns), share(bottom - top, rows)];
+    for (row, plots) in figure.plots.chunks(columns).enumerate() {
+        // Legends of a row take the same height, so that its axes are in line.
+        let lines = plots.iter().map(|plot| Ok(legend_rows(canvas, plot, each[0])?.len()));
+        let lines = lines.collect::<Result<Vec<usize>, FigureError>>()?.into_iter().max().unwrap_or(0);
+        for (column, plot) in plots.iter().enumerate() {
+            let left = MARGIN + column as f64 * (each[0] + BETWEEN);
+            let top = top + row as f64 * (each[1] + BETWEEN);
+            draw_plot(canvas, plot, [[left, top], [left + each[0], top + each[1]]], lines)?;
+        }
     }
     Ok(())
 }

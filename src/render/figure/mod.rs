@@ -87,7 +87,7 @@ mod tests {
             series: vec![series],
             references: Vec::new(),
         };
-        Figure { title: "Two plots".to_owned(), plots: vec![plot.clone(), plot], note: "a note".to_owned() }
+        Figure { title: "Two plots".to_owned(), plots: vec![plot.clone(), plot], columns: 0, note: "a note".to_owned() }
     }
 
     #[test]
