@@ -1,5 +1,7 @@
 //! `palpate study`: experiments, one file each.
 
+mod accuracy;
+mod files;
 mod stability;
 
 use super::Failure;
@@ -7,6 +9,7 @@ use super::Failure;
 /// Arguments of `palpate study`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
+  palpate study accuracy --quick
   palpate study stability --quick
   palpate study stability --steps 100000 --seed 2 --json")]
 pub(super) struct StudyArguments {
@@ -16,12 +19,15 @@ pub(super) struct StudyArguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Study {
+    /// Measure what accuracy costs in time and what it is worth for recognition; resumes where it stopped.
+    Accuracy(accuracy::AccuracyArguments),
     /// Run hard cases at every accuracy, and random scenes twice: failures, and silently wrong results.
     Stability(stability::StabilityArguments),
 }
 
 pub(super) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     match &arguments.study {
+        Study::Accuracy(arguments) => accuracy::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
     }
 }

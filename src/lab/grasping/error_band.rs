@@ -18,7 +18,7 @@ use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, IntegrationMethod, Scene};
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Channel, Quantity, Sensors};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Estimated errors of several channels, sample by sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -78,7 +78,7 @@ impl ErrorBand {
 
 /// Errors of a trial in a few numbers: root mean squares over samples and channels, and their shares of the range that
 /// those channels pass through.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorNorms {
     /// Curvature (1/m).
     pub curvature_per_m: f64,
@@ -118,13 +118,24 @@ impl ErrorNorms {
 
     /// How far one trial is from another, sampled at the same times; the range is that of both.
     pub fn between(trial: &SimulatedTrial, other: &SimulatedTrial, sensors: &Sensors) -> Self {
-        let read = |trial: &SimulatedTrial| -> Vec<Vec<Option<f64>>> {
+        Self::between_sensed([(trial, sensors), (other, sensors)])
+    }
+
+    /// The same for the sensors of whole fingers, where the trials may differ in joints and taxels.
+    pub fn of_whole_fingers(trial: &SimulatedTrial, other: &SimulatedTrial) -> Self {
+        let [own, others] = [trial, other].map(|trial| Sensors::whole_fingers(&trial.header.scene.gripper));
+        Self::between_sensed([(trial, &own), (other, &others)])
+    }
+
+    /// Difference of two trials, each read by its sensors, which have the same channels.
+    fn between_sensed([trial, other]: [(&SimulatedTrial, &Sensors); 2]) -> Self {
+        let read = |(trial, sensors): (&SimulatedTrial, &Sensors)| -> Vec<Vec<Option<f64>>> {
             trial.frames().iter().map(|f| sensors.read(f)).collect()
         };
         let (mut rows, others) = (read(trial), read(other));
         let (own, common) = (rows.len(), rows.len().min(others.len()));
         rows.extend(others);
-        Self::new(sensors.channels(), &rows, |channel, sample| {
+        Self::new(trial.1.channels(), &rows, |channel, sample| {
             // Without contact there is no pressure.
             let value = |sample: usize| Some(rows.get(sample)?.get(channel)?.unwrap_or_default());
             if sample < common { Some(value(sample)? - value(own + sample)?) } else { None }

@@ -1,5 +1,6 @@
 //! Experiments as functions from data to tables, without a window. The command line runs each of them.
 
+pub mod accuracy;
 mod accuracy_cost;
 mod comparison;
 mod effects;

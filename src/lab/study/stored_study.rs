@@ -32,9 +32,10 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
         serde_json::from_str(json)
     }
 
-    /// Writes it, one key per line.
+    /// Writes it, an element of a list per line.
     pub fn write(&self, path: &Path) -> Result<(), ResultFileError> {
-        let text = serde_json::to_string_pretty(self).map_err(|cause| ResultFileError::Unwritable { cause })?;
+        let text = serde_json::to_string(self).map(|text| text.replace("},{", "},\n{"));
+        let text = text.map_err(|cause| ResultFileError::Unwritable { cause })?;
         std::fs::write(path, text + "\n").map_err(|cause| ResultFileError::File {
             attempt: "write",
             path: path.to_owned(),

@@ -1,0 +1,113 @@
+//! `palpate study accuracy`: what accuracy costs, and what it is worth.
+
+use super::super::Failure;
+use super::super::interrupt::stop_flag;
+use super::super::terminal::{note, say, say_json, table};
+use super::files::{StudyOutput, StudyProgress};
+use palpate_geometry::units::three_digits;
+use palpate_lab::study::accuracy::{AccuracyPlan, AccuracyStudy, SceneGroup, SettingFamily, accuracy_figure};
+use palpate_lab::study::{Measuring, StoredStudy};
+use palpate_learn::method;
+
+/// Arguments of `palpate study accuracy`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate study accuracy --quick
+  palpate study accuracy --out accuracy/
+  palpate study accuracy --poses 8 --json")]
+pub(super) struct AccuracyArguments {
+    /// Take less than a minute: two poses, fewer settings and methods.
+    #[arg(long)]
+    quick: bool,
+    /// Poses of each object, free and fixed (default: 32, with --quick 2).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    poses: Option<u64>,
+    #[command(flatten)]
+    output: StudyOutput,
+    /// Print one JSON object instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Failure> {
+    let mut plan = if arguments.quick { AccuracyPlan::quick() } else { AccuracyPlan::full() };
+    plan.poses = arguments.poses.unwrap_or(plan.poses);
+    let folder = arguments.output.folder("accuracy", arguments.quick);
+    let mut file = plan.open(&folder.units("accuracy"))?;
+    let stop = stop_flag()?;
+    let bar = StudyProgress::new()?;
+    let progress = |done: usize, of: usize| bar.show(done, of);
+    let how = Measuring { threads: arguments.output.threads(), cancelled: &stop, progress: &progress };
+    let outcome = plan.run(&mut file, &how);
+    bar.clear();
+    let Some(study) = outcome? else {
+        note(&format!("stopped after {:.2} CPU hours; the same command goes on here", file.cpu_hours()));
+        return Ok(());
+    };
+    let stored = StoredStudy::new(&command(arguments), file.cpu_hours(), study);
+    let written = folder.write("accuracy", &stored, &accuracy_figure(&stored))?;
+    if arguments.json {
+        return say_json(&stored);
+    }
+    print(&stored.result)?;
+    say("")?;
+    say(format!("{:.0} CPU minutes. {written}", stored.cpu_hours * 60.0))
+}
+
+/// The command that repeats the study, without where it writes to.
+fn command(arguments: &AccuracyArguments) -> String {
+    let mut command = "palpate study accuracy".to_owned();
+    if arguments.quick {
+        command.push_str(" --quick");
+    }
+    if let Some(poses) = arguments.poses {
+        command.push_str(&format!(" --poses {poses}"));
+    }
+    command
+}
+
+fn print(study: &AccuracyStudy) -> Result<(), Failure> {
+    for group in [SceneGroup::Free, SceneGroup::Fixed] {
+        let front: Vec<_> = study.front(group).into_iter().map(|(setting, _)| setting).collect();
+        let rows: Vec<Vec<String>> = SettingFamily::ALL
+            .into_iter()
+            .flat_map(|family| study.family(family, group))
+            .map(|(setting, cost)| {
+                vec![
+                    setting.family.title().to_owned(),
+                    setting.name.clone(),
+                    three_digits(cost.cpu_ms.median),
+                    three_digits(1e3 * cost.curvature_per_m.median),
+                    three_digits(1e3 * cost.force_n.median),
+                    cost.failed.to_string(),
+                    if front.contains(&setting) { "*".to_owned() } else { String::new() },
+                    setting.on_command_line(),
+                ]
+            })
+            .collect();
+        say(format!("{} objects, medians of {} poses of {}", group.title(), study.poses, study.objects.join(", ")))?;
+        table(&["family", "setting", "CPU ms", "error 1/km", "error mN", "failed", "front", ""], &rows)?;
+        say("")?;
+    }
+    let Some(first) = study.recognition.first() else { return Ok(()) };
+    let keys: Vec<&str> = first.scores.iter().map(|score| score.method.as_str()).collect();
+    let mut header = vec!["trained on", "setting", "CPU ms", "left out"];
+    header.extend(keys.iter().map(|key| method(key).map_or(*key, |method| method.title)));
+    let rows: Vec<Vec<String>> = study
+        .recognition
+        .iter()
+        .map(|row| {
+            let mut cells = vec![row.setting.family.title().to_owned(), row.setting.name.clone()];
+            cells.extend([three_digits(row.cpu_ms), row.left_out.to_string()]);
+            cells.extend(row.scores.iter().map(|score| format!("{:.3}", score.f1.estimate)));
+            cells
+        })
+        .collect();
+    table(&header, &rows)?;
+    match study.knee() {
+        Some(row) => {
+            say(format!("Macro F1 on reference grasps. Knee: {}, {}", row.setting.family.title(), row.setting.name))
+        }
+        None => say("Macro F1 on reference grasps. No knee: every other setting is worse for some method"),
+    }
+}

@@ -1,0 +1,82 @@
+//! What all studies share: where they write, how many threads they use, and their progress.
+
+use super::super::Failure;
+use indicatif::{ProgressBar, ProgressStyle};
+use palpate_geometry::drawing::Figure;
+use palpate_geometry::palette::Theme;
+use palpate_lab::study::StoredStudy;
+use palpate_render::{figure_picture, figure_svg};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::PathBuf;
+
+/// Where a study writes, and its threads.
+#[derive(Debug, clap::Args)]
+pub(super) struct StudyOutput {
+    /// Folder for the results, which the same command continues, and for the pictures (default: palpate-NAME, with
+    /// --quick palpate-NAME-quick).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Number of threads (default: one per core).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl StudyOutput {
+    pub(super) fn folder(&self, study: &str, quick: bool) -> StudyFolder {
+        let named = || PathBuf::from(format!("palpate-{study}{}", if quick { "-quick" } else { "" }));
+        StudyFolder(self.out.clone().unwrap_or_else(named))
+    }
+
+    pub(super) fn threads(&self) -> usize {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.threads.map_or_else(cores, usize::from)
+    }
+}
+
+/// Folder of a study's files.
+pub(super) struct StudyFolder(PathBuf);
+
+/// Size of pictures (points): the width of a README.
+const SIZE: [u32; 2] = [960, 860];
+
+impl StudyFolder {
+    /// File of finished units.
+    pub(super) fn units(&self, study: &str) -> PathBuf {
+        self.0.join(format!("{study}.jsonl"))
+    }
+
+    /// Writes result and picture; returns a sentence that names the files.
+    pub(super) fn write<R: Serialize + DeserializeOwned>(
+        &self,
+        study: &str,
+        stored: &StoredStudy<R>,
+        figure: &Figure,
+    ) -> Result<String, Failure> {
+        let path = |extension: &str| self.0.join(format!("{study}.{extension}"));
+        stored.write(&path("json"))?;
+        std::fs::write(path("svg"), figure_svg(figure, Theme::Light, SIZE)?)?;
+        figure_picture(figure, Theme::Light, SIZE)?.save(&path("png"))?;
+        let files = ["json", "svg", "png"].map(|extension| path(extension).display().to_string());
+        Ok(format!("Written: {}", files.join(", ")))
+    }
+}
+
+/// Progress bar of a study.
+pub(super) struct StudyProgress(ProgressBar);
+
+impl StudyProgress {
+    pub(super) fn new() -> Result<Self, Failure> {
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {eta} left")?;
+        Ok(Self(ProgressBar::new(0).with_style(style)))
+    }
+
+    pub(super) fn show(&self, done: usize, of: usize) {
+        self.0.set_length(of as u64);
+        self.0.set_position(done as u64);
+    }
+
+    pub(super) fn clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
