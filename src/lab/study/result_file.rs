@@ -8,7 +8,6 @@ use super::effects::Measuring;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::{Accuracy, Scene};
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -169,28 +168,43 @@ impl<U: Serialize + DeserializeOwned + Send + Sync> ResultFile<U> {
         let missing: Vec<&(String, W)> = units.iter().filter(|(name, _)| self.get(name).is_none()).collect();
         let done = AtomicUsize::new(units.len() - missing.len());
         (how.progress)(done.load(Ordering::Relaxed), units.len());
+        let (next, finished, failure) = (AtomicUsize::new(0), AtomicUsize::new(0), Mutex::new(None));
         let file = Mutex::new(self);
-        let one = |(name, unit): &(String, W)| {
-            if how.cancelled.load(Ordering::Relaxed) {
-                return Ok(false);
-            }
+        let one = |name: &str, unit: &W| -> Result<(), E> {
             let start = cpu_time::ThreadTime::now();
-            let Some(result) = work(unit)? else { return Ok(false) };
+            let Some(result) = work(unit)? else { return Ok(()) };
             let cpu_s = start.elapsed().as_secs_f64();
-            // Another thread panicked, and so does this call.
-            let Ok(mut file) = file.lock() else { return Ok(false) };
-            file.add(name, result, cpu_s)?;
-            (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, units.len());
-            Ok(true)
+            // A poisoned lock: another thread panicked, and so does the scope.
+            if let Ok(mut file) = file.lock() {
+                file.add(name, result, cpu_s)?;
+                finished.fetch_add(1, Ordering::Relaxed);
+                (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, units.len());
+            }
+            Ok(())
         };
-        // Each thread takes the next unit, so that those that stand first, the long ones, are not left for the end.
-        let next = AtomicUsize::new(0);
-        let take = |_: usize| one(missing[next.fetch_add(1, Ordering::Relaxed)]);
-        let all = || (0..missing.len()).into_par_iter().map(take).try_reduce(|| true, |a, b| Ok(a && b));
-        // Falls back to rayon's global pool if no threads can be started.
-        match rayon::ThreadPoolBuilder::new().num_threads(how.threads.max(1)).build() {
-            Ok(pool) => pool.install(all),
-            Err(_none) => all(),
+        let all = || {
+            while let Some((name, unit)) = missing.get(next.fetch_add(1, Ordering::Relaxed))
+                && !how.cancelled.load(Ordering::Relaxed)
+            {
+                if let (Err(cause), Ok(mut failure)) = (one(name, unit), failure.lock()) {
+                    failure.get_or_insert(cause);
+                    next.store(missing.len(), Ordering::Relaxed);
+                }
+            }
+        };
+        // What a unit does in parallel stays in its thread, whose CPU time is the unit's.
+        let alone = || rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        std::thread::scope(|scope| {
+            for _ in 0..how.threads.clamp(1, missing.len().max(1)) {
+                scope.spawn(|| match alone() {
+                    Ok(pool) => pool.install(all),
+                    Err(_none) => all(),
+                });
+            }
+        });
+        match failure.into_inner() {
+            Ok(Some(cause)) => Err(cause),
+            _ => Ok(finished.into_inner() == missing.len()),
         }
     }
 }

@@ -40,6 +40,9 @@ pub(super) fn draw<B: DrawingBackend>(
         canvas.text(&Text { text: line, at: [MARGIN, bottom], align: Align::Left, size: SMALL, colour })?;
         bottom -= LINE;
     }
+    if !figure.note.is_empty() {
+        bottom -= 8.0;
+    }
     let columns = if figure.columns == 0 { figure.plots.len().max(1) } else { figure.columns };
     let rows = figure.plots.len().div_ceil(columns).max(1);
     let share = |room: f64, parts: usize| (room - (parts as f64 - 1.0) * BETWEEN) / parts as f64;
@@ -199,8 +202,9 @@ fn draw_axes<B: DrawingBackend>(
         } else {
             let [x, _] = frame.at([at, y_first]);
             dashes(canvas, [x, top], [x, bottom])?;
-            let at = [x + 4.0, top + SMALL];
-            canvas.text(&Text { text: &line.text, at, align: Align::Left, size: SMALL, colour: quiet })?;
+            let fits = x + 4.0 + canvas.width(&line.text, SMALL)? <= right;
+            let (align, x) = if fits { (Align::Left, x + 4.0) } else { (Align::Right, x - 4.0) };
+            canvas.text(&Text { text: &line.text, at: [x, top + SMALL], align, size: SMALL, colour: quiet })?;
         }
     }
     Ok(())
@@ -275,7 +279,7 @@ fn draw_series<B: DrawingBackend>(
 fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &Frame) -> Result<(), FigureError> {
     const SIZE: f64 = SMALL - 0.5;
     let around = |[x, y]: [f64; 2], radius: f64| [[x - radius, y - radius], [x + radius, y + radius]];
-    let mut obstacles: Vec<Box2> = Vec::new();
+    let mut obstacles = reference_places(canvas, plot, frame)?;
     let mut wanted = Vec::new();
     let mut texts = Vec::new();
     for series in plot.series.iter().rev() {
@@ -308,6 +312,31 @@ fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &F
         canvas.text(&Text { text, at, align: Align::Centre, size: SIZE, colour })?;
     }
     Ok(())
+}
+
+/// Reference lines and their texts, for labels to avoid.
+fn reference_places<B: DrawingBackend>(
+    canvas: &Canvas<B>,
+    plot: &Plot,
+    frame: &Frame,
+) -> Result<Vec<Box2>, FigureError> {
+    let [[left, top], [right, bottom]] = frame.room;
+    let mut places = Vec::new();
+    for line in &plot.references {
+        let axis = if line.horizontal { &plot.y } else { &plot.x };
+        let Some(at) = axis.coordinate(line.at) else { continue };
+        let width = canvas.width(&line.text, SMALL)?;
+        if line.horizontal {
+            let [_, y] = frame.at([*frame.x.start(), at]);
+            places.push([[left, y - 1.5], [right, y + 1.5]]);
+            places.push([[right - width, y - LINE], [right, y]]);
+        } else {
+            let [x, _] = frame.at([at, *frame.y.start()]);
+            places.push([[x - 1.5, top], [x + 1.5, bottom]]);
+            places.push([[x - width - 4.0, top], [x + width + 4.0, top + LINE]]);
+        }
+    }
+    Ok(places)
 }
 
 /// Places along a line, for labels to avoid.

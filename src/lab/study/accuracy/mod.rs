@@ -32,14 +32,15 @@ use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Scene, SceneError};
 use palpate_tactile::LayoutError;
-use recognition::{LevelAnswers, RecognitionBench, scores};
+use recognition::{LevelAnswers, RecognitionBench, TestGrasps, scores};
 use report::SceneKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
-/// Name of the study in its files.
+/// Name of the study in its files, and of the unit that counts the cost of test grasps.
 const STUDY: &str = "accuracy";
+const TESTS: &str = "recognition, test grasps";
 
 /// Error of the study.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +80,7 @@ pub struct AccuracyUnit(UnitResult);
 enum UnitResult {
     Grasps(Vec<GraspSample>),
     Recognition(LevelAnswers),
+    Tests(TestGrasps),
 }
 
 /// A unit of work.
@@ -134,10 +136,12 @@ impl AccuracyPlan {
         let trains =
             |(name, work): &(String, Work<'_>)| matches!(work, Work::Recognition(_)) && file.get(name).is_none();
         let bench = if units.iter().any(trains) {
-            match RecognitionBench::new(&self.recognition, how.cancelled)? {
-                Some(bench) => Some(bench),
-                None => return Ok(None),
+            let made = parallel(how.threads, || RecognitionBench::new(&self.recognition, how.cancelled))?;
+            let Some((bench, tests)) = made else { return Ok(None) };
+            if file.get(TESTS).is_none() {
+                file.add(TESTS, AccuracyUnit(UnitResult::Tests(tests)), tests.cpu_s)?;
             }
+            Some(bench)
         } else {
             None
         };
@@ -213,6 +217,14 @@ impl AccuracyPlan {
         let samples: Vec<_> = samples.into_iter().map(|sample| vec![(kind, sample)]).collect();
         let objects = vec![object.map_or_else(|| "empty".to_owned(), |object| object.name.clone())];
         Ok(Some(AccuracyStudy { objects, poses: 1, rows: self.rows(&samples), recognition: Vec::new() }))
+    }
+}
+
+/// Runs something that is parallel inside on as many threads; on rayon's own where none can be started.
+fn parallel<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
+        Ok(pool) => pool.install(work),
+        Err(_none) => work(),
     }
 }
 

@@ -31,6 +31,15 @@ pub(super) struct LevelAnswers {
     decided: BTreeMap<String, Vec<usize>>,
 }
 
+/// How many test grasps there are, and what they cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct TestGrasps {
+    test_grasps: usize,
+    left_out: usize,
+    /// CPU time of all (s).
+    pub(super) cpu_s: f64,
+}
+
 /// Objects with their poses, and the test grasps.
 pub(super) struct RecognitionBench<'a> {
     plan: &'a RecognitionPlan,
@@ -45,7 +54,10 @@ const TEST_SEEDS: u64 = 1_000_001;
 
 impl<'a> RecognitionBench<'a> {
     /// Loads the objects and computes the test grasps, in parallel; `None` if cancelled.
-    pub(super) fn new(plan: &'a RecognitionPlan, cancelled: &AtomicBool) -> Result<Option<Self>, AccuracyStudyError> {
+    pub(super) fn new(
+        plan: &'a RecognitionPlan,
+        cancelled: &AtomicBool,
+    ) -> Result<Option<(Self, TestGrasps)>, AccuracyStudyError> {
         let base = Scene {
             pose: PosePreset::named(&plan.preset).map(|preset| preset.poses()).unwrap_or_default(),
             ..Scene::default()
@@ -67,8 +79,10 @@ impl<'a> RecognitionBench<'a> {
         let of_object = |object: usize| bench.grasps_of(object, &plan.test, TEST_SEEDS, plan.test_grasps, &cancelled);
         let parts = (0..bench.objects.len()).into_par_iter().map(of_object);
         let Some(parts) = parts.collect::<Result<Option<Vec<Grasps>>, AccuracyStudyError>>()? else { return Ok(None) };
-        bench.test = bench.dataset(parts).0;
-        Ok(Some(bench))
+        let (test, cpu_ms, left_out) = bench.dataset(parts);
+        let made = TestGrasps { test_grasps: test.examples.len(), left_out, cpu_s: 1e-3 * cpu_ms.iter().sum::<f64>() };
+        bench.test = test;
+        Ok(Some((bench, made)))
     }
 
     /// Trains on grasps of a setting, and answers all test grasps; `None` if cancelled.
@@ -91,12 +105,12 @@ impl<'a> RecognitionBench<'a> {
         for key in &self.plan.methods {
             let Some(method) = method(key) else { continue };
             let settings = serde_json::Map::new();
-            let fitting = Fitting { seed: 1, quick: true, settings, progress: &|_| (), stop: cancelled };
-            let model = match method.train(&train, &fitting) {
+            let fitting = Fitting { seed: 1, quick: self.plan.quick, settings, progress: &|_| (), stop: cancelled };
+            let recogniser = match (method.fit)(&train, &fitting) {
                 Err(_) if stopped() => return Ok(None),
                 outcome => outcome.map_err(|cause| AccuracyStudyError::Fit { method: method.key, cause })?,
             };
-            let answers = answer(model.recogniser.as_ref(), &self.test);
+            let answers = answer(recogniser.as_ref(), &self.test);
             decided.insert(key.clone(), answers.verdicts.iter().map(|verdict| verdict.pmf.top().0).collect());
         }
         Ok(Some(LevelAnswers {
