@@ -4,7 +4,10 @@ use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::{SourceData, ViewSource};
-use palpate_lab::workers::{EffectsWorker, GripperView, LabelDraft, LabelView, MeasuredAccuracy, Snapshot};
+use palpate_lab::study::accuracy::AccuracyStudy;
+use palpate_lab::workers::{
+    EffectsWorker, GripperView, LabelDraft, LabelView, MeasuredAccuracy, SceneAccuracyJob, Snapshot,
+};
 use palpate_sim::frame::Frame;
 use palpate_sim::scene::Scene;
 use std::collections::BTreeMap;
@@ -15,6 +18,10 @@ pub struct PanelContext<'a> {
     pub snapshot: Option<&'a Snapshot>,
     /// Cost and error of the last scene measured.
     pub accuracy: Option<&'a MeasuredAccuracy>,
+    /// Measurement of what accuracy costs in a scene.
+    pub scene_accuracy: &'a SceneAccuracyJob,
+    /// Stored study of what accuracy costs; absent where it cannot be read.
+    pub stored_accuracy: Option<&'a AccuracyStudy>,
     /// Scene as set by the user.
     pub scene: &'a Scene,
     /// Measurement of the effects.

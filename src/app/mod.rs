@@ -19,7 +19,7 @@
 //! | workflow | `features/labelling.rs` `features/recognition.rs` | labelling session; recognition by both grippers |
 //! | actions | `actions.rs` `features/` | actions of all features |
 //! | context | `context.rs` | read-only context of panels |
-//! | parts | `widgets.rs` `plots.rs` `keys/binding.rs` | building blocks of panels and modes |
+//! | parts | `widgets.rs` `plots.rs` `figure_plot.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `modes/` | curves of channels; layout and keys of each mode |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
 //! | tiles | `tiling.rs` | panels beside each other |
@@ -37,6 +37,7 @@ mod bars;
 mod channel_curves;
 mod context;
 mod features;
+mod figure_plot;
 mod files;
 mod icons;
 mod keys;

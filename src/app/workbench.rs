@@ -23,7 +23,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelView, MeasuredAccuracy,
-    SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
+    SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
 };
 use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
@@ -107,8 +107,10 @@ impl Workbench {
         });
         let effects =
             EffectsWorker::start(explain, Arc::clone(&wake)).map_err(ThreadError::of("the measurement of effects"))?;
-        let simulation =
-            SimulationFeature::new(worker.map_err(ThreadError::of("the simulation"))?, effects, scene.clone());
+        let scene_accuracy = SceneAccuracyJob::start(Arc::clone(&wake))
+            .map_err(ThreadError::of("the measurement of what accuracy costs"))?;
+        let worker = worker.map_err(ThreadError::of("the simulation"))?;
+        let simulation = SimulationFeature::new(worker, effects, scene_accuracy, scene.clone());
         let gripper = GripperWorker::start(GripperSetup {
             scene: scene.clone(),
             store: store.clone(),
@@ -235,6 +237,8 @@ impl Workbench {
         PanelContext {
             snapshot,
             accuracy: accuracy.as_deref(),
+            scene_accuracy: self.simulation.scene_accuracy(),
+            stored_accuracy: self.simulation.stored_accuracy(),
             scene: self.simulation.scene(),
             effects: self.simulation.effects(),
             ghost: ghost_frame(snapshot, ghost.as_deref()),

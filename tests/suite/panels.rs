@@ -248,6 +248,59 @@ fn effects_are_switched_and_both_numbers_move() {
 }
 
 #[test]
+fn settings_are_adopted_from_the_picture_of_what_accuracy_costs() {
+    let mut bench = whole_window();
+    bench.harness.get_by_role_and_label(Role::Button, "Accuracy").click();
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_label_contains("stored study: free objects").is_some());
+    let before = bench.workbench().snapshot().unwrap();
+    bench.harness.get_by_role_and_label(Role::Button, "Adopt draft").click();
+    let after = bench.until(|s| s.grasp > before.grasp);
+    assert_eq!(after.scene.solver.accuracy, Accuracy::Draft);
+    // A point of the plot: the middle one of the settings near the pointer, wherever the plot stands.
+    let plot = bench.harness.get_by_label_contains("Error against CPU time").rect();
+    let mut found = None;
+    'search: for row in 1..40 {
+        for column in 1..40 {
+            let at = plot.min + plot.size() * egui::vec2(column as f32 / 40.0, row as f32 / 40.0);
+            bench.harness.hover_at(at);
+            bench.harness.run_steps(2);
+            if bench.harness.query_by_label_contains("--set solver.engine=rapier").is_some() {
+                found = Some(at);
+                break 'search;
+            }
+        }
+    }
+    let at = found.expect("rapier is somewhere in the plot");
+    bench.harness.drag_at(at);
+    bench.harness.drop_at(at);
+    bench.harness.run_steps(2);
+    bench.until(|s| s.scene.solver.engine == palpate_sim::scene::EngineKind::Rapier);
+}
+
+#[test]
+fn a_scene_is_measured_at_every_setting_on_request() {
+    let mut bench = whole_window();
+    bench.tell(SimulationAction::OpenObject(EMPTY.to_owned()));
+    bench.until(|s| s.object.is_none());
+    bench.harness.get_by_role_and_label(Role::Button, "Accuracy").click();
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("Measure this scene").click();
+    bench.harness.run_steps(2);
+    bench.until_shown(true, "this scene, one grasp per setting");
+    // Another accuracy of the same scene keeps it, another scene does not.
+    bench.harness.get_by_role_and_label(Role::Button, "Adopt reference").click();
+    bench.until(|s| s.scene.solver.accuracy == Accuracy::Reference);
+    bench.until_shown(true, "this scene, one grasp per setting");
+    bench.tell(SimulationAction::OpenObject("ball".to_owned()));
+    bench.until_shown(true, "stored study");
+    bench.harness.get_by_label("Measure this scene").click();
+    bench.until_shown(true, "measuring");
+    bench.harness.get_by_label("Stop").click();
+    bench.until_shown(true, "Measure this scene");
+}
+
+#[test]
 fn theme_keys_and_layout_answer() {
     let mut bench = whole_window();
     bench.harness.get_by_label("Theme").click();

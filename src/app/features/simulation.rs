@@ -4,7 +4,10 @@ use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::ShuffledObjects;
-use palpate_lab::workers::{Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SimWorker, Snapshot};
+use palpate_lab::study::accuracy::{AccuracyStudy, stored_accuracy};
+use palpate_lab::workers::{
+    Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot,
+};
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::{EMPTY, anchored, catalogue};
 use palpate_sim::scene::Scene;
@@ -30,12 +33,18 @@ pub enum SimulationAction {
     SetGhost(bool),
     /// Measure cost and influence of the scene's effects.
     MeasureEffects,
+    /// Measure what accuracy costs in the scene.
+    MeasureAccuracy,
+    /// Cancel that measurement.
+    StopMeasuringAccuracy,
 }
 
 /// State of the simulated gripper in the window.
 pub(in crate::app) struct SimulationFeature {
     worker: SimWorker,
     effects: EffectsWorker,
+    scene_accuracy: SceneAccuracyJob,
+    stored_accuracy: Option<AccuracyStudy>,
     scene: Scene,
     traces: TraceHistory,
     /// The busy worker has not taken the scene yet.
@@ -46,9 +55,23 @@ pub(in crate::app) struct SimulationFeature {
 }
 
 impl SimulationFeature {
-    pub(in crate::app) fn new(worker: SimWorker, effects: EffectsWorker, scene: Scene) -> Self {
-        let shuffled = ShuffledObjects::new(DECK_SEED);
-        Self { worker, effects, scene, traces: TraceHistory::default(), unsent: false, seen: None, shuffled }
+    pub(in crate::app) fn new(
+        worker: SimWorker,
+        effects: EffectsWorker,
+        scene_accuracy: SceneAccuracyJob,
+        scene: Scene,
+    ) -> Self {
+        Self {
+            worker,
+            effects,
+            scene_accuracy,
+            stored_accuracy: stored_accuracy().ok().map(|stored| stored.result),
+            scene,
+            traces: TraceHistory::default(),
+            unsent: false,
+            seen: None,
+            shuffled: ShuffledObjects::new(DECK_SEED),
+        }
     }
 
     pub(in crate::app) fn worker(&self) -> &SimWorker {
@@ -57,6 +80,16 @@ impl SimulationFeature {
 
     pub(in crate::app) fn effects(&self) -> &EffectsWorker {
         &self.effects
+    }
+
+    /// Measurement of what accuracy costs in a scene.
+    pub(in crate::app) fn scene_accuracy(&self) -> &SceneAccuracyJob {
+        &self.scene_accuracy
+    }
+
+    /// Stored study of what accuracy costs.
+    pub(in crate::app) fn stored_accuracy(&self) -> Option<&AccuracyStudy> {
+        self.stored_accuracy.as_ref()
     }
 
     /// Scene as set by the user.
@@ -106,6 +139,11 @@ impl SimulationFeature {
                 self.send(Command::SetGhost(ghost), notices);
             }
             SimulationAction::MeasureEffects => self.effects.ask(&self.scene),
+            SimulationAction::MeasureAccuracy => {
+                self.scene_accuracy.give_up();
+                self.scene_accuracy.ask(Box::new(self.scene.clone()));
+            }
+            SimulationAction::StopMeasuringAccuracy => self.scene_accuracy.give_up(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Panels, one file each. To add one, add a file and a line in [`ALL`], and its name to the layout of a mode; it then has a
 //! tab, a remembered place, and a test that draws it in both themes.
 
+mod accuracy;
 mod calibration;
 mod console;
 mod counts;
@@ -38,7 +39,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 21] = [
+pub const ALL: [PanelKind; 22] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -49,6 +50,7 @@ pub const ALL: [PanelKind; 21] = [
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
     PanelKind { name: "effects", title: "Effects", ui: effects::ui },
+    PanelKind { name: "accuracy", title: "Accuracy", ui: accuracy::ui },
     PanelKind { name: "label", title: "Label", ui: label::ui },
     PanelKind { name: "plan", title: "Plan", ui: plan::ui },
     PanelKind { name: "trials", title: "Trials", ui: trials::ui },

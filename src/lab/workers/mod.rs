@@ -10,7 +10,8 @@
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
-//! The thread "effects" measures on request what the effects of a scene cost and change. The thread "ghost" computes each
+//! The thread "effects" measures on request what the effects of a scene cost and change, "accuracy-study" what each
+//! setting of accuracy costs there. The thread "ghost" computes each
 //! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
@@ -37,6 +38,7 @@ mod listener_tests;
 mod messages;
 mod pace;
 mod refined_run;
+mod scene_accuracy;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
@@ -64,5 +66,6 @@ pub use messages::{
     Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status,
     TraceRow, Wake,
 };
+pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

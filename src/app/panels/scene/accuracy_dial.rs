@@ -1,12 +1,13 @@
-//! Accuracy: a tolerance by name or as a number, with its measured cost and error.
+//! Accuracy: a tolerance by name or as a number, with its measured cost and error, and what others would cost.
 
 use super::choice;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::theme::colour;
 use egui::{RichText, Slider, Ui};
 use palpate_geometry::units::{three_digits, two_digits};
 use palpate_lab::workers::Command;
-use palpate_sim::scene::{Accuracy, Integrator, Scene};
+use palpate_sim::scene::{Accuracy, EngineKind, IntegrationMethod, Integrator, Scene};
 
 /// First tolerance.
 const FIRST_TOLERANCE: f64 = 1e-5;
@@ -87,8 +88,14 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
         ui.end_row();
     };
     let cost = measured.map(|m| &m.cost);
+    let at_reference = cost.and_then(|cost| Some((cost.cpu_ms, reference_factor(context)?)));
     row("cost", cost.map(|c| format!("{} ms CPU", three_digits(c.cpu_ms))), "CPU time of a grasp on one thread");
     row("", cost.map(|c| format!("{}× real time", three_digits(c.times_real_time))), "Simulated time over CPU time");
+    if context.scene.solver.accuracy != Accuracy::Reference {
+        let text =
+            at_reference.map(|(ms, factor)| format!("≈ {} ms, {}×", two_digits(ms * factor), two_digits(factor)));
+        row("at reference", text, "CPU time of a grasp at accuracy reference, from the stored study (panel Accuracy)");
+    }
     let hover = "Estimated numerical error over the grasp (RMS)";
     let error =
         |size: f64, unit: &str, share: f64| format!("{} {unit}, {} %", two_digits(size), two_digits(share * 100.0));
@@ -96,4 +103,28 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
     row("± curvature", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
     row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
     row("± force", errors.map(|e| error(e.force_n, "N", e.force_share)), hover);
+    if cost.is_some_and(|cost| cost.persists) {
+        let warning = colour(context.view.theme.colours().warning);
+        ui.colored_label(warning, "stick-slip").on_hover_text(STICK_SLIP);
+        ui.colored_label(warning, "no step removes it").on_hover_text(STICK_SLIP);
+        ui.end_row();
+    }
+}
+
+/// Explanation of an error that stays.
+const STICK_SLIP: &str = "A hundredth of the tolerance leaves the error as it is: the object sticks or slips, or rolls one \
+                          way or the other, by differences that no real grasp repeats. A finer accuracy costs time and \
+                          gains nothing.";
+
+/// CPU time at `reference` over that of the scene's accuracy, from the stored study.
+fn reference_factor(context: &PanelContext<'_>) -> Option<f64> {
+    let (study, solver) = (context.stored_accuracy?, &context.scene.solver);
+    if solver.engine != EngineKind::Palpate || solver.method() != IntegrationMethod::Sdirk2 {
+        return None;
+    }
+    study.times_tolerance(
+        Accuracy::Reference.step_tolerance(),
+        solver.accuracy.step_tolerance(),
+        context.scene.holds_object(),
+    )
 }

@@ -1,6 +1,6 @@
 //! Settings that the accuracy study compares, as what `--set` takes, and how much it measures.
 
-use palpate_sim::scene::{EngineKind, Integrator, Scene, SceneError, Solver};
+use palpate_sim::scene::{Accuracy, EngineKind, Integrator, Scene, SceneError, Solver};
 use serde::{Deserialize, Serialize};
 
 /// A setting that trades accuracy for time.
@@ -93,6 +93,12 @@ impl AccuracySetting {
         scene.with_settings(&self.set)
     }
 
+    /// Tolerance of the second-order method; `None` for other families.
+    pub fn tolerance(&self) -> Option<f64> {
+        let accuracy = self.set.first()?.strip_prefix("solver.accuracy=")?.parse::<Accuracy>().ok()?;
+        (self.family == SettingFamily::Tolerance).then(|| accuracy.step_tolerance())
+    }
+
     /// True for the setting of a scene that nobody changed.
     pub fn is_default(&self) -> bool {
         self.set == ["solver.accuracy=standard"]
@@ -132,6 +138,8 @@ pub struct RecognitionPlan {
     pub train_grasps: u64,
     /// Test grasps of each object.
     pub test_grasps: u64,
+    /// Epochs of networks; a third of the usual number shows the same differences.
+    pub epochs: u32,
     /// True for quick fits.
     pub quick: bool,
 }
@@ -149,6 +157,7 @@ impl AccuracyPlan {
             preset: "B".to_owned(),
             train_grasps: 40,
             test_grasps: 40,
+            epochs: 60,
             quick: false,
         };
         Self { settings: settings(), objects: OBJECTS.map(str::to_owned).to_vec(), poses: 32, recognition }

@@ -104,7 +104,10 @@ impl<'a> RecognitionBench<'a> {
         let mut decided = BTreeMap::new();
         for key in &self.plan.methods {
             let Some(method) = method(key) else { continue };
-            let settings = serde_json::Map::new();
+            let mut settings = serde_json::Map::new();
+            if method.recipe.is_some() {
+                settings.insert("epochs".to_owned(), self.plan.epochs.into());
+            }
             let fitting = Fitting { seed: 1, quick: self.plan.quick, settings, progress: &|_| (), stop: cancelled };
             let recogniser = match (method.fit)(&train, &fitting) {
                 Err(_) if stopped() => return Ok(None),

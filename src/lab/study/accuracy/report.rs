@@ -238,14 +238,23 @@ impl AccuracyStudy {
         reference.next().map(|(_, cost)| cost.curvature_per_m.median)
     }
 
-    /// CPU time of a setting over that of the default, for scenes with objects fixed or free.
-    pub fn times_default(&self, setting: &AccuracySetting, fixed: bool) -> Option<f64> {
-        let cost = |is: &dyn Fn(&AccuracySetting) -> bool| {
-            let row = self.rows.iter().find(|row| is(&row.setting))?;
-            Some(row.group(SceneGroup::of(fixed))?.cpu_ms.median)
+    /// CPU time at one tolerance over that at another, for scenes with objects fixed or free.
+    pub fn times_tolerance(&self, tolerance: f64, other: f64, fixed: bool) -> Option<f64> {
+        let group = SceneGroup::of(fixed);
+        let mut costs: Vec<[f64; 2]> = self
+            .family(SettingFamily::Tolerance, group)
+            .filter_map(|(setting, cost)| Some([setting.tolerance()?.ln(), cost.cpu_ms.median.ln()]))
+            .filter(|cost| cost.iter().all(|value| value.is_finite()))
+            .collect();
+        costs.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let at = |tolerance: f64| {
+            let (first, last) = (costs.first()?, costs.last()?);
+            let x = tolerance.ln().clamp(first[0], last[0]);
+            let above = costs.iter().position(|cost| cost[0] >= x)?;
+            let ([x1, y1], [x0, y0]) = (costs[above], costs[above.saturating_sub(1)]);
+            Some(if x1 > x0 { y0 + (y1 - y0) * (x - x0) / (x1 - x0) } else { y1 })
         };
-        let default = cost(&AccuracySetting::is_default)?;
-        cost(&|own| own.set == setting.set).filter(|_| default > 0.0).map(|own| own / default)
+        Some((at(tolerance)? - at(other)?).exp())
     }
 
     /// The knee: cheapest training grasps with which no method is worse than with reference grasps, as far as their
@@ -287,8 +296,12 @@ mod tests {
         assert_eq!(names, ["draft", "standard", "reference"]);
         assert!(study.front(SceneGroup::Fixed).is_empty());
         assert_eq!(study.floor(SceneGroup::Free), Some(0.0001));
-        assert_eq!(study.times_default(&study.rows[2].setting, false), Some(10.0));
-        assert_eq!(study.times_default(&study.rows[2].setting, true), None);
+        let times = |tolerance: f64, fixed| study.times_tolerance(tolerance, 1e-4, fixed);
+        // From the table, between its rows, and beyond its end.
+        assert!(times(1e-6, false).is_some_and(|factor| (factor - 10.0).abs() < 1e-9));
+        assert!(times(1e-5, false).is_some_and(|factor| (factor - 10f64.sqrt()).abs() < 1e-9));
+        assert_eq!(times(1e-9, false), times(1e-6, false));
+        assert_eq!(times(1e-6, true), None);
     }
 
     #[test]

@@ -1,0 +1,183 @@
+//! What accuracy costs: the picture of the stored study, or the same measured for the scene in the hand. Each point is a
+//! setting; a click adopts it.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::simulation::SimulationAction;
+use crate::app::figure_plot::{self, ShownPlot};
+use crate::app::theme::colour;
+use egui::{Button, Pos2, RichText, ScrollArea, Ui};
+use palpate_geometry::drawing::Plot;
+use palpate_geometry::units::three_digits;
+use palpate_lab::study::accuracy::{
+    AccuracySetting, AccuracyStudy, GroupCost, SceneGroup, SettingFamily, accuracy_plot,
+};
+use palpate_lab::workers::SceneAccuracyState;
+use palpate_sim::scene::Scene;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let group = SceneGroup::of(context.scene.holds_object());
+    let own = context.scene_accuracy.view().filter(|view| is_like(&view.scene, context.scene));
+    let measured = match own.as_deref().map(|view| &view.state) {
+        Some(SceneAccuracyState::Ready(study)) => Some(study.as_ref()),
+        _ => None,
+    };
+    measure_ui(ui, context, own.as_deref().map(|view| &view.state), actions);
+    let Some(study) = measured.or(context.stored_accuracy) else {
+        ui.weak("The stored study cannot be read; measure this scene instead.");
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let plot = accuracy_plot(study, group);
+        let height = (ui.available_height() - FRONT_HEIGHT).max(LEAST_HEIGHT);
+        let labelled = |label: &str| label.contains("(default)") || ["draft", "reference"].contains(&label);
+        let shown = figure_plot::show(ui, context.view.theme, ("error against CPU time", &plot), height, labelled);
+        shown.response.widget_info(|| {
+            let text = format!("Error against CPU time, {} settings", study.rows.len());
+            egui::WidgetInfo::labeled(egui::Role::Figure, true, text)
+        });
+        mark_current(ui, context, study, group, (&plot, &shown));
+        pointed_ui(ui, context, study, group, (&plot, &shown), actions);
+        front_ui(ui, context, study, group, actions);
+    });
+}
+
+/// Room for the buttons below the plot, and the least height of the plot (points).
+const FRONT_HEIGHT: f32 = 62.0;
+const LEAST_HEIGHT: f32 = 130.0;
+
+/// True for scenes that differ in accuracy alone: what was measured for one holds for the other.
+fn is_like(measured: &Scene, scene: &Scene) -> bool {
+    Scene { solver: scene.solver.clone(), ..measured.clone() } == *scene
+}
+
+/// Origin of the picture, and the button that measures.
+fn measure_ui(ui: &mut Ui, context: &PanelContext<'_>, state: Option<&SceneAccuracyState>, actions: &mut Actions) {
+    ui.horizontal_wrapped(|ui| match state {
+        Some(SceneAccuracyState::Measuring(done, of)) => {
+            ui.weak(if *of == 0 { "measuring ..".to_owned() } else { format!("measuring .. {done} of {of}") });
+            if ui.button("Stop").on_hover_text("Stop measuring").clicked() {
+                actions.push(SimulationAction::StopMeasuringAccuracy);
+            }
+        }
+        Some(SceneAccuracyState::Ready(_)) => {
+            ui.weak("this scene, one grasp per setting");
+            if ui.button("Measure again").clicked() {
+                actions.push(SimulationAction::MeasureAccuracy);
+            }
+        }
+        Some(SceneAccuracyState::Failed(cause)) => {
+            ui.label(RichText::new(cause.to_string()).color(colour(context.view.theme.colours().error)));
+        }
+        Some(SceneAccuracyState::Stopped) | None => {
+            if let Some(study) = context.stored_accuracy {
+                let held = if context.scene.holds_object() { "fixed" } else { "free" };
+                let (shapes, poses) = (study.objects.len(), study.poses);
+                ui.weak(format!("stored study: {held} objects, {shapes} shapes, {poses} poses"))
+                    .on_hover_text("palpate study accuracy; palpate help accuracy has its tables");
+            }
+            let hover = "Grasp this scene at every setting, in the background (seconds)";
+            if ui.button("Measure this scene").on_hover_text(hover).clicked() {
+                actions.push(SimulationAction::MeasureAccuracy);
+            }
+        }
+    });
+}
+
+/// All settings with their cost in this group.
+fn settings(study: &AccuracyStudy, group: SceneGroup) -> impl Iterator<Item = (&AccuracySetting, &GroupCost)> {
+    SettingFamily::ALL.into_iter().flat_map(move |family| study.family(family, group))
+}
+
+/// True where adopting a setting would change nothing.
+fn is_current(setting: &AccuracySetting, scene: &Scene) -> bool {
+    setting.adopted(scene).is_ok_and(|adopted| adopted == *scene)
+}
+
+/// Rings the setting of the scene.
+fn mark_current(
+    ui: &Ui,
+    context: &PanelContext<'_>,
+    study: &AccuracyStudy,
+    group: SceneGroup,
+    (plot, shown): (&Plot, &ShownPlot),
+) {
+    let stroke = egui::Stroke::new(2.0, colour(context.view.theme.colours().text));
+    // Joints and taxels of the scene belong to every setting of motion.
+    let current = settings(study, group).find(|(setting, _)| is_current(setting, context.scene));
+    if let Some(place) = current.and_then(|(_, cost)| shown.position(plot, place_of(cost))) {
+        ui.painter().with_clip_rect(shown.response.rect).circle_stroke(place, 8.0, stroke);
+    }
+}
+
+fn place_of(cost: &GroupCost) -> [f64; 2] {
+    [cost.cpu_ms.median, cost.curvature_per_m.median]
+}
+
+/// Distance within which the pointer means a point (points).
+const NEAR: f32 = 14.0;
+
+/// Tells the setting under the pointer; a click adopts it.
+fn pointed_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    study: &AccuracyStudy,
+    group: SceneGroup,
+    (plot, shown): (&Plot, &ShownPlot),
+    actions: &mut Actions,
+) {
+    let Some(pointer) = shown.response.hover_pos() else { return };
+    let distance = |(_, cost): &(&AccuracySetting, &GroupCost)| {
+        shown.position(plot, place_of(cost)).map_or(f32::INFINITY, |at: Pos2| at.distance(pointer))
+    };
+    let nearest = settings(study, group).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let Some((setting, cost)) = nearest.filter(|found| distance(found) < NEAR) else { return };
+    ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+    let response = shown.response.clone().on_hover_ui_at_pointer(|ui| about_ui(ui, setting, cost));
+    if response.clicked() {
+        adopt(setting, context, actions);
+    }
+}
+
+fn adopt(setting: &AccuracySetting, context: &PanelContext<'_>, actions: &mut Actions) {
+    match setting.adopted(context.scene) {
+        Ok(scene) => actions.push(SimulationAction::SetScene(Box::new(scene))),
+        Err(cause) => actions.push(crate::app::notices::UserMessage::Error(cause.to_string())),
+    }
+}
+
+/// What a setting costs and how accurate it is.
+fn about_ui(ui: &mut Ui, setting: &AccuracySetting, cost: &GroupCost) {
+    ui.strong(format!("{}, {}", setting.name, setting.family.title()));
+    ui.monospace(setting.on_command_line());
+    let range = |spread: palpate_lab::study::accuracy::Spread, factor: f64, unit: &str| {
+        let [low, median, high] = [spread.low, spread.median, spread.high].map(|v| three_digits(factor * v));
+        if cost.grasps == 1 { format!("{median} {unit}") } else { format!("{median} {unit} ({low} to {high})") }
+    };
+    ui.label(format!("CPU {}", range(cost.cpu_ms, 1.0, "ms")));
+    ui.label(format!("error of curvature {}", range(cost.curvature_per_m, 1e3, "1/km")));
+    ui.label(format!("error of force {}", range(cost.force_n, 1e3, "mN")));
+    if cost.failed > 0 {
+        ui.label(format!("{} of {} grasps fail", cost.failed, cost.grasps));
+    }
+    ui.weak("Click to adopt");
+}
+
+/// Buttons of the settings on the front, for the keyboard and for small windows.
+fn front_ui(ui: &mut Ui, context: &PanelContext<'_>, study: &AccuracyStudy, group: SceneGroup, actions: &mut Actions) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
+        ui.weak("front").on_hover_text("Nothing cheaper is as accurate");
+        for (setting, cost) in study.front(group) {
+            let current = is_current(setting, context.scene);
+            let euler = if setting.family == SettingFamily::Tolerance { "" } else { " Euler" };
+            let name = format!("{}{euler}", setting.name);
+            let response = ui.add(Button::selectable(current, RichText::new(&name).small()));
+            let label = format!("Adopt {name}");
+            response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, current, &label));
+            if response.on_hover_ui(|ui| about_ui(ui, setting, cost)).clicked() {
+                adopt(setting, context, actions);
+            }
+        }
+    });
+}
