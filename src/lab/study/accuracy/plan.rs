@@ -140,8 +140,6 @@ pub struct RecognitionPlan {
     pub test_grasps: u64,
     /// Epochs of networks; a third of the usual number shows the same differences.
     pub epochs: u32,
-    /// True for quick fits.
-    pub quick: bool,
 }
 
 /// Three closed-form shapes and three meshes.
@@ -158,7 +156,6 @@ impl AccuracyPlan {
             train_grasps: 40,
             test_grasps: 40,
             epochs: 60,
-            quick: false,
         };
         Self { settings: settings(), objects: OBJECTS.map(str::to_owned).to_vec(), poses: 32, recognition }
     }
@@ -172,7 +169,6 @@ impl AccuracyPlan {
             .settings
             .retain(|setting| ["draft", "standard"].contains(&&*setting.name) || *setting == reference());
         plan.recognition.methods.truncate(3);
-        plan.recognition.quick = true;
         (plan.recognition.train_grasps, plan.recognition.test_grasps) = (8, 8);
         plan
     }
