@@ -1,7 +1,7 @@
 //! `palpate collect`: collects a simulated data set in parallel, resumable, in parts.
 
 use super::Failure;
-use super::setup::{SceneArguments, open_store};
+use super::setup::{RecomputeArguments, SceneArguments, open_store};
 use super::terminal::{say, say_json};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_lab::grasping::{CollectionPlan, CollectionReport, Shard, all_objects, collect};
@@ -34,6 +34,8 @@ pub(super) struct CollectArguments {
     /// Number of threads (default: one per core). The data do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    #[command(flatten)]
+    recompute: RecomputeArguments,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -65,6 +67,7 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
         trials: arguments.trials,
         seed: arguments.seed,
         shard: arguments.shard.unwrap_or(Shard::WHOLE),
+        recompute: arguments.recompute.chosen(),
     };
     let threads = match arguments.threads {
         Some(threads) => usize::from(threads),
@@ -88,10 +91,13 @@ fn print(report: &Report, store: &Path) -> Result<(), Failure> {
     say(format!("collection    {} in {}", collection.collection, store.display()))?;
     say(format!("stored        {} new trials, {} already there", collection.stored, collection.known))?;
     say(format!("poses         {} redrawn because the open fingers had no room", collection.redrawn))?;
+    if collection.recomputed > 0 {
+        say(format!("recomputed    {} trials at a finer accuracy than the scene asks for", collection.recomputed))?;
+    }
     if collection.unsound > 0 {
         say(format!(
-            "unsound       {} trials did not converge in every step or did not come to rest; they are marked, \
-             and data sets exclude them",
+            "unsound       {} trials did not converge in every step or did not come to rest at any accuracy; they are \
+             marked, and data sets exclude them",
             collection.unsound
         ))?;
     }

@@ -9,7 +9,7 @@ use glam::Vec2;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, grasp};
+use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, Recompute, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_learn::{StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
@@ -125,7 +125,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let stopped = loop {
         let pose_seed = seed.wrapping_add(grasps.len() as u64).wrapping_add(1);
         let (scene, _) = sampler.draw_after(object.as_ref(), pose_seed, released.as_ref());
-        let trial = grasp(&scene, object.as_ref(), pose_seed);
+        let trial = grasp_soundly(&scene, object.as_ref(), pose_seed, Recompute::Restless);
         let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
         identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
         for row in trial.frames().iter().map(|frame| reader.row(frame)) {

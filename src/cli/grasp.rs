@@ -1,10 +1,11 @@
 //! `palpate grasp`: simulates one grasp, prints a summary, stores the trial, writes it as CSV.
 
 use super::Failure;
-use super::setup::{SceneArguments, open_store};
+use super::setup::{RecomputeArguments, SceneArguments, open_store};
 use super::terminal::{say, say_json, warn};
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp};
+use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp_soundly};
+use palpate_sim::frame::TrustLevel;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_store::{contacts_path, write_contacts_csv, write_trial_csv};
@@ -21,6 +22,7 @@ use std::path::{Path, PathBuf};
   palpate grasp box --seed 7 --out box.csv --layout C6+F
   palpate grasp --scene scene.toml --set gripper.pad.friction=0.4
   palpate grasp ball --accuracy 1e-4 --error-band
+  palpate grasp jenga --seed 3 --until-agreement
 
 See also: palpate help scenes")]
 pub(super) struct GraspArguments {
@@ -40,6 +42,8 @@ pub(super) struct GraspArguments {
     /// Divide force by the convex hull of the contacts, as the paper does, instead of the participation area.
     #[arg(long)]
     hull: bool,
+    #[command(flatten)]
+    recompute: RecomputeArguments,
     /// Estimate the numerical error from a second run with finer steps.
     #[arg(long)]
     error_band: bool,
@@ -65,6 +69,9 @@ struct Report {
     cpu_ms: f64,
     /// CPU time of loading the object (ms).
     load_cpu_ms: f64,
+    /// How far the result can be trusted, and why.
+    trust: TrustLevel,
+    trust_reason: String,
     /// Half-widths of the numerical error band.
     #[serde(skip_serializing_if = "Option::is_none")]
     error_band: Option<ErrorNorms>,
@@ -88,8 +95,10 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     };
     let seed = arguments.seed.unwrap_or(0);
     let start = cpu_time::ThreadTime::now();
-    let trial = grasp(&scene, object.as_ref(), seed);
+    let trial = grasp_soundly(&scene, object.as_ref(), seed, arguments.recompute.chosen());
     let cpu_ms = start.elapsed().as_secs_f64() * 1e3;
+    // That of the accuracy it was computed at.
+    let scene = trial.header.scene.clone();
     let error_band = arguments
         .error_band
         .then(|| Sensors::whole_fingers(&scene.gripper))
@@ -101,7 +110,8 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     }
     let accuracy = scene.solver.accuracy.to_string();
     let summary = GraspSummary::new(&trial, &scene);
-    let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, error_band, trial_id };
+    let (trust, trust_reason) = summary.quality.trust();
+    let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, trust, trust_reason, error_band, trial_id };
     if arguments.json {
         say_json(&report)?;
     } else {
@@ -152,6 +162,10 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
     if let Some(error) = &report.error_band {
         print_error(error)?;
     }
+    if let Some(recomputed) = quality.recomputed {
+        say(format!("recomputed    at accuracy {}: {recomputed}", report.accuracy))?;
+    }
+    say(format!("trust         {}: {}", report.trust.name(), report.trust_reason))?;
     say(format!("cost          {:.1} ms CPU for {duration} s at accuracy {}", report.cpu_ms, report.accuracy))?;
     match report.trial_id {
         Some(id) => say(format!("stored        trial {id}")),

@@ -1,6 +1,7 @@
 //! Scene arguments shared by all commands that simulate, and opening the store.
 
 use super::Failure;
+use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use palpate_store::Store;
@@ -29,6 +30,21 @@ pub(super) struct SceneArguments {
     /// Set a key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
+}
+
+/// When a grasp is computed again at a finer accuracy.
+#[derive(Debug, clap::Args)]
+pub(super) struct RecomputeArguments {
+    /// Compute again at a tenth of the tolerance until two levels end alike, and take the finer (default: only where the
+    /// hold does not come to rest).
+    #[arg(long)]
+    until_agreement: bool,
+}
+
+impl RecomputeArguments {
+    pub(super) fn chosen(&self) -> Recompute {
+        if self.until_agreement { Recompute::UntilAgreement } else { Recompute::Restless }
+    }
 }
 
 /// Parser of a number within a range.

@@ -1,6 +1,7 @@
 //! Samples of a simulation and their numerical quality: plain records, raw quantities only.
 
 use crate::gripper::{Phase, Side};
+use crate::scene::Accuracy;
 use palpate_geometry::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -92,6 +93,64 @@ pub struct Quality {
     pub hold_changes: u32,
     /// Place and time of the imbalance; absent where every step reached its tolerance.
     pub imbalance: Option<Imbalance>,
+    /// Why the trial was computed more finely than its scene asked for; absent where it was not.
+    pub recomputed: Option<Recomputed>,
+    /// Whether another run of the same scene at a tenth of the tolerance, or at ten times the tolerance, ends alike;
+    /// absent where there was none.
+    pub agrees: Option<bool>,
+}
+
+/// A trial that was computed again at a finer accuracy than its scene asked for. The scene of the trial has the
+/// accuracy that it was computed at in the end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recomputed {
+    /// Accuracy that was asked for.
+    pub asked: Accuracy,
+    /// Cause.
+    pub cause: RecomputeCause,
+}
+
+/// Cause for computing a trial again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RecomputeCause {
+    /// Its hold did not come to rest.
+    Restless,
+    /// Two levels of accuracy had to agree.
+    UntilAgreement,
+}
+
+/// How far the numbers of a trial can be trusted: a light of three colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TrustLevel {
+    /// A finer run ends alike, and nothing was flagged.
+    Green,
+    /// Not compared with a finer run, or flagged.
+    Amber,
+    /// Wrong by its own finer run, or unsound.
+    Red,
+}
+
+impl TrustLevel {
+    /// Its name: green, amber or red.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Green => "green",
+            Self::Amber => "amber",
+            Self::Red => "red",
+        }
+    }
+}
+
+impl std::fmt::Display for Recomputed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { asked, cause } = self;
+        match cause {
+            RecomputeCause::Restless => write!(f, "the hold does not come to rest at {asked}"),
+            RecomputeCause::UntilAgreement => write!(f, "two levels had to agree, beginning at {asked}"),
+        }
+    }
 }
 
 /// Steps whose forces did not balance to the solver's tolerance: the first of them, and the worst.
@@ -117,6 +176,19 @@ impl Quality {
     /// True when the hold did not come to rest: forces kept changing, or do not balance at its end.
     pub fn is_restless(&self) -> bool {
         self.hold_changes >= RESTLESS_CHANGES || self.static_residual > RESTLESS_RESIDUAL
+    }
+
+    /// How far the trial can be trusted, and why, in a few words.
+    pub fn trust(&self) -> (TrustLevel, String) {
+        let missed = self.missed_steps;
+        let diverged = (!self.finite).then(|| "the simulation diverged".to_owned());
+        match (diverged.or_else(|| self.misses()), self.agrees) {
+            (Some(cause), _) => (TrustLevel::Red, cause),
+            (None, Some(false)) => (TrustLevel::Red, "a finer run of the same grasp ends elsewhere".to_owned()),
+            (None, _) if missed > 0 => (TrustLevel::Amber, format!("{missed} steps missed the accuracy")),
+            (None, None) => (TrustLevel::Amber, "not compared with a finer run".to_owned()),
+            (None, Some(true)) => (TrustLevel::Green, "a finer run of the same grasp ends alike".to_owned()),
+        }
     }
 
     /// Describes why a trial is not sound, in a sentence.
@@ -162,6 +234,8 @@ impl Default for Quality {
             static_residual: 0.0,
             hold_changes: 0,
             imbalance: None,
+            recomputed: None,
+            agrees: None,
         }
     }
 }
@@ -201,6 +275,28 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn trust_is_green_only_where_a_finer_run_agrees_and_nothing_is_flagged() {
+        let light = |change: &dyn Fn(&mut Quality)| {
+            let mut quality = Quality { agrees: Some(true), ..Quality::default() };
+            change(&mut quality);
+            quality.trust()
+        };
+        assert_eq!(light(&|_| ()).0, TrustLevel::Green);
+        assert_eq!(light(&|q| q.agrees = None).0, TrustLevel::Amber);
+        assert_eq!(light(&|q| q.missed_steps = 3), (TrustLevel::Amber, "3 steps missed the accuracy".to_owned()));
+        for change in [
+            (|q| q.agrees = Some(false)) as fn(&mut Quality),
+            |q| q.converged = false,
+            |q| q.finite = false,
+            |q| q.hold_changes = 5,
+            |q| q.static_residual = 0.3,
+        ] {
+            assert_eq!(light(&change).0, TrustLevel::Red);
+        }
+        assert!(light(&|q| q.hold_changes = 7).1.contains("7 changes of force"));
+    }
 
     #[test]
     fn loads_are_separated_by_side() {

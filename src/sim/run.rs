@@ -157,6 +157,12 @@ impl SimRun {
         self.engine.get_mut().pull_object(force);
     }
 
+    /// Moves the object, as if it had been put down elsewhere: a shift (m) and a turn about its centre of mass (axis times
+    /// angle, rad), world axes.
+    pub fn move_object(&mut self, shift: DVec3, turn: DVec3) {
+        self.engine.get_mut().move_object(shift, turn);
+    }
+
     /// Simulates up to the next event.
     pub fn next_event(&mut self) -> Result<SimEvent, SimulationError> {
         let clock = self.engine.get().clock();
@@ -213,6 +219,8 @@ impl SimRun {
 mod tests {
     use super::*;
     use crate::frame::TaxelLoad;
+    use glam::DQuat;
+    use palpate_geometry::Primitive;
 
     #[test]
     fn samples_and_actuation_interleave_on_the_clock() {
@@ -235,6 +243,25 @@ mod tests {
         assert_eq!(samples.len(), 30);
         assert_eq!(samples[0].0, 0);
         assert!((samples[0].1 - 1.0 / 75.0).abs() < 1e-15 && (samples[29].1 - 0.4).abs() < 1e-15);
+    }
+
+    #[test]
+    fn objects_are_moved_in_world_axes_by_both_engines() {
+        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+        for engine in EngineKind::ALL {
+            let mut scene = Scene::default();
+            scene.solver.engine = engine;
+            scene.gripper.mount.yaw_deg = 90.0;
+            let (mut run, _) = SimRun::new(&scene, Some(&ball));
+            let place = |run: &SimRun| run.first_look().world_from_object.expect("a ball");
+            let before = place(&run);
+            run.move_object(DVec3::new(0.003, 0.0, 0.001), DVec3::new(0.0, 0.2, 0.0));
+            let after = place(&run);
+            let moved = after.position - before.position;
+            assert!((moved - DVec3::new(0.003, 0.0, 0.001)).length() < 1e-6, "{engine:?}: {moved}");
+            let turned = after.rotation * before.rotation.inverse();
+            assert!(turned.abs_diff_eq(DQuat::from_rotation_y(0.2), 1e-5), "{engine:?}: {turned}");
+        }
     }
 
     #[test]

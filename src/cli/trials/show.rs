@@ -180,6 +180,11 @@ fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), 
         "static residual at hold {:.1e}, friction residual {:.1e}",
         quality.static_residual, quality.friction_residual
     ))?;
+    if let Some(recomputed) = quality.recomputed {
+        say(format!("recomputed at accuracy {}: {recomputed}", trial.header.scene.solver.accuracy))?;
+    }
+    let (trust, reason) = quality.trust();
+    say(format!("trust {}: {reason}", trust.name()))?;
     if !quality.is_sound() {
         say("unsound: data sets exclude it")?;
     }

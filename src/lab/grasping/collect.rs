@@ -4,7 +4,7 @@
 //! them. Every task has its own seed, derived from the plan's seed, the object's name and the task's number, and trials
 //! are stored in the order of the plan.
 
-use super::run::grasp;
+use super::agreement::{Recompute, grasp_soundly};
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
@@ -31,6 +31,8 @@ pub struct CollectionPlan {
     pub seed: u64,
     /// Part of the work to do.
     pub shard: Shard,
+    /// When a grasp is computed again at a finer accuracy.
+    pub recompute: Recompute,
 }
 
 /// One of several equal parts of the work.
@@ -61,7 +63,10 @@ pub struct CollectionReport {
     pub known: u32,
     /// Poses redrawn because the open fingers would have intersected the object.
     pub redrawn: u32,
-    /// Trials with non-finite values or without convergence: stored and marked, but excluded from data sets.
+    /// Trials computed again at a finer accuracy than the scene asks for.
+    pub recomputed: u32,
+    /// Trials with non-finite values, without convergence, or that do not come to rest at any accuracy: stored and
+    /// marked, but excluded from data sets.
     pub unsound: u32,
 }
 
@@ -115,7 +120,11 @@ impl CollectionPlan {
     pub fn name(&self) -> String {
         let mut scene = self.scene.clone();
         scene.object.source.clear();
-        format!("{:016x}", mixed(hash(&scene.to_toml()) ^ mixed(self.seed)))
+        let agreement = match self.recompute {
+            Recompute::Restless => 0,
+            Recompute::UntilAgreement => mixed(1),
+        };
+        format!("{:016x}", mixed(hash(&scene.to_toml()) ^ mixed(self.seed) ^ agreement))
     }
 
     fn tasks(&self) -> Vec<Task> {
@@ -249,6 +258,8 @@ fn store_in_order(
         report.redrawn += ready.iter().map(|(_, redrawn)| redrawn).sum::<u32>();
         let unsound = |(trial, _): &&(SimulatedTrial, u32)| !trial.data.quality.is_sound();
         report.unsound += ready.iter().filter(unsound).count() as u32;
+        let recomputed = |(trial, _): &&(SimulatedTrial, u32)| trial.data.quality.recomputed.is_some();
+        report.recomputed += ready.iter().filter(recomputed).count() as u32;
         line.stored.store(due, Ordering::Relaxed);
         progress(report.known + due as u32, object);
         if let Some(failure) = failure {
@@ -304,10 +315,10 @@ impl<'a> Bench<'a> {
         for number in first..task.number {
             let seed = self.plan.seed_of(&self.plan.objects[task.object], number);
             let (scene, _) = on_bench.sampler.draw_after(model, seed, released.as_ref());
-            released = grasp(&scene, model, seed).data.frames.pop();
+            released = grasp_soundly(&scene, model, seed, self.plan.recompute).data.frames.pop();
         }
         let (scene, redrawn) = on_bench.sampler.draw_after(model, task.seed, released.as_ref());
-        let mut trial = grasp(&scene, model, task.seed);
+        let mut trial = grasp_soundly(&scene, model, task.seed, self.plan.recompute);
         trial.header.collection = Some(self.collection.to_owned());
         Ok((trial, redrawn))
     }
@@ -322,7 +333,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.timing.duration_s = 0.4;
         let objects = ["ball", "smallcube", EMPTY].map(str::to_owned).to_vec();
-        CollectionPlan { scene, objects, trials: 5, seed: 1, shard: Shard::WHOLE }
+        CollectionPlan { scene, objects, trials: 5, seed: 1, shard: Shard::WHOLE, recompute: Recompute::default() }
     }
 
     fn store(folder: &tempfile::TempDir, name: &str) -> Store {
@@ -400,8 +411,10 @@ mod tests {
         let other_seed = CollectionPlan { seed: 2, ..plan() };
         let mut other_scene = plan();
         other_scene.scene.object.fixed = true;
-        let names = [plan().name(), other_seed.name(), other_scene.name()];
-        assert!(names[0] != names[1] && names[0] != names[2] && names[1] != names[2]);
+        let agreed = CollectionPlan { recompute: Recompute::UntilAgreement, ..plan() };
+        let names = [plan().name(), other_seed.name(), other_scene.name(), agreed.name()];
+        let different: std::collections::BTreeSet<&String> = names.iter().collect();
+        assert_eq!(different.len(), names.len());
         assert_eq!(CollectionPlan { trials: 50, objects: all_objects(), ..plan() }.name(), names[0]);
         let mut seeds: Vec<u64> =
             CollectionPlan { trials: 1000, objects: all_objects(), ..plan() }.tasks().iter().map(|t| t.seed).collect();

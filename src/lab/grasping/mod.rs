@@ -1,6 +1,7 @@
 //! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, and
 //! identification of an object by successive grasps.
 
+mod agreement;
 mod collect;
 mod controller;
 mod error_band;
@@ -10,6 +11,9 @@ mod run;
 mod shuffled_objects;
 mod summary;
 
+pub use agreement::{
+    Agreed, EndState, Recompute, ends_alike, grasp_soundly, grasp_until_agreement, has_lost_object, until_agreement,
+};
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};

@@ -17,8 +17,41 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// Interval of a share that is estimated by `count` of `of` (Wilson 1927): sound for rare events and small samples.
+    pub fn of_share(count: usize, of: usize) -> Self {
+        /// Quantile of the normal distribution at 97.5 %, for a coverage of [`LEVEL`].
+        const Z: f64 = 1.959_963_984_540_054;
+        if of == 0 {
+            return Self { estimate: 0.0, low: 0.0, high: 1.0 };
+        }
+        let (n, p) = (of as f64, count as f64 / of as f64);
+        let (middle, scale) = (p + Z * Z / (2.0 * n), 1.0 + Z * Z / n);
+        let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+        let low = if count == 0 { 0.0 } else { (middle - half) / scale };
+        let high = if count == of { 1.0 } else { (middle + half) / scale };
+        Self { estimate: p, low, high }
+    }
+
     /// True if the value lies in the interval, ends included.
     pub fn holds(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: `statsmodels.stats.proportion.proportion_confint(count, of, method="wilson")`.
+    #[test]
+    fn shares_have_wilson_intervals() {
+        for (count, of, low, high) in [(5, 50, 0.043_476, 0.213_602), (1, 1000, 0.000_177, 0.005_644)] {
+            let share = Interval::of_share(count, of);
+            assert!((share.low - low).abs() < 2e-6 && (share.high - high).abs() < 2e-6, "{share:?}");
+            assert!(share.holds(share.estimate));
+        }
+        let none = Interval::of_share(0, 2000);
+        assert!(none.low == 0.0 && (none.high - 0.001_917).abs() < 2e-6, "{none:?}");
+        assert_eq!(Interval::of_share(0, 0).high, 1.0);
     }
 }

@@ -36,6 +36,10 @@ pub trait Engine {
     /// Pulls at the object's centre of mass (N, world axes) from now on.
     fn pull_object(&mut self, force: DVec3);
 
+    /// Moves the object to another place and orientation, as if it had been put down there: a shift (m) and a turn
+    /// about its centre of mass (axis times angle, rad), world axes.
+    fn move_object(&mut self, shift: DVec3, turn: DVec3);
+
     /// Lets some ticks pass, within which nothing is sampled or commanded.
     fn advance_by(&mut self, ticks: u64) -> Result<(), SimulationError>;
 

@@ -18,7 +18,7 @@ use crate::frame::{Frame, Imbalance, Plan, Quality, TaxelLoad};
 use crate::gripper::{Actuation, Phase};
 use crate::objects::ObjectModel;
 use crate::scene::{Clock, Scene};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use palpate_geometry::Pose;
 
 /// A gripper and an object being simulated. One tick of the clock is one solver step or, under a tolerance, as many as
@@ -123,6 +123,15 @@ impl Simulation {
         self.pulls.object_force = self.model.world_from_gripper.inverse().direction(force);
     }
 
+    /// Moves the object by a shift (m) and a turn about its centre of mass (axis times angle, rad), world axes.
+    pub fn move_object(&mut self, shift: DVec3, turn: DVec3) {
+        let gripper_from_world = self.model.world_from_gripper.inverse();
+        let body = &mut self.state.body;
+        body.position += gripper_from_world.direction(shift);
+        let turn = DQuat::from_scaled_axis(gripper_from_world.direction(turn));
+        body.rotation = (turn * body.rotation).normalize();
+    }
+
     /// Advances by one tick; reports its last step.
     pub fn advance(&mut self) -> Result<StepReport, SimulationError> {
         self.advance_by(1)
@@ -219,8 +228,8 @@ impl Simulation {
             newton_max: totals.newton_max,
             friction_residual: totals.friction_residual,
             static_residual: self.static_residual(),
-            hold_changes: 0, // counted by the run, which knows the hold
             imbalance: self.imbalance.clone(),
+            ..Quality::default()
         }
     }
 
@@ -351,6 +360,10 @@ impl Engine for Simulation {
 
     fn pull_object(&mut self, force: DVec3) {
         self.pull_object(force);
+    }
+
+    fn move_object(&mut self, shift: DVec3, turn: DVec3) {
+        self.move_object(shift, turn);
     }
 
     fn advance_by(&mut self, ticks: u64) -> Result<(), SimulationError> {

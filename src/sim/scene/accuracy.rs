@@ -47,6 +47,15 @@ impl Accuracy {
         }
     }
 
+    /// The next level of accuracy: a tenth of the tolerance, by its name where it has one.
+    #[must_use]
+    pub fn finer(self) -> Self {
+        // Rounded, so that a tenth of 1e-5 is 1e-6 and not its neighbour.
+        let tenth = (1e14 * self.step_tolerance()).round() / 1e15;
+        let named = Self::NAMED.into_iter().find(|accuracy| accuracy.step_tolerance() == tenth);
+        named.unwrap_or(Self::Tolerance(tenth))
+    }
+
     /// Ticks per second, at least: fixed steps of Euler and of rapier. A tolerance needs no more than samples and
     /// actuation do.
     pub fn least_hz(self) -> u32 {
@@ -181,6 +190,14 @@ mod tests {
             let cause = wrong.parse::<Accuracy>().expect_err(wrong).to_string();
             assert!(cause.contains("draft") && cause.contains("1e-9"), "{cause}");
         }
+    }
+
+    #[test]
+    fn levels_are_tenths_and_keep_their_names() {
+        let levels = std::iter::successors(Some(Accuracy::Draft), |level| Some(level.finer()));
+        let names: Vec<String> = levels.take(6).map(|level| level.to_string()).collect();
+        assert_eq!(names, ["draft", "standard", "1e-5", "reference", "1e-7", "1e-8"]);
+        assert_eq!(Accuracy::Tolerance(3.3e-5).finer(), Accuracy::Tolerance(3.3e-6));
     }
 
     #[test]

@@ -223,6 +223,14 @@ impl Solver {
         let accuracy = Accuracy::Tolerance(0.1 * self.accuracy.step_tolerance());
         Self { accuracy, integrator: Integrator::Auto, ..self.clone() }
     }
+
+    /// Settings of the next level of accuracy, for computing a grasp again; `None` where the engine controls no error,
+    /// and below the least tolerance.
+    pub fn finer(&self) -> Option<Self> {
+        let accuracy = self.accuracy.finer();
+        let possible = self.engine == EngineKind::Palpate && Accuracy::TOLERANCES.contains(&accuracy.step_tolerance());
+        possible.then(|| Self { accuracy, integrator: Integrator::Auto, ..self.clone() })
+    }
 }
 
 impl Default for Solver {

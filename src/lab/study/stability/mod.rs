@@ -1,14 +1,18 @@
-//! Numerical stability: a table of hard cases with limits, run at every accuracy; and random scenes over wide ranges,
-//! each computed again with a quarter of the step, to count silently wrong answers.
+//! Numerical stability: a table of hard cases with limits, run at every accuracy; a table of holds that chatter; and
+//! random scenes over wide ranges, each held against the truth, to count silently wrong results.
 //!
 //! A case is one line in [`CASES`] and one function that measures. Its assertions are data, a measured value and its limit,
 //! so that the table can be printed, stored and tested alike.
 
 mod cases;
+mod chatter;
 mod random;
 
 pub use cases::CASES;
-pub use random::{FlagRow, Flags, RandomReport, RandomScene, StepRow, random_scenes};
+pub use chatter::{CHATTER_ACCURACIES, ChatterRow, ChatterUnit, chatter_table};
+pub use random::{
+    AccuracyRow, FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, Verdict,
+};
 
 use palpate_sim::physics::NotFinite;
 use palpate_sim::scene::{Accuracy, Timing};

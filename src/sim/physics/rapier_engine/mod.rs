@@ -239,6 +239,11 @@ impl Engine for RapierSimulation {
         self.pull = self.world_from_gripper.inverse().direction(force);
     }
 
+    fn move_object(&mut self, shift: DVec3, turn: DVec3) {
+        let gripper_from_world = self.world_from_gripper.inverse();
+        self.hand.move_object(gripper_from_world.direction(shift), gripper_from_world.direction(turn));
+    }
+
     fn advance_by(&mut self, ticks: u64) -> Result<(), SimulationError> {
         for _ in 0..ticks {
             self.hand.step(self.pull);

@@ -252,6 +252,15 @@ impl Hand {
         self.world.step();
     }
 
+    /// Moves the object: a shift (m) and a turn about its centre of mass (axis times angle, rad), gripper frame.
+    pub(super) fn move_object(&mut self, shift: DVec3, turn: DVec3) {
+        let Some(body) = self.object.and_then(|object| self.world.bodies.get_mut(object)) else { return };
+        let (centre, turn) = (body.center_of_mass(), Quat::from_scaled_axis(turn.as_vec3()));
+        let position = centre + turn * (body.translation() - centre) + length(shift);
+        let rotation = turn * *body.rotation();
+        body.set_position(Pose::from_parts(position, rotation), false);
+    }
+
     /// Joint angles, left finger then right, from palm to tip (rad).
     pub(super) fn angles(&self) -> impl Iterator<Item = f64> + '_ {
         self.joints.iter().flatten().map(|handle| {

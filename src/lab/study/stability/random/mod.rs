@@ -1,0 +1,9 @@
+//! Random scenes over wide ranges: how often a result is wrong, how often silently so, and what it costs to do better.
+
+mod judged;
+mod report;
+mod scene;
+
+pub use judged::{JudgedScene, LevelResult, Verdict};
+pub use report::{AccuracyRow, FlagRow, Policy, PolicyRow, RandomReport};
+pub use scene::RandomScene;

@@ -1,0 +1,291 @@
+//! What judged scenes come to: shares of silently wrong results by accuracy, and by what is done about them.
+
+use super::judged::{JudgedScene, LEVELS, LevelResult, Verdict};
+use palpate_learn::metrics::Interval;
+use palpate_sim::scene::Accuracy;
+use serde::{Deserialize, Serialize};
+
+/// What is done to notice or to avoid a wrong result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Policy {
+    /// Nothing: every result counts as right.
+    None,
+    /// Flags of a trial: not finite, not converged, restless, accuracy missed.
+    Flags,
+    /// A restless trial is computed again at a tenth of the tolerance, down to the reference; the others are flagged.
+    Restless,
+    /// A run at a tenth of the tolerance flags what it disagrees with.
+    RefinedRun,
+    /// Refined until two levels agree; what never agrees is flagged.
+    UntilAgreement,
+}
+
+impl Policy {
+    /// All of them, the cheapest first.
+    pub const ALL: [Self; 5] = [Self::None, Self::Flags, Self::Restless, Self::RefinedRun, Self::UntilAgreement];
+
+    /// Description in tables.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::None => "nothing",
+            Self::Flags => "flags of a trial",
+            Self::Restless => "flags; restless trials again (default)",
+            Self::RefinedRun => "flags and a refined run",
+            Self::UntilAgreement => "refine until two levels agree",
+        }
+    }
+
+    /// Reported result, whether it is flagged, and how many levels were computed for it.
+    fn outcome(self, levels: &[LevelResult]) -> (&LevelResult, bool, usize) {
+        let first = &levels[0];
+        match self {
+            Self::None => (first, false, 1),
+            Self::Flags => (first, first.is_flagged(), 1),
+            Self::Restless => {
+                let last = levels.iter().position(|level| !level.restless).unwrap_or(levels.len() - 1);
+                (&levels[last], levels[last].is_flagged(), last + 1)
+            }
+            Self::RefinedRun => {
+                let agrees = levels.get(1).and_then(|second| second.agrees).unwrap_or(true);
+                (first, first.is_flagged() || !agrees, levels.len().min(2))
+            }
+            Self::UntilAgreement => {
+                let agreed = levels.iter().position(|level| level.agrees == Some(true));
+                let last = agreed.unwrap_or(levels.len() - 1);
+                (&levels[last], agreed.is_none() || levels[last].is_flagged(), last + 1)
+            }
+        }
+    }
+}
+
+/// What a policy comes to, from one accuracy on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PolicyRow {
+    /// Accuracy that was asked for.
+    pub accuracy: String,
+    /// What is done.
+    pub policy: Policy,
+    /// Scenes with a single answer.
+    pub scenes: usize,
+    /// Wrong results without a flag.
+    pub silent: usize,
+    /// Their share, with its interval.
+    pub silent_share: Interval,
+    /// Wrong results, flagged or not.
+    pub wrong: usize,
+    /// Share of right results that are flagged.
+    pub false_alarms: f64,
+    /// Convex minimisations as a multiple of those of one run.
+    pub cost: f64,
+}
+
+/// Results at one accuracy, without flags or refinement.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AccuracyRow {
+    /// Accuracy, or a range of drawn tolerances.
+    pub accuracy: String,
+    /// Scenes with a single answer.
+    pub scenes: usize,
+    /// Wrong results.
+    pub wrong: usize,
+    /// Of these, without a flag.
+    pub silent: usize,
+    /// Share of the latter, with its interval.
+    pub silent_share: Interval,
+    /// The same where results are refined until two levels agree.
+    pub silent_after_agreement: usize,
+    /// Convex minimisations per scene.
+    pub solves: f64,
+}
+
+/// Detection performance of one flag, at the drawn accuracies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FlagRow {
+    /// The flag and its limit.
+    pub flag: String,
+    /// Share of the wrong results that are flagged.
+    pub recall: f64,
+    /// Share of the right results that are flagged.
+    pub false_alarms: f64,
+}
+
+/// Results of random scenes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RandomReport {
+    /// Seed of the scenes.
+    pub seed: u64,
+    /// Scenes.
+    pub scenes: usize,
+    /// Scenes without a single answer: small changes of the start change the end.
+    pub no_answer: usize,
+    /// Their share, with its interval.
+    pub no_answer_share: Interval,
+    /// Scenes whose end is not known: no two levels agree, or their cost was too high.
+    pub undecided: usize,
+    /// Of these, scenes whose result at the drawn accuracy is not flagged.
+    pub undecided_unflagged: usize,
+    /// Scenes with a number that is not finite, at any level.
+    pub non_finite: usize,
+    /// Steps at the drawn accuracies.
+    pub steps: u64,
+    /// Steps among them that missed the solver's tolerance.
+    pub unconverged_steps: u64,
+    /// Newton iterations per minimisation.
+    pub newton_mean: f64,
+    /// Most Newton iterations in a step.
+    pub newton_max: u32,
+    /// 99th percentile over scenes of the largest outer friction residual.
+    pub friction_residual_p99: f64,
+    /// Largest outer friction residual.
+    pub friction_residual_max: f64,
+    /// Results by accuracy: the levels, then ranges of drawn tolerances.
+    pub by_accuracy: Vec<AccuracyRow>,
+    /// Results by policy: from drawn tolerances, from draft and from standard on.
+    pub by_policy: Vec<PolicyRow>,
+    /// Flags, singly and together.
+    pub flags: Vec<FlagRow>,
+    /// First scenes that are silently wrong at their drawn accuracy although two levels agree.
+    pub examples: Vec<u64>,
+    /// CPU time (s).
+    pub cpu_s: f64,
+}
+
+/// Names of rows that begin at drawn tolerances.
+const DRAWN: &str = "1e-5 to 1e-2";
+/// Ends of the ranges of drawn tolerances.
+const RANGES: [f64; 7] = [1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2];
+
+impl RandomReport {
+    /// Sums up scenes of a seed, in the order of their numbers.
+    pub fn new(seed: u64, scenes: &[JudgedScene]) -> Self {
+        let with = |verdict| scenes.iter().filter(move |scene| scene.verdict == verdict);
+        let clear: Vec<&JudgedScene> = with(Verdict::Single).collect();
+        let no_answer = with(Verdict::NoAnswer).count();
+        let drawn: Vec<&LevelResult> = scenes.iter().map(|scene| &scene.drawn[0]).collect();
+        let solves: u64 = drawn.iter().map(|level| level.solves).sum();
+        let newton: f64 = drawn.iter().map(|level| level.newton_mean * level.solves as f64).sum();
+        let mut friction: Vec<f64> = drawn.iter().map(|level| level.friction_residual).collect();
+        friction.sort_by(f64::total_cmp);
+        let silent = |scene: &&&JudgedScene| {
+            let (level, flagged, _) = Policy::UntilAgreement.outcome(&scene.drawn);
+            !level.right && !flagged
+        };
+        Self {
+            seed,
+            scenes: scenes.len(),
+            no_answer,
+            no_answer_share: Interval::of_share(no_answer, scenes.len()),
+            undecided: with(Verdict::Undecided).count(),
+            undecided_unflagged: with(Verdict::Undecided).filter(|scene| !scene.drawn[0].is_flagged()).count(),
+            non_finite: scenes.iter().filter(|scene| scene.diverged).count(),
+            steps: drawn.iter().map(|level| level.steps).sum(),
+            unconverged_steps: drawn.iter().map(|level| level.unconverged).sum(),
+            newton_mean: newton / solves.max(1) as f64,
+            newton_max: drawn.iter().map(|level| level.newton_max).max().unwrap_or(0),
+            friction_residual_p99: friction.get(friction.len() * 99 / 100).copied().unwrap_or(0.0),
+            friction_residual_max: friction.last().copied().unwrap_or(0.0),
+            by_accuracy: accuracy_rows(&clear),
+            by_policy: policy_rows(&clear),
+            flags: flag_rows(&clear),
+            examples: clear.iter().filter(silent).map(|scene| scene.number).take(10).collect(),
+            cpu_s: scenes.iter().map(|scene| scene.cpu_s).sum(),
+        }
+    }
+
+    /// The row of a policy from an accuracy on.
+    pub fn policy(&self, accuracy: &str, policy: Policy) -> Option<&PolicyRow> {
+        self.by_policy.iter().find(|row| row.accuracy == accuracy && row.policy == policy)
+    }
+}
+
+fn accuracy_rows(scenes: &[&JudgedScene]) -> Vec<AccuracyRow> {
+    let row = |accuracy: String, ladders: &[&[LevelResult]]| {
+        let those: Vec<&LevelResult> = ladders.iter().map(|levels| &levels[0]).collect();
+        let silent = those.iter().filter(|level| !level.right && !level.is_flagged()).count();
+        let after = |levels: &&&[LevelResult]| {
+            let (level, flagged, _) = Policy::UntilAgreement.outcome(levels);
+            !level.right && !flagged
+        };
+        AccuracyRow {
+            accuracy,
+            scenes: those.len(),
+            wrong: those.iter().filter(|level| !level.right).count(),
+            silent,
+            silent_share: Interval::of_share(silent, those.len()),
+            silent_after_agreement: ladders.iter().filter(after).count(),
+            solves: those.iter().map(|level| level.solves as f64).sum::<f64>() / those.len().max(1) as f64,
+        }
+    };
+    let at = |k: usize| scenes.iter().map(|scene| scene.ladder(k)).collect::<Vec<_>>();
+    let mut rows: Vec<AccuracyRow> = (0..LEVELS.len() - 1).map(|k| row(LEVELS[k].to_string(), &at(k))).collect();
+    for range in RANGES.windows(2) {
+        let within = |scene: &&&JudgedScene| (range[0]..range[1]).contains(&scene.drawn[0].tolerance);
+        let those: Vec<&[LevelResult]> = scenes.iter().filter(within).map(|scene| scene.drawn.as_slice()).collect();
+        rows.push(row(format!("{:e} to {:e}", range[0], range[1]), &those));
+    }
+    rows
+}
+
+fn policy_rows(scenes: &[&JudgedScene]) -> Vec<PolicyRow> {
+    let rows_of = |accuracy: String, ladders: Vec<&[LevelResult]>| {
+        Policy::ALL.map(|policy| {
+            let outcomes: Vec<_> = ladders.iter().map(|levels| policy.outcome(levels)).collect();
+            let count = |is: &dyn Fn(bool, bool) -> bool| {
+                outcomes.iter().filter(|(level, flagged, _)| is(level.right, *flagged)).count()
+            };
+            let silent = count(&|right, flagged| !right && !flagged);
+            let right = count(&|right, _| right);
+            let spent: u64 = ladders
+                .iter()
+                .zip(&outcomes)
+                .map(|(levels, (_, _, computed))| levels[..*computed].iter().map(|level| level.solves).sum::<u64>())
+                .sum();
+            let single: u64 = ladders.iter().map(|levels| levels[0].solves).sum();
+            PolicyRow {
+                accuracy: accuracy.clone(),
+                policy,
+                scenes: ladders.len(),
+                silent,
+                silent_share: Interval::of_share(silent, ladders.len()),
+                wrong: ladders.len() - right,
+                false_alarms: count(&|right, flagged| right && flagged) as f64 / right.max(1) as f64,
+                cost: spent as f64 / single.max(1) as f64,
+            }
+        })
+    };
+    let drawn = rows_of(DRAWN.to_owned(), scenes.iter().map(|scene| scene.drawn.as_slice()).collect());
+    let named = [Accuracy::Draft, Accuracy::Standard]
+        .into_iter()
+        .enumerate()
+        .flat_map(|(k, accuracy)| rows_of(accuracy.to_string(), scenes.iter().map(|scene| scene.ladder(k)).collect()));
+    drawn.into_iter().chain(named).collect()
+}
+
+fn flag_rows(scenes: &[&JudgedScene]) -> Vec<FlagRow> {
+    let row = |flag: String, is_raised: &dyn Fn(&[LevelResult]) -> bool| {
+        let share = |right: bool| {
+            let those: Vec<&&JudgedScene> = scenes.iter().filter(|scene| scene.drawn[0].right == right).collect();
+            those.iter().filter(|scene| is_raised(&scene.drawn)).count() as f64 / those.len().max(1) as f64
+        };
+        FlagRow { flag, recall: share(false), false_alarms: share(true) }
+    };
+    let mut rows = vec![
+        row("no end: a number left the range, or too many steps".to_owned(), &|levels| !levels[0].ended),
+        row("a step missed the solver's tolerance".to_owned(), &|levels| levels[0].unconverged > 0),
+        row("a step missed the accuracy".to_owned(), &|levels| levels[0].missed > 0),
+    ];
+    for limit in [1, 5, 20] {
+        let raised = move |levels: &[LevelResult]| levels[0].hold_changes >= limit;
+        rows.push(row(format!("changes of force in the hold >= {limit}"), &raised));
+    }
+    for limit in [0.01, 0.05, 0.2] {
+        rows.push(row(format!("static residual > {limit}"), &|levels| levels[0].static_residual > limit));
+    }
+    for limit in [1.0, 5.0, 20.0] {
+        rows.push(row(format!("friction residual > {limit}"), &|levels| levels[0].friction_residual > limit));
+    }
+    rows.push(row("all flags of a trial".to_owned(), &|levels| levels[0].is_flagged()));
+    rows.push(row("a refined run disagrees".to_owned(), &|levels| levels[1].agrees == Some(false)));
+    rows
+}
