@@ -37,6 +37,13 @@ impl GraspTrace {
         marks.filter_map(|k| Some([self.t[k], end(k)?])).filter(|[from, to]| to > from).collect()
     }
 
+    /// Forgets all samples.
+    fn clear(&mut self) {
+        self.t.clear();
+        self.line_bar.clear();
+        self.channels.iter_mut().chain(&mut self.errors).for_each(Vec::clear);
+    }
+
     /// Forgets old samples.
     fn cut(&mut self) {
         let [kept, more] = if self.rolling { ROLLING_S } else { GRASP_S };
@@ -81,6 +88,10 @@ impl TraceHistory {
             });
         }
         let Some(last) = self.grasps.back_mut() else { return };
+        // A grasp that is computed again replaces its trace.
+        if !row.rolling && last.t.len() > 1 && row.t <= last.t[0] {
+            last.clear();
+        }
         last.t.push(row.t);
         last.line_bar.push(row.line_bar);
         // A changed layout has other channels; a trace never mixes two.
@@ -144,6 +155,13 @@ mod tests {
         assert_eq!(traces.current().map(|t| (t.grasp, t.t.len())), Some((6, 3)));
         let earlier: Vec<u64> = traces.earlier().map(|t| t.grasp).collect();
         assert_eq!(earlier, [3, 4, 5]);
+        // Computed again.
+        for t in [0.0, 0.1] {
+            let values = Box::new([7.0, 7.0]);
+            traces.push(&TraceRow { grasp: 6, rolling: false, t, line_bar: 0.5, values, errors: Box::default() });
+        }
+        let again = traces.current().map(|t| (t.grasp, t.t.clone(), t.channels[0].clone()));
+        assert_eq!(again, Some((6, vec![0.0, 0.1], vec![7.0, 7.0])));
         traces.clear();
         assert!(traces.current().is_none());
     }

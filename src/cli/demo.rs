@@ -125,7 +125,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let stopped = loop {
         let pose_seed = seed.wrapping_add(grasps.len() as u64).wrapping_add(1);
         let (scene, _) = sampler.draw_after(object.as_ref(), pose_seed, released.as_ref());
-        let trial = grasp_soundly(&scene, object.as_ref(), pose_seed, Recompute::Restless);
+        let trial = grasp_soundly(&scene, object.as_ref(), pose_seed, Recompute::Unsettled);
         let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
         identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
         for row in trial.frames().iter().map(|frame| reader.row(frame)) {

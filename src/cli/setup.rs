@@ -35,15 +35,15 @@ pub(super) struct SceneArguments {
 /// When a grasp is computed again at a finer accuracy.
 #[derive(Debug, clap::Args)]
 pub(super) struct RecomputeArguments {
-    /// Compute again at a tenth of the tolerance until two levels end alike, and take the finer (default: only where the
-    /// hold does not come to rest).
+    /// Compute again at a tenth of the tolerance until two levels end alike, and take the finer (default: only where
+    /// forces change in the hold).
     #[arg(long)]
     until_agreement: bool,
 }
 
 impl RecomputeArguments {
     pub(super) fn chosen(&self) -> Recompute {
-        if self.until_agreement { Recompute::UntilAgreement } else { Recompute::Restless }
+        if self.until_agreement { Recompute::UntilAgreement } else { Recompute::Unsettled }
     }
 }
 

@@ -91,6 +91,8 @@ pub struct Quality {
     /// Changes of a finger's force by more than 50 mN from one sample to the next, later than half a second into the
     /// hold, where nothing is commanded: the finger with more of them.
     pub hold_changes: u32,
+    /// The same over the whole hold, in which an object may still settle.
+    pub all_hold_changes: u32,
     /// Place and time of the imbalance; absent where every step reached its tolerance.
     pub imbalance: Option<Imbalance>,
     /// Why the trial was computed more finely than its scene asked for; absent where it was not.
@@ -114,8 +116,8 @@ pub struct Recomputed {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RecomputeCause {
-    /// Its hold did not come to rest.
-    Restless,
+    /// Forces changed repeatedly in its hold, or it did not come to rest.
+    Unsettled,
     /// Two levels of accuracy had to agree.
     UntilAgreement,
 }
@@ -147,7 +149,7 @@ impl std::fmt::Display for Recomputed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { asked, cause } = self;
         match cause {
-            RecomputeCause::Restless => write!(f, "the hold does not come to rest at {asked}"),
+            RecomputeCause::Unsettled => write!(f, "forces change in the hold at {asked}"),
             RecomputeCause::UntilAgreement => write!(f, "two levels had to agree, beginning at {asked}"),
         }
     }
@@ -167,15 +169,21 @@ pub struct Imbalance {
 }
 
 impl Quality {
-    /// True when the trial may be learned from: every number was finite, every step reached its tolerance, and the hold
-    /// came to rest.
+    /// True when the trial may be learned from: every number was finite, every step reached its tolerance, the hold came to
+    /// rest, and no finer run ends elsewhere.
     pub fn is_sound(&self) -> bool {
-        self.finite && self.converged && !self.is_restless()
+        self.finite && self.converged && !self.is_restless() && self.agrees != Some(false)
     }
 
     /// True when the hold did not come to rest: forces kept changing, or do not balance at its end.
     pub fn is_restless(&self) -> bool {
         self.hold_changes >= RESTLESS_CHANGES || self.static_residual > RESTLESS_RESIDUAL
+    }
+
+    /// True when forces changed repeatedly anywhere in the hold, or it did not come to rest: a finer run tells whether the
+    /// object really moves.
+    pub fn is_unsettled(&self) -> bool {
+        self.is_restless() || self.all_hold_changes >= RESTLESS_CHANGES
     }
 
     /// How far the trial can be trusted, and why, in a few words.
@@ -184,9 +192,8 @@ impl Quality {
         let diverged = (!self.finite).then(|| "the simulation diverged".to_owned());
         match (diverged.or_else(|| self.misses()), self.agrees) {
             (Some(cause), _) => (TrustLevel::Red, cause),
-            (None, Some(false)) => (TrustLevel::Red, "a finer run of the same grasp ends elsewhere".to_owned()),
             (None, _) if missed > 0 => (TrustLevel::Amber, format!("{missed} steps missed the accuracy")),
-            (None, None) => (TrustLevel::Amber, "not compared with a finer run".to_owned()),
+            (None, None | Some(false)) => (TrustLevel::Amber, "not compared with a finer run".to_owned()),
             (None, Some(true)) => (TrustLevel::Green, "a finer run of the same grasp ends alike".to_owned()),
         }
     }
@@ -203,12 +210,13 @@ impl Quality {
             return Some(format!("{missed} of {steps} steps missed the solver's tolerance{place}"));
         }
         let (changes, residual) = (self.hold_changes, 100.0 * self.static_residual);
-        self.is_restless().then(|| {
-            format!(
+        if self.is_restless() {
+            return Some(format!(
                 "the hold did not come to rest: {changes} changes of force above 50 mN, {residual:.0} % of the torque \
                  unbalanced at its end"
-            )
-        })
+            ));
+        }
+        (self.agrees == Some(false)).then(|| "a finer run of the same grasp ends elsewhere".to_owned())
     }
 }
 
@@ -233,6 +241,7 @@ impl Default for Quality {
             friction_residual: 0.0,
             static_residual: 0.0,
             hold_changes: 0,
+            all_hold_changes: 0,
             imbalance: None,
             recomputed: None,
             agrees: None,

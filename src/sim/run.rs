@@ -43,7 +43,9 @@ struct HoldWatch {
     since: Option<f64>,
     /// Normal force on each finger in the last sample (N).
     force: [f64; 2],
-    changes: [u32; 2],
+    /// Changes in the whole hold, and those once it has settled.
+    all: [u32; 2],
+    settled: [u32; 2],
 }
 
 /// After this much of the hold (s) what was pushed has settled.
@@ -52,14 +54,23 @@ const SETTLED_AFTER: f64 = 0.5;
 const CHANGE: f64 = 0.05;
 
 impl HoldWatch {
+    fn new(taxels: usize) -> Self {
+        Self { taxels, since: None, force: [0.0; 2], all: [0; 2], settled: [0; 2] }
+    }
+
     fn note(&mut self, frame: &Frame) {
         let force = Side::BOTH.map(|side| frame.normal_force(side, self.taxels));
-        if frame.phase != Phase::Hold {
-            self.since = None;
-        } else if frame.t - *self.since.get_or_insert(frame.t) > SETTLED_AFTER {
-            for side in Side::BOTH.map(Side::index) {
-                self.changes[side] += u32::from((force[side] - self.force[side]).abs() > CHANGE);
+        let into_hold = match frame.phase {
+            Phase::Hold => frame.t - *self.since.get_or_insert(frame.t),
+            Phase::Close | Phase::Release => {
+                self.since = None;
+                0.0
             }
+        };
+        for side in Side::BOTH.map(Side::index) {
+            let changed = (force[side] - self.force[side]).abs() > CHANGE;
+            self.all[side] += u32::from(changed && into_hold > 0.0);
+            self.settled[side] += u32::from(changed && into_hold > SETTLED_AFTER);
         }
         self.force = force;
     }
@@ -117,7 +128,7 @@ impl SimRun {
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let (engine, placement) = EngineRun::new(scene, object, refinement);
         let taxels = scene.gripper.taxels().count();
-        let hold = HoldWatch { taxels, since: None, force: [0.0; 2], changes: [0; 2] };
+        let hold = HoldWatch::new(taxels);
         let run = Self { engine, reported: None, phase: Phase::Close, static_residual: None, hold };
         (run, placement)
     }
@@ -203,7 +214,8 @@ impl SimRun {
         if let Some(at_hold) = self.static_residual {
             quality.static_residual = at_hold;
         }
-        quality.hold_changes = self.hold.changes[0].max(self.hold.changes[1]);
+        quality.hold_changes = self.hold.settled[0].max(self.hold.settled[1]);
+        quality.all_hold_changes = self.hold.all[0].max(self.hold.all[1]);
         quality
     }
 
@@ -266,20 +278,22 @@ mod tests {
 
     #[test]
     fn changes_of_force_count_once_the_hold_has_settled() {
-        let mut watch = HoldWatch { taxels: 10, since: None, force: [0.0; 2], changes: [0; 2] };
+        let mut watch = HoldWatch::new(10);
         let mut push = |phase, k: u32, left: f32| {
             let taxels = vec![TaxelLoad { taxel: 3, normal: left, along: 0.0, across: 0.0 }];
             let t = f64::from(k) / 75.0;
             let frame = Frame { sample: k, t, line_bar: 1.0, phase, q: vec![], world_from_object: None, taxels };
             watch.note(&frame);
-            watch.changes
+            (watch.settled, watch.all[0])
         };
         // 0.8 N on and off, in every phase.
         let force = |k: u32| if k.is_multiple_of(2) { 0.8 } else { 0.0 };
-        assert_eq!((0..30).map(|k| push(Phase::Close, k, force(k))).last(), Some([0, 0]));
-        assert_eq!((30..68).map(|k| push(Phase::Hold, k, force(k))).last(), Some([0, 0]), "within half a second");
-        assert_eq!((68..78).map(|k| push(Phase::Hold, k, force(k))).last(), Some([10, 0]));
-        assert_eq!((78..98).map(|k| push(Phase::Hold, k, 0.8 + 0.002 * (k as f32))).last().map(|c| c[1]), Some(0));
-        assert_eq!((98..130).map(|k| push(Phase::Release, k, force(k))).last().map(|c| c[0] <= 11), Some(true));
+        assert_eq!((0..30).map(|k| push(Phase::Close, k, force(k))).last(), Some(([0, 0], 0)));
+        assert_eq!((30..68).map(|k| push(Phase::Hold, k, force(k))).last(), Some(([0, 0], 37)), "within half a second");
+        assert_eq!((68..78).map(|k| push(Phase::Hold, k, force(k))).last(), Some(([10, 0], 47)));
+        let drifting = (78..98).map(|k| push(Phase::Hold, k, 0.8 + 0.002 * (k as f32))).last();
+        assert!(drifting.is_some_and(|(settled, all)| settled[0] <= 11 && all <= 48), "{drifting:?}");
+        let released = (98..130).map(|k| push(Phase::Release, k, force(k))).last();
+        assert_eq!(released, drifting);
     }
 }

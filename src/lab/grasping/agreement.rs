@@ -1,4 +1,4 @@
-//! Grasps computed again at finer accuracy: where the hold did not come to rest, or until two levels agree.
+//! Grasps computed again at finer accuracy: where forces change in the hold, or until two levels agree.
 //!
 //! No flag sees that a free object slipped the other way: the path decides, not the state at the end. Another run at a
 //! tenth of the tolerance sees most of it, and where the two disagree a still finer one decides:
@@ -23,9 +23,9 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Recompute {
-    /// Where its hold did not come to rest.
+    /// Where forces change repeatedly in its hold, or it does not come to rest.
     #[default]
-    Restless,
+    Unsettled,
     /// Until two levels of accuracy agree.
     UntilAgreement,
 }
@@ -132,14 +132,14 @@ fn next_level(solver: &Solver) -> Option<Solver> {
 /// that it was computed from in the end; its quality says what was asked for, and why that was not enough.
 pub fn grasp_soundly(scene: &Scene, object: Option<&ObjectModel>, seed: u64, recompute: Recompute) -> SimulatedTrial {
     match recompute {
-        Recompute::Restless => {
+        Recompute::Unsettled => {
             let mut trial = grasp(scene, object, seed);
-            while trial.data.quality.is_restless()
+            while trial.data.quality.is_unsettled()
                 && let Some(solver) = next_level(&trial.header.scene.solver)
             {
                 trial = grasp(&Scene { solver, ..scene.clone() }, object, seed);
             }
-            noted(trial, scene, RecomputeCause::Restless)
+            noted(trial, scene, RecomputeCause::Unsettled)
         }
         Recompute::UntilAgreement => grasp_until_agreement(scene, object, seed, &|| false).expect("is never cancelled"),
     }
@@ -267,7 +267,7 @@ mod tests {
         let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
         let mut scene = Scene::default();
         scene.solver.accuracy = Accuracy::Draft;
-        let draft = grasp_soundly(&scene, Some(&ball), 0, Recompute::Restless);
+        let draft = grasp_soundly(&scene, Some(&ball), 0, Recompute::Unsettled);
         assert!(draft == grasp(&scene, Some(&ball), 0), "a grasp at rest is computed once");
         let agreed = grasp_soundly(&scene, Some(&ball), 0, Recompute::UntilAgreement);
         assert_eq!(agreed.header.scene.solver.accuracy, Accuracy::Standard);

@@ -121,7 +121,7 @@ impl CollectionPlan {
         let mut scene = self.scene.clone();
         scene.object.source.clear();
         let agreement = match self.recompute {
-            Recompute::Restless => 0,
+            Recompute::Unsettled => 0,
             Recompute::UntilAgreement => mixed(1),
         };
         format!("{:016x}", mixed(hash(&scene.to_toml()) ^ mixed(self.seed) ^ agreement))

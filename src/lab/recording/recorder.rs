@@ -54,6 +54,7 @@ enum Message {
     Frame(Box<Frame>),
     Finish(Box<Quality>, Vec<String>),
     Discard,
+    Replace(Box<SimulatedTrial>),
     BeginBoard(Box<BoardTrialPlan>),
     Board(Box<LinkEvent>),
     Mark(PhaseMark),
@@ -73,7 +74,8 @@ impl Recorder {
     pub fn start(store: PathBuf, notify: impl Fn(RecorderNotice) + Send + 'static) -> std::io::Result<Self> {
         let (messages, inbox) = channel();
         let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            let mut writer = Writer { path: store, store: None, trial: OpenTrial::None, notify: Box::new(notify) };
+            let mut writer =
+                Writer { path: store, store: None, trial: OpenTrial::None, last: None, notify: Box::new(notify) };
             writer.work(&inbox);
         })?;
         Ok(Self { messages: Some(messages), thread: Some(thread) })
@@ -104,6 +106,11 @@ impl Recorder {
     /// Gives a simulated trial up: it is marked as deleted.
     pub fn discard(&self) {
         self.send(Message::Discard);
+    }
+
+    /// Stores a simulated trial in place of the last finished one, which is marked as deleted.
+    pub fn replace(&self, trial: SimulatedTrial) {
+        self.send(Message::Replace(Box::new(trial)));
     }
 
     /// Begins a trial of the real gripper.
@@ -146,6 +153,8 @@ struct Writer {
     path: PathBuf,
     store: Option<Store>,
     trial: OpenTrial,
+    /// The last simulated trial that was finished.
+    last: Option<TrialId>,
     notify: Box<dyn Fn(RecorderNotice) + Send>,
 }
 
@@ -188,6 +197,7 @@ impl Writer {
                 if let Some(id) = self.write_frames()? {
                     self.trial = OpenTrial::None;
                     self.with_store(|store| store.finish(id, &quality, &warnings))?;
+                    self.last = Some(id);
                     (self.notify)(RecorderNotice::Stored(id));
                 }
             }
@@ -195,6 +205,13 @@ impl Writer {
                 if let OpenTrial::Simulated(id, _) = std::mem::replace(&mut self.trial, OpenTrial::None) {
                     self.with_store(|store| store.delete(&[id]))?;
                 }
+            }
+            Message::Replace(trial) => {
+                let id = self.with_store(|store| store.insert(&trial))?;
+                if let Some(old) = self.last.replace(id) {
+                    self.with_store(|store| store.delete(&[old]))?;
+                }
+                (self.notify)(RecorderNotice::Stored(id));
             }
             Message::BeginBoard(plan) => {
                 let writer = self.with_store(|store| BoardWriter::begin(store, &plan))?;
@@ -312,6 +329,25 @@ mod tests {
         let store = Store::open(&path).expect("opens");
         assert!(store.load(id).expect("whole") == trial.into());
         assert_eq!((store.list(false).expect("lists").len(), store.list(true).expect("lists").len()), (1, 2));
+    }
+
+    #[test]
+    fn a_trial_that_is_computed_again_replaces_the_last_one() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("trials.sqlite");
+        let recorder = Recorder::start(path.clone(), |_| ()).expect("starts");
+        let trials = [3, 4].map(|seed| grasp(&Scene::default(), None, seed));
+        for trial in &trials {
+            recorder.begin(trial.clone());
+            trial.frames().iter().for_each(|frame| recorder.frame(frame));
+            recorder.finish(&trial.data.quality, &trial.header.warnings);
+        }
+        let again = grasp(&Scene::default(), None, 5);
+        recorder.replace(again);
+        drop(recorder);
+        let store = Store::open(&path).expect("opens");
+        let seeds = |all: bool| store.list(all).expect("lists").iter().map(|row| row.seed).collect::<Vec<_>>();
+        assert_eq!((seeds(false), seeds(true)), (vec![3, 5], vec![3, 4, 5]));
     }
 
     #[test]

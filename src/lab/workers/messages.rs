@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_learn::Model;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{Accuracy, Scene};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Channel, SensorLayout};
 use std::path::PathBuf;
@@ -41,6 +41,9 @@ pub enum Command {
     SetErrorBand(bool),
     /// Whether the other engine computes each grasp too, for [`super::SimWorker::ghost`].
     SetGhost(bool),
+    /// Compute the last finished grasp again until two levels of accuracy agree, and show and store that result instead;
+    /// pauses.
+    ComputeAgain,
     /// Pull the object with this force (N, world axes); zero releases it.
     Pull(DVec3),
     /// End the thread.
@@ -157,6 +160,17 @@ pub struct Status {
     pub recording: bool,
     /// A refined run computes the numerical error band.
     pub error_band: bool,
+    /// What is being done to check the last finished grasp.
+    pub checking: Option<Checking>,
+}
+
+/// Work that tells how far a finished grasp can be trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Checking {
+    /// A finer run is computed to compare with.
+    Comparing,
+    /// The grasp is computed again until two levels agree.
+    ComputingAgain,
 }
 
 /// A grasp that has ended.
@@ -164,8 +178,13 @@ pub struct Status {
 pub struct FinishedGrasp {
     /// Its number, as in [`TraceRow::grasp`].
     pub grasp: u64,
-    /// Summary.
+    /// Summary; its quality says how far it can be trusted.
     pub summary: GraspSummary,
+    /// Accuracy that it was computed at.
+    pub accuracy: Accuracy,
+    /// False where it cannot be computed again more finely: the object was pulled by hand, or the engine controls no
+    /// error.
+    pub repeatable: bool,
 }
 
 /// The newest state of everything, to be drawn.

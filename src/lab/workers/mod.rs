@@ -10,6 +10,8 @@
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
+//! The thread "check" compares each finished grasp with a finer run, and computes it again on request.
+//!
 //! The thread "effects" measures on request what the effects of a scene cost and change, "accuracy-study" what each
 //! setting of accuracy costs there. The thread "ghost" computes each
 //! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
@@ -22,6 +24,7 @@
 
 mod accuracy_job;
 mod background_job;
+mod check_job;
 mod current;
 mod diagnostics_job;
 mod effects;
@@ -63,8 +66,8 @@ pub use labelling_session::{
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
 pub use messages::{
-    Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status,
-    TraceRow, Wake,
+    Checking, Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,
+    Status, TraceRow, Wake,
 };
 pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;

@@ -90,6 +90,37 @@ fn a_watched_grasp_is_the_same_as_a_headless_one_and_is_stored() {
 }
 
 #[test]
+fn a_finished_grasp_is_compared_and_computed_again_on_request() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("trials.sqlite");
+    let mut scene = ball();
+    scene.solver.accuracy = Accuracy::Draft;
+    let watched = start(scene.clone(), path.clone(), 1);
+    watched.send(Command::SetSpeed(64.0));
+    let trust = |s: &Snapshot| s.last.as_ref().map(|last| last.summary.quality.trust().0);
+    let compared = watched.until(|s| trust(s) == Some(TrustLevel::Green));
+    let last = compared.last.as_ref().expect("finished");
+    assert!(last.repeatable && last.accuracy == Accuracy::Draft);
+    let first: Vec<TraceRow> = watched.worker.rows().collect();
+    watched.send(Command::ComputeAgain);
+    let again = watched.until(|s| s.last.as_ref().is_some_and(|last| last.accuracy != Accuracy::Draft));
+    let last = again.last.as_ref().expect("finished");
+    let quality = &last.summary.quality;
+    assert_eq!((last.accuracy, quality.agrees, last.grasp), (Accuracy::Standard, Some(true), 1));
+    assert!(quality.recomputed.is_some_and(|recomputed| recomputed.asked == Accuracy::Draft));
+    assert!(again.status.checking.is_none() && !again.status.playing);
+    let rows: Vec<TraceRow> = watched.worker.rows().collect();
+    assert_eq!((first.len(), rows.len()), (120, 120));
+    assert!(rows.iter().zip(&first).all(|(a, b)| (a.grasp, a.t) == (b.grasp, b.t)) && rows != first);
+    drop(watched);
+    let store = Store::open(&path).expect("opens");
+    assert_eq!((store.list(false).expect("lists").len(), store.list(true).expect("lists").len()), (1, 2));
+    let object = ball().load_object().expect("loads");
+    let stored = crate::grasping::grasp_until_agreement(&scene, object.as_ref(), 0, &|| false).expect("not cancelled");
+    assert!(store.load(2).expect("whole") == stored.into());
+}
+
+#[test]
 fn stepping_pausing_and_resetting() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("trials.sqlite");

@@ -1,23 +1,25 @@
 //! Session of the simulation thread: owns the simulated gripper, keeps pace with real time and publishes snapshots.
 
 use super::accuracy_job::AccuracyJob;
+use super::check_job::{CheckJob, CheckRequest, CheckResult, Subject, start_check_job};
 use super::current::Current;
 use super::ghost::{GhostGrasp, GhostMaker};
 use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
 use super::listener::Listener;
 use super::messages::{
-    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status, TraceRow,
-    Wake,
+    Checking, Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status,
+    TraceRow, Wake,
 };
 use super::pace::Pace;
 use super::refined_run::RefinedRun;
-use crate::grasping::{FrameReader, GraspSummary, prepare};
+use crate::grasping::{EndState, FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
 use crate::recording::{Recorder, RecorderNotice};
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
+use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Channel, SensorLayout};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,6 +30,8 @@ use std::time::{Duration, Instant};
 const BETWEEN_GRASPS: Duration = Duration::from_millis(600);
 /// Longest time spent stepping before something is published.
 const BUDGET: Duration = Duration::from_millis(12);
+/// Pause between two looks at a check that is running.
+const CHECK_AGAIN: Duration = Duration::from_millis(20);
 /// Being later than this counts as unable to keep up: the clock is set anew instead of being chased.
 const LATEST: f64 = 0.25;
 
@@ -57,6 +61,12 @@ pub(super) struct Session {
     recorder: Option<Recorder>,
     /// Absent where its thread could not be started.
     accuracy_job: Option<AccuracyJob>,
+    /// Absent where its thread could not be started.
+    checker: Option<CheckJob>,
+    /// The last finished grasp, where it can be computed again.
+    subject: Option<Subject>,
+    /// Result of the checker that was taken last.
+    checked: Option<Arc<CheckResult>>,
     listener: Option<Listener>,
     layout: SensorLayout,
     nominal: Scene,
@@ -103,10 +113,14 @@ impl Session {
             }
         };
         let accuracy_job = AccuracyJob::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
+        let checker = start_check_job(Arc::clone(&outlets.wake)).ok();
         let grasps = setup.grasps.max(1);
         let mut session = Self {
             recorder,
             accuracy_job,
+            checker,
+            subject: None,
+            checked: None,
             listener: setup.model.map(|model| Listener::new(model, grasps)),
             layout: setup.layout,
             nominal: setup.scene,
@@ -168,6 +182,13 @@ impl Session {
 
     /// Time until something is due; `None` until the next command.
     fn time_to_wait(&self) -> Option<Duration> {
+        let due = self.time_to_grasp();
+        let busy = self.status.checking.map(|_| CHECK_AGAIN);
+        due.into_iter().chain(busy).min()
+    }
+
+    /// Time until the simulation goes on; `None` while it is paused.
+    fn time_to_grasp(&self) -> Option<Duration> {
         if !self.status.playing {
             return None;
         }
@@ -232,6 +253,15 @@ impl Session {
                 if std::mem::replace(&mut self.status.error_band, shown) != shown {
                     self.own_pose_done = false;
                     self.begin_round();
+                }
+            }
+            Command::ComputeAgain => {
+                if let (Some(checker), Some(subject)) = (&mut self.checker, &self.subject) {
+                    checker.give_up();
+                    checker.ask(CheckRequest::ComputeAgain(subject.clone()));
+                    self.status.checking = Some(Checking::ComputingAgain);
+                    self.status.playing = false;
+                    self.status.actual_speed = 0.0;
                 }
             }
             Command::Pull(force) => {
@@ -391,6 +421,7 @@ impl Session {
 
     /// Takes all samples that are due, within the budget.
     fn advance(&mut self) {
+        self.take_check();
         if !self.status.playing {
             return;
         }
@@ -463,14 +494,24 @@ impl Session {
         for warning in trial.header.warnings.iter().skip(current.warned) {
             self.outlets.notify(Notice::Warning(warning.clone()));
         }
-        if self.recorder_busy
-            && let Some(recorder) = &self.recorder
-        {
+        let recorded = self.recorder_busy;
+        if recorded && let Some(recorder) = &self.recorder {
             recorder.finish(&trial.data.quality, &trial.header.warnings);
             self.recorder_busy = false;
         }
+        let subject = Subject {
+            grasp: self.grasp,
+            scene: Arc::clone(&current.scene),
+            object: self.object.as_ref().and_then(|object| object.model.clone()),
+            seed: trial.header.seed,
+            end: EndState::of(trial.frames()),
+            recorded,
+        };
+        let repeatable = !current.pulled && current.scene.solver.finer().is_some();
         let summary = GraspSummary::new(&trial, &current.scene);
-        self.last = Some(Arc::new(FinishedGrasp { grasp: self.grasp, summary }));
+        let accuracy = current.scene.solver.accuracy;
+        self.last = Some(Arc::new(FinishedGrasp { grasp: self.grasp, summary, accuracy, repeatable }));
+        self.begin_check(Some(subject).filter(|_| repeatable));
         self.status.actual_speed = 0.0;
         if trial.data.quality.finite {
             if let Some(listener) = &mut self.listener {
@@ -482,6 +523,74 @@ impl Session {
             self.end_round();
         }
         self.publish();
+    }
+
+    /// Compares the grasp that has just ended with a finer run, where it can be computed again.
+    fn begin_check(&mut self, subject: Option<Subject>) {
+        self.status.checking = None;
+        self.subject = subject;
+        let Some(checker) = &mut self.checker else { return };
+        checker.give_up();
+        if let Some(subject) = &self.subject {
+            checker.ask(CheckRequest::Compare(subject.clone()));
+            self.status.checking = Some(Checking::Comparing);
+        }
+    }
+
+    /// Takes in the result of a check, where there is a new one of the last finished grasp.
+    fn take_check(&mut self) {
+        let Some(checker) = &self.checker else { return };
+        let settled = checker.is_settled();
+        let is_taken = |result: &Arc<CheckResult>| self.checked.as_ref().is_some_and(|old| Arc::ptr_eq(old, result));
+        if let Some(result) = checker.view().filter(|result| !is_taken(result)) {
+            self.checked = Some(Arc::clone(&result));
+            match &*result {
+                CheckResult::Compared { grasp, agrees } => self.take_comparison(*grasp, *agrees),
+                CheckResult::ComputedAgain { grasp, trial } => self.take_again(*grasp, trial),
+            }
+            self.publish();
+        }
+        // A check that was cancelled ends without a result.
+        if settled && self.status.checking.take().is_some() {
+            self.publish();
+        }
+    }
+
+    fn take_comparison(&mut self, grasp: u64, agrees: bool) {
+        let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
+        let mut last = FinishedGrasp::clone(last);
+        last.summary.quality.agrees = Some(agrees);
+        self.last = Some(Arc::new(last));
+    }
+
+    /// Shows and stores a grasp that was computed again instead of the one before.
+    fn take_again(&mut self, grasp: u64, trial: &SimulatedTrial) {
+        let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
+        let scene = &trial.header.scene;
+        let (summary, repeatable) = (GraspSummary::new(trial, scene), last.repeatable);
+        let accuracy = scene.solver.accuracy;
+        self.last = Some(Arc::new(FinishedGrasp { grasp, summary, accuracy, repeatable }));
+        if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
+            recorder.replace(trial.clone());
+        }
+        let Some(current) = self.current.as_mut().filter(|current| current.ended && self.grasp == grasp) else {
+            return;
+        };
+        let plotted = self.channels.len();
+        for frame in trial.frames() {
+            let row = current.reader.row(frame);
+            let values = row.values[..plotted].into();
+            let row =
+                TraceRow { grasp, rolling: false, t: row.t_s, line_bar: row.line_bar, values, errors: Box::default() };
+            if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
+                self.outlets.rows_lost.store(true, Ordering::Relaxed);
+            }
+        }
+        if let Some(frame) = trial.frames().last() {
+            current.frame = Arc::new(frame.clone());
+        }
+        current.plan = Arc::new(trial.data.plan.clone());
+        current.scene = Arc::new(scene.clone());
     }
 
     /// Between two grasps: is another one needed?

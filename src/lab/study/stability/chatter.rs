@@ -42,7 +42,7 @@ pub struct ChatterRow {
     pub accuracy: String,
     /// Grasps.
     pub grasps: usize,
-    /// Grasps computed again because their hold did not come to rest.
+    /// Grasps computed again because forces change in their hold.
     pub recomputed: usize,
     /// Of these, restless at the reference accuracy too: left out of data sets.
     pub remaining: usize,
@@ -85,6 +85,11 @@ impl ChatterUnit {
         units.filter(|unit| unit.grasps > 0).collect()
     }
 
+    /// Its name in files of results.
+    pub(super) fn name(&self) -> String {
+        format!("chatter {} {}", PRESETS[self.preset].name, catalogue()[self.object].name)
+    }
+
     /// Computes its grasps, at each accuracy in the same poses.
     pub fn run(&self) -> Result<Vec<ChatterRow>, ObjectError> {
         let preset: &PosePreset = &PRESETS[self.preset];
@@ -120,7 +125,7 @@ impl ChatterUnit {
 
 impl ChatterRow {
     fn count(&mut self, scene: &Scene, object: Option<&ObjectModel>, seed: u64) {
-        let stored = grasp_soundly(scene, object, seed, Recompute::Restless);
+        let stored = grasp_soundly(scene, object, seed, Recompute::Unsettled);
         let quality = &stored.data.quality;
         // A trial that was not computed again is the one that was asked for.
         let asked = quality.recomputed.is_some().then(|| grasp(scene, object, seed));

@@ -7,6 +7,8 @@
 mod cases;
 mod chatter;
 mod random;
+mod study;
+mod tables;
 
 pub use cases::CASES;
 pub use chatter::{CHATTER_ACCURACIES, ChatterRow, ChatterUnit, chatter_table};
@@ -14,9 +16,13 @@ pub use random::{
     AccuracyRow, FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, Verdict,
 };
 
+pub use study::{CaseSummary, StabilityError, StabilityPlan, StabilityReport, StabilityUnit};
+pub(super) use tables::sections;
+pub use tables::{policy_table, stability_figure, stored_stability};
+
 use palpate_sim::physics::NotFinite;
 use palpate_sim::scene::{Accuracy, Timing};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Accuracy or step length of a case.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +95,7 @@ pub const ACCURACIES: [Accuracy; 5] =
 pub const QUICK_ACCURACIES: &[Accuracy] = ACCURACIES.split_at(2).0;
 
 /// Limit of a measured value.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
     /// No larger than this.
@@ -127,7 +133,7 @@ impl std::fmt::Display for Limit {
 }
 
 /// Measured value with its limit.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Name, with its unit in brackets.
     pub what: String,
@@ -178,12 +184,12 @@ pub struct Case {
 }
 
 /// One row of the table: a case at one setting.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseRow {
     /// The case.
-    pub case: &'static str,
+    pub case: String,
     /// Claim.
-    pub claim: &'static str,
+    pub claim: String,
     /// The setting.
     pub setting: String,
     /// All measurements; the one closest to its limit, or beyond it, comes first.
@@ -221,7 +227,7 @@ impl Case {
         };
         findings.sort_by(|a, b| b.limit.used(b.measured).total_cmp(&a.limit.used(a.measured)));
         let holds = not_finite.is_none() && findings.iter().all(Measurement::holds);
-        CaseRow { case: self.name, claim: self.claim, setting: name, findings, not_finite, holds }
+        CaseRow { case: self.name.to_owned(), claim: self.claim.to_owned(), setting: name, findings, not_finite, holds }
     }
 }
 

@@ -9,6 +9,7 @@ use super::scene::{Push, Ran, RandomScene};
 use crate::grasping::until_agreement;
 use palpate_sim::scene::{Accuracy, Solver};
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 
 /// Levels that every scene is computed at: down to the reference, and the one that the reference is compared with.
 pub(super) const LEVELS: [Accuracy; 5] =
@@ -118,19 +119,17 @@ impl JudgedScene {
     pub fn new(seed: u64, number: u64) -> Self {
         let scene = RandomScene::draw(seed, number);
         let start = cpu_time::ThreadTime::now();
-        let truth = Truth::of(&scene);
-        let below = LEVELS.len() - truth.first_two.len();
-        let mut runs: Vec<Ran> =
-            LEVELS[..below].iter().map(|accuracy| scene.run(&solver(*accuracy), Push::default())).collect();
-        runs.extend(truth.first_two.clone());
-        let level = |k: usize| LevelResult::new(LEVELS[k], &runs[k], &truth.run, k.checked_sub(1).map(|k| &runs[k]));
+        let runs = Runs::of(&scene);
+        let truth = Truth::of(&runs);
+        let ran = LEVELS.map(|accuracy| runs.at(accuracy));
+        let level = |k: usize| LevelResult::new(LEVELS[k], &ran[k], &truth.run, k.checked_sub(1).map(|k| &ran[k]));
         let levels: Vec<LevelResult> = (0..LEVELS.len()).map(level).collect();
-        let drawn = from_drawn(&scene, &truth);
-        let disputed = !truth.at_once || levels.iter().chain(&drawn).any(|level| !level.right);
-        let verdict = if disputed { truth.pushed(&scene) } else { Verdict::Single };
-        let diverged = runs.iter().any(|ran| !ran.quality.finite);
+        let drawn = from_drawn(&runs, &truth);
+        let disputed = truth.accuracy != LEVELS[4] || levels.iter().chain(&drawn).any(|level| !level.right);
+        let verdict = if disputed { truth.pushed(&runs) } else { Verdict::Single };
+        let diverged = runs.any_diverged();
         let cpu_s = start.elapsed().as_secs_f64();
-        Self { number, levels, drawn, truth: truth.solver.accuracy.step_tolerance(), verdict, diverged, cpu_s }
+        Self { number, levels, drawn, truth: truth.accuracy.step_tolerance(), verdict, diverged, cpu_s }
     }
 
     /// Results from one of the levels on, as many as there may be until two agree: down to the reference.
@@ -143,73 +142,118 @@ fn solver(accuracy: Accuracy) -> Solver {
     Solver { accuracy, ..Solver::default() }
 }
 
-/// Results from the drawn tolerance on, until two levels agree.
-fn from_drawn(scene: &RandomScene, truth: &Truth) -> Vec<LevelResult> {
-    let mut levels: Vec<LevelResult> = Vec::new();
-    let mut accuracy = Accuracy::Tolerance(scene.tolerance);
-    let run = |solver: &Solver| scene.run(solver, Push::default());
-    until_agreement(&solver(accuracy), run, |coarse, fine| {
-        if levels.is_empty() {
-            levels.push(LevelResult::new(accuracy, coarse, &truth.run, None));
+/// Runs of a scene by tolerance. Finer runs than one that was given up are given up at once.
+struct Runs<'a> {
+    scene: &'a RandomScene,
+    known: RefCell<Vec<(f64, Ran)>>,
+}
+
+impl<'a> Runs<'a> {
+    /// Computes the reference first: where that is given up, the levels between it and standard are not computed.
+    fn of(scene: &'a RandomScene) -> Self {
+        let runs = Self { scene, known: RefCell::default() };
+        if !runs.at(LEVELS[3]).has_ended() {
+            runs.known.borrow_mut().push((LEVELS[2].step_tolerance(), Ran::given_up()));
         }
-        accuracy = accuracy.finer();
-        levels.push(LevelResult::new(accuracy, fine, &truth.run, Some(coarse)));
-        agree(coarse, fine)
-    });
+        runs
+    }
+
+    fn at(&self, accuracy: Accuracy) -> Ran {
+        let tolerance = accuracy.step_tolerance();
+        let holds = |(known, ran): &&(f64, Ran)| *known == tolerance || *known > tolerance && !ran.has_ended();
+        let known = self.known.borrow().iter().find(holds).map(|(_, ran)| ran.clone());
+        known.unwrap_or_else(|| {
+            let ran = self.scene.run(&solver(accuracy), Push::default());
+            self.known.borrow_mut().push((tolerance, ran.clone()));
+            ran
+        })
+    }
+
+    fn any_diverged(&self) -> bool {
+        self.known.borrow().iter().any(|(_, ran)| !ran.quality.finite)
+    }
+}
+
+/// Results from the drawn tolerance on, until two levels agree.
+fn from_drawn(runs: &Runs<'_>, truth: &Truth) -> Vec<LevelResult> {
+    let mut levels: Vec<LevelResult> = Vec::new();
+    let mut accuracy = Accuracy::Tolerance(runs.scene.tolerance);
+    until_agreement(
+        &solver(accuracy),
+        |solver| runs.at(solver.accuracy),
+        |coarse, fine| {
+            if levels.is_empty() {
+                levels.push(LevelResult::new(accuracy, coarse, &truth.run, None));
+            }
+            accuracy = accuracy.finer();
+            levels.push(LevelResult::new(accuracy, fine, &truth.run, Some(coarse)));
+            agree(coarse, fine)
+        },
+    );
     levels
 }
 
 /// The truth about a scene.
 struct Truth {
-    /// Runs at the reference accuracy and at the next level.
-    first_two: [Ran; 2],
     run: Ran,
-    /// Settings of that run.
-    solver: Solver,
-    /// Settings of the level before.
-    coarser: Solver,
-    /// Two levels agree.
-    settled: bool,
-    /// The first two do.
-    at_once: bool,
+    /// Accuracy of that run.
+    accuracy: Accuracy,
+    /// The level before, if it agrees.
+    coarser: Option<Accuracy>,
 }
 
 impl Truth {
-    fn of(scene: &RandomScene) -> Self {
-        let first_two = [LEVELS[3], LEVELS[4]].map(|accuracy| scene.run(&solver(accuracy), Push::default()));
-        let at_once = first_two[1].ends_like(&first_two[0]);
-        let mut truth = Self {
-            run: first_two[1].clone(),
-            coarser: solver(LEVELS[3]),
-            solver: solver(LEVELS[4]),
-            settled: at_once,
-            at_once,
-            first_two,
-        };
-        while let Some(finer) = truth.solver.finer().filter(|_| !truth.settled && truth.run.has_ended()) {
-            let run = scene.run(&finer, Push::default());
-            truth.settled = run.ends_like(&truth.run);
-            truth.coarser = std::mem::replace(&mut truth.solver, finer);
-            truth.run = run;
+    fn of(runs: &Runs<'_>) -> Self {
+        let mut accuracy = LEVELS[3];
+        let mut run = runs.at(accuracy);
+        while run.has_ended()
+            && let Some(finer) = solver(accuracy).finer().map(|solver| solver.accuracy)
+        {
+            let finer_run = runs.at(finer);
+            let coarser = finer_run.ends_like(&run).then_some(accuracy);
+            (accuracy, run) = (finer, finer_run);
+            if coarser.is_some() {
+                return Self { run, accuracy, coarser };
+            }
         }
-        truth
+        Self { run, accuracy, coarser: None }
     }
 
     /// Changes the start in twelve ways: at the coarser of two levels that agree, or at the reference accuracy.
-    fn pushed(&self, scene: &RandomScene) -> Verdict {
-        let (solver, run) = match self.settled {
-            true => (&self.coarser, &self.run),
-            false => (&solver(LEVELS[3]), &self.first_two[0]),
-        };
+    fn pushed(&self, runs: &Runs<'_>) -> Verdict {
+        let accuracy = self.coarser.unwrap_or(LEVELS[3]);
+        let run = runs.at(accuracy);
         let mut apart = 0;
         // A run that was given up tells nothing.
-        for push in scene.pushes().into_iter().take_while(|_| run.has_ended()) {
-            let pushed = scene.run(solver, push);
-            apart += u32::from(pushed.has_ended() && !pushed.ends_like(run));
+        for push in runs.scene.pushes().into_iter().take_while(|_| run.has_ended()) {
+            let pushed = runs.scene.run(&solver(accuracy), push);
+            apart += u32::from(pushed.has_ended() && !pushed.ends_like(&run));
             if apart == APART {
                 return Verdict::NoAnswer;
             }
         }
-        if self.settled { Verdict::Single } else { Verdict::Undecided }
+        if self.coarser.is_some() { Verdict::Single } else { Verdict::Undecided }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_is_judged_the_same_again_and_a_quiet_one_has_one_end() {
+        let scenes: Vec<JudgedScene> = [1, 3, 6].map(|number| JudgedScene::new(1, number)).to_vec();
+        for scene in &scenes {
+            assert_eq!((scene.verdict, scene.truth, scene.diverged), (Verdict::Single, 1e-7, false), "{scene:?}");
+            assert!(scene.levels.iter().all(|level| level.right && level.agrees != Some(false)), "{scene:?}");
+            let tolerances: Vec<f64> = scene.levels.iter().map(|level| level.tolerance).collect();
+            assert_eq!(tolerances, [1e-3, 1e-4, 1e-5, 1e-6, 1e-7]);
+            assert!(scene.levels.windows(2).all(|pair| pair[1].solves > pair[0].solves));
+            assert!(scene.drawn.len() == 2 && scene.drawn[1].agrees == Some(true));
+            assert_eq!((scene.ladder(0).len(), scene.ladder(1).len(), scene.ladder(3).len()), (4, 3, 2));
+        }
+        let mut again = JudgedScene::new(1, 3);
+        again.cpu_s = scenes[1].cpu_s;
+        assert_eq!(again, scenes[1]);
     }
 }

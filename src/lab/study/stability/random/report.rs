@@ -25,6 +25,17 @@ impl Policy {
     /// All of them, the cheapest first.
     pub const ALL: [Self; 5] = [Self::None, Self::Flags, Self::Restless, Self::RefinedRun, Self::UntilAgreement];
 
+    /// Name in the figure.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "nothing",
+            Self::Flags => "flags",
+            Self::Restless => "restless again",
+            Self::RefinedRun => "refined run",
+            Self::UntilAgreement => "until agreement",
+        }
+    }
+
     /// Description in tables.
     pub fn about(self) -> &'static str {
         match self {

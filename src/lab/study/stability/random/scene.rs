@@ -163,7 +163,7 @@ pub(super) struct Push {
 
 /// Minimisations after which a run is given up: a second of CPU time. Fingertips that graze a stiff edge can rattle there
 /// at steps of the least length, and undamped fingers ring.
-const MOST_SOLVES: u64 = 50_000;
+const MOST_SOLVES: u64 = 60_000;
 
 /// Result of a run.
 #[derive(Clone, Debug)]
@@ -177,6 +177,11 @@ impl Ran {
     /// True if both runs reach their end, and end alike.
     pub(super) fn ends_like(&self, other: &Self) -> bool {
         self.end.as_ref().zip(other.end.as_ref()).is_some_and(|(a, b)| a.is_like(b))
+    }
+
+    /// A run that is not computed because a coarser one was given up.
+    pub(super) fn given_up() -> Self {
+        Self { end: None, quality: Quality::default() }
     }
 
     /// True if the run reached its end.
