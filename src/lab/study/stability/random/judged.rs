@@ -84,9 +84,9 @@ impl LevelResult {
         }
     }
 
-    /// True where a trial with this result is flagged: it is not sound, or missed its accuracy.
+    /// True where a trial with this result is flagged as unsound.
     pub fn is_flagged(&self) -> bool {
-        !self.ended || self.unconverged > 0 || self.restless || self.missed > 0
+        !self.ended || self.unconverged > 0 || self.restless
     }
 }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub enum Policy {
     /// Nothing: every result counts as right.
     None,
-    /// Flags of a trial: not finite, not converged, restless, accuracy missed.
+    /// Flags of a trial: not finite, not converged, restless.
     Flags,
     /// A restless trial is computed again at a tenth of the tolerance, down to the reference; the others are flagged.
     Restless,
