@@ -11,7 +11,7 @@ use super::Failure;
 #[command(after_help = "Examples:
   palpate study accuracy --quick
   palpate study stability --quick
-  palpate study stability --steps 100000 --seed 2 --json")]
+  palpate study stability --scenes 500 --seed 2 --json")]
 pub(super) struct StudyArguments {
     #[command(subcommand)]
     study: Study,
@@ -21,7 +21,7 @@ pub(super) struct StudyArguments {
 enum Study {
     /// Measure what accuracy costs in time and what it is worth for recognition; resumes where it stopped.
     Accuracy(accuracy::AccuracyArguments),
-    /// Run hard cases at every accuracy, and random scenes twice: failures, and silently wrong results.
+    /// Run hard cases at every accuracy, search holds for chatter, and count silently wrong random scenes; resumes.
     Stability(stability::StabilityArguments),
 }
 

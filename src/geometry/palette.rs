@@ -99,6 +99,8 @@ pub struct ThemeColours {
     pub quiet_text: Rgb,
     /// Active, selected and clickable elements.
     pub accent: Rgb,
+    /// Something is as it should be.
+    pub good: Rgb,
     /// Something deserves a look.
     pub warning: Rgb,
     /// Something failed.
@@ -135,6 +137,7 @@ impl Theme {
                 text: Rgb(226, 230, 235),
                 quiet_text: Rgb(152, 162, 174),
                 accent: Rgb(98, 168, 232),
+                good: Rgb(110, 196, 124),
                 warning: Rgb(240, 180, 60),
                 error: Rgb(240, 104, 92),
                 sky: Rgb(38, 44, 52),
@@ -149,6 +152,7 @@ impl Theme {
                 text: Rgb(28, 32, 38),
                 quiet_text: Rgb(90, 98, 108),
                 accent: Rgb(20, 98, 174),
+                good: Rgb(26, 116, 56),
                 warning: Rgb(150, 92, 0),
                 error: Rgb(186, 44, 34),
                 sky: Rgb(236, 240, 244),

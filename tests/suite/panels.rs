@@ -13,7 +13,7 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_sim::scene::{Accuracy, Effect, Setting};
+use palpate_sim::scene::{Accuracy, Effect, Scene, Setting};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -66,6 +66,42 @@ fn time_is_steered_by_buttons() {
     bench.harness.get_by_label("Reset").click();
     let reset = bench.until(|s| s.grasp > paused.grasp);
     assert_eq!(reset.frame.t, 0.0);
+}
+
+/// A grasp that one Newton iteration does not solve, as the red light needs.
+fn shown_light(theme: Theme, iterations: u32) -> (Bench, RgbaImage) {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "grasp");
+    let mut bench = bench(BenchSetup { theme, size: [300.0, 380.0], panel, ..BenchSetup::default() });
+    let mut scene = Scene::default();
+    scene.solver.max_iterations = iterations;
+    bench.tell(SimulationAction::SetScene(Box::new(scene)));
+    bench.tell(Command::SetGrasps(1));
+    bench.tell(Command::SetSpeed(64.0));
+    bench.until(|s| s.status.finished && s.status.checking.is_none());
+    let picture = bench.harness.render().unwrap();
+    (bench, picture)
+}
+
+#[test]
+fn a_light_says_how_far_a_grasp_can_be_trusted() {
+    let rows = [100, 1].map(|iterations| {
+        let [dark, light] = Theme::ALL.map(|theme| shown_light(theme, iterations).1);
+        side_by_side(&dark, &light)
+    });
+    compare("panel_grasp_trust", &side_by_side(&rows[0], &rows[1]), "the CPU renderer of the tests");
+}
+
+#[test]
+fn a_grasp_is_computed_again_by_a_button() {
+    let (mut bench, _) = shown_light(Theme::Dark, 100);
+    assert!(bench.harness.query_by_label("Trust light: green").is_some());
+    let before = bench.workbench().snapshot().unwrap();
+    bench.harness.get_by_label("Compute again").click();
+    let after = bench.until(|s| s.last.as_ref().is_some_and(|last| last.accuracy != Accuracy::Standard));
+    let [before, after] = [before, after].map(|snapshot| snapshot.last.clone().unwrap());
+    assert_eq!((after.grasp, after.accuracy), (before.grasp, Accuracy::Tolerance(1e-5)));
+    assert!(after.summary.hold != before.summary.hold);
+    assert!(bench.harness.query_by_label_contains("two levels had to agree, beginning at standard").is_some());
 }
 
 #[test]

@@ -2,13 +2,17 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use egui::{Grid, RichText, ScrollArea, Ui};
+use crate::app::theme::colour;
+use crate::app::widgets::wrapped;
+use egui::{Button, Grid, RichText, ScrollArea, Sense, Shape, Stroke, Ui, pos2, vec2};
+use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::workers::{FinishedGrasp, ObjectCard, Snapshot};
+use palpate_lab::workers::{Checking, Command, FinishedGrasp, ObjectCard, Snapshot};
+use palpate_sim::frame::TrustLevel;
 use palpate_sim::gripper::Side;
 use palpate_tactile::Quantity;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(snapshot) = context.snapshot else {
         ui.weak("Waiting for the first grasp ..");
         return;
@@ -24,7 +28,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
         readings_ui(ui, context, snapshot);
         ui.add_space(6.0);
         match &snapshot.last {
-            Some(last) => last_ui(ui, last),
+            Some(last) => {
+                ui.weak(format!("result of grasp {}", last.grasp));
+                trust_ui(ui, context.view.theme, last, snapshot.status.checking, actions);
+                last_ui(ui, last);
+            }
             None => {
                 ui.weak("The result appears when the grasp ends.");
             }
@@ -77,9 +85,59 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
     });
 }
 
+/// How far the result can be trusted and why, and a button that computes it again.
+fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Checking>, actions: &mut Actions) {
+    let quality = &last.summary.quality;
+    let (level, reason) = quality.trust();
+    let reason = match checking {
+        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with a finer run ..".to_owned(),
+        Some(Checking::ComputingAgain) => "computing again at finer accuracy ..".to_owned(),
+        _ => reason,
+    };
+    ui.horizontal(|ui| {
+        light_ui(ui, theme, level);
+        ui.strong(format!("trust: {}", level.name()));
+        ui.weak(format!("at {}", last.accuracy));
+        let free = last.repeatable && checking != Some(Checking::ComputingAgain);
+        let about = if last.repeatable {
+            "Refine until two levels of accuracy agree, and show and store that result instead"
+        } else {
+            "Not possible: the object was pulled by hand, or this engine controls no error"
+        };
+        let button = ui.add_enabled(free, Button::new("Compute again"));
+        if button.on_hover_text(about).on_disabled_hover_text(about).clicked() {
+            actions.push(Command::ComputeAgain);
+        }
+    });
+    wrapped(ui, RichText::new(reason).small());
+    if let Some(recomputed) = quality.recomputed {
+        wrapped(ui, RichText::new(format!("computed at {}: {recomputed}", last.accuracy)).small().weak());
+    }
+}
+
+/// Light of a trial: a green circle, an amber triangle or a red square.
+fn light_ui(ui: &mut Ui, theme: Theme, level: TrustLevel) {
+    let (rect, response) = ui.allocate_exact_size(vec2(16.0, 16.0), Sense::hover());
+    let label = format!("Trust light: {}", level.name());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &label));
+    let (colours, centre) = (theme.colours(), rect.center());
+    let corners = |corners: &[[f32; 2]]| corners.iter().map(|[x, y]| pos2(centre.x + x, centre.y + y)).collect();
+    ui.painter().add(match level {
+        TrustLevel::Green => Shape::circle_filled(centre, 6.0, colour(colours.good)),
+        TrustLevel::Amber => {
+            let points = corners(&[[0.0, -6.5], [7.0, 5.5], [-7.0, 5.5]]);
+            Shape::convex_polygon(points, colour(colours.warning), Stroke::NONE)
+        }
+        TrustLevel::Red => {
+            let points = corners(&[[-5.5, -5.5], [5.5, -5.5], [5.5, 5.5], [-5.5, 5.5]]);
+            Shape::convex_polygon(points, colour(colours.error), Stroke::NONE)
+        }
+    });
+    response.on_hover_text(label);
+}
+
 fn last_ui(ui: &mut Ui, last: &FinishedGrasp) {
     let summary = &last.summary;
-    ui.weak(format!("result of grasp {}", last.grasp));
     Grid::new("summary").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
         let mut line = |name: &str, value: String| {
             ui.label(name);

@@ -3,19 +3,22 @@
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
 use super::super::terminal::{note, say, say_json, table};
-use indicatif::{ProgressBar, ProgressStyle};
-use palpate_geometry::palette::Theme;
+use super::files::{StudyOutput, StudyProgress};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::stability::{
     CaseRow, Limit, RandomReport, StabilityPlan, StabilityReport, policy_table, stability_figure,
 };
-use palpate_lab::study::{Measuring, ResultFile, StoredStudy};
-use palpate_render::{figure_picture, figure_svg};
+use palpate_lab::study::{Measuring, StoredStudy};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate study stability`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate study stability --quick
+  palpate study stability --out stability/
+  palpate study stability --scenes 500 --grasps 200 --seed 2 --json
+
+See also: palpate help stability")]
 pub(super) struct StabilityArguments {
     /// Take a minute instead of hours: draft and standard only, short runs, few grasps and random scenes.
     #[arg(long)]
@@ -29,13 +32,8 @@ pub(super) struct StabilityArguments {
     /// Random seed of the scenes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder for stability.json, .svg and .png. Results are kept in stability.jsonl as they are computed: after Ctrl+C or
-    /// a crash the same command resumes where it stopped.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Number of threads (default: one per core). The results do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    output: StudyOutput,
     /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
@@ -51,9 +49,6 @@ struct Report {
     /// CPU time (h).
     cpu_hours: f64,
 }
-
-/// Size of the figure (pixels).
-const SIZE: [u32; 2] = [1200, 520];
 
 impl StabilityArguments {
     fn plan(&self) -> StabilityPlan {
@@ -88,52 +83,32 @@ impl StabilityArguments {
 
 pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
     let plan = arguments.plan();
-    let mut results = match &arguments.out {
-        Some(folder) => plan.results(&folder.join("stability.jsonl"))?,
-        None => ResultFile::in_memory(),
-    };
-    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {eta} left")?);
-    let threads =
-        arguments.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
-    let cancelled = stop_flag()?;
-    let progress = |done: usize, of: usize| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-    };
-    let finished = plan.run(&mut results, &Measuring { threads, cancelled: &cancelled, progress: &progress });
-    bar.finish_and_clear();
-    if !finished? {
-        return Err(match &arguments.out {
-            Some(_) => "interrupted; the same command resumes where it stopped".into(),
-            None => "interrupted; with --out DIR it can be resumed".into(),
-        });
-    }
+    let folder = arguments.output.folder("stability", arguments.quick);
+    let mut results = plan.results(&folder.units("stability"))?;
+    let stop = stop_flag()?;
+    let bar = StudyProgress::new()?;
+    let progress = |done: usize, of: usize| bar.show(done, of);
+    let how = Measuring { threads: arguments.output.threads(), cancelled: &stop, progress: &progress };
+    let outcome = plan.run(&mut results, &how);
+    bar.clear();
     let cpu_hours = results.cpu_hours();
-    let report = Report { table: plan.case_rows(&results), report: plan.report(&results), cpu_hours };
+    if !outcome? {
+        note(&format!("stopped after {cpu_hours:.2} CPU hours; the same command goes on here"));
+        return Ok(());
+    }
+    let stored = StoredStudy::new(&arguments.command(), cpu_hours, plan.report(&results));
+    let written = folder.write("stability", &stored, &stability_figure(&stored))?;
+    let report = Report { table: plan.case_rows(&results), report: stored.result, cpu_hours };
     if arguments.json {
         say_json(&report)?;
     } else {
         print(&report)?;
-    }
-    if let Some(folder) = &arguments.out {
-        let stored = StoredStudy::new(&arguments.command(), cpu_hours, report.report.clone());
-        write(folder, &stored)?;
+        say(format!("{:.0} CPU minutes. {written}", cpu_hours * 60.0))?;
     }
     match report.table.iter().filter(|row| !row.holds).count() + report.report.random.non_finite {
         0 => Ok(()),
         failed => Err(format!("{failed} hard case(s) or random scene(s) failed").into()),
     }
-}
-
-/// Writes the result and its picture.
-fn write(folder: &Path, stored: &StoredStudy<StabilityReport>) -> Result<(), Failure> {
-    let file = |extension: &str| folder.join(format!("stability.{extension}"));
-    stored.write(&file("json"))?;
-    let figure = stability_figure(stored);
-    std::fs::write(file("svg"), figure_svg(&figure, Theme::Light, SIZE)?)?;
-    figure_picture(&figure, Theme::Light, SIZE)?.save(&file("png"))?;
-    note(&format!("written       {}, .svg and .png", file("json").display()));
-    Ok(())
 }
 
 fn print(report: &Report) -> Result<(), Failure> {
@@ -143,8 +118,7 @@ fn print(report: &Report) -> Result<(), Failure> {
     print_chatter(&report.report)?;
     say("")?;
     print_random(&report.report.random)?;
-    say("")?;
-    say(format!("cost          {} h CPU", three_digits(report.cpu_hours)))
+    say("")
 }
 
 fn print_chatter(report: &StabilityReport) -> Result<(), Failure> {

@@ -4,6 +4,7 @@ use super::{Command, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Trace
 use crate::grasping::grasp;
 use glam::DVec3;
 use palpate_learn::Model;
+use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::Store;

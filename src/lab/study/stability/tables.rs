@@ -138,8 +138,8 @@ pub fn stability_figure(stored: &StoredStudy<StabilityReport>) -> Figure {
                 series: series(&|row| 100.0 * row.false_alarms, false),
             },
         ],
+        columns: 1,
         note: format!("{} random scenes; {}", random.scenes, stored.origin().replace('`', "")),
-        ..Figure::default()
     }
 }
 
