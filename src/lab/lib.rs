@@ -22,7 +22,7 @@
 //! | 0 | [`labelling`] | flags of a trial, begin and end of a grasp, trials to review |
 //! | 0 | [`datasets`] | trials of a store as a data set; saved models |
 //! | 0 | [`picture`] | scene and frame to a draw list |
-//! | 1 | [`grasping`] | the grasp controller, runs, collections, identification, error bands |
+//! | 1 | [`grasping`] | the grasp controller, runs, computing again, collections, identification, error bands |
 //! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
 //! | 2 | [`study`] | measurements and comparisons as functions |
 //! | 3 | [`workers`] | threads for the window: commands in, snapshots and rows out |

@@ -77,6 +77,7 @@ fn shown_light(theme: Theme, iterations: u32) -> (Bench, RgbaImage) {
     bench.tell(SimulationAction::SetScene(Box::new(scene)));
     bench.tell(Command::SetGrasps(1));
     bench.tell(Command::SetSpeed(64.0));
+    bench.tell(Command::Play);
     bench.until(|s| s.status.finished && s.status.checking.is_none());
     let picture = bench.harness.render().unwrap();
     (bench, picture)

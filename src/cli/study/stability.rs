@@ -23,7 +23,7 @@ pub(super) struct StabilityArguments {
     /// Take a minute instead of hours: draft and standard only, short runs, few grasps and random scenes.
     #[arg(long)]
     quick: bool,
-    /// Number of random scenes (default: 2000, with --quick 12).
+    /// Number of random scenes (default: 2000, with --quick 5).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     scenes: Option<u64>,
     /// Grasps of each preset at draft and at standard that are searched for chatter (default: 1000, with --quick 16).

@@ -13,7 +13,7 @@ mod tables;
 pub use cases::CASES;
 pub use chatter::{CHATTER_ACCURACIES, ChatterRow, ChatterUnit, chatter_table};
 pub use random::{
-    AccuracyRow, FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, Verdict,
+    AccuracyRow, FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, SceneVerdict,
 };
 
 pub use study::{CaseSummary, StabilityError, StabilityPlan, StabilityReport, StabilityUnit};

@@ -1,5 +1,6 @@
 //! Tables and the figure of the study, for the terminal, the manual and the README.
 
+use super::chatter::ChatterRow;
 use super::random::{Policy, PolicyRow, RandomReport};
 use super::study::StabilityReport;
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
@@ -88,14 +89,33 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
         ]
     });
     let cases = markdown_table(&["case", "claim", "passed", "closest to its limit"], &case_rows.collect::<Vec<_>>());
-    let document = "assets/help/stability.md";
-    let in_manual = |name, text| GeneratedSection { document, name, text };
+    let in_manual = |name, text| GeneratedSection { document: "assets/help/stability.md", name, text };
     Ok(vec![
         in_manual("silent share", policies),
         in_manual("silent share by accuracy", by_accuracy),
         in_manual("chatter", chatter),
         in_manual("hard cases", cases),
+        GeneratedSection { document: "README.md", name: "stability in short", text: in_short(&stored.result) },
     ])
+}
+
+/// The result in two sentences.
+fn in_short(report: &StabilityReport) -> String {
+    let share = |policy| {
+        let row = report.random.policy(&Accuracy::Standard.to_string(), policy);
+        row.map_or_else(Default::default, |row| {
+            let [low, high] = [row.silent_share.low, row.silent_share.high].map(percent);
+            (format!("{} % ({low} to {high} %)", percent(row.silent_share.estimate)), format!("{:.1}", row.cost))
+        })
+    };
+    let ((single, _), (agreed, cost)) = (share(Policy::Flags), share(Policy::UntilAgreement));
+    let sum = |count: fn(&ChatterRow) -> usize| report.chatter.iter().map(count).sum::<usize>();
+    format!(
+        "At accuracy `standard` {single} of extreme random scenes are silently wrong; refined until two levels agree \
+         (`--until-agreement`, {cost} times the cost), {agreed}. Of {} ordinary grasps, {} chatter in the hold as stored.",
+        sum(|row| row.grasps),
+        sum(|row| row.chattering_stored)
+    )
 }
 
 /// The figure: share of silently wrong results against cost and against false alarms.

@@ -18,7 +18,7 @@ pub(super) const LEVELS: [Accuracy; 5] =
 /// What is known about the truth of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum SceneVerdict {
     /// It has one end.
     Single,
     /// Small changes of the start change the end.
@@ -107,7 +107,7 @@ pub struct JudgedScene {
     /// Tolerance of the truth.
     pub truth: f64,
     /// What is known about it.
-    pub verdict: Verdict,
+    pub verdict: SceneVerdict,
     /// True if a number left the range in any run.
     pub diverged: bool,
     /// CPU time of all runs (s).
@@ -126,7 +126,7 @@ impl JudgedScene {
         let levels: Vec<LevelResult> = (0..LEVELS.len()).map(level).collect();
         let drawn = from_drawn(&runs, &truth);
         let disputed = truth.accuracy != LEVELS[4] || levels.iter().chain(&drawn).any(|level| !level.right);
-        let verdict = if disputed { truth.pushed(&runs) } else { Verdict::Single };
+        let verdict = if disputed { truth.pushed(&runs) } else { SceneVerdict::Single };
         let diverged = runs.any_diverged();
         let cpu_s = start.elapsed().as_secs_f64();
         Self { number, levels, drawn, truth: truth.accuracy.step_tolerance(), verdict, diverged, cpu_s }
@@ -220,7 +220,7 @@ impl Truth {
     }
 
     /// Changes the start in twelve ways: at the coarser of two levels that agree, or at the reference accuracy.
-    fn pushed(&self, runs: &Runs<'_>) -> Verdict {
+    fn pushed(&self, runs: &Runs<'_>) -> SceneVerdict {
         let accuracy = self.coarser.unwrap_or(LEVELS[3]);
         let run = runs.at(accuracy);
         let mut apart = 0;
@@ -229,10 +229,10 @@ impl Truth {
             let pushed = runs.scene.run(&solver(accuracy), push);
             apart += u32::from(pushed.has_ended() && !pushed.ends_like(&run));
             if apart == APART {
-                return Verdict::NoAnswer;
+                return SceneVerdict::NoAnswer;
             }
         }
-        if self.coarser.is_some() { Verdict::Single } else { Verdict::Undecided }
+        if self.coarser.is_some() { SceneVerdict::Single } else { SceneVerdict::Undecided }
     }
 }
 
@@ -244,7 +244,7 @@ mod tests {
     fn a_scene_is_judged_the_same_again_and_a_quiet_one_has_one_end() {
         let scenes: Vec<JudgedScene> = [1, 3, 6].map(|number| JudgedScene::new(1, number)).to_vec();
         for scene in &scenes {
-            assert_eq!((scene.verdict, scene.truth, scene.diverged), (Verdict::Single, 1e-7, false), "{scene:?}");
+            assert_eq!((scene.verdict, scene.truth, scene.diverged), (SceneVerdict::Single, 1e-7, false), "{scene:?}");
             assert!(scene.levels.iter().all(|level| level.right && level.agrees != Some(false)), "{scene:?}");
             let tolerances: Vec<f64> = scene.levels.iter().map(|level| level.tolerance).collect();
             assert_eq!(tolerances, [1e-3, 1e-4, 1e-5, 1e-6, 1e-7]);

@@ -4,6 +4,6 @@ mod judged;
 mod report;
 mod scene;
 
-pub use judged::{JudgedScene, LevelResult, Verdict};
+pub use judged::{JudgedScene, LevelResult, SceneVerdict};
 pub use report::{AccuracyRow, FlagRow, Policy, PolicyRow, RandomReport};
 pub use scene::RandomScene;

@@ -1,6 +1,6 @@
 //! What judged scenes come to: shares of silently wrong results by accuracy, and by what is done about them.
 
-use super::judged::{JudgedScene, LEVELS, LevelResult, Verdict};
+use super::judged::{JudgedScene, LEVELS, LevelResult, SceneVerdict};
 use palpate_learn::metrics::Interval;
 use palpate_sim::scene::Accuracy;
 use serde::{Deserialize, Serialize};
@@ -171,8 +171,8 @@ impl RandomReport {
     /// Sums up scenes of a seed, in the order of their numbers.
     pub fn new(seed: u64, scenes: &[JudgedScene]) -> Self {
         let with = |verdict| scenes.iter().filter(move |scene| scene.verdict == verdict);
-        let clear: Vec<&JudgedScene> = with(Verdict::Single).collect();
-        let no_answer = with(Verdict::NoAnswer).count();
+        let clear: Vec<&JudgedScene> = with(SceneVerdict::Single).collect();
+        let no_answer = with(SceneVerdict::NoAnswer).count();
         let drawn: Vec<&LevelResult> = scenes.iter().map(|scene| &scene.drawn[0]).collect();
         let solves: u64 = drawn.iter().map(|level| level.solves).sum();
         let newton: f64 = drawn.iter().map(|level| level.newton_mean * level.solves as f64).sum();
@@ -187,8 +187,8 @@ impl RandomReport {
             scenes: scenes.len(),
             no_answer,
             no_answer_share: Interval::of_share(no_answer, scenes.len()),
-            undecided: with(Verdict::Undecided).count(),
-            undecided_unflagged: with(Verdict::Undecided).filter(|scene| !scene.drawn[0].is_flagged()).count(),
+            undecided: with(SceneVerdict::Undecided).count(),
+            undecided_unflagged: with(SceneVerdict::Undecided).filter(|scene| !scene.drawn[0].is_flagged()).count(),
             non_finite: scenes.iter().filter(|scene| scene.diverged).count(),
             steps: drawn.iter().map(|level| level.steps).sum(),
             unconverged_steps: drawn.iter().map(|level| level.unconverged).sum(),
