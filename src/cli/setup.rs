@@ -35,8 +35,8 @@ pub(super) struct SceneArguments {
 /// When a grasp is computed again at a finer accuracy.
 #[derive(Debug, clap::Args)]
 pub(super) struct RecomputeArguments {
-    /// Compute again at a tenth of the tolerance until two levels end alike, and take the finer (default: only where
-    /// forces change in the hold).
+    /// Compute again at a tenth of the tolerance until three levels in a row end alike, and take the finest (default:
+    /// only where forces change in the hold).
     #[arg(long)]
     until_agreement: bool,
 }

@@ -118,7 +118,7 @@ pub struct Recomputed {
 pub enum RecomputeCause {
     /// Forces changed repeatedly in its hold, or it did not come to rest.
     Unsettled,
-    /// Two levels of accuracy had to agree.
+    /// Three levels of accuracy had to agree.
     UntilAgreement,
 }
 
@@ -150,7 +150,7 @@ impl std::fmt::Display for Recomputed {
         let Self { asked, cause } = self;
         match cause {
             RecomputeCause::Unsettled => write!(f, "forces change in the hold at {asked}"),
-            RecomputeCause::UntilAgreement => write!(f, "two levels had to agree, beginning at {asked}"),
+            RecomputeCause::UntilAgreement => write!(f, "three levels had to agree, beginning at {asked}"),
         }
     }
 }

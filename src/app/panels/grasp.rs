@@ -98,20 +98,20 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
         light_ui(ui, theme, level);
         ui.strong(format!("trust: {}", level.name()));
         ui.weak(format!("at {}", last.accuracy));
-        let free = last.repeatable && checking != Some(Checking::ComputingAgain);
-        let about = if last.repeatable {
-            "Refine until two levels of accuracy agree, and show and store that result instead"
-        } else {
-            "Not possible: the object was pulled by hand, or this engine controls no error"
-        };
-        let button = ui.add_enabled(free, Button::new("Compute again"));
-        if button.on_hover_text(about).on_disabled_hover_text(about).clicked() {
-            actions.push(Command::ComputeAgain);
-        }
     });
     wrapped(ui, RichText::new(reason).small());
     if let Some(recomputed) = quality.recomputed {
         wrapped(ui, RichText::new(format!("computed at {}: {recomputed}", last.accuracy)).small().weak());
+    }
+    let free = last.repeatable && checking != Some(Checking::ComputingAgain);
+    let about = if last.repeatable {
+        "Refine until three levels of accuracy agree, and show and store that result instead"
+    } else {
+        "Not possible: the object was pulled by hand, or this engine controls no error"
+    };
+    let button = ui.add_enabled(free, Button::new("Compute again"));
+    if button.on_hover_text(about).on_disabled_hover_text(about).clicked() {
+        actions.push(Command::ComputeAgain);
     }
 }
 

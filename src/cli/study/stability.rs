@@ -170,11 +170,12 @@ fn print_random(random: &RandomReport) -> Result<(), Failure> {
         .by_accuracy
         .iter()
         .map(|row| {
-            let counts = [row.scenes, row.wrong, row.silent, row.silent_after_agreement].map(|count| count.to_string());
-            [vec![row.accuracy.clone()], counts.to_vec(), vec![format!("{:.0}", row.solves)]].concat()
+            let after = row.silent_after_agreement.map_or_else(String::new, |count| count.to_string());
+            let counts = [row.scenes, row.wrong, row.silent].map(|count| count.to_string());
+            [vec![row.accuracy.clone()], counts.to_vec(), vec![after, format!("{:.0}", row.solves)]].concat()
         })
         .collect();
-    table(&["accuracy", "scenes", "wrong", "silently wrong", "until agreement", "solves per scene"], &accuracies)?;
+    table(&["accuracy", "scenes", "wrong", "silently wrong", "three agree", "solves per scene"], &accuracies)?;
     say("")?;
     let (header, rows) = policy_table(random);
     table(&header, &rows)?;

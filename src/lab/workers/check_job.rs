@@ -1,5 +1,5 @@
 //! Check of finished grasps in a thread of its own: comparison with a run at a tenth of the tolerance, and computing
-//! again until two levels agree.
+//! again until three levels agree.
 
 use super::background_job::BackgroundJob;
 use super::messages::Wake;
@@ -28,7 +28,7 @@ pub(super) struct Subject {
 pub(super) enum CheckRequest {
     /// Compare its end with that of a finer run.
     Compare(Subject),
-    /// Compute it again until two levels agree.
+    /// Compute it again until three levels agree.
     ComputeAgain(Subject),
 }
 

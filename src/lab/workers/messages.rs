@@ -41,7 +41,7 @@ pub enum Command {
     SetErrorBand(bool),
     /// Whether the other engine computes each grasp too, for [`super::SimWorker::ghost`].
     SetGhost(bool),
-    /// Compute the last finished grasp again until two levels of accuracy agree, and show and store that result instead;
+    /// Compute the last finished grasp again until three levels of accuracy agree, and show and store that result instead;
     /// pauses.
     ComputeAgain,
     /// Pull the object with this force (N, world axes); zero releases it.
@@ -169,7 +169,7 @@ pub struct Status {
 pub enum Checking {
     /// A finer run is computed to compare with.
     Comparing,
-    /// The grasp is computed again until two levels agree.
+    /// The grasp is computed again until three levels agree.
     ComputingAgain,
 }
 

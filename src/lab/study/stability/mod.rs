@@ -13,7 +13,7 @@ mod tables;
 pub use cases::CASES;
 pub use chatter::{CHATTER_ACCURACIES, ChatterRow, ChatterUnit, chatter_table};
 pub use random::{
-    AccuracyRow, FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, SceneVerdict,
+    FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, SceneVerdict, SilentShareRow,
 };
 
 pub use study::{CaseSummary, StabilityError, StabilityPlan, StabilityReport, StabilityUnit};

@@ -191,7 +191,7 @@ mod tests {
     fn a_study_that_was_stopped_comes_to_the_same_report() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("stability.jsonl");
-        let plan = StabilityPlan { thorough: false, grasps: 1, scenes: 7, seed: 1 };
+        let plan = StabilityPlan { thorough: false, grasps: 1, scenes: 3, seed: 2 };
         let run = |stop_after: usize, threads: usize| {
             let mut results = plan.results(&path)?;
             let cancelled = AtomicBool::new(false);
@@ -204,9 +204,9 @@ mod tests {
         };
         let units = plan.units().len();
         let (whole, partial) = run(units - 1, 1)?;
-        assert!(!whole && partial.random.scenes == 5, "{}", partial.random.scenes);
+        assert!(!whole && partial.random.scenes == 0 && partial.chatter.len() == 8, "{partial:?}");
         let (whole, resumed) = run(usize::MAX, 2)?;
-        assert!(whole && resumed.random.scenes == 7);
+        assert!(whole && resumed.random.scenes == 3);
         std::fs::remove_file(&path)?;
         let (_, mut at_once) = run(usize::MAX, 2)?;
         // Only CPU times differ.

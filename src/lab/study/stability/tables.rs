@@ -60,11 +60,12 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
         stored.origin()
     );
     let accuracies = random.by_accuracy.iter().map(|row| {
-        let counts = [row.scenes, row.wrong, row.silent, row.silent_after_agreement].map(|count| count.to_string());
-        [vec![row.accuracy.clone()], counts.to_vec()].concat()
+        let after = row.silent_after_agreement.map_or_else(String::new, |count| count.to_string());
+        let counts = [row.scenes, row.wrong, row.silent].map(|count| count.to_string());
+        [vec![row.accuracy.clone()], counts.to_vec(), vec![after]].concat()
     });
     let by_accuracy = markdown_table(
-        &["accuracy", "scenes", "wrong", "silently wrong", "refined until two levels agree"],
+        &["accuracy", "scenes", "wrong", "silently wrong", "refined until three levels agree"],
         &accuracies.collect::<Vec<_>>(),
     );
     let chatter_rows = chatter.iter().map(|row| {
@@ -108,10 +109,10 @@ fn in_short(report: &StabilityReport) -> String {
             (format!("{} % ({low} to {high} %)", percent(row.silent_share.estimate)), format!("{:.1}", row.cost))
         })
     };
-    let ((single, _), (agreed, cost)) = (share(Policy::Flags), share(Policy::UntilAgreement));
+    let ((single, _), (agreed, cost)) = (share(Policy::Flags), share(Policy::ThreeAgree));
     let sum = |count: fn(&ChatterRow) -> usize| report.chatter.iter().map(count).sum::<usize>();
     format!(
-        "At accuracy `standard` {single} of extreme random scenes are silently wrong; refined until two levels agree \
+        "At accuracy `standard` {single} of extreme random scenes are silently wrong; refined until three levels agree \
          (`--until-agreement`, {cost} times the cost), {agreed}. Of {} ordinary grasps, {} chatter in the hold as stored.",
         sum(|row| row.grasps),
         sum(|row| row.chattering_stored)

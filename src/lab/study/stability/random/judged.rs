@@ -132,9 +132,9 @@ impl JudgedScene {
         Self { number, levels, drawn, truth: truth.accuracy.step_tolerance(), verdict, diverged, cpu_s }
     }
 
-    /// Results from one of the levels on, as many as there may be until two agree: down to the reference.
+    /// Results from one of the levels on.
     pub(super) fn ladder(&self, first: usize) -> &[LevelResult] {
-        &self.levels[first..(LEVELS.len() - 1).max(first + 2)]
+        &self.levels[first..]
     }
 }
 
@@ -180,6 +180,7 @@ fn from_drawn(runs: &Runs<'_>, truth: &Truth) -> Vec<LevelResult> {
     let mut accuracy = Accuracy::Tolerance(runs.scene.tolerance);
     until_agreement(
         &solver(accuracy),
+        2,
         |solver| runs.at(solver.accuracy),
         |coarse, fine| {
             if levels.is_empty() {
@@ -250,7 +251,7 @@ mod tests {
             assert_eq!(tolerances, [1e-3, 1e-4, 1e-5, 1e-6, 1e-7]);
             assert!(scene.levels.windows(2).all(|pair| pair[1].solves > pair[0].solves));
             assert!(scene.drawn.len() == 2 && scene.drawn[1].agrees == Some(true));
-            assert_eq!((scene.ladder(0).len(), scene.ladder(1).len(), scene.ladder(3).len()), (4, 3, 2));
+            assert_eq!((scene.ladder(0).len(), scene.ladder(3).len()), (5, 2));
         }
         let mut again = JudgedScene::new(1, 3);
         again.cpu_s = scenes[1].cpu_s;

@@ -5,5 +5,5 @@ mod report;
 mod scene;
 
 pub use judged::{JudgedScene, LevelResult, SceneVerdict};
-pub use report::{AccuracyRow, FlagRow, Policy, PolicyRow, RandomReport};
+pub use report::{FlagRow, Policy, PolicyRow, RandomReport, SilentShareRow};
 pub use scene::RandomScene;

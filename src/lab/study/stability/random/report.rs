@@ -18,12 +18,15 @@ pub enum Policy {
     /// A run at a tenth of the tolerance flags what it disagrees with.
     RefinedRun,
     /// Refined until two levels agree; what never agrees is flagged.
-    UntilAgreement,
+    TwoAgree,
+    /// Refined until three levels in a row agree, as `--until-agreement` does.
+    ThreeAgree,
 }
 
 impl Policy {
     /// All of them, the cheapest first.
-    pub const ALL: [Self; 5] = [Self::None, Self::Flags, Self::Restless, Self::RefinedRun, Self::UntilAgreement];
+    pub const ALL: [Self; 6] =
+        [Self::None, Self::Flags, Self::Restless, Self::RefinedRun, Self::TwoAgree, Self::ThreeAgree];
 
     /// Name in the figure.
     pub fn name(self) -> &'static str {
@@ -32,7 +35,8 @@ impl Policy {
             Self::Flags => "flags",
             Self::Restless => "restless again",
             Self::RefinedRun => "refined run",
-            Self::UntilAgreement => "until agreement",
+            Self::TwoAgree => "two agree",
+            Self::ThreeAgree => "three agree",
         }
     }
 
@@ -43,7 +47,8 @@ impl Policy {
             Self::Flags => "flags of a trial",
             Self::Restless => "flags; restless trials again (default)",
             Self::RefinedRun => "flags and a refined run",
-            Self::UntilAgreement => "refine until two levels agree",
+            Self::TwoAgree => "refine until two levels agree",
+            Self::ThreeAgree => "refine until three levels agree (`--until-agreement`)",
         }
     }
 
@@ -61,13 +66,18 @@ impl Policy {
                 let agrees = levels.get(1).and_then(|second| second.agrees).unwrap_or(true);
                 (first, first.is_flagged() || !agrees, levels.len().min(2))
             }
-            Self::UntilAgreement => {
-                let agreed = levels.iter().position(|level| level.agrees == Some(true));
-                let last = agreed.unwrap_or(levels.len() - 1);
-                (&levels[last], agreed.is_none() || levels[last].is_flagged(), last + 1)
-            }
+            Self::TwoAgree => agreed(levels, 1),
+            Self::ThreeAgree => agreed(levels, 2),
         }
     }
+}
+
+/// The first level that agrees with the one before, as do so many in a row; else the last, which is flagged.
+fn agreed(levels: &[LevelResult], in_a_row: usize) -> (&LevelResult, bool, usize) {
+    let agree = |last: &usize| (last + 1 - in_a_row..=*last).all(|k| levels[k].agrees == Some(true));
+    let found = (in_a_row..levels.len()).find(agree);
+    let last = found.unwrap_or(levels.len() - 1);
+    (&levels[last], found.is_none() || levels[last].is_flagged(), last + 1)
 }
 
 /// What a policy comes to, from one accuracy on.
@@ -93,7 +103,7 @@ pub struct PolicyRow {
 
 /// Results at one accuracy, without flags or refinement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AccuracyRow {
+pub struct SilentShareRow {
     /// Accuracy, or a range of drawn tolerances.
     pub accuracy: String,
     /// Scenes with a single answer.
@@ -104,8 +114,8 @@ pub struct AccuracyRow {
     pub silent: usize,
     /// Share of the latter, with its interval.
     pub silent_share: Interval,
-    /// The same where results are refined until two levels agree.
-    pub silent_after_agreement: usize,
+    /// The same where results are refined until three levels agree; absent for drawn tolerances.
+    pub silent_after_agreement: Option<usize>,
     /// Convex minimisations per scene.
     pub solves: f64,
 }
@@ -151,12 +161,12 @@ pub struct RandomReport {
     /// Largest outer friction residual.
     pub friction_residual_max: f64,
     /// Results by accuracy: the levels, then ranges of drawn tolerances.
-    pub by_accuracy: Vec<AccuracyRow>,
+    pub by_accuracy: Vec<SilentShareRow>,
     /// Results by policy: from drawn tolerances, from draft and from standard on.
     pub by_policy: Vec<PolicyRow>,
     /// Flags, singly and together.
     pub flags: Vec<FlagRow>,
-    /// First scenes that are silently wrong at their drawn accuracy although two levels agree.
+    /// First scenes that are silently wrong from draft on although three levels agree.
     pub examples: Vec<u64>,
     /// CPU time (s).
     pub cpu_s: f64,
@@ -179,7 +189,7 @@ impl RandomReport {
         let mut friction: Vec<f64> = drawn.iter().map(|level| level.friction_residual).collect();
         friction.sort_by(f64::total_cmp);
         let silent = |scene: &&&JudgedScene| {
-            let (level, flagged, _) = Policy::UntilAgreement.outcome(&scene.drawn);
+            let (level, flagged, _) = Policy::ThreeAgree.outcome(scene.ladder(0));
             !level.right && !flagged
         };
         Self {
@@ -210,37 +220,37 @@ impl RandomReport {
     }
 }
 
-fn accuracy_rows(scenes: &[&JudgedScene]) -> Vec<AccuracyRow> {
-    let row = |accuracy: String, ladders: &[&[LevelResult]]| {
+fn accuracy_rows(scenes: &[&JudgedScene]) -> Vec<SilentShareRow> {
+    let row = |accuracy: String, ladders: &[&[LevelResult]], named: bool| {
         let those: Vec<&LevelResult> = ladders.iter().map(|levels| &levels[0]).collect();
         let silent = those.iter().filter(|level| !level.right && !level.is_flagged()).count();
         let after = |levels: &&&[LevelResult]| {
-            let (level, flagged, _) = Policy::UntilAgreement.outcome(levels);
+            let (level, flagged, _) = Policy::ThreeAgree.outcome(levels);
             !level.right && !flagged
         };
-        AccuracyRow {
+        SilentShareRow {
             accuracy,
             scenes: those.len(),
             wrong: those.iter().filter(|level| !level.right).count(),
             silent,
             silent_share: Interval::of_share(silent, those.len()),
-            silent_after_agreement: ladders.iter().filter(after).count(),
+            silent_after_agreement: named.then(|| ladders.iter().filter(after).count()),
             solves: those.iter().map(|level| level.solves as f64).sum::<f64>() / those.len().max(1) as f64,
         }
     };
     let at = |k: usize| scenes.iter().map(|scene| scene.ladder(k)).collect::<Vec<_>>();
-    let mut rows: Vec<AccuracyRow> = (0..LEVELS.len() - 1).map(|k| row(LEVELS[k].to_string(), &at(k))).collect();
+    let mut rows: Vec<SilentShareRow> = (0..4).map(|k| row(LEVELS[k].to_string(), &at(k), k < 3)).collect();
     for range in RANGES.windows(2) {
         let within = |scene: &&&JudgedScene| (range[0]..range[1]).contains(&scene.drawn[0].tolerance);
         let those: Vec<&[LevelResult]> = scenes.iter().filter(within).map(|scene| scene.drawn.as_slice()).collect();
-        rows.push(row(format!("{:e} to {:e}", range[0], range[1]), &those));
+        rows.push(row(format!("{:e} to {:e}", range[0], range[1]), &those, false));
     }
     rows
 }
 
 fn policy_rows(scenes: &[&JudgedScene]) -> Vec<PolicyRow> {
-    let rows_of = |accuracy: String, ladders: Vec<&[LevelResult]>| {
-        Policy::ALL.map(|policy| {
+    let rows_of = |accuracy: String, ladders: Vec<&[LevelResult]>, policies: &[Policy]| {
+        let row = |policy: &Policy| {
             let outcomes: Vec<_> = ladders.iter().map(|levels| policy.outcome(levels)).collect();
             let count = |is: &dyn Fn(bool, bool) -> bool| {
                 outcomes.iter().filter(|(level, flagged, _)| is(level.right, *flagged)).count()
@@ -255,7 +265,7 @@ fn policy_rows(scenes: &[&JudgedScene]) -> Vec<PolicyRow> {
             let single: u64 = ladders.iter().map(|levels| levels[0].solves).sum();
             PolicyRow {
                 accuracy: accuracy.clone(),
-                policy,
+                policy: *policy,
                 scenes: ladders.len(),
                 silent,
                 silent_share: Interval::of_share(silent, ladders.len()),
@@ -263,13 +273,15 @@ fn policy_rows(scenes: &[&JudgedScene]) -> Vec<PolicyRow> {
                 false_alarms: count(&|right, flagged| right && flagged) as f64 / right.max(1) as f64,
                 cost: spent as f64 / single.max(1) as f64,
             }
-        })
+        };
+        policies.iter().map(row).collect::<Vec<_>>()
     };
-    let drawn = rows_of(DRAWN.to_owned(), scenes.iter().map(|scene| scene.drawn.as_slice()).collect());
-    let named = [Accuracy::Draft, Accuracy::Standard]
-        .into_iter()
-        .enumerate()
-        .flat_map(|(k, accuracy)| rows_of(accuracy.to_string(), scenes.iter().map(|scene| scene.ladder(k)).collect()));
+    // Drawn tolerances are refined until two levels agree, and no further.
+    let drawn = scenes.iter().map(|scene| scene.drawn.as_slice()).collect();
+    let drawn = rows_of(DRAWN.to_owned(), drawn, &Policy::ALL[..5]);
+    let named = [Accuracy::Draft, Accuracy::Standard].into_iter().enumerate().flat_map(|(k, accuracy)| {
+        rows_of(accuracy.to_string(), scenes.iter().map(|scene| scene.ladder(k)).collect(), &Policy::ALL)
+    });
     drawn.into_iter().chain(named).collect()
 }
 
