@@ -1,4 +1,4 @@
-//! Grasps computed again at finer accuracy: where forces change in the hold, or until two levels agree.
+//! Grasps computed again at finer accuracy: where forces change in the hold, or until three levels agree.
 //!
 //! No flag sees that a free object slipped the other way: the path decides, not the state at the end. Another run at a
 //! tenth of the tolerance sees most of it, and where the two disagree still finer ones decide:
@@ -269,7 +269,10 @@ mod tests {
         frames.push(frame(77, Phase::Hold, 0.2, 0.0));
         assert_eq!(EndState::of(&frames), Some(EndState::Lost));
         let closing = frame(0, Phase::Close, 0.3, 0.05);
-        assert_eq!(EndState::of(&[closing.clone()]), Some(EndState::Held { q: vec![0.3; 2], place: DVec3::Z * 0.05 }));
+        assert_eq!(
+            EndState::of(std::slice::from_ref(&closing)),
+            Some(EndState::Held { q: vec![0.3; 2], place: DVec3::Z * 0.05 })
+        );
         assert_eq!(EndState::of(&[]), None);
     }
 
