@@ -2,6 +2,7 @@
 
 use crate::gripper::{Phase, Side};
 use crate::scene::Accuracy;
+use glam::DVec3;
 use palpate_geometry::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +32,8 @@ pub struct Frame {
     pub phase: Phase,
     /// Joint angles, left finger then right, from palm to tip (rad).
     pub q: Vec<f64>,
+    /// Way of the hand from where it began, in the world (m); zero unless it is shaken.
+    pub hand: DVec3,
     /// The object's frame in the world; absent for an empty hand.
     pub world_from_object: Option<Pose>,
     /// Loaded taxels, in rising order; those not listed carry nothing.
@@ -42,6 +45,11 @@ impl Frame {
     pub fn joints(&self, side: Side) -> &[f64] {
         let n = self.q.len() / 2;
         &self.q[side.index() * n..(side.index() + 1) * n]
+    }
+
+    /// Pose of the gripper in the world, given the one in which the trial began.
+    pub fn world_from_gripper(&self, begun: &Pose) -> Pose {
+        Pose { position: begun.position + self.hand, ..*begun }
     }
 
     /// Loads on one pad that has `count` taxels, with indices counted from that pad's first taxel.
@@ -316,6 +324,7 @@ mod tests {
             line_bar: 0.0,
             phase: Phase::Close,
             q: vec![1.0, 2.0, 3.0, 4.0],
+            hand: DVec3::ZERO,
             world_from_object: None,
             taxels: vec![load(3, 1.0), load(9, 2.0), load(10, 4.0), load(19, 8.0)],
         };

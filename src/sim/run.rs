@@ -6,7 +6,7 @@ use crate::objects::ObjectModel;
 #[cfg(feature = "rapier")]
 use crate::physics::RapierSimulation;
 use crate::physics::{Engine, Placement, Refinement, Simulation, SimulationError};
-use crate::scene::{EngineKind, Scene};
+use crate::scene::{Effect, EngineKind, Scene};
 use glam::DVec3;
 
 /// The next event of a simulation.
@@ -39,6 +39,8 @@ pub struct SimRun {
 struct HoldWatch {
     /// Taxels of a finger.
     taxels: usize,
+    /// Time until which the hand stands still (s).
+    still_until: f64,
     /// Time of the first sample of the hold (s).
     since: Option<f64>,
     /// Normal force on each finger in the last sample (N).
@@ -54,15 +56,15 @@ const SETTLED_AFTER: f64 = 0.5;
 const CHANGE: f64 = 0.05;
 
 impl HoldWatch {
-    fn new(taxels: usize) -> Self {
-        Self { taxels, since: None, force: [0.0; 2], all: [0; 2], settled: [0; 2] }
+    fn new(taxels: usize, still_until: f64) -> Self {
+        Self { taxels, still_until, since: None, force: [0.0; 2], all: [0; 2], settled: [0; 2] }
     }
 
     fn note(&mut self, frame: &Frame) {
         let force = Side::BOTH.map(|side| frame.normal_force(side, self.taxels));
         let into_hold = match frame.phase {
-            Phase::Hold => frame.t - *self.since.get_or_insert(frame.t),
-            Phase::Close | Phase::Release => {
+            Phase::Hold if frame.t <= self.still_until => frame.t - *self.since.get_or_insert(frame.t),
+            Phase::Close | Phase::Hold | Phase::Release => {
                 self.since = None;
                 0.0
             }
@@ -128,7 +130,9 @@ impl SimRun {
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
         let (engine, placement) = EngineRun::new(scene, object, refinement);
         let taxels = scene.gripper.taxels().count();
-        let hold = HoldWatch::new(taxels);
+        let shaken = scene.hand_motion().filter(|_| engine.get().plan().is_on(Effect::Shaking.name()));
+        let still_until = shaken.map_or(f64::INFINITY, |motion| motion.begins_s());
+        let hold = HoldWatch::new(taxels, still_until);
         let run = Self { engine, reported: None, phase: Phase::Close, static_residual: None, hold };
         (run, placement)
     }
@@ -194,6 +198,10 @@ impl SimRun {
             if self.engine.get().tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
                 let frame = self.engine.get().frame();
                 self.hold.note(&frame);
+                // A hand that moves leaves nothing at rest: the last sample before counts.
+                if self.phase == Phase::Hold && self.hold.still_until.is_finite() && frame.t <= self.hold.still_until {
+                    self.static_residual = Some(self.engine.get().quality().static_residual);
+                }
                 return Ok(SimEvent::Sampled(frame));
             }
         }
@@ -201,7 +209,7 @@ impl SimRun {
 
     /// Sets the line pressure (bar) from now on.
     pub fn command(&mut self, bar: f64, phase: Phase) {
-        if self.phase == Phase::Hold && phase == Phase::Release {
+        if self.phase == Phase::Hold && phase == Phase::Release && self.hold.still_until.is_infinite() {
             self.static_residual = Some(self.engine.get().quality().static_residual);
         }
         self.phase = phase;
@@ -278,11 +286,20 @@ mod tests {
 
     #[test]
     fn changes_of_force_count_once_the_hold_has_settled() {
-        let mut watch = HoldWatch::new(10);
+        let mut watch = HoldWatch::new(10, f64::INFINITY);
         let mut push = |phase, k: u32, left: f32| {
             let taxels = vec![TaxelLoad { taxel: 3, normal: left, along: 0.0, across: 0.0 }];
             let t = f64::from(k) / 75.0;
-            let frame = Frame { sample: k, t, line_bar: 1.0, phase, q: vec![], world_from_object: None, taxels };
+            let frame = Frame {
+                sample: k,
+                t,
+                line_bar: 1.0,
+                phase,
+                q: vec![],
+                hand: DVec3::ZERO,
+                world_from_object: None,
+                taxels,
+            };
             watch.note(&frame);
             (watch.settled, watch.all[0])
         };

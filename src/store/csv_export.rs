@@ -79,7 +79,7 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
                     let (segment, along) = grid.place(taxel, &scene.gripper.finger);
                     let in_plane = bent.segments[segment].point(along, grid.height(taxel));
                     let in_gripper = scene.gripper.plane(side).point(in_plane, grid.across(taxel));
-                    let place = trial.data.world_from_gripper.point(in_gripper);
+                    let place = frame.world_from_gripper(&trial.data.world_from_gripper).point(in_gripper);
                     let mut record = vec![number(frame.t), side.name().to_owned()];
                     record.extend([segment, taxel].map(|n| n.to_string()));
                     record.extend(place.to_array().map(number));
@@ -144,7 +144,8 @@ fn row(frame: &Frame, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) 
     for side in Side::BOTH {
         let plane = scene.gripper.plane(side);
         let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
-        let places = bent.joints().map(|p| trial.data.world_from_gripper.point(plane.point(p, 0.0)));
+        let world_from_gripper = frame.world_from_gripper(&trial.data.world_from_gripper);
+        let places = bent.joints().map(|p| world_from_gripper.point(plane.point(p, 0.0)));
         fields.extend(places.flat_map(|p| p.to_array().map(number)));
     }
     if let Some(pose) = frame.world_from_object {

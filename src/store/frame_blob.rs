@@ -4,7 +4,7 @@
 //! magic "PPF1"            4 bytes
 //! joints (both fingers)   u16
 //! has object              u8      0 or 1
-//! reserved                u8      0
+//! hand moves              u8      0 or 1; zero in all files of versions without shaking
 //! frames                  u32
 //! per frame:
 //!   sample                u32
@@ -12,6 +12,7 @@
 //!   line pressure (bar)   f64
 //!   phase                 u8      0 close, 1 hold, 2 release
 //!   joint angles (rad)    f64 x joints
+//!   way of the hand (m)   f64 x 3                                       (only where hand moves is 1)
 //!   object in the world   f64 x 7   x y z (m), quaternion x y z w       (only where has object is 1)
 //!   loaded taxels         u16
 //!   per taxel:            u16 taxel, f32 normal, f32 along, f32 across (N)
@@ -52,7 +53,8 @@ pub fn encode_frames(frames: &[Frame]) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend_from_slice(MAGIC);
     out.extend_from_slice(&(joints as u16).to_le_bytes());
-    out.extend_from_slice(&[u8::from(has_object), 0]);
+    let hand_moves = frames.iter().any(|f| f.hand != DVec3::ZERO);
+    out.extend_from_slice(&[u8::from(has_object), u8::from(hand_moves)]);
     out.extend_from_slice(&(frames.len() as u32).to_le_bytes());
     for frame in frames {
         assert_eq!(frame.q.len(), joints, "all frames of a trial have the same joints");
@@ -62,6 +64,11 @@ pub fn encode_frames(frames: &[Frame]) -> Vec<u8> {
         out.push(phase_code(frame.phase));
         for q in &frame.q {
             out.extend_from_slice(&q.to_le_bytes());
+        }
+        if hand_moves {
+            for x in frame.hand.to_array() {
+                out.extend_from_slice(&x.to_le_bytes());
+            }
         }
         if has_object {
             let pose = frame.world_from_object.unwrap_or_default();
@@ -88,15 +95,15 @@ pub fn decode_frames(bytes: &[u8]) -> Result<Vec<Frame>, BlobError> {
         return Err(BlobError::Magic);
     }
     let joints = usize::from(u16::from_le_bytes(reader.take()?));
-    let [has_object, reserved] = reader.take()?;
+    let [has_object, hand_moves] = reader.take()?;
     let count = u32::from_le_bytes(reader.take()?);
-    if has_object > 1 || reserved != 0 {
+    if has_object > 1 || hand_moves > 1 {
         return Err(BlobError::Magic);
     }
     let mut frames = Vec::new();
     for index in 0..count {
         reader.frame = index;
-        frames.push(reader.frame(joints, has_object == 1)?);
+        frames.push(reader.frame(joints, has_object == 1, hand_moves == 1)?);
     }
     if reader.at == bytes.len() { Ok(frames) } else { Err(BlobError::BadValue { frame: count }) }
 }
@@ -140,7 +147,7 @@ impl Reader<'_> {
         BlobError::BadValue { frame: self.frame }
     }
 
-    fn frame(&mut self, joints: usize, has_object: bool) -> Result<Frame, BlobError> {
+    fn frame(&mut self, joints: usize, has_object: bool, hand_moves: bool) -> Result<Frame, BlobError> {
         let sample = u32::from_le_bytes(self.take()?);
         let (t, line_bar) = (self.number()?, self.number()?);
         let [code] = self.take()?;
@@ -151,6 +158,7 @@ impl Reader<'_> {
             _ => return Err(self.bad()),
         };
         let q = (0..joints).map(|_| self.number()).collect::<Result<_, _>>()?;
+        let hand = if hand_moves { DVec3::new(self.number()?, self.number()?, self.number()?) } else { DVec3::ZERO };
         let world_from_object = if has_object { Some(self.pose()?) } else { None };
         let count = u16::from_le_bytes(self.take()?);
         let mut taxels = Vec::new();
@@ -162,7 +170,7 @@ impl Reader<'_> {
                 across: self.small_number()?,
             });
         }
-        Ok(Frame { sample, t, line_bar, phase, q, world_from_object, taxels })
+        Ok(Frame { sample, t, line_bar, phase, q, hand, world_from_object, taxels })
     }
 
     fn pose(&mut self) -> Result<Pose, BlobError> {

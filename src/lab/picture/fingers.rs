@@ -95,6 +95,7 @@ mod tests {
             line_bar: 0.0,
             phase: Phase::Close,
             q: vec![0.0; 20],
+            hand: glam::DVec3::ZERO,
             world_from_object: None,
             taxels: [1, 161].map(|taxel| TaxelLoad { taxel, normal: 0.1, along: 0.0, across: 0.0 }).into(),
         };

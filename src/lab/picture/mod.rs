@@ -92,6 +92,7 @@ impl Stage {
             annotations::add(&mut overlay, view);
         }
         let palm = self.world_from_gripper.position.as_vec3();
+        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         DrawList {
             camera: view.camera,
             backdrop: [colours.sky, colours.horizon],
@@ -104,19 +105,16 @@ impl Stage {
             }),
             solids: self.solids(frame),
             ghosts: Vec::new(),
-            fingers: fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, view.full_scale),
-            arrows: if view.forces {
-                forces::arrows(&self.gripper, &self.world_from_gripper, frame)
-            } else {
-                Vec::new()
-            },
+            fingers: fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, view.full_scale),
+            arrows: if view.forces { forces::arrows(&self.gripper, &world_from_gripper, frame) } else { Vec::new() },
             overlay,
         }
     }
 
     /// Outlines of another run of the same scene, for [`DrawList::ghosts`].
     pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
-        let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, frame, 1.0);
+        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        let fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, 1.0);
         let colour = theme.colours().accent;
         let solid = |mesh, world_from_mesh| Solid { mesh, world_from_mesh, gloss: 0.0 };
         let mut ghosts: Vec<Solid> =
@@ -144,7 +142,7 @@ impl Stage {
             world_from_mesh: matrix(pose),
             gloss,
         };
-        let mut solids = vec![solid(&self.palm, &self.world_from_gripper, 0.12)];
+        let mut solids = vec![solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper), 0.12)];
         solids.extend(self.pedestal.as_ref().map(|mesh| solid(mesh, &Pose::IDENTITY, 0.05)));
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
             solids.push(solid(mesh, pose, 0.10));

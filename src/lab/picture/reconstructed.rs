@@ -8,7 +8,16 @@ pub(super) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -
     let (joints, segment) = (gripper.finger.joints, gripper.finger.segment_length());
     let angle = |side: Side| curvature[side.index()].filter(|kappa| kappa.is_finite()).unwrap_or(0.0) * segment;
     let q = Side::BOTH.into_iter().flat_map(|side| std::iter::repeat_n(angle(side), joints)).collect();
-    Frame { sample: 0, t: 0.0, line_bar: 0.0, phase: Phase::Close, q, world_from_object: None, taxels: Vec::new() }
+    Frame {
+        sample: 0,
+        t: 0.0,
+        line_bar: 0.0,
+        phase: Phase::Close,
+        q,
+        hand: glam::DVec3::ZERO,
+        world_from_object: None,
+        taxels: Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -33,6 +33,8 @@ pub(super) struct Blueprint {
     pub(super) inertials: Vec<Inertial>,
     /// Triangles of all meshes, seen and touched.
     triangles: usize,
+    /// Young's modulus of the surface (Pa), where the file gives one.
+    pub(super) modulus: Option<f64>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -60,6 +62,7 @@ impl Blueprint {
             collision: Vec::new(),
             inertials: Vec::new(),
             triangles: 0,
+            modulus: None,
             warnings: Vec::new(),
         }
     }
@@ -156,6 +159,7 @@ impl Blueprint {
             parts: solids.into(),
             mass,
             friction: DEFAULT_FRICTION,
+            modulus: self.modulus,
             bounds,
             warnings: self.warnings,
         })

@@ -138,6 +138,8 @@ pub struct ObjectModel {
     pub mass: MassProperties,
     /// Friction coefficient of its surface.
     pub friction: f64,
+    /// Young's modulus of its surface (Pa), where the file gives one; rigid otherwise.
+    pub modulus: Option<f64>,
     /// Bounding box of the contact solids.
     pub bounds: Bounds,
     /// Warnings: values guessed and meshes repaired while loading.
@@ -159,6 +161,7 @@ impl ObjectModel {
             resting: Resting::on_primitive(&shape, &Pose::IDENTITY),
             mass: unit.with_mass(unit.mass * density),
             friction,
+            modulus: None,
             bounds: shape.bounds(),
             warnings: Vec::new(),
         }

@@ -16,6 +16,9 @@ use std::collections::HashMap;
 /// Reads meshes by the reference that the URDF makes to them.
 pub(super) type MeshReader<'a> = &'a dyn Fn(&str) -> Result<Vec<ColouredPart>, MeshFileError>;
 
+/// Moduli of elasticity that a surface can have (Pa).
+const MODULI: std::ops::RangeInclusive<f64> = 100.0..=1e12;
+
 /// Link, joint or material with its name.
 type Named<'a> = (String, &'a Element);
 
@@ -58,6 +61,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
         for (collision, shape) in &collisions {
             let place = *root_from_link * origin_of(collision, link).map_err(malformed)?;
             blueprint.add_collision(&shape_of(shape, link, read_mesh)?, &place);
+            note_modulus(collision, link, &mut blueprint);
         }
         let own = inertial_of(link, element).map_err(malformed)?;
         if !(visuals.is_empty() && collisions.is_empty()) || own.is_some_and(|(mass, _)| mass.mass != 0.0) {
@@ -167,6 +171,22 @@ fn link_poses<'a>(
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let words = text.split([',', ';', ' ', '\t', '\n', '\r']);
     words.filter_map(|word| word.parse().ok()).collect::<Vec<f64>>().try_into().ok()
+}
+
+/// Notes the modulus of a collision shape: Drake's `drake:hydroelastic_modulus`. Of several shapes the softest counts.
+fn note_modulus(collision: &Element, link: &str, blueprint: &mut Blueprint) {
+    let properties = collision.child("proximity_properties");
+    let Some(modulus) = properties.and_then(|all| all.child("hydroelastic_modulus")) else { return };
+    match modulus.attribute("value").and_then(|text| text.trim().parse::<f64>().ok()) {
+        Some(value) if MODULI.contains(&value) => {
+            blueprint.modulus = Some(blueprint.modulus.map_or(value, |known| known.min(value)));
+        }
+        _ => blueprint.warnings.push(format!(
+            "link \"{link}\": its hydroelastic_modulus is not between {} and {} Pa; the object is taken to be rigid",
+            MODULI.start(),
+            MODULI.end()
+        )),
+    }
 }
 
 /// The first `<origin>` of an element; no origin is the identity.

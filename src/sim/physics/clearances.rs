@@ -21,6 +21,7 @@ pub(super) struct Clearances {
     /// Way that any point of the object has gone, at most (m).
     object_way: f64,
     resting: Nearby,
+    world: DVec3,
 }
 
 /// Places where the object may rest on its support soon.
@@ -50,20 +51,28 @@ impl Clearances {
             object: (DMat3::IDENTITY, DVec3::ZERO),
             object_way: 0.0,
             resting: Nearby { gap: f64::NEG_INFINITY, ..Nearby::default() },
+            world: DVec3::ZERO,
         }
     }
 
     /// Adds the ways from the last layout to this one.
     ///
-    /// `object`: its rotation and its centre.
-    pub(super) fn follow(&mut self, model: &PhysicsModel, segments: &[SegmentPose], object: Option<(DMat3, DVec3)>) {
+    /// `object`: its rotation and its centre; `world`: its displacement (m).
+    pub(super) fn follow(
+        &mut self,
+        model: &PhysicsModel,
+        segments: &[SegmentPose],
+        object: Option<(DMat3, DVec3)>,
+        world: DVec3,
+    ) {
         let links = model.chain.joints + 1;
         let depth = model.skin.thickness.max(model.skin.back);
-        let (mut moved, mut turned, mut centre) = (0.0, 0.0, DVec3::ZERO);
+        let (mut moved, mut turned, mut centre) = ((world - self.world).length(), 0.0, DVec3::ZERO);
+        self.world = world;
         if let Some((axes, place)) = object {
             let change = axes - self.object.0;
             turned = change.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-            moved = (place - self.object.1).length();
+            moved += (place - self.object.1).length();
             (self.object, centre) = ((axes, place), place);
             self.object_way += moved + turned * model.body.as_ref().map_or(0.0, |body| body.radius);
         }

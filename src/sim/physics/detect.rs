@@ -21,7 +21,8 @@
 //! [`super::step`].
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
-use super::effects::FingerContact;
+use super::effects::{FingerContact, Shell};
+use super::environment::Environment;
 use super::finger_pair::{Fronts, OtherFinger, in_series};
 use super::model::{Body, PhysicsModel};
 use super::state::State;
@@ -71,13 +72,17 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
     let h = workspace.step.h;
     let object = model.body.as_ref().map(|body| Solid::new(body, &workspace.body));
     let (linear, angular) = state.body_velocity(model);
+    // Out of the workspace, which the rest of it fills.
+    let moved_world = workspace.moved_world.take();
+    let environment = moved_world.as_ref().unwrap_or(&model.environment);
+    let passing = workspace.passing.velocity.length();
     let pose = object.as_ref().map(|solid| (solid.object_from_gripper, solid.centre));
-    workspace.clearances.follow(model, &workspace.segments, pose);
+    workspace.clearances.follow(model, &workspace.segments, pose, environment.way_from(&model.environment));
     // No segment is farther from its axis than this.
     let reach = model.springs.reach.iter().copied().fold(0.0, f64::max);
     let turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
     let fastest = state.fastest(model) + turning * reach;
-    let farthest = margin(h, fastest);
+    let farthest = margin(h, fastest + passing);
     workspace.fingers_meet = false;
     let may_meet = workspace.clearances.of_fingers() <= margin(h, 2.0 * fastest);
     let fronts = if may_meet { fronts_of_near_fingers(model, workspace) } else { None };
@@ -94,11 +99,11 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let link_velocity = workspace.spatial[link];
             let speed =
                 link_velocity.linear_at(middle - workspace.reference).length() + link_velocity.angular.length() * reach;
-            let against_world = margin(h, speed);
+            let against_world = margin(h, speed + passing);
             let object_speed = linear.length() + object.as_ref().map_or(0.0, |o| angular.length() * o.body.radius);
             let against_object = margin(h, speed + object_speed);
             let to_object = object.as_ref().map_or(f64::INFINITY, |o| o.distance(middle));
-            let to_world = model.environment.distance(middle);
+            let to_world = environment.distance(middle);
             let near_object = object.as_ref().filter(|_| to_object < reach + against_object);
             let near_world = to_world < reach + against_world;
             let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
@@ -111,6 +116,7 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             }
             let near = Near {
                 solid: object.as_ref(),
+                environment,
                 object: near_object.map(|o| (o, against_object)),
                 world: near_world.then_some(against_world),
                 finger: against_finger,
@@ -120,11 +126,12 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
         }
     }
     if let Some(body) = model.free_body()
-        && !model.environment.is_empty()
+        && !environment.is_empty()
     {
-        let speed = linear.length() + angular.length() * body.radius;
-        detect_resting(model, state, workspace, body, margin(h, speed));
+        let speed = linear.length() + angular.length() * body.radius + passing;
+        detect_resting(model, state, (workspace, environment), body, margin(h, speed));
     }
+    workspace.moved_world = moved_world;
 }
 
 /// Gap up to which contacts are kept, given the speed of approach (m).
@@ -136,6 +143,7 @@ fn margin(h: f64, speed: f64) -> f64 {
 struct Near<'a> {
     /// The object, near or not.
     solid: Option<&'a Solid<'a>>,
+    environment: &'a Environment,
     object: Option<(&'a Solid<'a>, f64)>,
     world: Option<f64>,
     /// The other finger.
@@ -152,12 +160,12 @@ impl Near<'_> {
 
     /// Distances of a point of the segment from the object and from the nearer of object and world (m), or lower bounds,
     /// near or not: what is noted for later must hold when the other one has come near.
-    fn distances(&self, model: &PhysicsModel, p: DVec3) -> (f64, f64) {
+    fn distances(&self, p: DVec3) -> (f64, f64) {
         let to_object = self.solid.map_or(f64::INFINITY, |solid| solid.distance(p));
         if self.least_to_world >= to_object {
             return (to_object, to_object);
         }
-        (to_object, to_object.min(model.environment.distance(p)))
+        (to_object, to_object.min(self.environment.distance(p)))
     }
 }
 
@@ -185,7 +193,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             radius: model.springs.radius,
             rest: spring.height - model.springs.radius,
         };
-        let (to_object, clearance) = near.distances(model, ray.foot);
+        let (to_object, clearance) = near.distances(ray.foot);
         if near.finger.is_none() {
             workspace.clearances.note_spring(site, place.link, clearance);
             if clearance > spring.height + near.farthest() {
@@ -193,7 +201,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             }
         }
         let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
-        let on_world = near.world.and_then(|margin| ray.cast_environment(model, margin));
+        let on_world = near.world.and_then(|margin| ray.cast_environment(near.environment, margin));
         let (mut hit, mut against) = match (on_object, on_world) {
             (Some(object), Some(world)) if world.compression > object.compression => (Some(world), Against::World),
             (Some(object), _) => (Some(object), Against::Object),
@@ -223,7 +231,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             _ => (spring.stiffness, spring.height),
         };
         let shear = local_axes * state.touched.shear[site];
-        let shear_stiffness = SHEAR_SHARE * stiffness;
+        let mut shear_stiffness = SHEAR_SHARE * stiffness;
         // Axial and sideways compliance in series, along the normal.
         let squared = hit.cosine * hit.cosine;
         let compliance = squared + (1.0 - squared) / SHEAR_SHARE;
@@ -232,7 +240,12 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             Against::Finger(_) => height * compliance / hit.cosine.max(LEAST_COSINE),
             Against::Object | Against::World => height,
         };
-        let stiffness = stiffness / compliance;
+        let (mut stiffness, mut height) = (stiffness / compliance, height);
+        if let (Against::Object, Some(shell)) = (against, &model.shell) {
+            let under = shell.under(spring.stiffness, spring.height);
+            (stiffness, height) = shell.in_series((stiffness, height), under);
+            shear_stiffness = Shell::shear_in_series(shear_stiffness, under);
+        }
         workspace.contacts.push(Contact {
             site: site as u32,
             acting: Acting::Segment(place.link as u32),
@@ -350,8 +363,7 @@ impl Ray {
         })
     }
 
-    fn cast_environment(&self, model: &PhysicsModel, margin: f64) -> Option<Hit> {
-        let environment = &model.environment;
+    fn cast_environment(&self, environment: &Environment, margin: f64) -> Option<Hit> {
         let surface = |p| (environment.distance(p), environment.normal(p));
         let gap = environment.distance(self.foot) - self.radius;
         let touch = self.trace((self.foot, self.axis), gap, margin, |p| environment.distance(p), surface)?;
@@ -438,9 +450,14 @@ impl Ray {
 }
 
 /// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
-fn detect_resting(model: &PhysicsModel, state: &State, workspace: &mut Workspace, body: &Body, margin: f64) {
+fn detect_resting(
+    model: &PhysicsModel,
+    state: &State,
+    (workspace, environment): (&mut Workspace, &Environment),
+    body: &Body,
+    margin: f64,
+) {
     let (h, pose) = (workspace.step.h, workspace.body);
-    let environment = &model.environment;
     if environment.distance(pose.position) > body.radius + margin {
         return;
     }

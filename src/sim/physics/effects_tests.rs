@@ -26,6 +26,7 @@ fn everything() -> Scene {
     scene.gripper.mount.offset = [0.0, 0.010, -0.006];
     scene.gripper.actuation.filling_time = 0.05;
     scene.gripper.finger.creep_time = 1.0;
+    (scene.object.modulus, scene.shaking.amplitude) = (Auto::Value(5e4), 0.01);
     scene
 }
 
@@ -89,7 +90,7 @@ fn off_is_the_same_as_constants_that_vanish() {
     let ball = small_ball();
     let placement = Placement::new(&everything(), Some(&ball));
     type Change = fn(&mut Scene);
-    let cases: [(Effect, Change); 6] = [
+    let cases: [(Effect, Change); 8] = [
         (Effect::FreeObject, |s| s.object.fixed = true),
         (Effect::FingerGravity, |s| s.world.gravity = 0.0),
         (Effect::Support, |s| s.support.kind = SupportKind::None),
@@ -98,6 +99,8 @@ fn off_is_the_same_as_constants_that_vanish() {
         }),
         (Effect::PneumaticLag, |s| s.gripper.actuation.filling_time = 0.0),
         (Effect::Creep, |s| s.gripper.finger.creep_share = 0.0),
+        (Effect::Shaking, |s| s.shaking.amplitude = 0.0),
+        (Effect::SoftObject, |s| s.object.modulus = Auto::Auto),
     ];
     for (effect, vanish) in cases {
         let mut scene = everything();

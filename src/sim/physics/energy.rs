@@ -1,11 +1,14 @@
 //! Mechanical energy of a state, and the work that a drive does: what a step must never gain beyond.
 
 use super::detect::detect;
+use super::effects::work_of_motion;
+use super::integrator::Surroundings;
 use super::model::PhysicsModel;
 use super::solve::segment_velocities;
 use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
 use super::workspace::Workspace;
+use glam::DVec3;
 
 /// Mechanical energy, and what part of it cannot run away.
 #[derive(Clone, Copy, Debug)]
@@ -58,22 +61,32 @@ pub(super) fn mechanical_energy(model: &PhysicsModel, state: &State, ws: &mut Wo
     Energy { total, spin }
 }
 
-/// Work that a drive does on the way from one state to another (J). Where chambers lag it is what the pressure at the
-/// end would do; while they fill or empty, that is more than they did.
-pub(super) fn work_done(model: &PhysicsModel, drive: &Drive, from: &State, to: &State, ws: &mut Workspace) -> f64 {
+/// Work that is done on the way from one state to another (J), by the drive and by a hand that moves. Where chambers lag
+/// it is what the pressure at the end would do; while they fill or empty, that is more than they did.
+pub(super) fn work_done(within: &Surroundings<'_>, from: &State, to: &State, ws: &mut Workspace) -> f64 {
+    let (model, drive) = (within.model, within.drive);
     let torque = model.chamber.as_ref().map_or(drive.torque, |chamber| chamber.torque(to.chamber_bar));
     let bent: f64 = to.q.iter().sum::<f64>() - from.q.iter().sum::<f64>();
     let pulled = drive.object_force.dot(to.body.position - from.body.position);
     let mut work = torque * bent + pulled;
     let n = model.chain.joints;
-    for finger in 0..2 {
-        let plane = &model.planes[finger];
-        let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
-        let [before, after] = [from, to].map(|state| {
+    // Tips, and the sum of mass times place (kg m) of all that inertia acts on.
+    let mut places = |state: &State| {
+        let mut moments = model.free_body().map_or(DVec3::ZERO, |body| state.body.position * body.mass);
+        let tips = [0, 1].map(|finger| {
+            let plane = &model.planes[finger];
+            let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
             let tip = model.chain.bend(&state.q[finger * n..(finger + 1) * n], segments);
+            for (link, mass) in model.chain.masses.iter().enumerate() {
+                moments += plane.point(model.chain.centre(segments, link), 0.0) * *mass;
+            }
             plane.point(tip, 0.0)
         });
-        work += drive.tip_force[finger].dot(after - before);
+        (tips, moments)
+    };
+    let (before, after) = (places(from), places(to));
+    for finger in 0..2 {
+        work += drive.tip_force[finger].dot(after.0[finger] - before.0[finger]);
     }
-    work
+    work + work_of_motion((from, to), within.ws.force_of_world(), after.1 - before.1)
 }

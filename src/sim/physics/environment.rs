@@ -59,6 +59,23 @@ impl Environment {
         Self { table, top: if pedestal.is_some() { support.height } else { 0.0 }, pedestal, gripper_from_world }
     }
 
+    /// Becomes another one shifted by a way (m), without allocating.
+    pub(super) fn shifted(&mut self, original: &Self, by: DVec3) {
+        self.gripper_from_world.position = original.gripper_from_world.position + by;
+        self.table = original.table.map(|plane| Plane { offset: plane.offset + by.dot(plane.up), ..plane });
+        if let (Some(own), Some(other)) = (&mut self.pedestal, &original.pedestal) {
+            own.origin = other.origin - other.axes * by;
+            for (own, other) in own.rim.iter_mut().zip(&other.rim) {
+                *own = *other + by;
+            }
+        }
+    }
+
+    /// Displacement from another one (m).
+    pub(super) fn way_from(&self, original: &Self) -> DVec3 {
+        self.gripper_from_world.position - original.gripper_from_world.position
+    }
+
     /// True when there is nothing to touch.
     pub(super) fn is_empty(&self) -> bool {
         self.table.is_none() && self.pedestal.is_none()
@@ -124,5 +141,16 @@ mod tests {
         assert!(sideways.abs_diff_eq(DVec3::Y, 1e-12));
         assert!((environment.height_above_top(at(DVec3::Z * (height + 0.005))) - 0.005).abs() < 1e-12);
         assert_eq!(environment.rim().len(), RIM_POINTS);
+        // Moved in the gripper's frame, everything is where it was seen from a gripper that moved the other way.
+        let by = DVec3::new(0.004, -0.03, 0.002);
+        let mut moved = environment.clone();
+        moved.shifted(&environment, by);
+        assert!(moved.way_from(&environment).abs_diff_eq(by, 1e-15));
+        for p in [DVec3::new(0.01, 0.02, -0.1), DVec3::new(-0.02, 0.0, -0.16), DVec3::new(0.0, 0.05, -0.19)] {
+            assert!((moved.distance(p + by) - environment.distance(p)).abs() < 1e-12);
+            assert!(moved.normal(p + by).abs_diff_eq(environment.normal(p), 1e-12));
+            assert!((moved.height_above_top(p + by) - environment.height_above_top(p)).abs() < 1e-12);
+        }
+        assert!(moved.rim()[3].abs_diff_eq(environment.rim()[3] + by, 1e-15));
     }
 }

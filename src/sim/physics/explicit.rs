@@ -28,8 +28,8 @@ pub(super) fn explicit_step(
     drive: &Drive,
     h: f64,
 ) -> Result<StepReport, NotFinite> {
-    lay_out(model, state, ws);
     ws.step.h = h;
+    lay_out(model, state, ws);
     segment_velocities(model, &state.velocity, ws);
     detect(model, state, ws);
     relative_velocities(model, &state.velocity, ws, Product::OfVelocity);

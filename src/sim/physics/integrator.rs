@@ -51,6 +51,8 @@ pub(super) struct Integrator {
     start: State,
     /// Velocities at the end of the first stage.
     middle: Vec<f64>,
+    /// Velocity of the hand there (m/s).
+    middle_hand: DVec3,
 }
 
 /// A step that was taken.
@@ -63,7 +65,7 @@ pub(super) struct Taken {
 
 impl Integrator {
     pub(super) fn new(method: IntegrationMethod, state: &State) -> Self {
-        Self { method, start: state.clone(), middle: state.velocity.clone() }
+        Self { method, start: state.clone(), middle: state.velocity.clone(), middle_hand: DVec3::ZERO }
     }
 
     /// Order of convergence where motion is smooth.
@@ -97,6 +99,7 @@ impl Integrator {
             IntegrationMethod::Sdirk2 => {
                 let first = within.step(state, GAMMA * h)?;
                 self.middle.copy_from_slice(&state.velocity);
+                self.middle_hand = state.hand[1];
                 state.go_on_from(&self.start, 1.0 / GAMMA - 2.0, within.model);
                 let second = within.step(state, GAMMA * h)?;
                 let b1 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
@@ -108,8 +111,8 @@ impl Integrator {
     }
 
     /// Size of the sum of velocities at start, after the first stage and now, with weights (s): the largest change of
-    /// a joint angle or of the object's orientation (rad), of a fingertip or of the object's position as shares of
-    /// a finger's length.
+    /// a joint angle or of the object's orientation (rad), of a fingertip or of the object's position, and of the place of a hand
+    /// that moves, as shares of a finger's length.
     fn error(&self, state: &State, model: &PhysicsModel, weights: [f64; 3]) -> f64 {
         let n = model.chain.joints;
         let length: f64 = model.chain.lengths.iter().sum();
@@ -130,6 +133,11 @@ impl Integrator {
         if model.free_body().is_some() {
             let three = |k: usize| DVec3::new(at(k), at(k + 1), at(k + 2)).length();
             largest = largest.max(three(2 * n) / length).max(three(2 * n + 3));
+        }
+        if model.hand_motion.is_some() {
+            let velocities = [self.start.hand[1], self.middle_hand, state.hand[1]];
+            let way: DVec3 = velocities.iter().zip(weights).map(|(velocity, weight)| *velocity * weight).sum();
+            largest = largest.max(way.length() / length);
         }
         if largest.is_finite() { largest } else { f64::INFINITY }
     }

@@ -42,7 +42,11 @@ mod placement;
 mod rapier_engine;
 #[cfg(feature = "rapier")]
 mod resting;
+#[cfg(test)]
+mod shaking_tests;
 mod simulation;
+#[cfg(test)]
+mod softness_tests;
 mod solve;
 mod state;
 mod step;

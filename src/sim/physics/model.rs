@@ -3,13 +3,13 @@
 use super::chain::ChainModel;
 use super::contact::ContactStep;
 use super::contact_springs::ContactSprings;
-use super::effects::{Chamber, FingerContact, Relaxation, plan};
+use super::effects::{Chamber, FingerContact, Relaxation, Shell, plan};
 use super::environment::Environment;
 use super::placement::Placement;
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, GripperModel, PadLaw, Side};
 use crate::objects::{ObjectModel, Resting};
-use crate::scene::{Effect, Scene, Support, SupportKind};
+use crate::scene::{Effect, HandMotion, Scene, Support, SupportKind};
 use glam::{DMat3, DVec3};
 use palpate_geometry::{DistanceField, Pose};
 
@@ -37,6 +37,10 @@ pub struct PhysicsModel {
     pub(super) chamber: Option<Chamber>,
     /// Joints that creep.
     pub(super) relaxation: Option<Relaxation>,
+    /// Motion of the hand.
+    pub(super) hand_motion: Option<HandMotion>,
+    /// Soft shell of the object.
+    pub(super) shell: Option<Shell>,
     /// Effects simulated.
     pub(super) plan: Plan,
     pub(super) tolerance: f64,
@@ -121,6 +125,12 @@ impl PhysicsModel {
         let gravity_world = DVec3::new(0.0, 0.0, -scene.world.gravity);
         let gravity = placement.world_from_gripper.inverse().direction(gravity_world);
         let gravity_if = |effect: Effect| if is_on(effect) { gravity } else { DVec3::ZERO };
+        let shell = if is_on(Effect::SoftObject) { Shell::new(scene, object) } else { None };
+        let on_support = |object: &ObjectModel| {
+            let heavy = object.mass.mass * scene.world.gravity / (RESTING_POINTS * scene.support.sink);
+            let rigid = heavy.max(scene.support.stiffness);
+            shell.map_or(rigid, |shell| shell.on_support(rigid, RESTING_POINTS, scene, object))
+        };
         let body = object.map(|object| Body {
             field: object.field.clone(),
             resting: object.resting.clone(),
@@ -130,8 +140,7 @@ impl PhysicsModel {
             inertia: object.mass.inertia,
             inverse_inertia: object.mass.inertia.inverse(),
             free: is_on(Effect::FreeObject),
-            support_stiffness: (object.mass.mass * scene.world.gravity / (RESTING_POINTS * scene.support.sink))
-                .max(scene.support.stiffness),
+            support_stiffness: on_support(object),
             support_friction: mu(surface_friction(object), scene.support.friction),
         });
         let nothing = Support { kind: SupportKind::None, ..scene.support.clone() };
@@ -160,6 +169,8 @@ impl PhysicsModel {
             skin: Skin::new(gripper),
             chamber: is_on(Effect::PneumaticLag).then(|| Chamber::new(&gripper.actuation)),
             relaxation: is_on(Effect::Creep).then(|| Relaxation::new(&gripper.finger)),
+            hand_motion: if is_on(Effect::Shaking) { scene.hand_motion() } else { None },
+            shell,
             plan,
             tolerance: scene.solver.tolerance,
             max_iterations: scene.solver.max_iterations,

@@ -155,7 +155,10 @@ pub(super) fn relative_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Work
         };
         let relative = match contact.against {
             Against::Object => acting - object.linear_at(contact.arm),
-            Against::World => acting,
+            Against::World => match which {
+                Product::OfVelocity => acting - ws.passing.velocity,
+                Product::OfDirection => acting,
+            },
             Against::Finger(other) => acting - ws.spatial[other as usize].linear_at(contact.arm),
         };
         match which {

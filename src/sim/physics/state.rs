@@ -16,6 +16,10 @@ pub struct State {
     pub velocity: Vec<f64>,
     /// The object's centre of mass and the axes of its frame, in the gripper frame.
     pub(super) body: Pose,
+    /// Time since the start (s).
+    pub(super) time: f64,
+    /// Displacement (m) and velocity (m/s) of a hand that moves, in the gripper frame; see `effects/shaking.rs`.
+    pub(super) hand: [DVec3; 2],
     /// Contacts of the last step.
     pub(super) touched: ContactMemory,
     /// Length of that step (s); zero before the first.
@@ -100,6 +104,8 @@ impl State {
             q: vec![0.0; model.joint_count()],
             velocity: vec![0.0; model.unknowns()],
             body,
+            time: 0.0,
+            hand: [DVec3::ZERO; 2],
             touched: ContactMemory::new(model.sites()),
             lag_h: 0.0,
             chamber_bar: 0.0,
@@ -113,15 +119,18 @@ impl State {
         let body = model.body.as_ref()?;
         let gripper_from_object =
             Pose { position: self.body.position - self.body.rotation * body.centre, rotation: self.body.rotation };
-        Some(model.world_from_gripper * gripper_from_object)
+        let moved = Pose { position: gripper_from_object.position + self.hand[0], ..gripper_from_object };
+        Some(model.world_from_gripper * moved)
     }
 
     /// Becomes another state of the same model, without allocating.
     pub(super) fn copy_from(&mut self, other: &Self) {
-        let Self { q, velocity, body, touched, lag_h, chamber_bar, filled_from_bar, crept } = other;
+        let Self { q, velocity, body, time, hand, touched, lag_h, chamber_bar, filled_from_bar, crept } = other;
         self.q.copy_from_slice(q);
         self.velocity.copy_from_slice(velocity);
         self.body = *body;
+        self.time = *time;
+        self.hand = *hand;
         self.touched.copy_from(touched);
         self.lag_h = *lag_h;
         self.chamber_bar = *chamber_bar;
@@ -141,6 +150,10 @@ impl State {
         }
         for (now, before) in self.crept.iter_mut().zip(&start.crept) {
             *now += share * (*now - before);
+        }
+        self.time += (self.time - start.time) * share;
+        for (now, before) in self.hand.iter_mut().zip(start.hand) {
+            *now += (*now - before) * share;
         }
         self.chamber_bar = went_on(start.chamber_bar, self.chamber_bar, self.filled_from_bar, share);
         self.body.position += (self.body.position - start.body.position) * share;
@@ -203,6 +216,11 @@ impl State {
             for ((crept, q), rate) in self.crept.iter_mut().zip(&self.q).zip(&self.velocity) {
                 *crept = relaxation.crept(h, *q, *rate, *crept);
             }
+        }
+        self.time += h;
+        if let Some(motion) = &model.hand_motion {
+            let velocity = motion.at(self.time).velocity;
+            self.hand = [self.hand[0] + velocity * h, velocity];
         }
         for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
             *q += h * rate;

@@ -3,6 +3,7 @@
 use super::chain::turning;
 use super::contact::Acting;
 use super::detect::{detect, segment_axes};
+use super::effects::{move_world, note_passing};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
 use super::solve::{Product, Unbalanced, minimise, relative_velocities, segment_velocities};
@@ -73,7 +74,8 @@ pub fn step(
     h: f64,
 ) -> Result<StepReport, NotFinite> {
     ws.step.h = h;
-    let ahead = time_ahead(model, state, h);
+    note_passing(model, state, ws);
+    let ahead = time_ahead(model, state, ws);
     lay_out_ahead(model, state, ahead, ws);
     let drive = fill_chamber(model, state, drive, h);
     gather_dynamics(model, state, ws, &drive);
@@ -128,19 +130,22 @@ const FARTHEST_AHEAD: f64 = 2e-3;
 /// A step holds normals, arms and inertia. Taken from its start they lag behind the motion: two stages of SDIRK2 see
 /// them 0.29 h late on average, which feeds energy into whatever swings (a button between two fingertips swings up and
 /// falls out). Taken from where its end is expected they do not lag, and the second order is kept.
-fn time_ahead(model: &PhysicsModel, state: &State, h: f64) -> f64 {
-    let fastest = state.fastest(model);
+fn time_ahead(model: &PhysicsModel, state: &State, ws: &Workspace) -> f64 {
+    let h = ws.step.h;
+    let fastest = state.fastest(model) + ws.passing.velocity.length();
     if h * fastest <= FARTHEST_AHEAD { h } else { FARTHEST_AHEAD / fastest }
 }
 
 /// Places of the segments, and the velocity of everything beyond each joint per unit of its rate.
 pub(super) fn lay_out(model: &PhysicsModel, state: &State, ws: &mut Workspace) {
+    note_passing(model, state, ws);
     lay_out_ahead(model, state, 0.0, ws);
 }
 
 /// The same as they would be after a time (s) at the present velocities.
 fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Workspace) {
     let n = model.chain.joints;
+    move_world(model, ws, ahead);
     for ((place, q), rate) in ws.q.iter_mut().zip(&state.q).zip(&state.velocity) {
         *place = q + ahead * rate;
     }
@@ -177,7 +182,7 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
         let joints = finger * n..(finger + 1) * n;
         let sign = model.planes[finger].sign;
         let in_plane = |v: DVec3| DVec2::new(sign * v.x, -v.z);
-        let gravity = in_plane(model.finger_gravity);
+        let gravity = in_plane(model.finger_gravity - ws.passing.acceleration);
         let pull = in_plane(drive.tip_force[finger]);
         let tip = segments[n].point(model.chain.lengths[n], 0.0);
         let q = &state.q[joints.clone()];
@@ -205,7 +210,8 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
         let (linear, angular) = state.body_velocity(model);
         let r = state.body.matrix();
         ws.body_inertia = r * body.inertia * r.transpose();
-        let known_linear = (linear + model.object_gravity * h) * body.mass + drive.object_force * h;
+        let known_linear =
+            (linear + (model.object_gravity - ws.passing.acceleration) * h) * body.mass + drive.object_force * h;
         // No gyroscopic torque: `State::integrate` carries the angular momentum over, which amounts to it.
         let known_angular = ws.body_inertia * angular;
         ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());

@@ -235,7 +235,7 @@ impl Control {
             return 0.0;
         }
         let before = mechanical_energy(model, &self.origin, &mut self.aside);
-        let work = work_done(model, within.drive, &self.origin, state, &mut self.aside);
+        let work = work_done(within, &self.origin, state, &mut self.aside);
         let gain = mechanical_energy(model, state, &mut self.aside).total - before.total - work;
         (gain - UNFELT_GAIN * share).max(0.0) / (strained + before.spin).max(f64::MIN_POSITIVE)
     }

@@ -1,7 +1,9 @@
 //! Scratch memory of a step: allocated once, overwritten every step, never saved.
 
 use super::clearances::Clearances;
-use super::contact::{Contact, ContactStep};
+use super::contact::{Against, Contact, ContactStep};
+use super::effects::{Passing, moved_world};
+use super::environment::Environment;
 use super::hessian::{Hessian, Lanes};
 use super::model::PhysicsModel;
 use crate::gripper::SegmentPose;
@@ -196,6 +198,11 @@ pub struct Workspace {
     pub(super) body_inertia: DMat3,
     /// Momentum and known impulses, r: without contact A v = r.
     pub(super) rhs: Vec<f64>,
+    // a hand that moves
+    /// Motion of the surroundings in this step; at rest where the hand is.
+    pub(super) passing: Passing,
+    /// The surroundings where they are in this step; `None` where the hand never moves.
+    pub(super) moved_world: Option<Environment>,
     // contacts
     pub(super) clearances: Clearances,
     pub(super) contacts: Vec<Contact>,
@@ -239,6 +246,8 @@ impl Workspace {
             finger_matrix: vec![Lanes::ZERO; n * n],
             body_inertia: DMat3::ZERO,
             rhs: vec![0.0; unknowns],
+            passing: Passing::default(),
+            moved_world: moved_world(model),
             clearances: Clearances::new(model),
             contacts: Vec::with_capacity(model.sites()),
             fingers_meet: false,
@@ -253,5 +262,14 @@ impl Workspace {
             hessian: Hessian::new(n, unknowns - 2 * n),
             coupling: vec![Spatial::default(); n * (n + 1)],
         }
+    }
+    /// Force of the surroundings on fingers and object in the last step (N).
+    pub(super) fn force_of_world(&self) -> DVec3 {
+        let against_world = self.contacts.iter().filter(|contact| contact.against == Against::World);
+        let force = |contact: &Contact| {
+            let (normal, tangential) = contact.force(self.step);
+            contact.normal * normal + tangential
+        };
+        against_world.map(force).sum()
     }
 }

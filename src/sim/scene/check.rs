@@ -49,6 +49,7 @@ impl Scene {
         self.check_object_and_support(&mut ranges);
         self.check_gripper(&mut ranges);
         self.check_programme(&mut ranges);
+        self.check_shaking(&mut ranges);
         self.check_timing_and_solver(&mut ranges);
         match ranges.fault {
             Some(fault) => Err(fault),
@@ -79,6 +80,8 @@ impl Scene {
         ranges.auto("object.mass", object.mass, 1e-6..=1e3);
         ranges.number("object.density", object.density, 0.1..=30_000.0);
         ranges.auto("object.friction", object.friction, 0.0..=100.0);
+        ranges.auto("object.modulus", object.modulus, 100.0..=1e12);
+        ranges.auto("object.shell", object.shell, 1e-4..=1.0);
         ranges.auto("object.scale", object.scale, 1e-9..=1e9);
         ranges.numbers("pose.shift", &self.pose.shift, &(0.0..=0.5));
         ranges.number("pose.yaw_deg", self.pose.yaw_deg, 0.0..=180.0);
@@ -89,6 +92,19 @@ impl Scene {
         ranges.number("support.sink", support.sink, 1e-9..=1e-2);
         ranges.number("support.stiffness", support.stiffness, 1.0..=1e9);
         ranges.number("world.gravity", self.world.gravity, 0.0..=1000.0);
+    }
+
+    fn check_shaking(&self, ranges: &mut Ranges) {
+        let shaking = &self.shaking;
+        ranges.number("shaking.amplitude", shaking.amplitude, 0.0..=0.5);
+        ranges.number("shaking.frequency", shaking.frequency, 0.01..=100.0);
+        ranges.numbers("shaking.direction", &shaking.direction, &(-1e3..=1e3));
+        if shaking.direction == [0.0; 3] {
+            ranges.refuse("shaking.direction", &"[0, 0, 0]", "a direction".to_owned());
+        }
+        ranges.number("shaking.lift", shaking.lift, 0.0..=0.5);
+        ranges.auto("shaking.start", shaking.start, 0.0..=1e5);
+        ranges.auto("shaking.end", shaking.end, 0.0..=1e5);
     }
 
     fn check_gripper(&self, ranges: &mut Ranges) {

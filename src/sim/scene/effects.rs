@@ -74,6 +74,10 @@ effects! {
     PneumaticLag = "pneumatic-lag",
     /// Joints that yield slowly under load.
     Creep = "creep",
+    /// A hand that lifts and shakes what it holds.
+    Shaking = "shaking",
+    /// An object whose surface gives way.
+    SoftObject = "soft-object",
 }
 
 /// The setting of every effect; all `auto` by default.

@@ -10,6 +10,7 @@ mod effects;
 mod engine;
 mod file;
 mod poses;
+mod shaking;
 mod timing;
 
 pub use accuracy::{Accuracy, IntegrationMethod, Integrator, UnknownAccuracy};
@@ -18,6 +19,7 @@ pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
 pub use file::{SceneError, SceneKey};
 pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
+pub use shaking::{HandMotion, HandPlace, Shaking};
 pub use timing::{Clock, Timing};
 
 use crate::gripper::{GripperModel, Programme};
@@ -39,6 +41,8 @@ pub struct Scene {
     pub pose: PoseSpread,
     /// Line pressure over time.
     pub programme: Programme,
+    /// Motion of the hand once it has closed.
+    pub shaking: Shaking,
     /// Rates and duration.
     pub timing: Timing,
     /// Solver settings.
@@ -86,6 +90,14 @@ impl Scene {
         self.effects.set(Effect::FreeObject, Setting::Auto);
     }
 
+    /// Softness of an object in this scene; `None` where it is rigid.
+    pub fn softness(&self, object: &ObjectModel) -> Option<Softness> {
+        let modulus = self.object.modulus.value().or(object.modulus)?;
+        // Against finite elements of a soft ball within 20 % from 0.3 to 1.1 N; see `physics/effects/soft_object.rs`.
+        let soft_to_the_middle = 0.25 * object.bounds.size().min_element();
+        Some(Softness { modulus, thickness: self.object.shell.value().unwrap_or(soft_to_the_middle) })
+    }
+
     /// Loads what the scene grasps; `None` for an empty hand.
     pub fn load_object(&self) -> Result<Option<ObjectModel>, ObjectError> {
         load(&self.object.source, &self.load_options())
@@ -110,10 +122,24 @@ pub struct ObjectSetup {
     pub density: f64,
     /// Friction coefficient of the surface; `auto` takes the object's own, or 0.6.
     pub friction: Auto,
+    /// Young's modulus of its surface (Pa); `auto` takes the object's own, or leaves it rigid.
+    pub modulus: Auto,
+    /// Thickness of the soft shell around its rigid core (m); `auto`: a quarter of the smallest extent, which presses
+    /// like a body that is soft to the middle.
+    pub shell: Auto,
     /// Factor on all lengths in the file; `auto` guesses millimetres or metres, with a warning.
     pub scale: Auto,
     /// Shape used for contact.
     pub collision: CollisionShape,
+}
+
+/// Soft shell of an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Softness {
+    /// Young's modulus (Pa).
+    pub modulus: f64,
+    /// Thickness (m).
+    pub thickness: f64,
 }
 
 /// The kinds of support.
@@ -184,6 +210,8 @@ impl Default for ObjectSetup {
             mass: Auto::Auto,
             density: LoadOptions::default().density,
             friction: Auto::Auto,
+            modulus: Auto::Auto,
+            shell: Auto::Auto,
             scale: Auto::Auto,
             collision: CollisionShape::File,
         }

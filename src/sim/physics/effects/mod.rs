@@ -16,13 +16,17 @@ mod free_object;
 mod friction;
 mod object_gravity;
 mod pneumatic_lag;
+mod shaking;
 mod situation;
+mod soft_object;
 mod support;
 
 pub(super) use creep::Relaxation;
 pub(super) use finger_contact::FingerContact;
 pub(super) use pneumatic_lag::{Chamber, went_on};
+pub(super) use shaking::{Passing, move_world, moved_world, note_passing, work_of_motion};
 use situation::Situation;
+pub(super) use soft_object::Shell;
 
 use super::placement::Placement;
 use crate::frame::{Plan, PlannedEffect};
@@ -63,6 +67,8 @@ pub fn rule_of(effect: Effect) -> &'static Rule {
         Effect::FingerContact => &finger_contact::RULE,
         Effect::PneumaticLag => &pneumatic_lag::RULE,
         Effect::Creep => &creep::RULE,
+        Effect::Shaking => &shaking::RULE,
+        Effect::SoftObject => &soft_object::RULE,
     }
 }
 

@@ -57,11 +57,13 @@ use palpate_geometry::{DistanceField, Pose};
 use world::{Hand, Touch};
 
 /// Effects that this engine always or never has.
-const SETTLED: [(Effect, bool, &str); 4] = [
+const SETTLED: [(Effect, bool, &str); 6] = [
     (Effect::FingerInertia, true, "rapier's chains always have inertia"),
     (Effect::FingerContact, false, "rapier's fingers do not meet each other here"),
     (Effect::PneumaticLag, false, "rapier follows the line pressure without lag"),
     (Effect::Creep, false, "rapier's springs do not creep"),
+    (Effect::Shaking, false, "rapier's hand stays where it is"),
+    (Effect::SoftObject, false, "rapier's objects are rigid"),
 ];
 
 /// The plan as rapier carries it out.
@@ -270,6 +272,7 @@ impl Engine for RapierSimulation {
             line_bar: self.line_bar,
             phase: self.phase,
             q,
+            hand: DVec3::ZERO,
             world_from_object: self.hand.gripper_from_object().map(|pose| self.world_from_gripper * pose),
             taxels,
         }
