@@ -1,6 +1,7 @@
 //! `palpate study`: experiments, one file each.
 
 mod accuracy;
+mod effects;
 mod files;
 mod stability;
 
@@ -10,6 +11,8 @@ use super::Failure;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   palpate study accuracy --quick
+  palpate study effects --quick
+  palpate study effects --out studies/
   palpate study stability --quick
   palpate study stability --scenes 500 --seed 2 --json")]
 pub(super) struct StudyArguments {
@@ -21,6 +24,8 @@ pub(super) struct StudyArguments {
 enum Study {
     /// Measure what accuracy costs in time and what it is worth for recognition; resumes where it stopped.
     Accuracy(accuracy::AccuracyArguments),
+    /// Audit what `auto` leaves out: random scenes with each effect flipped, and with all on.
+    Effects(effects::EffectsArguments),
     /// Run hard cases at every accuracy, search holds for chatter, and count silently wrong random scenes; resumes.
     Stability(stability::StabilityArguments),
 }
@@ -28,6 +33,7 @@ enum Study {
 pub(super) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     match &arguments.study {
         Study::Accuracy(arguments) => accuracy::run(arguments),
+        Study::Effects(arguments) => effects::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
     }
 }

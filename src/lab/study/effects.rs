@@ -172,14 +172,18 @@ fn explain_one(
 }
 
 /// Scene with one effect flipped.
-fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
+pub(super) fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
     let mut scene = scene.clone();
     scene.effects.set(effect, if plan.is_on(effect.name()) { Setting::Off } else { Setting::On });
     scene
 }
 
 /// Runs a whole trial and returns it with its CPU time (s); `None` when cancelled.
-fn run(scene: &Scene, object: Option<&ObjectModel>, cancelled: &AtomicBool) -> Option<(SimulatedTrial, f64)> {
+pub(super) fn run(
+    scene: &Scene,
+    object: Option<&ObjectModel>,
+    cancelled: &AtomicBool,
+) -> Option<(SimulatedTrial, f64)> {
     let start = cpu_time::ThreadTime::now();
     let mut run = prepare(scene, object, 0);
     while run.next_frame().is_some() {

@@ -3,6 +3,7 @@
 pub mod accuracy;
 mod accuracy_cost;
 mod comparison;
+mod effect_audit;
 mod effects;
 mod finger_fit;
 mod generated;
@@ -17,6 +18,10 @@ mod timed_grasp;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
+pub use effect_audit::{
+    AuditError, AuditPlan, AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectSize, SEEN, audit_effects,
+    audit_figure, audit_table, stored_effects,
+};
 pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain_effects};
 pub use finger_fit::{
     Course, Estimate, FingerFit, FingerFitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
