@@ -1,83 +1,245 @@
-//! Physical effects: setting, reason, cost, and influence on the grasp. Cost and influence are measured in the background
-//! while the panel is open.
+//! Physical effects as a table: setting, and bars of cost and change, which are measured in the background while the
+//! panel is open. Rows keep their place: old values stay, dimmed, until new ones come. A click on a name unfolds it.
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::simulation::SimulationAction;
-use crate::app::theme::colour;
-use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
+use crate::app::theme::{colour, veil};
+use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{ExplainedEffect, Explanation};
 use palpate_lab::workers::{EffectsState, EffectsView};
 use palpate_sim::frame::PlannedEffect;
-use palpate_sim::scene::{Effect, Scene, Setting};
+use palpate_sim::scene::{Effect, Setting};
+
+/// Height of a row (points).
+const ROW: f32 = 23.0;
+/// Widths of the lamp and of the three settings together.
+const LAMP: f32 = 14.0;
+const SETTINGS: f32 = 86.0;
+/// Least and largest width of a bar; names take the rest.
+const BARS: std::ops::RangeInclusive<f32> = 26.0..=70.0;
+/// Width of the longest name.
+const NAME: f32 = 100.0;
+const GAP: f32 = 5.0;
+/// Opacity of values that a new measurement will replace.
+const DIMMED: f32 = 0.4;
+/// Smallest change that has a bar, as a share of a sensor's range; the bar is logarithmic.
+const LEAST_CHANGE: f64 = 1e-3;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if context.effects.asked() != Some(context.scene) {
         actions.push(SimulationAction::MeasureEffects);
     }
-    let view = context.effects.view().filter(|view| *view.scene == *context.scene);
-    let explanation = match view.as_deref().map(|view| &view.state) {
-        Some(EffectsState::Ready(explanation)) => Some(explanation.as_ref()),
-        _ => None,
-    };
+    let view = context.effects.view();
+    let current = view.as_deref().filter(|view| *view.scene == *context.scene);
+    let fresh = matches!(current.map(|view| &view.state), Some(EffectsState::Ready(_)));
+    let explanation = view.as_deref().and_then(|view| view.last.as_deref());
     let mut scene = context.scene.clone();
+    let unfolded_id = ui.scope_id().with("unfolded");
+    let mut unfolded: Option<Effect> = ui.data(|data| data.get_temp(unfolded_id)).flatten();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        state_ui(ui, view.as_deref());
+        ui.spacing_mut().item_spacing.y = 0.0;
+        state_ui(ui, current, explanation);
+        header_ui(ui);
         for effect in Effect::ALL {
             let explained = explanation.and_then(|e| e.effects.iter().find(|e| e.planned.name == effect.name()));
-            // Until all is measured, the plan of the current grasp.
-            let current = context.snapshot.and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
-            let planned = explained.map(|explained| &explained.planned).or(current);
-            effect_ui(ui, context.view.theme, &mut scene, *effect, planned);
-            details_ui(ui, planned, explained.zip(explanation));
-            ui.add_space(7.0);
+            // The plan of the current grasp comes before the measurement.
+            let running = context.snapshot.and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
+            let planned = if fresh { explained.map(|e| &e.planned).or(running) } else { running };
+            let row = Row { effect: *effect, planned, explained, explanation, fresh, theme: context.view.theme };
+            let open = unfolded == Some(*effect);
+            if let Some(setting) = row.setting_ui(ui, scene.effects.get(*effect), open, &mut unfolded) {
+                scene.effects.set(*effect, setting);
+            }
+            if open {
+                row.details_ui(ui);
+            }
         }
     });
+    ui.data_mut(|data| data.insert_temp(unfolded_id, unfolded));
     if scene != *context.scene {
         actions.push(SimulationAction::SetScene(Box::new(scene)));
     }
 }
 
-/// State of the measurement.
-fn state_ui(ui: &mut Ui, view: Option<&EffectsView>) {
+/// State of the measurement, in a line.
+fn state_ui(ui: &mut Ui, view: Option<&EffectsView>, explanation: Option<&Explanation>) {
     let text = match view.map(|view| &view.state) {
         None | Some(EffectsState::Measuring(_, 0)) => "measuring ..".to_owned(),
         Some(EffectsState::Measuring(done, of)) => format!("measuring .. {done} of {of}"),
-        Some(EffectsState::Ready(explanation)) => {
-            format!("a grasp takes {} ms of CPU time", three_digits(explanation.cpu_ms))
+        Some(EffectsState::Ready(_)) => {
+            let cpu_ms = explanation.map_or(0.0, |explanation| explanation.cpu_ms);
+            format!("a grasp takes {} ms of CPU time", three_digits(cpu_ms))
         }
         Some(EffectsState::Failed(cause)) => cause.to_string(),
     };
-    ui.weak(text);
-    ui.add_space(4.0);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    let line = egui::Label::new(RichText::new(&text).weak()).truncate();
+    ui.scope_builder(UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)), |ui| ui.add(line));
+    response.on_hover_text(text);
 }
 
-/// Lamp, name and settings.
-fn effect_ui(ui: &mut Ui, theme: Theme, scene: &mut Scene, effect: Effect, planned: Option<&PlannedEffect>) {
-    let name = effect.name();
-    ui.horizontal(|ui| {
-        lamp_ui(ui, theme, name, planned.is_some_and(|planned| planned.on));
-        ui.strong(name);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
-            for setting in Setting::ALL.into_iter().rev() {
-                let chosen = scene.effects.get(effect) == setting;
-                let response = ui.selectable_label(chosen, setting.name());
-                let label = format!("{name} {}", setting.name());
-                response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, &label));
-                if response.clicked() {
-                    scene.effects.set(effect, setting);
-                }
+/// Columns of a row: lamp, name, settings, cost, change.
+fn columns(row: Rect) -> [Rect; 5] {
+    let rest = row.width() - LAMP - SETTINGS - NAME - 4.0 * GAP;
+    let bar = (0.5 * rest).clamp(*BARS.start(), *BARS.end());
+    let name = row.width() - LAMP - SETTINGS - 2.0 * bar - 4.0 * GAP;
+    let mut left = row.left();
+    [LAMP, name, SETTINGS, bar, bar].map(|width| {
+        let rect = Rect::from_min_size(egui::pos2(left, row.top()), vec2(width.max(0.0), row.height()));
+        left += width + GAP;
+        rect
+    })
+}
+
+fn header_ui(ui: &mut Ui) {
+    let (row, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW - 4.0), Sense::hover());
+    let [lamp, name, settings, cost, change] = columns(row);
+    let titles = [
+        (lamp.union(name), "effect", "Click a name for the reason, the cost and the change in words"),
+        (settings, "setting", "auto: on where the scene calls for it"),
+        (cost, "cost", "CPU time that the effect takes, or would take; the bar ends at all of the grasp's"),
+        (
+            change,
+            "change",
+            "Largest change of curvature, pressure or force without it, or with it; logarithmic, 0.1 to 100 %",
+        ),
+    ];
+    for (rect, title, hover) in titles {
+        let label = egui::Label::new(RichText::new(title).small().weak()).truncate();
+        let builder = UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center));
+        ui.scope_builder(builder, |ui| ui.add(label).on_hover_text(hover));
+    }
+}
+
+/// An effect with what is known of it.
+struct Row<'a> {
+    effect: Effect,
+    planned: Option<&'a PlannedEffect>,
+    explained: Option<&'a ExplainedEffect>,
+    explanation: Option<&'a Explanation>,
+    /// False while a new measurement is under way.
+    fresh: bool,
+    theme: Theme,
+}
+
+impl Row<'_> {
+    /// Draws the row; returns a setting that was clicked.
+    fn setting_ui(&self, ui: &mut Ui, now: Setting, open: bool, unfolded: &mut Option<Effect>) -> Option<Setting> {
+        let (row, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+        let [lamp, name, settings, cost, change] = columns(row);
+        lamp_ui(ui, lamp, self.theme, self.effect.name(), self.planned.is_some_and(|planned| planned.on));
+        if self.name_ui(ui, name, open) {
+            *unfolded = if open { None } else { Some(self.effect) };
+        }
+        let clicked = settings_ui(ui, settings, self.effect.name(), now);
+        if let (Some(explained), Some(explanation)) = (self.explained, self.explanation) {
+            let colours = self.theme.colours();
+            let saves = explained.cost_share < 0.0;
+            let ink = if saves { colours.quiet_text } else { colours.accent };
+            let share = explained.cost_share.abs() as f32;
+            self.bar_ui(ui, cost, (share, colour(ink)), &explained.cost_in_words());
+            let size = explained.change.norms;
+            let largest = size.curvature_share.max(size.pressure_share).max(size.force_share);
+            let share = (1.0 - (largest.max(LEAST_CHANGE)).log10() / LEAST_CHANGE.log10()) as f32;
+            let words = explained.change_in_words(explanation.contact_onset_s);
+            self.bar_ui(ui, change, (share, colour(colours.warning)), &words);
+        }
+        clicked
+    }
+
+    /// The name; true when it was clicked.
+    fn name_ui(&self, ui: &mut Ui, rect: Rect, open: bool) -> bool {
+        let response = ui.interact(rect, ui.scope_id().with(("name", self.effect.name())), Sense::click());
+        let colours = self.theme.colours();
+        let ink = if response.hovered() || open { colours.accent } else { colours.text };
+        let font = egui::TextStyle::Body.resolve(ui.style());
+        let painter = ui.painter().with_clip_rect(rect.expand2(vec2(GAP, 0.0)));
+        painter.text(rect.left_center(), egui::Align2::LEFT_CENTER, self.effect.name(), font, colour(ink));
+        response.widget_info(|| {
+            egui::WidgetInfo::selected(egui::Role::Button, true, open, format!("about {}", self.effect.name()))
+        });
+        let clicked = response.clicked();
+        if let Some(planned) = self.planned {
+            response.on_hover_text(reason(planned));
+        }
+        clicked
+    }
+
+    /// A bar from the left; its words for the mouse and for screen readers.
+    fn bar_ui(&self, ui: &mut Ui, rect: Rect, (share, ink): (f32, Color32), words: &str) {
+        let response = ui.interact(rect, ui.scope_id().with((rect.left() as i32, self.effect.name())), Sense::hover());
+        let opacity = if self.fresh { 1.0 } else { DIMMED };
+        let room = rect.shrink2(vec2(0.0, 0.5 * (rect.height() - 9.0)));
+        ui.painter().rect_filled(room, 2.0, veil(self.theme.colours().border, 0.5 * opacity));
+        let width = room.width() * share.clamp(0.0, 1.0);
+        if width >= 0.5 {
+            let filled = Rect::from_min_size(room.min, vec2(width, room.height()));
+            ui.painter().rect_filled(filled, 2.0, ink.gamma_multiply(opacity));
+        }
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, words));
+        let state = if self.fresh { "" } else { "\nmeasuring again .." };
+        response.on_hover_text(format!("{}: {words}{state}", self.effect.name()));
+    }
+
+    /// Reason, cost and change in words.
+    fn details_ui(&self, ui: &mut Ui) {
+        let mut lines = Vec::new();
+        if let Some(explained) = self.explained {
+            lines.push(explained.about.to_owned());
+        }
+        lines.extend(self.planned.map(reason));
+        if let (Some(explained), Some(explanation)) = (self.explained, self.explanation) {
+            lines.push(format!("It {}.", explained.cost_in_words()));
+            lines.push(format!("{}.", capitalised(&explained.change_in_words(explanation.contact_onset_s))));
+        }
+        let indented = egui::Margin { left: (LAMP + GAP) as i8, bottom: 6, ..egui::Margin::ZERO };
+        egui::Frame::new().inner_margin(indented).show(ui, |ui| {
+            for line in lines {
+                let text = RichText::new(line).small();
+                ui.add(egui::Label::new(if self.fresh { text } else { text.weak() }).wrap());
             }
         });
+    }
+}
+
+/// Reason of a decision with its number.
+fn reason(planned: &PlannedEffect) -> String {
+    let relation = if planned.number > planned.threshold { ">" } else { "≤" };
+    format!("{} ({} {relation} {})", capitalised(&planned.reason), three_digits(planned.number), planned.threshold)
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Off, auto, on as three cells; returns the one that was clicked.
+fn settings_ui(ui: &mut Ui, rect: Rect, name: &str, now: Setting) -> Option<Setting> {
+    let mut clicked = None;
+    let builder = UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center));
+    ui.scope_builder(builder, |ui| {
+        ui.spacing_mut().item_spacing.x = 1.0;
+        ui.spacing_mut().button_padding = vec2(3.5, 1.0);
+        ui.spacing_mut().interact_size.y = ROW - 4.0;
+        for setting in Setting::ALL {
+            let chosen = now == setting;
+            let response = ui.selectable_label(chosen, RichText::new(setting.name()).small());
+            let label = format!("{name} {}", setting.name());
+            response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, &label));
+            if response.clicked() {
+                clicked = Some(setting);
+            }
+        }
     });
+    clicked
 }
 
 /// Lamp, lit where the effect is on.
-fn lamp_ui(ui: &mut Ui, theme: Theme, name: &str, on: bool) {
-    let (rect, response) = ui.allocate_exact_size(egui::vec2(12.0, 12.0), Sense::hover());
+fn lamp_ui(ui: &mut Ui, rect: Rect, theme: Theme, name: &str, on: bool) {
+    let response = ui.interact(rect, ui.scope_id().with(("lamp", name)), Sense::hover());
     let label = format!("{name} is {}", if on { "on" } else { "off" });
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &label));
     let colours = theme.colours();
@@ -88,23 +250,4 @@ fn lamp_ui(ui: &mut Ui, theme: Theme, name: &str, on: bool) {
     let rim = if on { colours.accent } else { colours.quiet_text };
     ui.painter().circle_stroke(centre, 4.5, egui::Stroke::new(1.2, colour(rim)));
     response.on_hover_text(label);
-}
-
-/// Reason, cost and influence.
-fn details_ui(ui: &mut Ui, planned: Option<&PlannedEffect>, explained: Option<(&ExplainedEffect, &Explanation)>) {
-    let quiet = |ui: &mut Ui, text: String| ui.add(egui::Label::new(RichText::new(text).small().weak()).wrap());
-    if let Some(planned) = planned {
-        let relation = if planned.number > planned.threshold { ">" } else { "≤" };
-        let number = three_digits(planned.number);
-        let text = format!("{} ({number} {relation} {})", planned.reason, planned.threshold);
-        let response = quiet(ui, text);
-        if let Some((explained, _)) = explained {
-            response.on_hover_text(format!("{}\nNumber: {}.", explained.about, explained.number_is));
-        }
-    }
-    if let Some((explained, explanation)) = explained {
-        let small = |ui: &mut Ui, text: String| ui.add(egui::Label::new(RichText::new(text).small()).wrap());
-        small(ui, explained.cost_in_words());
-        small(ui, explained.change_in_words(explanation.contact_onset_s));
-    }
 }

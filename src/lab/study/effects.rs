@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn support_and_friction_matter_to_a_light_free_ball_but_hardly_its_weight() {
-        let report = explained(&draft(), Some(&ball(0.020, 2.0)));
+        let report = explained(&draft(), Some(&ball(0.020, 0.2)));
         let on = ["free-object", "finger-gravity", "support", "friction", "finger-inertia"];
         assert_eq!(report.names_on(), on, "{:#?}", report.effects);
         let weight = report.of(Effect::ObjectGravity);
@@ -308,7 +308,9 @@ mod tests {
         scene.gripper.finger.creep_time = 5.0;
         let report = explained(&scene, Some(&ball(0.025, 400.0)));
         let creep = report.of(Effect::Creep);
-        assert!(creep.planned.on && creep.planned.number == 4.0, "{:?}", creep.planned);
+        // A tenth of the stiffness, of which 21 s under load relax nearly all in 5 s.
+        let relaxed = 0.1 * (1.0 - f64::exp(-21.0 / 5.0));
+        assert!(creep.planned.on && (creep.planned.number - relaxed).abs() < 1e-12, "{:?}", creep.planned);
         assert!(
             creep.change.norms.force_share > 0.01 && creep.change.norms.curvature_share > 0.005,
             "{:?}",

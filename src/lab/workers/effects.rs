@@ -36,6 +36,8 @@ pub struct EffectsView {
     pub scene: Arc<Scene>,
     /// State of the measurement.
     pub state: EffectsState,
+    /// Newest finished measurement, of this scene or of one before it.
+    pub last: Option<Arc<Explanation>>,
 }
 
 /// Function that measures a scene: its explanation, `None` when cancelled.
@@ -68,7 +70,7 @@ impl EffectsWorker {
     pub fn start(explain: Explain, wake: Wake) -> std::io::Result<Self> {
         let (commands, inbox) = channel();
         let view = Arc::new(Latest::default());
-        let job = MeasuringJob { explain, view: Arc::clone(&view), wake, kept: VecDeque::new() };
+        let job = MeasuringJob { explain, view: Arc::clone(&view), wake, kept: VecDeque::new(), last: None };
         let thread = std::thread::Builder::new().name("effects".to_owned()).spawn(move || job.work(&inbox))?;
         Ok(Self { commands: Some(commands), asked: None, view, thread: Some(thread) })
     }
@@ -121,14 +123,17 @@ struct MeasuringJob {
     view: Arc<Latest<EffectsView>>,
     wake: Wake,
     kept: VecDeque<(Arc<Scene>, Arc<Explanation>)>,
+    last: Option<Arc<Explanation>>,
 }
 
 impl MeasuringJob {
     fn work(mut self, inbox: &Receiver<MeasureRequest>) {
         let mut next = inbox.recv().ok();
         while let Some(command) = next.take() {
-            if let Some((_, known)) = self.kept.iter().find(|(scene, _)| *scene == command.scene) {
-                self.publish(&command.scene, EffectsState::Ready(Arc::clone(known)));
+            let known = self.kept.iter().find(|(scene, _)| *scene == command.scene).map(|(_, known)| Arc::clone(known));
+            if let Some(known) = known {
+                self.last = Some(Arc::clone(&known));
+                self.publish(&command.scene, EffectsState::Ready(known));
             } else {
                 self.publish(&command.scene, EffectsState::Measuring(0, 0));
                 match inbox.recv_timeout(SETTLE) {
@@ -154,6 +159,7 @@ impl MeasuringJob {
             Ok(None) => return,
             Err(cause) => return self.publish(&command.scene, EffectsState::Failed(Arc::new(cause))),
         };
+        self.last = Some(Arc::clone(&explanation));
         self.publish(&command.scene, EffectsState::Ready(Arc::clone(&explanation)));
         self.kept.push_back((Arc::clone(&command.scene), explanation));
         if self.kept.len() > KEPT {
@@ -162,7 +168,8 @@ impl MeasuringJob {
     }
 
     fn publish(&self, scene: &Arc<Scene>, state: EffectsState) {
-        self.view.publish(Arc::new(EffectsView { scene: Arc::clone(scene), state }));
+        let (scene, last) = (Arc::clone(scene), self.last.clone());
+        self.view.publish(Arc::new(EffectsView { scene, state, last }));
         (self.wake)();
     }
 }

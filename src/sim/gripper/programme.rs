@@ -53,10 +53,14 @@ impl Programme {
         (self.peak_bar / self.close_bar_per_tick - 1e-9).ceil().max(0.0) as u32
     }
 
+    /// Actuation ticks the releasing takes.
+    pub fn release_ticks(&self) -> u32 {
+        (self.peak_bar / self.release_bar_per_tick - 1e-9).ceil().max(0.0) as u32
+    }
+
     /// Actuation ticks until the pressure is back at zero.
     pub fn total_ticks(&self) -> u32 {
-        let release = (self.peak_bar / self.release_bar_per_tick - 1e-9).ceil().max(0.0) as u32;
-        self.close_ticks().saturating_add(self.hold_ticks).saturating_add(release)
+        self.close_ticks().saturating_add(self.hold_ticks).saturating_add(self.release_ticks())
     }
 
     /// Commanded pressure (bar) during actuation tick `tick` (the first is 0), and the phase it belongs to.

@@ -130,7 +130,7 @@ impl Draw<'_> {
             scene.gripper.actuation.filling_time = self.between(1e-3, 0.3);
         }
         scene.programme.peak_bar = self.between(0.3, 1.5);
-        scene.programme.close_bar_per_tick = self.between(0.01, 0.1);
+        scene.programme.close_bar_per_tick = self.between(0.03, 0.15);
         scene.programme.hold_ticks = self.between(5.0, 50.0).round() as u32;
         scene.timing.duration_s = 0.1 * f64::from(scene.programme.total_ticks() + 2);
     }

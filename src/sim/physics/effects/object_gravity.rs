@@ -7,7 +7,7 @@ use palpate_geometry::units::three_digits;
 pub(super) const RULE: Rule = Rule {
     about: "The object has weight: it rests, slips and falls.",
     number: "weight / grip force",
-    threshold: 1e-3, // a tenth of a gram in the default gripper; lighter things go where the fingers push them
+    threshold: 1e-4, // a hundredth of a gram in the default gripper; lighter things go where the fingers push them
     ruling,
 };
 

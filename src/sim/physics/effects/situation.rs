@@ -43,6 +43,11 @@ impl Situation<'_> {
         (ticks / f64::from(self.scene.timing.actuation_hz)).min(self.scene.timing.duration_s)
     }
 
+    /// Length of the release (s).
+    pub(super) fn release_s(&self) -> f64 {
+        f64::from(self.scene.programme.release_ticks()) / f64::from(self.scene.timing.actuation_hz)
+    }
+
     /// Length of the hold (s), within the trial.
     pub(super) fn hold_s(&self) -> f64 {
         let hold = f64::from(self.scene.programme.hold_ticks) / f64::from(self.scene.timing.actuation_hz);
