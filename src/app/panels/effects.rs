@@ -21,8 +21,8 @@ const SETTINGS: f32 = 86.0;
 /// Least and largest width of a bar; names take the rest.
 const BARS: std::ops::RangeInclusive<f32> = 26.0..=70.0;
 /// Width of the longest name.
-const NAME: f32 = 100.0;
-const GAP: f32 = 5.0;
+const NAME: f32 = 92.0;
+const GAP: f32 = 4.0;
 /// Opacity of values that a new measurement will replace.
 const DIMMED: f32 = 0.4;
 /// Smallest change that has a bar, as a share of a sensor's range; the bar is logarithmic.
@@ -108,7 +108,7 @@ fn header_ui(ui: &mut Ui) {
         ),
     ];
     for (rect, title, hover) in titles {
-        let label = egui::Label::new(RichText::new(title).small().weak()).truncate();
+        let label = egui::Label::new(RichText::new(title).small().weak()).extend();
         let builder = UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center));
         ui.scope_builder(builder, |ui| ui.add(label).on_hover_text(hover));
     }
