@@ -11,7 +11,7 @@ use palpate_geometry::units::three_digits;
 pub(super) const RULE: Rule = Rule {
     about: "The chambers take time to fill and to empty.",
     number: "filling time / time in which the pressure changes",
-    threshold: 0.005, // tuned by `palpate study effects`: changes are seen from 0.03 on
+    threshold: 0.002, // tuned by `palpate study effects`: changes are seen from 0.005 on
     ruling,
 };
 
