@@ -147,6 +147,11 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
     if let Some(moved) = summary.object_moved_m {
         say(format!("object moved  {} mm", three_digits(mm(moved))))?;
     }
+    if let Some(shaken) = &summary.shaken {
+        let held = if shaken.held { "held" } else { "lost" };
+        let slipped = shaken.slipped_m.map(|way| format!(", {} mm in the hand", three_digits(mm(way))));
+        say(format!("shaken        {held}{}", slipped.unwrap_or_default()))?;
+    }
     let quality = &summary.quality;
     say(format!(
         "solver        {} steps, {:.2} Newton iterations per solve (at most {}), {}",

@@ -2,7 +2,7 @@
 
 use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, Side};
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{Effect, Scene};
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{ContactPatch, PressureArea, Span, curvature};
 use serde::Serialize;
@@ -28,8 +28,19 @@ pub struct GraspSummary {
     pub hold: Option<HoldSummary>,
     /// Displacement of the object's frame from start to hold (m); null for an empty hand.
     pub object_moved_m: Option<f64>,
+    /// Outcome of a shaking; null where the hand stays where it is.
+    pub shaken: Option<ShakenSummary>,
     /// Solver statistics.
     pub quality: Quality,
+}
+
+/// Outcome of a shaking.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ShakenSummary {
+    /// Way of the object within the hand, from before the lift to the end of the hold (m); null for an empty hand.
+    pub slipped_m: Option<f64>,
+    /// True where both pads carry load at the end of the hold.
+    pub held: bool,
 }
 
 /// Means over the last quarter of the hold.
@@ -59,8 +70,23 @@ impl GraspSummary {
             contact_onset_s: trial.frames().iter().find(touches).map(|frame| frame.t),
             hold: HoldSummary::new(&held[held.len() - held.len().div_ceil(4)..], scene),
             object_moved_m: moved(),
+            shaken: ShakenSummary::new(trial, scene, &held),
             quality: trial.data.quality.clone(),
         }
+    }
+}
+
+impl ShakenSummary {
+    fn new(trial: &SimulatedTrial, scene: &Scene, held: &[&Frame]) -> Option<Self> {
+        let motion = scene.hand_motion().filter(|_| trial.data.plan.is_on(Effect::Shaking.name()))?;
+        let in_hand = |frame: &Frame| Some(frame.world_from_object?.position - frame.hand);
+        let before = trial.frames().iter().rev().find(|frame| frame.t <= motion.begins_s())?;
+        let last = held.last()?;
+        let count = scene.gripper.taxels().count();
+        Some(Self {
+            slipped_m: in_hand(last).zip(in_hand(before)).map(|(last, before)| (last - before).length()),
+            held: Side::BOTH.iter().all(|side| last.normal_force(*side, count) > CONTACT_FORCE),
+        })
     }
 }
 
@@ -94,7 +120,7 @@ mod tests {
     use crate::grasping::grasp;
     use palpate_geometry::Primitive;
     use palpate_sim::objects::ObjectModel;
-    use palpate_sim::scene::{Effect, Setting};
+    use palpate_sim::scene::Setting;
 
     #[test]
     fn a_larger_ball_is_met_earlier_and_bends_the_fingers_less() {
@@ -108,6 +134,25 @@ mod tests {
         assert!(large.contact_onset_s < small.contact_onset_s && large.contact_onset_s.is_some());
         assert!(hold_large.curvature_per_m[0] < hold_small.curvature_per_m[0]);
         assert!(hold_large.force_n[1] > 0.1 && hold_large.pressure_pa[1] > 100.0);
+    }
+
+    #[test]
+    fn a_shaken_grasp_says_whether_it_held() {
+        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.020 }, 400.0, 0.6);
+        let shaken = |amplitude: f64, frequency: f64| {
+            let mut scene = Scene::default();
+            (scene.programme.hold_ticks, scene.timing.duration_s) = (30, 6.0);
+            (scene.shaking.amplitude, scene.shaking.frequency) = (amplitude, frequency);
+            let summary = GraspSummary::new(&grasp(&scene, Some(&ball), 0), &scene);
+            (summary.shaken, summary.object_moved_m, summary.quality.is_restless())
+        };
+        assert_eq!(shaken(0.0, 2.0).0, None);
+        let (gentle, moved, restless) = shaken(0.002, 2.0);
+        assert!(moved > Some(0.02), "lifted: {moved:?}");
+        let gentle = gentle.expect("shaken");
+        assert!(gentle.held && gentle.slipped_m < Some(0.004) && !restless, "{gentle:?}, restless {restless}");
+        let hard = shaken(0.03, 8.0).0.expect("shaken");
+        assert!(hard.slipped_m > Some(0.02), "{hard:?}");
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Sections of the manual and the README that are written from stored results of studies.
 
 use super::accuracy::{accuracy_tables, stored_accuracy};
+use super::effect_audit::{AuditReport, audit_table, stored_effects};
 use super::stability;
-use super::stored_study::GeneratedSection;
+use super::stored_study::{GeneratedSection, StoredStudy};
 
 /// All generated sections; a test checks that the documents hold them, and
 /// `cargo run -p palpate-workshop -- tables` writes them.
@@ -12,5 +13,20 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
         name: "accuracy study",
         text: accuracy_tables(&stored_accuracy()?),
     };
-    Ok([vec![accuracy], stability::sections()?].concat())
+    let effects = GeneratedSection {
+        document: "assets/help/effects.md",
+        name: "effects",
+        text: effects_text(&stored_effects()?),
+    };
+    Ok([vec![accuracy, effects], stability::sections()?].concat())
+}
+
+fn effects_text(stored: &StoredStudy<AuditReport>) -> String {
+    let AuditReport { scenes, missed, within_noise, .. } = stored.result;
+    format!(
+        "{}\n\nWith all effects on at once the change is seen in {missed} of {scenes} scenes; in {within_noise} more it is as \
+         large, but within the noise. CPU time: with the effect over that without it, median. {}.",
+        audit_table(&stored.result),
+        stored.origin()
+    )
 }

@@ -308,6 +308,24 @@ mod tests {
     }
 
     #[test]
+    fn the_modulus_of_a_soft_object_is_drakes() {
+        let of = |values: [&str; 2]| {
+            let collision = values.map(|value| {
+                format!(
+                    "<collision><geometry><sphere radius='0.02'/></geometry><drake:proximity_properties>\
+                     <drake:hydroelastic_modulus value='{value}'/></drake:proximity_properties></collision>"
+                )
+            });
+            let text = format!("<robot xmlns:drake='http://d'><link name='a'>{}</link></robot>", collision.concat());
+            let read = blueprint(&text).expect("a URDF");
+            (read.modulus, read.warnings.len())
+        };
+        assert_eq!(of(["5e4", "2e4"]), (Some(2e4), 0), "the softer of two");
+        assert_eq!(of(["-1", "nan"]), (None, 2));
+        assert_eq!(blueprint("<robot><link name='a'/></robot>").expect("a URDF").modulus, None);
+    }
+
+    #[test]
     fn files_that_are_no_urdf_are_refused_with_the_reason() {
         let message = |text: &str| blueprint(text).map(|_| ()).expect_err("refused").to_string();
         assert!(message("").contains("no XML"));
