@@ -93,6 +93,6 @@ fn print(stored: &StoredStudy<AuditReport>) -> Result<(), Failure> {
     say(
         "seen: curvature changes by more than 0.1 1/m or force by more than 10 mN (RMS), and by more than twice what a",
     )?;
-    say("tenth of the tolerance or a push of 1 um changes")?;
+    say("tenth of the tolerance or a push of 10 um changes")?;
     say(stored.origin().replace('`', ""))
 }

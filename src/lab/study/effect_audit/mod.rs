@@ -3,7 +3,7 @@
 //!
 //! A change is seen where curvature differs by more than [`SEEN`]'s or force by more than its, root mean square over the
 //! trial and both fingers, and by more than twice what means nothing: the change of the same scene at a tenth of the
-//! tolerance, and after pushes of the gripper by 1 µm along each axis. Objects that slip or roll change that much by
+//! tolerance, and after pushes of the gripper by 10 µm along each axis. Objects that slip or roll change that much by
 //! themselves.
 //!
 //! `free-object` is left as it is: the scene says whether the object is held.
@@ -48,7 +48,7 @@ pub const SEEN: EffectSize = EffectSize { curvature_per_m: 0.1, force_n: 0.010 }
 /// Factor on what means nothing.
 const CLEAR_OF_NOISE: f64 = 2.0;
 /// Push of the gripper that means nothing (m).
-const PUSH: f64 = 1e-6;
+const PUSH: f64 = 1e-5;
 
 impl EffectSize {
     fn between(one: &SimulatedTrial, other: &SimulatedTrial, sensors: &Sensors) -> Self {
