@@ -219,7 +219,9 @@ impl SimRun {
     /// Numerical quality of the frames so far.
     pub fn quality(&self) -> Quality {
         let mut quality = self.engine.get().quality();
-        if let Some(at_hold) = self.static_residual {
+        // A hand that moves before the hold leaves none to be judged.
+        let unjudged = self.hold.still_until.is_finite().then_some(0.0);
+        if let Some(at_hold) = self.static_residual.or(unjudged) {
             quality.static_residual = at_hold;
         }
         quality.hold_changes = self.hold.settled[0].max(self.hold.settled[1]);

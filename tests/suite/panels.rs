@@ -277,9 +277,24 @@ fn effects_are_switched_and_both_numbers_move() {
     let after = bench.until(|s| s.grasp > before.grasp);
     assert!(before.plan.is_on("finger-contact") && !after.plan.is_on("finger-contact"));
     assert_eq!(after.scene.effects.get(Effect::FingerContact), Setting::Off);
+    // Old values stay in their places until new ones come.
+    let row = |bench: &Bench| bench.harness.get_by_label("about creep").rect();
+    let place = row(&bench);
+    assert!(bench.harness.query_by_label_contains("measuring").is_some());
+    assert_eq!(bench.harness.query_all_by_label_contains(cost).count(), Effect::ALL.len());
     bench.until_effects_are_measured();
+    assert_eq!(row(&bench), place, "nothing jumps");
     assert!(bench.harness.query_by_label("finger-contact is off").is_some());
     assert!(bench.harness.query_by_label_contains("onset at").is_some(), "what putting it in would change");
+    // Words on demand.
+    let words = "The pads of the two fingers touch each other";
+    assert!(bench.harness.query_by_label_contains(words).is_none());
+    bench.harness.get_by_label("about finger-contact").click();
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_label_contains(words).is_some());
+    bench.harness.get_by_label("about finger-contact").click();
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_label_contains(words).is_none());
     bench.harness.get_by_role_and_label(Role::Button, "finger-contact auto").click();
     bench.until(|s| s.plan.is_on("finger-contact"));
 }
@@ -335,6 +350,20 @@ fn a_scene_is_measured_at_every_setting_on_request() {
     bench.until_shown(true, "measuring");
     bench.harness.get_by_label("Stop").click();
     bench.until_shown(true, "Measure this scene");
+}
+
+#[test]
+fn effects_are_unfolded_in_both_themes() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "effects").unwrap();
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let mut bench = bench(BenchSetup { theme, size: [300.0, 400.0], panel: Some(panel), ..BenchSetup::default() });
+        bench.advance_to(2.6);
+        bench.until_effects_are_measured();
+        bench.harness.get_by_label("about support").click();
+        bench.harness.run_steps(2);
+        bench.harness.render().unwrap()
+    });
+    compare("effects_unfolded", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
 
 #[test]

@@ -3,16 +3,17 @@
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
 use super::super::terminal::{note, say, say_json, table};
-use indicatif::{ProgressBar, ProgressStyle};
-use palpate_geometry::palette::Theme;
-use palpate_lab::study::{
-    AuditPlan, AuditReport, AuditedScene, Measuring, ResultFile, StoredStudy, audit_effects, audit_figure,
-};
-use palpate_render::{figure_picture, figure_svg};
-use std::path::PathBuf;
+use super::files::{StudyOutput, StudyProgress};
+use palpate_lab::study::{AuditPlan, AuditReport, Measuring, ResultFile, StoredStudy, audit_effects, audit_figure};
 
 /// Arguments of `palpate study effects`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate study effects --quick
+  palpate study effects --out effects/
+  palpate study effects --scenes 100 --seed 2 --json
+
+See also: palpate help effects")]
 pub(super) struct EffectsArguments {
     /// Take seconds instead of minutes: few scenes.
     #[arg(long)]
@@ -23,10 +24,8 @@ pub(super) struct EffectsArguments {
     /// Random seed of the scenes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder that receives finished scenes as they come (effects.jsonl), the result (effects.json) and a picture
-    /// (effects.svg, effects.png). The same command resumes where it stopped.
-    #[arg(long, value_name = "FOLDER")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: StudyOutput,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -34,44 +33,35 @@ pub(super) struct EffectsArguments {
 
 const SCENES: u32 = 500;
 const QUICK_SCENES: u32 = 40;
-/// Size of the picture (points).
-const SIZE: [u32; 2] = [920, 420];
 const NAME: &str = "effects";
 
 pub(super) fn run(arguments: &EffectsArguments) -> Result<(), Failure> {
     let scenes = arguments.scenes.unwrap_or(if arguments.quick { QUICK_SCENES } else { SCENES });
     let plan = AuditPlan { scenes, seed: arguments.seed };
-    let mut results: ResultFile<AuditedScene> = match &arguments.out {
-        // More scenes of the same seed go on from fewer.
-        Some(folder) => ResultFile::open(&folder.join(format!("{NAME}.jsonl")), NAME, &plan.seed)?,
-        None => ResultFile::in_memory(),
-    };
-    let bar = ProgressBar::new(u64::from(scenes));
-    bar.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {eta} left")?);
+    let folder = arguments.output.folder(NAME, arguments.quick);
+    // More scenes of the same seed go on from fewer.
+    let mut results = ResultFile::open(&folder.units(NAME), NAME, &plan.seed)?;
     let stop = stop_flag()?;
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let progress = |done: usize, _of: usize| bar.set_position(done as u64);
-    let how = Measuring { threads, cancelled: &stop, progress: &progress };
-    let finished = audit_effects(plan, &mut results, &how)?;
-    bar.finish_and_clear();
-    let count = results.units().len();
-    if !finished {
-        let hint = if arguments.out.is_some() { "; the same command goes on from here" } else { "" };
-        return Err(format!("stopped after {count} of {scenes} scenes{hint}").into());
+    let bar = StudyProgress::new()?;
+    let progress = |done: usize, of: usize| bar.show(done, of);
+    let how = Measuring { threads: arguments.output.threads(), cancelled: &stop, progress: &progress };
+    let finished = audit_effects(plan, &mut results, &how);
+    bar.clear();
+    if !finished? {
+        note(&format!("stopped after {} of {scenes} scenes; the same command goes on here", results.units().len()));
+        return Ok(());
     }
     let report = AuditReport::new(results.units().values().take(scenes as usize));
     let seed = if plan.seed == 1 { String::new() } else { format!(" --seed {}", plan.seed) };
     let amount = if scenes == SCENES { String::new() } else { format!(" --scenes {scenes}") };
     let stored = StoredStudy::new(&format!("palpate study effects{amount}{seed}"), results.cpu_hours(), report);
-    if let Some(folder) = &arguments.out {
-        let path = |extension: &str| folder.join(format!("{NAME}.{extension}"));
-        stored.write(&path("json"))?;
-        let figure = audit_figure(&stored);
-        std::fs::write(path("svg"), figure_svg(&figure, Theme::Light, SIZE)?)?;
-        figure_picture(&figure, Theme::Light, SIZE)?.save(&path("png"))?;
-        note(&format!("written: effects.json, effects.svg, effects.png in {}", folder.display()));
+    let written = folder.write(NAME, &stored, &audit_figure(&stored))?;
+    if arguments.json {
+        say_json(&stored)
+    } else {
+        print(&stored)?;
+        say(written)
     }
-    if arguments.json { say_json(&stored) } else { print(&stored) }
 }
 
 fn print(stored: &StoredStudy<AuditReport>) -> Result<(), Failure> {

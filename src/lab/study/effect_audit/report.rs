@@ -169,7 +169,7 @@ pub fn audit_figure(stored: &StoredStudy<AuditReport>) -> Figure {
     let report = &stored.result;
     Figure {
         title: format!("What auto leaves out: {} random scenes, each effect flipped", report.scenes),
-        columns: 0,
+        columns: 1,
         plots: PLOTS.iter().map(|(title, effects)| plot(report, title, effects)).collect(),
         note: format!("90th percentile of the scenes; crosses: missed. {}", stored.origin().replace('`', "")),
     }
