@@ -65,12 +65,17 @@ pub(super) fn show(
         .y_grid_spacer(marks(&plot.y, &y_bounds))
         .x_axis_formatter(texts(&plot.x, &x_bounds))
         .y_axis_formatter(texts(&plot.y, &y_bounds))
-        .x_axis_label(plot.x.title.clone())
-        .y_axis_label(plot.y.title.clone())
         .set_margin_fraction(egui::Vec2::ZERO);
+    if height > ROOM_FOR_TITLES {
+        widget = widget.x_axis_label(plot.x.title.clone()).y_axis_label(plot.y.title.clone());
+    } else {
+        let axes = format!("{} against {}", plot.y.title, plot.x.title);
+        ui.add(egui::Label::new(RichText::new(axes).small().weak()).truncate());
+    }
     if ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {
         let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
-        widget = widget.legend(legend.position(egui_plot::Corner::RightTop));
+        let legend = legend.text_style(egui::TextStyle::Small).position(egui_plot::Corner::LeftBottom);
+        widget = widget.legend(legend);
     }
     let shown = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(x_bounds.clone());
@@ -103,6 +108,8 @@ pub(super) fn show(
     ShownPlot { response: shown.response, transform: shown.transform }
 }
 
+/// Height from which on titles stand at the axes (points).
+const ROOM_FOR_TITLES: f32 = 200.0;
 /// Least width and height of a plot with a legend (points).
 const ROOM_FOR_LEGEND: [f32; 2] = [380.0, 220.0];
 
@@ -130,6 +137,7 @@ fn add_series(plot_ui: &mut egui_plot::PlotUi<'_>, plot: &Plot, series: &DataSer
         Marker::Square => (MarkerShape::Square, true),
         Marker::Cross => (MarkerShape::Cross, false),
     };
-    let points = Points::new(series.name.clone(), places).shape(shape).filled(filled).radius(3.5).color(ink);
+    let radius = if series.marker == Marker::Cross { 5.5 } else { 3.5 };
+    let points = Points::new(series.name.clone(), places).shape(shape).filled(filled).radius(radius).color(ink);
     plot_ui.points(points.allow_hover(false));
 }

@@ -13,7 +13,8 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_sim::scene::{Accuracy, Effect, Scene, Setting};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::{Accuracy, Effect, PosePreset, Scene, Setting};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -234,6 +235,36 @@ fn turning_the_accuracy_dial_moves_both_numbers() {
     bench.until(|s| !s.status.error_band && s.frame.t == 0.0);
 }
 
+#[test]
+fn the_accuracy_dial_tells_stick_slip_and_what_reference_costs() {
+    let mut bench = whole_window();
+    bench.harness.get_by_label("Scene").click();
+    let mut scene = Scene { pose: PosePreset::named("B").unwrap().poses(), ..Scene::default() };
+    scene.object.source = "ball".to_owned();
+    scene.object.fixed = true;
+    bench.tell(SimulationAction::SetScene(Box::new(scene.clone())));
+    bench.until(|s| s.scene.object.fixed);
+    let fixed = measured(&mut bench);
+    assert!(!fixed.cost.persists);
+    assert!(bench.harness.query_by_label("stick-slip").is_none());
+    assert!(bench.harness.query_by_label("at reference").is_some());
+    let shown = bench.harness.query_all_by_label_contains("×").count();
+    assert!(shown >= 2, "real time, and the cost at reference beside that now");
+    // A free cylinder on its side rolls one way or the other.
+    (scene.object.fixed, scene.object.source) = (false, "syringe".to_owned());
+    let object = scene.load_object().unwrap();
+    let sampler = PoseSampler::new(&scene, object.as_ref());
+    let persists = |seed: u64| {
+        let drawn = sampler.draw(object.as_ref(), seed).0;
+        bench.tell(SimulationAction::SetScene(Box::new(drawn.clone())));
+        bench.until(|s| *s.scene == drawn);
+        let persists = measured(&mut bench).cost.persists;
+        assert_eq!(bench.harness.query_by_label("stick-slip").is_some(), persists, "seed {seed}");
+        persists
+    };
+    assert!((1..=8).any(persists));
+}
+
 /// What the gauge says of the scene that is being grasped.
 fn measured(bench: &mut Bench) -> Arc<MeasuredAccuracy> {
     let scene = bench.workbench().snapshot().unwrap().scene.clone();
@@ -309,25 +340,40 @@ fn settings_are_adopted_from_the_picture_of_what_accuracy_costs() {
     bench.harness.get_by_role_and_label(Role::Button, "Adopt draft").click();
     let after = bench.until(|s| s.grasp > before.grasp);
     assert_eq!(after.scene.solver.accuracy, Accuracy::Draft);
-    // A point of the plot: the middle one of the settings near the pointer, wherever the plot stands.
-    let plot = bench.harness.get_by_label_contains("Error against CPU time").rect();
-    let mut found = None;
-    'search: for row in 1..40 {
-        for column in 1..40 {
-            let at = plot.min + plot.size() * egui::vec2(column as f32 / 40.0, row as f32 / 40.0);
-            bench.harness.hover_at(at);
-            bench.harness.run_steps(2);
-            if bench.harness.query_by_label_contains("--set solver.engine=rapier").is_some() {
-                found = Some(at);
-                break 'search;
-            }
-        }
-    }
-    let at = found.expect("rapier is somewhere in the plot");
+    let at = point_at(&mut bench, "--set solver.engine=rapier");
     bench.harness.drag_at(at);
     bench.harness.drop_at(at);
     bench.harness.run_steps(2);
     bench.until(|s| s.scene.solver.engine == palpate_sim::scene::EngineKind::Rapier);
+}
+
+/// Moves the pointer over the plot of what accuracy costs until it shows a text there. Rapier and coarse settings stand in its
+/// upper half.
+fn point_at(bench: &mut Bench, text: &str) -> egui::Pos2 {
+    let plot = bench.harness.get_by_label_contains("Error against CPU time").rect();
+    for row in 1..14 {
+        for column in 1..28 {
+            let at = plot.min + plot.size() * egui::vec2(column as f32 / 28.0, row as f32 / 28.0);
+            bench.harness.hover_at(at);
+            bench.harness.run_steps(2);
+            if bench.harness.query_by_label_contains(text).is_some() {
+                return at;
+            }
+        }
+    }
+    panic!("{text} is nowhere in the plot");
+}
+
+#[test]
+fn the_picture_of_what_accuracy_costs_shows_the_setting_under_the_pointer() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "accuracy").unwrap();
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let mut bench = bench(BenchSetup { theme, size: [520.0, 420.0], panel: Some(panel), ..BenchSetup::default() });
+        bench.harness.run_steps(3);
+        point_at(&mut bench, "solver.engine=rapier");
+        bench.harness.render().unwrap()
+    });
+    compare("panel_accuracy_wide", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
 
 #[test]

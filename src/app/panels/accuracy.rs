@@ -6,11 +6,11 @@ use crate::app::context::PanelContext;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::figure_plot::{self, ShownPlot};
 use crate::app::theme::colour;
-use egui::{Button, Pos2, RichText, ScrollArea, Ui};
+use egui::{Button, Pos2, RichText, ScrollArea, Tooltip, Ui};
 use palpate_geometry::drawing::Plot;
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::accuracy::{
-    AccuracySetting, AccuracyStudy, GroupCost, SceneGroup, SettingFamily, accuracy_plot,
+    AccuracySetting, AccuracyStudy, GroupCost, SceneGroup, SettingFamily, Spread, accuracy_plot,
 };
 use palpate_lab::workers::SceneAccuracyState;
 use palpate_sim::scene::Scene;
@@ -30,7 +30,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let plot = accuracy_plot(study, group);
         let height = (ui.available_height() - FRONT_HEIGHT).max(LEAST_HEIGHT);
-        let labelled = |label: &str| label.contains("(default)") || ["draft", "reference"].contains(&label);
+        let roomy = height > ROOM_FOR_LABELS;
+        let labelled = |label: &str| roomy && (label.contains("(default)") || ["draft", "reference"].contains(&label));
         let shown = figure_plot::show(ui, context.view.theme, ("error against CPU time", &plot), height, labelled);
         shown.response.widget_info(|| {
             let text = format!("Error against CPU time, {} settings", study.rows.len());
@@ -45,6 +46,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 /// Room for the buttons below the plot, and the least height of the plot (points).
 const FRONT_HEIGHT: f32 = 62.0;
 const LEAST_HEIGHT: f32 = 130.0;
+/// Height from which on points have labels.
+const ROOM_FOR_LABELS: f32 = 200.0;
 
 /// True for scenes that differ in accuracy alone: what was measured for one holds for the other.
 fn is_like(measured: &Scene, scene: &Scene) -> bool {
@@ -132,8 +135,12 @@ fn pointed_ui(
     };
     let nearest = settings(study, group).min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let Some((setting, cost)) = nearest.filter(|found| distance(found) < NEAR) else { return };
+    let Some(place) = shown.position(plot, place_of(cost)) else { return };
     ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-    let response = shown.response.clone().on_hover_ui_at_pointer(|ui| about_ui(ui, setting, cost));
+    // Beside the point at once, without the delay of hints.
+    let beside = egui::Rect::from_center_size(place, egui::Vec2::splat(2.0 * NEAR));
+    let (ctx, response) = (ui.ctx().clone(), &shown.response);
+    Tooltip::always_open(ctx, response.layer_id, response.id, beside).show(|ui| about_ui(ui, setting, cost));
     if response.clicked() {
         adopt(setting, context, actions);
     }
@@ -148,19 +155,21 @@ fn adopt(setting: &AccuracySetting, context: &PanelContext<'_>, actions: &mut Ac
 
 /// What a setting costs and how accurate it is.
 fn about_ui(ui: &mut Ui, setting: &AccuracySetting, cost: &GroupCost) {
+    ui.spacing_mut().item_spacing.y = 2.0;
+    let small = |ui: &mut Ui, text: String| ui.label(RichText::new(text).small());
     ui.strong(format!("{}, {}", setting.name, setting.family.title()));
-    ui.monospace(setting.on_command_line());
-    let range = |spread: palpate_lab::study::accuracy::Spread, factor: f64, unit: &str| {
+    ui.label(RichText::new(setting.on_command_line()).small().monospace());
+    let range = |spread: Spread, factor: f64, unit: &str| {
         let [low, median, high] = [spread.low, spread.median, spread.high].map(|v| three_digits(factor * v));
         if cost.grasps == 1 { format!("{median} {unit}") } else { format!("{median} {unit} ({low} to {high})") }
     };
-    ui.label(format!("CPU {}", range(cost.cpu_ms, 1.0, "ms")));
-    ui.label(format!("error of curvature {}", range(cost.curvature_per_m, 1e3, "1/km")));
-    ui.label(format!("error of force {}", range(cost.force_n, 1e3, "mN")));
+    small(ui, format!("CPU {}", range(cost.cpu_ms, 1.0, "ms")));
+    let errors = [range(cost.curvature_per_m, 1e3, "1/km"), range(cost.force_n, 1e3, "mN")];
+    small(ui, format!("error {}", errors.join(", ")));
     if cost.failed > 0 {
-        ui.label(format!("{} of {} grasps fail", cost.failed, cost.grasps));
+        small(ui, format!("{} of {} grasps fail", cost.failed, cost.grasps));
     }
-    ui.weak("Click to adopt");
+    ui.label(RichText::new("Click to adopt").small().weak());
 }
 
 /// Buttons of the settings on the front, for the keyboard and for small windows.

@@ -79,9 +79,9 @@ fn recognition_text(study: &AccuracyStudy) -> String {
         None => "No setting is as good as the reference for every method.".to_owned(),
     };
     format!(
-        "Models are trained on grasps of each setting and tested on reference grasps of other poses. Macro F1 (%) after \
-         one grasp; in brackets the difference from training on reference grasps, with its 95 % interval. {knee} Cheaper \
-         grasps cost recognition, dearer ones gain none."
+        "Models are trained on grasps of each setting and tested on reference grasps of other poses, through \
+         physical-like sensors. Macro F1 (%) after one grasp; in brackets the difference from training on \
+         reference grasps, with its 95 % interval. {knee}"
     )
 }
 
