@@ -74,7 +74,7 @@ pub(super) fn show(
     }
     if ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {
         let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
-        let legend = legend.text_style(egui::TextStyle::Small).position(egui_plot::Corner::LeftBottom);
+        let legend = legend.text_style(egui::TextStyle::Small).position(egui_plot::Corner::RightBottom);
         widget = widget.legend(legend);
     }
     let shown = widget.show(ui, |plot_ui| {
@@ -87,8 +87,8 @@ pub(super) fn show(
             let word = RichText::new(&line.text).small();
             if line.horizontal {
                 plot_ui.hline(HLine::new("", at).color(ink).width(1.0).style(dashes));
-                let place = PlotPoint::new(*x_bounds.end(), at);
-                plot_ui.text(Text::new("", place, word).color(ink).anchor(Align2::RIGHT_BOTTOM));
+                let place = PlotPoint::new(*x_bounds.start(), at);
+                plot_ui.text(Text::new("", place, word).color(ink).anchor(Align2::LEFT_BOTTOM));
             } else {
                 plot_ui.vline(VLine::new("", at).color(ink).width(1.0).style(dashes));
                 let place = PlotPoint::new(at, *y_bounds.end());
