@@ -82,7 +82,7 @@ fn trials_are_listed_shown_exported_deleted_and_restored() {
     assert_eq!(objects, ["ball", "cube"]);
     let shown = run(at, &["trials", "show", "2"]);
     assert!(shown.code == Some(0) && shown.out.contains("cube"), "{shown:?}");
-    assert!(shown.out.contains("effect creep off (auto): the hold lasts 1.00 s"), "{shown:?}");
+    assert!(shown.out.contains("effect creep off (auto): the load lasts 2.00 s"), "{shown:?}");
     assert_eq!(json(at, &["trials", "show", "2", "--json"])["plan"].as_array().unwrap().len(), Effect::ALL.len());
     let exported = run(at, &["trials", "export", "1", "2", "--out", "csv"]);
     assert_eq!(exported.code, Some(0), "{exported:?}");

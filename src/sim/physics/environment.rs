@@ -19,6 +19,17 @@ pub(super) struct Environment {
     gripper_from_world: Pose,
 }
 
+/// Motion of the surroundings in the hand's frame over a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Passing {
+    /// Displacement at the start of the step (m).
+    pub(super) place: DVec3,
+    /// Velocity at the end of the step (m/s).
+    pub(super) velocity: DVec3,
+    /// Acceleration of the hand over the step (m/s²).
+    pub(super) acceleration: DVec3,
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Plane {
     up: DVec3,

@@ -2,8 +2,7 @@
 
 use super::clearances::Clearances;
 use super::contact::{Against, Contact, ContactStep};
-use super::effects::{Passing, moved_world};
-use super::environment::Environment;
+use super::environment::{Environment, Passing};
 use super::hessian::{Hessian, Lanes};
 use super::model::PhysicsModel;
 use crate::gripper::SegmentPose;
@@ -247,7 +246,7 @@ impl Workspace {
             body_inertia: DMat3::ZERO,
             rhs: vec![0.0; unknowns],
             passing: Passing::default(),
-            moved_world: moved_world(model),
+            moved_world: model.hand_motion.as_ref().map(|_| model.environment.clone()),
             clearances: Clearances::new(model),
             contacts: Vec::with_capacity(model.sites()),
             fingers_meet: false,

@@ -12,7 +12,7 @@
 
 use super::situation::Situation;
 use super::{Rule, Ruling, ratio};
-use crate::physics::environment::Environment;
+use crate::physics::environment::Passing;
 use crate::physics::model::PhysicsModel;
 use crate::physics::state::State;
 use crate::physics::workspace::Workspace;
@@ -42,17 +42,6 @@ fn ruling(situation: &Situation<'_>) -> Ruling {
     Ruling { possible: true, number: ratio(force, grip), facts }
 }
 
-/// Motion of the surroundings in the hand's frame over a step.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::physics) struct Passing {
-    /// Displacement at the start of the step (m).
-    place: DVec3,
-    /// Velocity at the end of the step (m/s).
-    pub(in crate::physics) velocity: DVec3,
-    /// Acceleration of the hand over the step (m/s²).
-    pub(in crate::physics) acceleration: DVec3,
-}
-
 /// Notes how the surroundings pass by in the step that begins.
 pub(in crate::physics) fn note_passing(model: &PhysicsModel, state: &State, ws: &mut Workspace) {
     let Some(motion) = &model.hand_motion else { return };
@@ -68,11 +57,6 @@ pub(in crate::physics) fn move_world(model: &PhysicsModel, ws: &mut Workspace, a
     if let Some(moved) = &mut ws.moved_world {
         moved.shifted(&model.environment, ws.passing.place + ws.passing.velocity * ahead);
     }
-}
-
-/// The surroundings of a model whose hand moves.
-pub(in crate::physics) fn moved_world(model: &PhysicsModel) -> Option<Environment> {
-    model.hand_motion.as_ref().map(|_| model.environment.clone())
 }
 
 /// Work (J) of inertia and of the moving surroundings on the way from one state to another: `force` is that of the
