@@ -32,6 +32,8 @@ fn a_shaken_finger_sways_as_a_cantilever_under_its_inertia() {
         let shaking = &mut scene.shaking;
         (shaking.amplitude, shaking.frequency, shaking.direction) = (0.02, frequency, [1.0, 0.0, 0.0]);
         (shaking.start, shaking.end, shaking.lift) = (Auto::Value(0.0), Auto::Value(100.0), 0.0);
+        // Slower than what a sensor sees, which `auto` leaves out.
+        scene.effects.set(Effect::Shaking, Setting::On);
         let finger = scene.gripper.finger.clone();
         let mut run = Run::new(&scene, None, 1e-3);
         // Two periods and a half, from the end of the lift's time on.

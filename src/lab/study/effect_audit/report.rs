@@ -221,19 +221,18 @@ mod tests {
 
     #[test]
     fn what_is_left_off_and_seen_is_missed() {
-        let mut scenes = vec![scene(0.01, false, 0.001); 6];
-        scenes.extend([scene(0.01, false, 0.02), scene(1.0, true, 0.05), scene(1.0, true, 0.001)]);
+        let threshold = rule_of(Effect::Creep).threshold;
+        let (below, above) = (0.1 * threshold, 10.0 * threshold);
+        let mut scenes = vec![scene(below, false, 0.001); 6];
+        scenes.extend([scene(below, false, 0.02), scene(above, true, 0.05), scene(above, true, 0.001)]);
         let report = AuditReport::new(&scenes);
         assert_eq!((report.scenes, report.missed), (9, 2));
         let creep = report.effects.iter().find(|row| row.name == "creep").expect("a row");
         assert_eq!((creep.off, creep.missed, creep.on, creep.needless), (7, 1, 2, 1));
         assert_eq!(creep.bins.len(), 1, "{:?}", creep.bins);
         assert_eq!(creep.misses, [[0.1, 2.0]]);
-        assert!(
-            audit_table(&report).contains("| `creep` | 0.1 | 2 | 1 | 7 | 1 | 0 | 1.10 |"),
-            "{}",
-            audit_table(&report)
-        );
+        let row = format!("| `creep` | {threshold} | 2 | 1 | 7 | 1 | 0 | 1.10 |");
+        assert!(audit_table(&report).contains(&row), "{}", audit_table(&report));
     }
 
     #[test]
