@@ -20,6 +20,7 @@
 //! | 2 | [`physics`] | convex implicit step, contact, effects, placement; rapier as a second engine |
 //! | 3 | [`run`] | a simulation on its clock: samples and actuation ticks in order |
 //! | 4 | [`poses`] | random poses of gripper and object, named by a seed |
+//! | 5 | `bench` | benchmark of the simulator alone, a program of its own |
 //!
 //! # Example
 //!
@@ -45,7 +46,8 @@
 //! # Features
 //!
 //! `rapier` (on by default) adds the second engine and the resting faces of objects. Without it, scenes that need
-//! either are refused with [`scene::SceneError::NeedsRapier`].
+//! either are refused with [`scene::SceneError::NeedsRapier`]. `bench` builds the benchmark: `cargo run --release
+//! -p palpate-sim --no-default-features --features bench`.
 
 pub mod frame;
 pub mod gripper;

@@ -15,7 +15,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("candle_nn", &["src/learn/baselines/convolution.rs", "src/lab/study/network_cost.rs"]),
     ("cc", &["src/device/build.rs"]),
     ("clap", &["src/cli", "src/workshop"]),
-    ("cpu_time", &["src/cli", "src/lab/study", "src/learn/evaluation.rs", "src/learn/methods.rs"]),
+    ("cpu_time", &["src/cli", "src/lab/study", "src/learn/evaluation.rs", "src/learn/methods.rs", "src/sim/bench"]),
     ("crc32fast", &["src/store/checksum.rs"]),
     ("csv", &["src/store"]),
     ("ctrlc", &["src/cli/interrupt.rs"]),
@@ -58,6 +58,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("tracing", &["src"]),
     ("tracing_subscriber", &["src/cli/terminal.rs"]),
     ("wgpu", &["src/render", "src/app"]),
+    ("wide", &["src/sim/physics/hessian.rs"]),
     ("winit", &["src/app/startup.rs"]),
 ];
 

@@ -50,7 +50,8 @@ impl Unbalanced {
 /// A gradient this small compared with nothing at all counts as zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 
-/// A gradient this small, as a share of the forces, gives slip limits that are better than what lagging costs them.
+/// After an iteration a gradient this small, as a share of the contact forces, gives slip limits that are better than what
+/// lagging costs them.
 const ENOUGH_FOR_LIMITS: f64 = 1e-3;
 
 /// Minimises over `velocity`, starting from it. Needs the workspace's dynamics, and contacts with their relative
@@ -74,7 +75,8 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
             report.converged = true;
             return report;
         }
-        if size.gradient <= allowed.max(ENOUGH_FOR_LIMITS * size.forces) && passes < model.relag_passes {
+        let enough = if report.iterations > 0 { ENOUGH_FOR_LIMITS * size.contacts } else { 0.0 };
+        if size.gradient <= allowed.max(enough) && passes < model.relag_passes {
             passes += 1;
             let step = ws.step;
             for contact in &mut ws.contacts {
@@ -185,6 +187,8 @@ pub(super) fn segment_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Works
 pub(super) struct Size {
     gradient: f64,
     forces: f64,
+    /// Contact forces alone.
+    contacts: f64,
 }
 
 pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
@@ -242,7 +246,11 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
         momentum += ws.a_velocity[k] * ws.a_velocity[k] * weight;
         known += ws.rhs[k] * ws.rhs[k] * weight;
     }
-    Size { gradient: gradient.sqrt(), forces: contact_size.max(momentum).max(known).sqrt() }
+    Size {
+        gradient: gradient.sqrt(),
+        forces: contact_size.max(momentum).max(known).sqrt(),
+        contacts: contact_size.sqrt(),
+    }
 }
 
 /// The unknown with the largest share in the gradient, or the first whose share is no number at all.
