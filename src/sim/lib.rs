@@ -15,12 +15,12 @@
 //! |---|---|---|
 //! | 0 | [`gripper`] | description of finger, pad, taxels, actuation and programme; kinematics of a bent finger |
 //! | 0 | [`objects`] | URDF, OBJ and STL files, the sixteen built-in objects |
-//! | 1 | [`frame`] | samples, plan of effects and numerical quality |
 //! | 1 | [`scene`] | scene files: every setting, with its range and default |
-//! | 2 | [`physics`] | convex implicit step, contact, effects, placement; rapier as a second engine |
-//! | 3 | [`run`] | a simulation on its clock: samples and actuation ticks in order |
-//! | 4 | [`poses`] | random poses of gripper and object, named by a seed |
-//! | 5 | `bench` | benchmark of the simulator alone, a program of its own |
+//! | 2 | [`frame`] | samples, plan of effects and numerical quality |
+//! | 3 | [`physics`] | convex implicit step, contact, effects, placement; rapier as a second engine |
+//! | 4 | [`run`] | a simulation on its clock: samples and actuation ticks in order |
+//! | 5 | [`poses`] | random poses of gripper and object, named by a seed |
+//! | 6 | `bench` | benchmark of the simulator alone, a program of its own |
 //!
 //! # Example
 //!

@@ -66,6 +66,7 @@ const HOMES: &[(&str, &[&str])] = &[
 const RANDOM: &[&str] = &[
     "src/cli/demo.rs",
     "src/lab/grasping/shuffled_objects.rs",
+    "src/lab/study/effect_audit",
     "src/lab/study/network_cost.rs",
     "src/lab/study/stability",
     "src/learn",

@@ -172,7 +172,8 @@ fn print_random(random: &RandomReport) -> Result<(), Failure> {
         .map(|row| {
             let after = row.silent_after_agreement.map_or_else(String::new, |count| count.to_string());
             let counts = [row.scenes, row.wrong, row.silent].map(|count| count.to_string());
-            [vec![row.accuracy.clone()], counts.to_vec(), vec![after, format!("{:.0}", row.solves)]].concat()
+            let solves = if row.scenes > 0 { format!("{:.0}", row.solves) } else { String::new() };
+            [vec![row.accuracy.clone()], counts.to_vec(), vec![after, solves]].concat()
         })
         .collect();
     table(&["accuracy", "scenes", "wrong", "silently wrong", "three agree", "solves per scene"], &accuracies)?;

@@ -544,10 +544,17 @@ impl Session {
         let is_taken = |result: &Arc<CheckResult>| self.checked.as_ref().is_some_and(|old| Arc::ptr_eq(old, result));
         if let Some(result) = checker.view().filter(|result| !is_taken(result)) {
             self.checked = Some(Arc::clone(&result));
-            match &*result {
-                CheckResult::Compared { grasp, agrees } => self.take_comparison(*grasp, *agrees),
-                CheckResult::ComputedAgain { grasp, trial } => self.take_again(*grasp, trial),
-            }
+            let answered = match &*result {
+                CheckResult::Compared { grasp, agrees } => {
+                    self.take_comparison(*grasp, *agrees);
+                    Checking::Comparing
+                }
+                CheckResult::ComputedAgain { grasp, trial } => {
+                    self.take_again(*grasp, trial);
+                    Checking::ComputingAgain
+                }
+            };
+            self.status.checking = self.status.checking.filter(|checking| *checking != answered);
             self.publish();
         }
         // A check that was cancelled ends without a result.

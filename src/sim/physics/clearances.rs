@@ -25,7 +25,7 @@ pub(super) struct Clearances {
 }
 
 /// Places where the object may rest on its support soon.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Nearby {
     /// Resting points of the object.
     pub(super) points: Vec<u32>,
@@ -50,7 +50,12 @@ impl Clearances {
             segments: vec![SegmentPose::default(); model.link_count()],
             object: (DMat3::IDENTITY, DVec3::ZERO),
             object_way: 0.0,
-            resting: Nearby { gap: f64::NEG_INFINITY, ..Nearby::default() },
+            resting: Nearby {
+                points: Vec::with_capacity(model.resting_points()),
+                rim: Vec::with_capacity(model.environment.rim().len()),
+                gap: f64::NEG_INFINITY,
+                way: 0.0,
+            },
             world: DVec3::ZERO,
         }
     }
