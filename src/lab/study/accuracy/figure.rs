@@ -1,7 +1,7 @@
 //! The picture: error against CPU time for free and fixed objects, by kind of object, and recognition beside it.
 
 use super::plan::{AccuracySetting, SettingFamily};
-use super::report::{AccuracyStudy, GroupCost, SceneGroup};
+use super::report::{AccuracyStudy, FAILED_SHARE, GroupCost, SceneGroup};
 use crate::study::stored_study::StoredStudy;
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 use palpate_learn::method;
@@ -43,7 +43,7 @@ pub fn accuracy_plot(study: &AccuracyStudy, group: SceneGroup) -> Plot {
     }
     series.retain(|series| !series.points.is_empty());
     if series.iter().any(|series| series.marker == Marker::Cross) {
-        let name = "more than 5 % fail".to_owned();
+        let name = format!("more than {:.0} % end elsewhere", 100.0 * FAILED_SHARE);
         series.push(DataSeries { name, colour: GREY, marker: Marker::Cross, ..DataSeries::default() });
     }
     let floor = study.floor(group).map(|at| ReferenceLine { horizontal: true, at, text: "floor of SDIRK2".to_owned() });

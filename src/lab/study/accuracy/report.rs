@@ -176,7 +176,7 @@ pub struct MethodScore {
 }
 
 /// Share of failed grasps from which on a setting counts as failed.
-pub const FAILED_SHARE: f64 = 0.05;
+pub const FAILED_SHARE: f64 = 0.1;
 
 impl GroupCost {
     pub(super) fn new(group: SceneGroup, samples: &[(SceneKind, GraspSample)]) -> Option<Self> {
