@@ -283,7 +283,7 @@ mod tests {
             row(SettingFamily::Tolerance, "standard", 4.0, 0.002, 1),
             row(SettingFamily::Tolerance, "reference", 40.0, 0.0001, 0),
             row(SettingFamily::EulerSteps, "1/300 s", 3.0, 0.02, 0),
-            row(SettingFamily::Rapier, "1/150 s", 1.0, 0.0001, 2),
+            row(SettingFamily::Rapier, "1/150 s", 1.0, 0.0001, 3),
             row(SettingFamily::Joints, "N = 5", 1.0, 1e-6, 0),
         ];
         AccuracyStudy { objects: vec!["ball".to_owned()], poses: 1, rows, recognition: Vec::new() }
