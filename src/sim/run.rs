@@ -39,7 +39,7 @@ pub struct SimRun {
 struct HoldWatch {
     /// Taxels of a finger.
     taxels: usize,
-    /// Time until which the hand stands still (s).
+    /// Time at which the hand starts to move (s).
     still_until: f64,
     /// Time of the first sample of the hold (s).
     since: Option<f64>,

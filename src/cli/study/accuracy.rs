@@ -1,12 +1,11 @@
 //! `palpate study accuracy`: what accuracy costs, and what it is worth.
 
 use super::super::Failure;
-use super::super::interrupt::stop_flag;
-use super::super::terminal::{note, say, say_json, table};
-use super::files::{StudyOutput, StudyProgress};
+use super::super::terminal::{say, say_json, table};
+use super::files::{StudyOutput, note_stopped};
 use palpate_geometry::units::three_digits;
+use palpate_lab::study::StoredStudy;
 use palpate_lab::study::accuracy::{AccuracyPlan, AccuracyStudy, SceneGroup, SettingFamily, accuracy_figure};
-use palpate_lab::study::{Measuring, StoredStudy};
 use palpate_learn::method;
 
 /// Arguments of `palpate study accuracy`.
@@ -34,14 +33,8 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Failure> {
     plan.poses = arguments.poses.unwrap_or(plan.poses);
     let folder = arguments.output.folder("accuracy", arguments.quick);
     let mut file = plan.open(&folder.units("accuracy"))?;
-    let stop = stop_flag()?;
-    let bar = StudyProgress::new()?;
-    let progress = |done: usize, of: usize| bar.show(done, of);
-    let how = Measuring { threads: arguments.output.threads(), cancelled: &stop, progress: &progress };
-    let outcome = plan.run(&mut file, &how);
-    bar.clear();
-    let Some(study) = outcome? else {
-        note(&format!("stopped after {:.2} CPU hours; the same command goes on here", file.cpu_hours()));
+    let Some(study) = arguments.output.run(|how| plan.run(&mut file, how))?? else {
+        note_stopped(&format!("{:.2} CPU hours", file.cpu_hours()));
         return Ok(());
     };
     let stored = StoredStudy::new(&command(arguments), file.cpu_hours(), study);

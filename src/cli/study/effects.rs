@@ -1,10 +1,9 @@
 //! `palpate study effects`: audit of the rules of `auto`.
 
 use super::super::Failure;
-use super::super::interrupt::stop_flag;
-use super::super::terminal::{note, say, say_json, table};
-use super::files::{StudyOutput, StudyProgress};
-use palpate_lab::study::{AuditPlan, AuditReport, Measuring, ResultFile, StoredStudy, audit_effects, audit_figure};
+use super::super::terminal::{say, say_json, table};
+use super::files::{StudyOutput, note_stopped};
+use palpate_lab::study::{AuditPlan, AuditReport, ResultFile, StoredStudy, audit_effects, audit_figure};
 
 /// Arguments of `palpate study effects`.
 #[derive(Debug, clap::Args)]
@@ -39,16 +38,10 @@ pub(super) fn run(arguments: &EffectsArguments) -> Result<(), Failure> {
     let scenes = arguments.scenes.unwrap_or(if arguments.quick { QUICK_SCENES } else { SCENES });
     let plan = AuditPlan { scenes, seed: arguments.seed };
     let folder = arguments.output.folder(NAME, arguments.quick);
-    // More scenes of the same seed go on from fewer.
+    // More scenes of the same seed continue from fewer.
     let mut results = ResultFile::open(&folder.units(NAME), NAME, &plan.seed)?;
-    let stop = stop_flag()?;
-    let bar = StudyProgress::new()?;
-    let progress = |done: usize, of: usize| bar.show(done, of);
-    let how = Measuring { threads: arguments.output.threads(), cancelled: &stop, progress: &progress };
-    let finished = audit_effects(plan, &mut results, &how);
-    bar.clear();
-    if !finished? {
-        note(&format!("stopped after {} of {scenes} scenes; the same command goes on here", results.units().len()));
+    if !arguments.output.run(|how| audit_effects(plan, &mut results, how))?? {
+        note_stopped(&format!("{} of {scenes} scenes", results.units().len()));
         return Ok(());
     }
     let report = AuditReport::new(results.units().values().take(scenes as usize));

@@ -1,10 +1,12 @@
 //! What all studies share: where they write, how many threads they use, and their progress.
 
 use super::super::Failure;
+use super::super::interrupt::stop_flag;
+use super::super::terminal::note;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_geometry::drawing::Figure;
 use palpate_geometry::palette::Theme;
-use palpate_lab::study::StoredStudy;
+use palpate_lab::study::{Measuring, StoredStudy};
 use palpate_render::{figure_picture, figure_svg};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -28,9 +30,20 @@ impl StudyOutput {
         StudyFolder(self.out.clone().unwrap_or_else(named))
     }
 
-    pub(super) fn threads(&self) -> usize {
+    /// Runs a study under a progress bar until it ends or Ctrl+C stops it.
+    pub(super) fn run<T>(&self, study: impl FnOnce(&Measuring<'_>) -> T) -> Result<T, Failure> {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.threads.map_or_else(cores, usize::from)
+        let stop = stop_flag()?;
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {eta} left")?;
+        let bar = ProgressBar::new(0).with_style(style);
+        let progress = |done: usize, of: usize| {
+            bar.set_length(of as u64);
+            bar.set_position(done as u64);
+        };
+        let threads = self.threads.map_or_else(cores, usize::from);
+        let outcome = study(&Measuring { threads, cancelled: &stop, progress: &progress });
+        bar.finish_and_clear();
+        Ok(outcome)
     }
 }
 
@@ -62,21 +75,7 @@ impl StudyFolder {
     }
 }
 
-/// Progress bar of a study.
-pub(super) struct StudyProgress(ProgressBar);
-
-impl StudyProgress {
-    pub(super) fn new() -> Result<Self, Failure> {
-        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {eta} left")?;
-        Ok(Self(ProgressBar::new(0).with_style(style)))
-    }
-
-    pub(super) fn show(&self, done: usize, of: usize) {
-        self.0.set_length(of as u64);
-        self.0.set_position(done as u64);
-    }
-
-    pub(super) fn clear(&self) {
-        self.0.finish_and_clear();
-    }
+/// Says how far a study got that was stopped.
+pub(super) fn note_stopped(after: &str) {
+    note(&format!("stopped after {after}; the same command continues here"));
 }

@@ -1,14 +1,13 @@
 //! `palpate study stability`: hard cases, holds that chatter, and random scenes.
 
 use super::super::Failure;
-use super::super::interrupt::stop_flag;
-use super::super::terminal::{note, say, say_json, table};
-use super::files::{StudyOutput, StudyProgress};
+use super::super::terminal::{say, say_json, table};
+use super::files::{StudyOutput, note_stopped};
 use palpate_geometry::units::three_digits;
+use palpate_lab::study::StoredStudy;
 use palpate_lab::study::stability::{
     CaseRow, Limit, RandomReport, StabilityPlan, StabilityReport, policy_table, stability_figure,
 };
-use palpate_lab::study::{Measuring, StoredStudy};
 use serde::Serialize;
 
 /// Arguments of `palpate study stability`.
@@ -85,15 +84,10 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
     let plan = arguments.plan();
     let folder = arguments.output.folder("stability", arguments.quick);
     let mut results = plan.results(&folder.units("stability"))?;
-    let stop = stop_flag()?;
-    let bar = StudyProgress::new()?;
-    let progress = |done: usize, of: usize| bar.show(done, of);
-    let how = Measuring { threads: arguments.output.threads(), cancelled: &stop, progress: &progress };
-    let outcome = plan.run(&mut results, &how);
-    bar.clear();
+    let finished = arguments.output.run(|how| plan.run(&mut results, how))??;
     let cpu_hours = results.cpu_hours();
-    if !outcome? {
-        note(&format!("stopped after {cpu_hours:.2} CPU hours; the same command goes on here"));
+    if !finished {
+        note_stopped(&format!("{cpu_hours:.2} CPU hours"));
         return Ok(());
     }
     let stored = StoredStudy::new(&arguments.command(), cpu_hours, plan.report(&results));

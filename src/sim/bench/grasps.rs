@@ -1,6 +1,6 @@
 //! Cost of a grasp in the simulator alone: `cargo run --release -p palpate-sim --no-default-features --features bench`.
 //!
-//! Without rapier it builds in under a minute. Columns: CPU time of one trial on one thread (ms, the least of the
+//! Built without rapier. Columns: CPU time of one trial on one thread (ms, the least of the
 //! runs), minimisations, CPU time per minimisation (µs). Arguments: names of scenes and accuracies select rows;
 //! `--runs N`; `--against PROGRAM` interleaves the runs with those of another build of this benchmark and adds the ratio.
 

@@ -177,7 +177,6 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
     } else {
         ws.finger_matrix.fill(Lanes::ZERO);
     }
-    let mut diagonal = h * model.chain.damping + h * h * model.chain.stiffness;
     for (finger, segments) in [left, right].into_iter().enumerate() {
         let joints = finger * n..(finger + 1) * n;
         let sign = model.planes[finger].sign;
@@ -194,15 +193,14 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
             rhs[i] = h * (load - model.chain.stiffness * q[i] - ws.bias[i]);
         }
         if let Some(relaxation) = &model.relaxation {
-            let lost = relaxation.soften(h, q, &state.crept[joints], rhs);
-            if finger == 1 {
-                diagonal -= lost;
-            }
+            relaxation.soften(h, q, &state.crept[joints], rhs);
         }
     }
     if model.finger_inertia {
         multiply(&ws.finger_matrix, &state.velocity[..2 * n], &mut ws.rates, |k, momentum| ws.rhs[k] += momentum);
     }
+    let lost = model.relaxation.as_ref().map_or(0.0, |relaxation| relaxation.diagonal_loss(h));
+    let diagonal = h * model.chain.damping + h * h * model.chain.stiffness - lost;
     for entry in ws.finger_matrix.iter_mut().step_by(n + 1) {
         *entry += diagonal;
     }

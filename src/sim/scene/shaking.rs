@@ -95,7 +95,7 @@ impl Scene {
 }
 
 impl HandMotion {
-    /// Time until which the hand stands still (s).
+    /// Time at which the hand starts to move (s).
     pub fn begins_s(&self) -> f64 {
         self.begins
     }

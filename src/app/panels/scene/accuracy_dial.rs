@@ -112,7 +112,7 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
 }
 
 /// Explanation of an error that stays.
-const STICK_SLIP: &str = "A hundredth of the tolerance leaves the error as it is: the object sticks or slips, or rolls one \
+const STICK_SLIP: &str = "A hundredth of the tolerance does not reduce the error: the object sticks or slips, or rolls one \
                           way or the other, by differences that no real grasp repeats. A finer accuracy costs time and \
                           gains nothing.";
 

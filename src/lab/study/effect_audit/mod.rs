@@ -63,7 +63,7 @@ impl EffectSize {
         }
     }
 
-    /// Size as a multiple of what is seen.
+    /// Size as a multiple of a visible change.
     pub fn of_seen(&self) -> f64 {
         (self.curvature_per_m / SEEN.curvature_per_m).max(self.force_n / SEEN.force_n)
     }

@@ -41,7 +41,7 @@ pub struct AuditRow {
     pub cost: Option<f64>,
     /// Changes by number over threshold.
     pub bins: Vec<AuditBin>,
-    /// Number over threshold, and change over what is seen, of each missed scene.
+    /// Number over threshold, and change over a visible one, of each missed scene.
     pub misses: Vec<[f64; 2]>,
 }
 
@@ -52,7 +52,7 @@ pub struct AuditBin {
     pub number: f64,
     /// Scenes.
     pub count: usize,
-    /// Median change over what is seen.
+    /// Median change over a visible one.
     pub median: f64,
     /// 90th percentile of it.
     pub upper: f64,
@@ -199,13 +199,13 @@ fn plot(report: &AuditReport, title: &str, effects: &[Effect]) -> Plot {
     Plot {
         title: title.to_owned(),
         x: PlotAxis { range: Some([1e-3, 1e3]), ..PlotAxis::logarithmic("number of the rule / threshold") },
-        y: PlotAxis::logarithmic("change / what is seen (0.1 1/m, 10 mN)"),
+        y: PlotAxis::logarithmic("change / visible change (0.1 1/m, 10 mN)"),
         references: vec![line(true, "seen"), line(false, "on from here")],
         series,
     }
 }
 
-/// Changes below this share of what is seen are drawn at it.
+/// Changes below this share of a visible one are drawn at it.
 const LEAST_SHOWN: f64 = 1e-3;
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ pub fn policy_table(random: &RandomReport) -> ([&'static str; 6], Vec<Vec<String
             format!("{:.2}", row.cost),
         ]
     };
-    let header = ["accuracy", "what is done", "wrong", "silently wrong % (95 %)", "false alarms %", "cost"];
+    let header = ["accuracy", "policy", "wrong", "silently wrong % (95 %)", "false alarms %", "cost"];
     (header, random.by_policy.iter().map(row).collect())
 }
 

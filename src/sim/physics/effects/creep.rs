@@ -63,12 +63,17 @@ impl Relaxation {
     }
 
     /// Turns joints that were gathered with their whole stiffness k into joints that creep: `rhs` loses
-    /// h s k (a e - q). Returns what each diagonal entry of the matrix loses, h s k (h - b).
-    pub(in crate::physics) fn soften(&self, h: f64, q: &[f64], crept: &[f64], rhs: &mut [f64]) -> f64 {
-        let (a, b) = self.course(h);
+    /// h s k (a e - q), and each diagonal entry of the matrix [`Self::diagonal_loss`].
+    pub(in crate::physics) fn soften(&self, h: f64, q: &[f64], crept: &[f64], rhs: &mut [f64]) {
+        let (a, _) = self.course(h);
         for ((rhs, q), crept) in rhs.iter_mut().zip(q).zip(crept) {
             *rhs += h * self.stiffness * (q - a * (q - crept));
         }
+    }
+
+    /// Loss of a diagonal entry in a step of `h` (s): h s k (h - b).
+    pub(in crate::physics) fn diagonal_loss(&self, h: f64) -> f64 {
+        let (_, b) = self.course(h);
         h * self.stiffness * (h - b)
     }
 
@@ -109,7 +114,7 @@ mod tests {
             let finger = Finger { creep_share: share, creep_time: time, ..Finger::default() };
             let k = finger.joint_stiffness();
             for h in [1e-6, 1e-3, 1.0, 1e3] {
-                let diagonal = h * h * k - Relaxation::new(&finger).soften(h, &[0.0], &[0.0], &mut [0.0]);
+                let diagonal = h * h * k - Relaxation::new(&finger).diagonal_loss(h);
                 assert!(diagonal >= h * h * k * (1.0 - share) * (1.0 - 1e-12), "share {share}, time {time}, h {h}");
             }
         }

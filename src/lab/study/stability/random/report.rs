@@ -1,4 +1,4 @@
-//! What judged scenes come to: shares of silently wrong results by accuracy, and by what is done about them.
+//! Shares of silently wrong results among judged scenes, by accuracy and by policy.
 
 use super::judged::{JudgedScene, LEVELS, LevelResult, SceneVerdict};
 use palpate_learn::metrics::Interval;

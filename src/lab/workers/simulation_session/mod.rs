@@ -1,15 +1,17 @@
 //! Session of the simulation thread: owns the simulated gripper, keeps pace with real time and publishes snapshots.
 
+mod checks;
+
 use super::accuracy_job::AccuracyJob;
-use super::check_job::{CheckJob, CheckRequest, CheckResult, Subject, start_check_job};
+use super::check_job::{CheckJob, CheckResult, Subject, start_check_job};
 use super::current::Current;
 use super::ghost::{GhostGrasp, GhostMaker};
 use super::held_object::{LoadedObject, card_of, stamp_of};
 use super::latest::Latest;
 use super::listener::Listener;
 use super::messages::{
-    Checking, Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status,
-    TraceRow, Wake,
+    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status, TraceRow,
+    Wake,
 };
 use super::pace::Pace;
 use super::refined_run::RefinedRun;
@@ -19,7 +21,6 @@ use crate::recording::{Recorder, RecorderNotice};
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Channel, SensorLayout};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -48,6 +49,13 @@ pub(super) struct Outlets {
 }
 
 impl Outlets {
+    /// Sends a row, or notes that one was lost where the window takes none.
+    fn send(&self, row: TraceRow) {
+        if let Err(TrySendError::Full(_)) = self.rows.try_send(row) {
+            self.rows_lost.store(true, Ordering::Relaxed);
+        }
+    }
+
     fn notify(&self, notice: Notice) {
         // The window may be closed.
         let _sent = self.notices.send(notice);
@@ -255,15 +263,7 @@ impl Session {
                     self.begin_round();
                 }
             }
-            Command::ComputeAgain => {
-                if let (Some(checker), Some(subject)) = (&mut self.checker, &self.subject) {
-                    checker.give_up();
-                    checker.ask(CheckRequest::ComputeAgain(subject.clone()));
-                    self.status.checking = Some(Checking::ComputingAgain);
-                    self.status.playing = false;
-                    self.status.actual_speed = 0.0;
-                }
-            }
+            Command::ComputeAgain => self.compute_again(),
             Command::Pull(force) => {
                 if let Some(current) = self.current.as_mut().filter(|c| force.is_finite() && !c.ended) {
                     current.pull(force);
@@ -482,9 +482,7 @@ impl Session {
             errors,
         };
         current.frame = Arc::new(frame);
-        if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
-            self.outlets.rows_lost.store(true, Ordering::Relaxed);
-        }
+        self.outlets.send(row);
     }
 
     fn end_grasp(&mut self) {
@@ -523,81 +521,6 @@ impl Session {
             self.end_round();
         }
         self.publish();
-    }
-
-    /// Compares the grasp that has just ended with a finer run, where it can be computed again.
-    fn begin_check(&mut self, subject: Option<Subject>) {
-        self.status.checking = None;
-        self.subject = subject;
-        let Some(checker) = &mut self.checker else { return };
-        checker.give_up();
-        if let Some(subject) = &self.subject {
-            checker.ask(CheckRequest::Compare(subject.clone()));
-            self.status.checking = Some(Checking::Comparing);
-        }
-    }
-
-    /// Takes in the result of a check, where there is a new one of the last finished grasp.
-    fn take_check(&mut self) {
-        let Some(checker) = &self.checker else { return };
-        let settled = checker.is_settled();
-        let is_taken = |result: &Arc<CheckResult>| self.checked.as_ref().is_some_and(|old| Arc::ptr_eq(old, result));
-        if let Some(result) = checker.view().filter(|result| !is_taken(result)) {
-            self.checked = Some(Arc::clone(&result));
-            let answered = match &*result {
-                CheckResult::Compared { grasp, agrees } => {
-                    self.take_comparison(*grasp, *agrees);
-                    Checking::Comparing
-                }
-                CheckResult::ComputedAgain { grasp, trial } => {
-                    self.take_again(*grasp, trial);
-                    Checking::ComputingAgain
-                }
-            };
-            self.status.checking = self.status.checking.filter(|checking| *checking != answered);
-            self.publish();
-        }
-        // A check that was cancelled ends without a result.
-        if settled && self.status.checking.take().is_some() {
-            self.publish();
-        }
-    }
-
-    fn take_comparison(&mut self, grasp: u64, agrees: bool) {
-        let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
-        let mut last = FinishedGrasp::clone(last);
-        last.summary.quality.agrees = Some(agrees);
-        self.last = Some(Arc::new(last));
-    }
-
-    /// Shows and stores a grasp that was computed again instead of the one before.
-    fn take_again(&mut self, grasp: u64, trial: &SimulatedTrial) {
-        let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
-        let scene = &trial.header.scene;
-        let (summary, repeatable) = (GraspSummary::new(trial, scene), last.repeatable);
-        let accuracy = scene.solver.accuracy;
-        self.last = Some(Arc::new(FinishedGrasp { grasp, summary, accuracy, repeatable }));
-        if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
-            recorder.replace(trial.clone());
-        }
-        let Some(current) = self.current.as_mut().filter(|current| current.ended && self.grasp == grasp) else {
-            return;
-        };
-        let plotted = self.channels.len();
-        for frame in trial.frames() {
-            let row = current.reader.row(frame);
-            let values = row.values[..plotted].into();
-            let row =
-                TraceRow { grasp, rolling: false, t: row.t_s, line_bar: row.line_bar, values, errors: Box::default() };
-            if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
-                self.outlets.rows_lost.store(true, Ordering::Relaxed);
-            }
-        }
-        if let Some(frame) = trial.frames().last() {
-            current.frame = Arc::new(frame.clone());
-        }
-        current.plan = Arc::new(trial.data.plan.clone());
-        current.scene = Arc::new(scene.clone());
     }
 
     /// Between two grasps: is another one needed?

@@ -1,0 +1,94 @@
+//! Checks of the last finished grasp: a finer run to compare with, and the grasp computed again.
+
+use super::super::check_job::{CheckRequest, CheckResult, Subject};
+use super::super::messages::{Checking, FinishedGrasp, TraceRow};
+use super::Session;
+use crate::grasping::GraspSummary;
+use palpate_tactile::trial::SimulatedTrial;
+use std::sync::Arc;
+
+impl Session {
+    /// Compares the grasp that has just ended with a finer run, where it can be computed again.
+    pub(super) fn begin_check(&mut self, subject: Option<Subject>) {
+        self.status.checking = None;
+        self.subject = subject;
+        let Some(checker) = &mut self.checker else { return };
+        checker.give_up();
+        if let Some(subject) = &self.subject {
+            checker.ask(CheckRequest::Compare(subject.clone()));
+            self.status.checking = Some(Checking::Comparing);
+        }
+    }
+
+    /// Pauses, and computes the last finished grasp again until levels of accuracy agree.
+    pub(super) fn compute_again(&mut self) {
+        if let (Some(checker), Some(subject)) = (&mut self.checker, &self.subject) {
+            checker.give_up();
+            checker.ask(CheckRequest::ComputeAgain(subject.clone()));
+            self.status.checking = Some(Checking::ComputingAgain);
+            self.status.playing = false;
+            self.status.actual_speed = 0.0;
+        }
+    }
+
+    /// Takes in the result of a check, where there is a new one of the last finished grasp.
+    pub(super) fn take_check(&mut self) {
+        let Some(checker) = &self.checker else { return };
+        let settled = checker.is_settled();
+        let is_taken = |result: &Arc<CheckResult>| self.checked.as_ref().is_some_and(|old| Arc::ptr_eq(old, result));
+        if let Some(result) = checker.view().filter(|result| !is_taken(result)) {
+            self.checked = Some(Arc::clone(&result));
+            let answered = match &*result {
+                CheckResult::Compared { grasp, agrees } => {
+                    self.take_comparison(*grasp, *agrees);
+                    Checking::Comparing
+                }
+                CheckResult::ComputedAgain { grasp, trial } => {
+                    self.take_again(*grasp, trial);
+                    Checking::ComputingAgain
+                }
+            };
+            self.status.checking = self.status.checking.filter(|checking| *checking != answered);
+            self.publish();
+        }
+        // A check that was cancelled ends without a result.
+        if settled && self.status.checking.take().is_some() {
+            self.publish();
+        }
+    }
+
+    fn take_comparison(&mut self, grasp: u64, agrees: bool) {
+        let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
+        let mut last = FinishedGrasp::clone(last);
+        last.summary.quality.agrees = Some(agrees);
+        self.last = Some(Arc::new(last));
+    }
+
+    /// Shows and stores a grasp that was computed again instead of the one before.
+    fn take_again(&mut self, grasp: u64, trial: &SimulatedTrial) {
+        let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
+        let scene = &trial.header.scene;
+        let (summary, repeatable) = (GraspSummary::new(trial, scene), last.repeatable);
+        let accuracy = scene.solver.accuracy;
+        self.last = Some(Arc::new(FinishedGrasp { grasp, summary, accuracy, repeatable }));
+        if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
+            recorder.replace(trial.clone());
+        }
+        let Some(current) = self.current.as_mut().filter(|current| current.ended && self.grasp == grasp) else {
+            return;
+        };
+        let plotted = self.channels.len();
+        for frame in trial.frames() {
+            let row = current.reader.row(frame);
+            let values = row.values[..plotted].into();
+            let row =
+                TraceRow { grasp, rolling: false, t: row.t_s, line_bar: row.line_bar, values, errors: Box::default() };
+            self.outlets.send(row);
+        }
+        if let Some(frame) = trial.frames().last() {
+            current.frame = Arc::new(frame.clone());
+        }
+        current.plan = Arc::new(trial.data.plan.clone());
+        current.scene = Arc::new(scene.clone());
+    }
+}
