@@ -6,7 +6,7 @@ use super::files::{StudyOutput, note_stopped};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::stability::{
-    CaseRow, Limit, RandomReport, StabilityPlan, StabilityReport, policy_table, stability_figure,
+    CaseRow, RandomReport, StabilityPlan, StabilityReport, policy_table, stability_figure,
 };
 use serde::Serialize;
 
@@ -184,13 +184,7 @@ fn cells_of(row: &CaseRow) -> Vec<String> {
     let verdict = if row.holds { "pass" } else { "FAIL" };
     let [what, measured, limit] = match (row.findings.first(), &row.not_finite) {
         (_, Some(body)) => [format!("{body} diverged"), String::new(), String::new()],
-        (Some(finding), None) => {
-            let limit = match finding.limit {
-                Limit::AtMost(limit) => format!("<= {limit:.3e}"),
-                Limit::AtLeast(limit) => format!(">= {limit:.3e}"),
-            };
-            [finding.what.clone(), format!("{:.3e}", finding.measured), limit]
-        }
+        (Some(finding), None) => [finding.what.clone(), format!("{:.3e}", finding.measured), finding.limit.to_string()],
         (None, None) => [String::new(), String::new(), String::new()],
     };
     vec![row.case.clone(), row.setting.clone(), what, measured, limit, verdict.to_owned()]

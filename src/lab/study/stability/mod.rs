@@ -123,19 +123,24 @@ impl Limit {
     }
 }
 
+/// Characters of a limit that is written without an exponent, at most.
+const LONGEST_PLAIN: usize = "1.000000001".len();
+
 impl std::fmt::Display for Limit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::AtMost(limit) => write!(f, "<= {limit}"),
-            Self::AtLeast(limit) => write!(f, ">= {limit}"),
-        }
+        let (sign, limit) = match self {
+            Self::AtMost(limit) => ("<=", limit),
+            Self::AtLeast(limit) => (">=", limit),
+        };
+        let plain = limit.to_string();
+        if plain.len() <= LONGEST_PLAIN { write!(f, "{sign} {plain}") } else { write!(f, "{sign} {limit:.2e}") }
     }
 }
 
 /// Measured value with its limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// Name, with its unit in brackets.
+    /// Name, with its unit in parentheses.
     pub what: String,
     /// Value.
     pub measured: f64,

@@ -38,7 +38,7 @@ pub(super) fn squeezed_masses(conditions: &Conditions) -> Findings {
             let creep = (late - early).length() / 0.5;
             let moved = (run.object_centre() - start).length();
             findings.push(Measurement::at_most(format!("creep at {mass} kg [m/s]"), creep, 1e-6));
-            findings.push(Measurement::at_most(format!("moved at {mass} kg [m]"), moved, 0.01));
+            findings.push(Measurement::at_most(format!("moved at {mass} kg (m)"), moved, 0.01));
             let depth = run.deepest() / scene.gripper.pad.thickness;
             findings.push(Measurement::at_most(format!("depth over the pad's thickness at {mass} kg"), depth, 1.0));
             findings.push(missed(&run));
@@ -72,7 +72,7 @@ pub(super) fn light_stiff_sticky(conditions: &Conditions) -> Findings {
             rest(SteppedScene::new(&scene, Some(&object), if conditions.thorough { 1e-4 } else { 5e-4 }))?;
         let (place, depth, missed) = rest(stepped(&scene, Some(&object), conditions))?;
         let apart = (place - reference).length();
-        findings.push(Measurement::at_most("resting place apart from the reference [m]", apart, 5e-3));
+        findings.push(Measurement::at_most("resting place apart from the reference (m)", apart, 5e-3));
         findings.push(Measurement::at_most("depth over the pad's thickness", depth / scene.gripper.pad.thickness, 1.0));
         findings.push(missed);
     }
@@ -127,7 +127,7 @@ pub(super) fn initial_overlap(conditions: &Conditions) -> Findings {
         forward = forward.max(run.tip().0);
         most = most.max(run.energy());
     }
-    findings.push(Measurement::at_most("way on through a plate [m]", forward, 0.0));
+    findings.push(Measurement::at_most("way on through a plate (m)", forward, 0.0));
     findings.push(Measurement::at_most("most energy over the first at a plate", most / start, 1.0 + 1e-9));
     findings.push(missed(&run));
     Ok(findings)
@@ -151,7 +151,7 @@ pub(super) fn thrown_object(conditions: &Conditions) -> Findings {
         }
         let at = format!("at {speed} m/s");
         findings.push(Measurement::at_most(
-            format!("beyond the finger's root {at} [m]"),
+            format!("beyond the finger's root {at} (m)"),
             farthest - run.half_gap(),
             0.0,
         ));
@@ -220,7 +220,7 @@ pub(super) fn thin_things(conditions: &Conditions) -> Findings {
         findings.push(Measurement::at_least(format!("force on the {name} [N]"), force, 0.01));
         findings.push(Measurement::at_most(format!("depth over the pad's thickness: {name}"), depth, 1.0));
         let across = run.tip().0 - run.half_gap();
-        findings.push(Measurement::at_most(format!("tip beyond the {name} [m]"), across, 0.002));
+        findings.push(Measurement::at_most(format!("tip beyond the {name} (m)"), across, 0.002));
         findings.push(missed(&run));
     }
     Ok(findings)

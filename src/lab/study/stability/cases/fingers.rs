@@ -67,8 +67,8 @@ pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
         before = now;
     }
     Ok(vec![
-        Measurement::at_most("largest gain in one tick [J]", largest, allowed),
-        Measurement::at_most("net gain [J]", before - start, 0.0),
+        Measurement::at_most("largest gain in one tick (J)", largest, allowed),
+        Measurement::at_most("net gain (J)", before - start, 0.0),
         missed(&run),
     ])
 }

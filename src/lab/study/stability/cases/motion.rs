@@ -35,9 +35,9 @@ pub(super) fn resting_masses(conditions: &Conditions) -> Findings {
             -moved.z / scene.support.sink,
             1.1,
         ));
-        findings.push(Measurement::at_least(format!("sinking {of} [m]"), -moved.z, 0.0));
-        findings.push(Measurement::at_most(format!("creep {of} [m]"), moved.truncate().length(), 1e-9));
-        findings.push(Measurement::at_most(format!("creep {of} on a slope [m]"), slid, 1e-7));
+        findings.push(Measurement::at_least(format!("sinking {of} (m)"), -moved.z, 0.0));
+        findings.push(Measurement::at_most(format!("creep {of} (m)"), moved.truncate().length(), 1e-9));
+        findings.push(Measurement::at_most(format!("creep {of} on a slope (m)"), slid, 1e-7));
         findings.push(Measurement::at_most(format!("load {of} not carried"), (carried / weight - 1.0).abs(), 1e-5));
         findings.push(missed(&run));
     }
@@ -54,8 +54,8 @@ pub(super) fn long_hold(conditions: &Conditions) -> Findings {
     run.cover(conditions.span(600.0), |_| torque(FULL_TORQUE))?;
     let drift = (run.object_centre() - place).length();
     Ok(vec![
-        Measurement::at_most("drift [m]", drift, 1e-5),
-        Measurement::at_most("change of energy [J]", (run.energy() - energy).abs(), 1e-6),
+        Measurement::at_most("drift (m)", drift, 1e-5),
+        Measurement::at_most("change of energy (J)", (run.energy() - energy).abs(), 1e-6),
         missed(&run),
     ])
 }
@@ -96,7 +96,7 @@ pub(super) fn free_flight(conditions: &Conditions) -> Findings {
             spin / fastest,
             1.0 + 1e-9,
         ));
-        findings.push(Measurement::at_most(format!("off the straight line {at} [m]"), off, 1e-9));
+        findings.push(Measurement::at_most(format!("off the straight line {at} (m)"), off, 1e-9));
         findings.push(missed(&run));
     }
     Ok(findings)
