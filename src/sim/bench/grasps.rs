@@ -12,14 +12,15 @@ use palpate_sim::scene::Scene;
 use std::io::Write;
 use std::process::Command;
 
-/// Names of the scenes; the last two are a baked mesh and a union of solids.
-const SCENES: [&str; 7] = ["fixed_ball", "ball", "fixed_box", "box", "cylinder", "lemon", "syringe"];
+/// Names of the scenes. The lemon is a baked mesh, the syringe a union of solids; an empty hand presses finger on finger.
+const SCENES: [&str; 8] = ["fixed_ball", "ball", "fixed_box", "box", "cylinder", "lemon", "syringe", "empty"];
 
 fn scene(name: &str) -> (Scene, Option<ObjectModel>) {
     let mut scene = Scene::default();
     let (kind, fixed) = name.strip_prefix("fixed_").map_or((name, false), |kind| (kind, true));
     scene.object.fixed = fixed;
     let shape = match kind {
+        "empty" => return (scene, None),
         "ball" => Primitive::Sphere { radius: 0.025 },
         "box" => Primitive::Cuboid { half: DVec3::splat(0.020) },
         "cylinder" => Primitive::Cylinder { radius: 0.0175, half_length: 0.030 },

@@ -91,7 +91,11 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
         for j in 0..=model.chain.joints {
             let link = first_link + j;
             let segment = workspace.segments[link];
-            if fronts.is_none() && workspace.clearances.of_link(link) > farthest {
+            let may_meet = |margin: f64| {
+                let segment = (&segment, model.chain.lengths[j]);
+                fronts.as_ref().is_some_and(|(fronts, _)| fronts.may_meet(model, finger, segment, margin))
+            };
+            if workspace.clearances.of_link(link) > farthest && !may_meet(margin(h, 2.0 * fastest)) {
                 continue;
             }
             let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
@@ -107,8 +111,8 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let near_object = object.as_ref().filter(|_| to_object < reach + against_object);
             let near_world = to_world < reach + against_world;
             let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
-                let margin = margin(workspace.step.h, speed + fastest[1 - finger]);
-                fronts.may_meet(model, finger, (&segment, model.chain.lengths[j]), margin).then_some(margin)
+                let margin = margin(h, speed + fastest[1 - finger]);
+                may_meet(margin).then_some((fronts, margin))
             });
             if near_object.is_none() && !near_world && against_finger.is_none() {
                 workspace.clearances.note_link(link, to_object.min(to_world) - reach);
@@ -147,7 +151,7 @@ struct Near<'a> {
     object: Option<(&'a Solid<'a>, f64)>,
     world: Option<f64>,
     /// The other finger.
-    finger: Option<f64>,
+    finger: Option<(&'a Fronts, f64)>,
     /// Distance of the whole segment from the world, at least (m).
     least_to_world: f64,
 }
@@ -183,31 +187,41 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
     for k in model.springs.of_segment(place.segment_index) {
         let spring = &model.springs.all[k];
         let site = place.finger * model.springs.all.len() + k;
-        if near.finger.is_none() && workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest() {
+        let clear = workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest();
+        if clear && near.finger.is_none() {
             continue;
         }
         let (foot, axis) = spring.ray(&place.segment);
+        let finger = near.finger.and_then(|(fronts, margin)| {
+            let gap = fronts.least_distance(model, place.finger, foot.x) - spring.height;
+            (gap <= margin).then_some(margin)
+        });
+        if clear && finger.is_none() {
+            continue;
+        }
         let ray = Ray {
             foot: plane.point(foot, spring.across),
             axis: plane.direction(axis),
             radius: model.springs.radius,
             rest: spring.height - model.springs.radius,
         };
-        let (to_object, clearance) = near.distances(ray.foot);
-        if near.finger.is_none() {
+        let (mut hit, mut against) = (None, Against::World);
+        if !clear {
+            let (to_object, clearance) = near.distances(ray.foot);
             workspace.clearances.note_spring(site, place.link, clearance);
-            if clearance > spring.height + near.farthest() {
-                continue;
+            if clearance <= spring.height + near.farthest() {
+                let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
+                let on_world = near.world.and_then(|margin| ray.cast_environment(near.environment, margin));
+                (hit, against) = match (on_object, on_world) {
+                    (Some(object), Some(world)) if world.compression > object.compression => {
+                        (Some(world), Against::World)
+                    }
+                    (Some(object), _) => (Some(object), Against::Object),
+                    (None, world) => (world, Against::World),
+                };
             }
         }
-        let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
-        let on_world = near.world.and_then(|margin| ray.cast_environment(near.environment, margin));
-        let (mut hit, mut against) = match (on_object, on_world) {
-            (Some(object), Some(world)) if world.compression > object.compression => (Some(world), Against::World),
-            (Some(object), _) => (Some(object), Against::Object),
-            (None, world) => (world, Against::World),
-        };
-        if let Some(margin) = near.finger {
+        if let Some(margin) = finger {
             let other = OtherFinger::opposite(model, &workspace.segments, place.finger);
             if let Some(met) = ray.cast_finger(&other, margin) {
                 // A contact in waiting gives way to all others.
@@ -371,9 +385,9 @@ impl Ray {
     }
 
     fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
-        let surface = |p| (other.distance(p), other.normal(p));
         let gap = other.distance(self.foot) - self.radius;
-        let touch = self.trace((self.foot, self.axis), gap, margin, |p| other.distance(p), surface)?;
+        let (distance, surface) = (|p| other.distance(p), |p| other.surface(p));
+        let touch = self.trace((self.foot, self.axis), gap, margin, distance, surface)?;
         self.pressed(&touch, touch.cosine.max(0.0), margin)
     }
 

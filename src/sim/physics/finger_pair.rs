@@ -25,17 +25,34 @@ pub(super) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
     (0.25 * stiffness, 2.0 * height)
 }
 
-/// Inward protrusion of each finger from its own straight neutral axis (m).
+/// Inward protrusion of each finger from its own straight neutral axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fronts([f64; 2]);
+pub(super) struct Fronts {
+    /// Of the most inward segment (m).
+    segments: [f64; 2],
+    /// More than that by which the round skin at a bent joint protrudes, at most (m).
+    joints: [f64; 2],
+}
 
 impl Fronts {
     pub(super) fn new(model: &PhysicsModel, segments: &[SegmentPose]) -> Self {
-        let n = model.chain.joints;
-        Self([0, 1].map(|finger| {
-            let own = &segments[finger * (n + 1)..(finger + 1) * (n + 1)];
-            own.iter().zip(&model.chain.lengths).map(|(s, l)| front(model, s, *l)).fold(f64::NEG_INFINITY, f64::max)
-        }))
+        let own = |finger: usize| &segments[finger * (model.chain.joints + 1)..][..=model.chain.joints];
+        let protruding = |finger: usize| {
+            let fronts = own(finger).iter().zip(&model.chain.lengths).map(|(s, l)| front(model, s, *l));
+            fronts.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let rounding = |finger: usize| {
+            let straightness = own(finger).windows(2).map(|pair| pair[0].along.dot(pair[1].along));
+            model.skin.thickness.max(model.skin.back) * (1.0 - straightness.fold(1.0, f64::min))
+        };
+        Self { segments: [0, 1].map(protruding), joints: [0, 1].map(rounding) }
+    }
+
+    /// Distance of a point from the other finger's skin, at least (m). `inward`: of the point, from the straight neutral
+    /// axis of its own finger (m).
+    pub(super) fn least_distance(&self, model: &PhysicsModel, finger: usize, inward: f64) -> f64 {
+        let other = self.segments[1 - finger] + self.joints[1 - finger];
+        2.0 * model.planes[finger].half_gap - other - inward
     }
 
     /// True where this segment of a finger may come within `margin` (m) of any of the other finger.
@@ -46,12 +63,12 @@ impl Fronts {
         segment: (&SegmentPose, f64),
         margin: f64,
     ) -> bool {
-        front(model, segment.0, segment.1) + self.0[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
+        front(model, segment.0, segment.1) + self.segments[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
     }
 
     /// Clearance between the fingers, seen from the side (m).
     pub(super) fn clearance(&self, model: &PhysicsModel) -> f64 {
-        2.0 * model.planes[0].half_gap - self.0[0] - self.0[1]
+        2.0 * model.planes[0].half_gap - self.segments[0] - self.segments[1]
     }
 }
 
@@ -133,12 +150,17 @@ impl<'a> OtherFinger<'a> {
     /// Distance of a point from the skin (m), negative inside.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (along, away, _) = self.excess(&self.place(p), p.y);
+        self.beyond_core(along, away)
+    }
+
+    /// Distance from the skin (m), given that beyond the core along the finger and away from its middle (m).
+    fn beyond_core(&self, along: f64, away: f64) -> f64 {
         let outside = along.max(0.0).hypot(away.max(0.0));
         outside + along.max(away).min(0.0) - self.model.springs.radius
     }
 
-    /// Outward normal of the skin nearest to a point.
-    pub(super) fn normal(&self, p: DVec3) -> DVec3 {
+    /// Distance of a point from the skin (m), and outward normal of the skin nearest to it.
+    pub(super) fn surface(&self, p: DVec3) -> (f64, DVec3) {
         let place = self.place(p);
         let (along, away, in_front) = self.excess(&place, p.y);
         let ahead = self.segments[place.segment].along;
@@ -155,7 +177,7 @@ impl<'a> OtherFinger<'a> {
                 }
             }
         };
-        self.plane.direction(direction)
+        (self.beyond_core(along, away), self.plane.direction(direction))
     }
 
     /// The segment that a point touches.
