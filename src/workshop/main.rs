@@ -5,6 +5,7 @@
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
+//! | `cargo run --release -p palpate-workshop -- scores --store FILE` | the scores of all methods, into `assets/studies/recognition.json`; resumes |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README, from the stored results in `assets/studies` |
 //! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
 //!
@@ -20,11 +21,12 @@ mod tools;
 
 use clap::{Parser, Subcommand};
 use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
-use palpate_lab::study::generated_sections;
+use palpate_lab::study::{Measuring, generated_sections, measure_scores};
 use palpate_sim::objects::{ShapeClass, SizeClass};
 use palpate_store::Store;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use tools::Parts;
 
 /// How the physics sees an object.
@@ -85,6 +87,15 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
+    /// Collect grasps, fit all methods and judge them.
+    Scores {
+        /// Result.
+        #[arg(long, default_value = "assets/studies/recognition.json")]
+        out: PathBuf,
+        /// Trial store that receives the grasps, with the finished methods beside it; a second run goes on from them.
+        #[arg(long)]
+        store: PathBuf,
+    },
     /// Write the tables of the manual and the README from the stored results of studies.
     Tables,
     /// Feed random bytes to the protocol decoder and check its events.
@@ -112,9 +123,20 @@ fn main() -> Result<(), Failure> {
             report(format_args!("{count} thumbnails in {}", out.display()));
         }
         Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
+        Command::Scores { out, store } => write_scores(&out, &store)?,
         Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,
     }
+    Ok(())
+}
+
+fn write_scores(out: &Path, store: &Path) -> Result<(), Failure> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let cancelled = AtomicBool::new(false);
+    let how = Measuring { threads, cancelled: &cancelled, progress: &|done, of| report(format_args!("{done} of {of}")) };
+    let scores = measure_scores(&mut Store::open(store)?, &store.with_extension("scores.jsonl"), &how)?;
+    scores.ok_or("cancelled")?.write(out)?;
+    report(format_args!("scores in {}", out.display()));
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use super::accuracy::{accuracy_tables, stored_accuracy};
 use super::effect_audit::{AuditReport, audit_table, stored_effects};
-use super::stability;
+use super::{recognition_scores, stability};
 use super::stored_study::{GeneratedSection, StoredStudy};
 
 /// All generated sections; a test checks that the documents hold them, and
@@ -18,7 +18,7 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
         name: "effects",
         text: effects_text(&stored_effects()?),
     };
-    Ok([vec![accuracy, effects], stability::sections()?].concat())
+    Ok([vec![accuracy, effects], stability::sections()?, recognition_scores::sections()?].concat())
 }
 
 fn effects_text(stored: &StoredStudy<AuditReport>) -> String {

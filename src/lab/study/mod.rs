@@ -10,6 +10,7 @@ mod generated;
 mod labelled_training;
 mod network_cost;
 mod physics_cost;
+mod recognition_scores;
 mod result_file;
 mod search;
 pub mod stability;
@@ -34,6 +35,7 @@ pub use labelled_training::{
 };
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
+pub use recognition_scores::{ControlScores, RecognitionScores, ScoreError, ScoreReport, measure_scores};
 pub use result_file::{ResultFile, ResultFileError, program};
 pub use search::{SearchRow, search};
 pub use stored_study::{GeneratedSection, StoredStudy, markdown_table};
