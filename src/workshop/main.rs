@@ -133,7 +133,8 @@ fn main() -> Result<(), Failure> {
 fn write_scores(out: &Path, store: &Path) -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let cancelled = AtomicBool::new(false);
-    let how = Measuring { threads, cancelled: &cancelled, progress: &|done, of| report(format_args!("{done} of {of}")) };
+    let how =
+        Measuring { threads, cancelled: &cancelled, progress: &|done, of| report(format_args!("{done} of {of}")) };
     let scores = measure_scores(&mut Store::open(store)?, &store.with_extension("scores.jsonl"), &how)?;
     scores.ok_or("cancelled")?.write(out)?;
     report(format_args!("scores in {}", out.display()));

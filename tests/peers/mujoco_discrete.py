@@ -223,26 +223,10 @@ def compare(program, name):
     return {"converged": converged, **rows}
 
 
-def ratios(scenes):
-    """Markdown rows: error and cost of Palpate at each tolerance, and what MuJoCo costs at the same error. It is of
-    first order: error times cost is the same at all steps but for chance, and the geometric mean over them is taken."""
-    for tolerance in (1e-3, 1e-4, 1e-5):
-        cells = []
-        for name in m.SCENES:
-            ours = next(r for r in scenes[name]["palpate tolerance"] if r["setting"] == tolerance)
-            theirs = [(r["error_own_deg"], r["cpu_ms"]) for r in scenes[name]["mujoco discrete"]]
-            error, cpu = ours["error_own_deg"], ours["cpu_ms"]
-            cost = np.exp(np.mean([np.log(e * c) for e, c in theirs])) / error
-            beyond = "" if min(theirs)[0] <= error <= max(theirs)[0] else ", extrapolated"
-            cells.append(f"{error:.4f}° in {cpu:.1f} ms; {cost:.0f} ms{beyond}: {cost / cpu:.0f} x")
-        print(f"| {tolerance:g} | " + " | ".join(cells) + " |")
-
-
 def main(program):
     scenes = {name: compare(program, name) for name in m.SCENES}
     out = {"mujoco": mujoco.__version__, "runs": RUNS, "scenes": scenes}
     (m.RESULTS / "cost.json").write_text(json.dumps(out, indent=1) + "\n")
-    ratios(scenes)
 
 
 if __name__ == "__main__":

@@ -69,7 +69,11 @@ const KINDS: [Kind; 5] = [
 
 impl Kind {
     fn methods(&self) -> Vec<&'static Method> {
-        if self.methods.is_empty() { in_table_order() } else { self.methods.iter().filter_map(|key| method(key)).collect() }
+        if self.methods.is_empty() {
+            in_table_order()
+        } else {
+            self.methods.iter().filter_map(|key| method(key)).collect()
+        }
     }
 }
 
@@ -244,9 +248,8 @@ pub(super) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
         let ece = format!("{:.3}", row.ece);
         vec![format!("`{}`", row.method), interval, row.after(3), row.after(5), size, shape, ece]
     });
-    let kinds = others.iter().map(|row| {
-        vec![row.grasps.clone(), format!("`{}`", row.method), row.after(1), row.after(3)]
-    });
+    let kinds =
+        others.iter().map(|row| vec![row.grasps.clone(), format!("`{}`", row.method), row.after(1), row.after(3)]);
     let fed_back = first.iter().filter(|row| ITERATED.contains(&row.method.as_str()));
     let gap = fed_back.flat_map(|row| row.by_grasps.iter().zip(&row.by_grasps_independent)).map(|(a, b)| (a - b).abs());
     let shuffled = &controls.shuffled_labels;
@@ -254,7 +257,10 @@ pub(super) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
         "{}\n\n{}\n\nControls of `{EXAMPLE}` (`palpate evaluate --controls`): with shuffled labels {} ({} to {}), with the \
          true size and shape given {}. PMF feedback stays within {} points of the product of experts, which treats grasps \
          as independent, at every number of grasps.\n\n`{COMMAND}`, version {}.",
-        markdown_table(&["method", "one grasp", "after three", "after five", "size", "shape", "ECE"], &methods.collect::<Vec<_>>()),
+        markdown_table(
+            &["method", "one grasp", "after three", "after five", "size", "shape", "ECE"],
+            &methods.collect::<Vec<_>>()
+        ),
         markdown_table(&["other grasps", "method", "one grasp", "after three"], &kinds.collect::<Vec<_>>()),
         percent(shuffled.estimate),
         percent(shuffled.low),
