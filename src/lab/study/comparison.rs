@@ -132,6 +132,11 @@ impl Comparison<'_> {
         }
     }
 
+    /// Fits and evaluates one method in this thread.
+    pub fn row_of(&self, method: &'static Method) -> Result<ComparisonRow, ComparisonError> {
+        self.of_method(method).map(|judged| judged.row)
+    }
+
     fn of_method(&self, method: &'static Method) -> Result<Judged, ComparisonError> {
         let fitting = self.fitting();
         let model =

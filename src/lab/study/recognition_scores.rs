@@ -191,8 +191,8 @@ pub fn measure_scores(
             Comparison { train: &train, test: &test, seed: SEED, quick: false, stop, interrupted: how.cancelled };
         let finished = results.complete(&units, how, |unit| match unit {
             Some(method) => {
-                let row = comparison.of_methods(&[*method], 1, &|_| ())?.into_iter().next();
-                Ok::<_, ScoreError>(row.map(|row| ScoreUnit::Scores(RecognitionScores::new(kind.about, row))))
+                let row = comparison.row_of(method)?;
+                Ok::<_, ScoreError>(Some(ScoreUnit::Scores(RecognitionScores::new(kind.about, row))))
             }
             None => {
                 let measured = comparison.controls(example)?;
@@ -256,7 +256,7 @@ pub(super) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     let text = format!(
         "{}\n\n{}\n\nControls of `{EXAMPLE}` (`palpate evaluate --controls`): with shuffled labels {} ({} to {}), with the \
          true size and shape given {}. PMF feedback stays within {} points of the product of experts, which treats grasps \
-         as independent, at every number of grasps.\n\n`{COMMAND}`, version {}.",
+         as independent, at every number of grasps.\n\n{}",
         markdown_table(
             &["method", "one grasp", "after three", "after five", "size", "shape", "ECE"],
             &methods.collect::<Vec<_>>()
@@ -267,7 +267,7 @@ pub(super) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
         percent(shuffled.high),
         percent(controls.true_size_and_shape.estimate),
         percent(gap.fold(0.0, f64::max)),
-        stored.program
+        stored.origin()
     );
     let best = first.iter().max_by(|a, b| a.f1.total_cmp(&b.f1));
     let in_short = best.map_or_else(String::new, |best| {
