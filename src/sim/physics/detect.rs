@@ -27,7 +27,7 @@ use super::finger_pair::{Fronts, OtherFinger, in_series};
 use super::model::{Body, PhysicsModel};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
-use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
+use crate::gripper::{FingerPlane, PadLaw, SegmentFrame, SegmentPose};
 use glam::{DMat3, DVec3};
 use palpate_geometry::Pose;
 
@@ -77,10 +77,15 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
     let environment = moved_world.as_ref().unwrap_or(&model.environment);
     let passing = workspace.passing.velocity.length();
     let pose = object.as_ref().map(|solid| (solid.object_from_gripper, solid.centre));
-    workspace.clearances.follow(model, &workspace.segments, pose, environment.way_from(&model.environment));
+    let frames = workspace.space.as_ref().map_or(&[][..], |space| &space.frames);
+    let world = environment.way_from(&model.environment);
+    workspace.clearances.follow(model, (&workspace.segments, frames), pose, world);
     // No segment is farther from its axis than this.
     let reach = model.springs.reach.iter().copied().fold(0.0, f64::max);
-    let turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
+    let mut turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
+    if let Some(sideways) = &model.sideways {
+        turning += sideways.turning(state.sway_rates(model));
+    }
     let fastest = state.fastest(model) + turning * reach;
     let farthest = margin(h, fastest + passing);
     workspace.fingers_meet = false;
@@ -91,10 +96,14 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
         for j in 0..=model.chain.joints {
             let link = first_link + j;
             let segment = workspace.segments[link];
+            let frame = workspace.frames().get(link).copied();
             if fronts.is_none() && workspace.clearances.of_link(link) > farthest {
                 continue;
             }
-            let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
+            let middle = match &frame {
+                Some(frame) => frame.point(0.5 * model.chain.lengths[j], 0.0, 0.0),
+                None => model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0),
+            };
             let reach = model.springs.reach[j] + model.springs.radius;
             let link_velocity = workspace.spatial[link];
             let speed =
@@ -108,7 +117,9 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let near_world = to_world < reach + against_world;
             let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
                 let margin = margin(workspace.step.h, speed + fastest[1 - finger]);
-                fronts.may_meet(model, finger, (&segment, model.chain.lengths[j]), margin).then_some(margin)
+                fronts
+                    .may_meet(model, finger, (&segment, frame.as_ref(), model.chain.lengths[j]), margin)
+                    .then_some(margin)
             });
             if near_object.is_none() && !near_world && against_finger.is_none() {
                 workspace.clearances.note_link(link, to_object.min(to_world) - reach);
@@ -122,7 +133,7 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
                 finger: against_finger,
                 least_to_world: to_world - reach,
             };
-            detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment });
+            detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment, frame });
         }
     }
     if let Some(body) = model.free_body()
@@ -175,24 +186,27 @@ struct Place {
     segment_index: usize,
     link: usize,
     segment: SegmentPose,
+    /// The segment in space, where it leaves its plane.
+    frame: Option<SegmentFrame>,
 }
 
 fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
     let plane = model.planes[place.finger];
-    let local_axes = segment_axes(&plane, &place.segment);
+    let local_axes = place.frame.map_or_else(|| segment_axes(&plane, &place.segment), |frame| frame.axes);
     for k in model.springs.of_segment(place.segment_index) {
         let spring = &model.springs.all[k];
         let site = place.finger * model.springs.all.len() + k;
         if near.finger.is_none() && workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest() {
             continue;
         }
-        let (foot, axis) = spring.ray(&place.segment);
-        let ray = Ray {
-            foot: plane.point(foot, spring.across),
-            axis: plane.direction(axis),
-            radius: model.springs.radius,
-            rest: spring.height - model.springs.radius,
+        let (foot, axis) = match &place.frame {
+            Some(frame) => spring.ray_in_space(frame),
+            None => {
+                let (foot, axis) = spring.ray(&place.segment);
+                (plane.point(foot, spring.across), plane.direction(axis))
+            }
         };
+        let ray = Ray { foot, axis, radius: model.springs.radius, rest: spring.height - model.springs.radius };
         let (to_object, clearance) = near.distances(ray.foot);
         if near.finger.is_none() {
             workspace.clearances.note_spring(site, place.link, clearance);
@@ -208,7 +222,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             (None, world) => (world, Against::World),
         };
         if let Some(margin) = near.finger {
-            let other = OtherFinger::opposite(model, &workspace.segments, place.finger);
+            let other = OtherFinger::opposite(model, workspace, place.finger);
             if let Some(met) = ray.cast_finger(&other, margin) {
                 // A contact in waiting gives way to all others.
                 let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));
@@ -276,14 +290,18 @@ fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Op
     let fastest = [0, 1].map(|finger| {
         let speed = |j: usize| {
             let link = finger * links + j;
-            let middle = workspace.segments[link].point(0.5 * model.chain.lengths[j], 0.0);
-            let arm = model.planes[finger].point(middle, 0.0) - workspace.reference;
+            let half = 0.5 * model.chain.lengths[j];
+            let middle = match workspace.frames().get(link) {
+                Some(frame) => frame.point(half, 0.0, 0.0),
+                None => model.planes[finger].point(workspace.segments[link].point(half, 0.0), 0.0),
+            };
+            let arm = middle - workspace.reference;
             let velocity = &workspace.spatial[link];
             velocity.linear_at(arm).length() + velocity.angular.length() * model.springs.reach[j]
         };
         (0..links).map(speed).fold(0.0, f64::max)
     });
-    let fronts = Fronts::new(model, &workspace.segments);
+    let fronts = Fronts::new(model, workspace);
     let clearance = fronts.clearance(model);
     workspace.clearances.note_fingers(clearance);
     (clearance < margin(workspace.step.h, fastest[0] + fastest[1])).then_some((fronts, fastest))

@@ -13,10 +13,11 @@
 //!
 //! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
 //! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs.
-//! Both fingers bend in one plane, so that nothing moves across.
+//! Where fingers leave their planes, along, across and height are those of the nearest segment as it is turned in space.
 
 use super::model::PhysicsModel;
-use crate::gripper::{FingerPlane, SegmentPose};
+use super::workspace::Workspace;
+use crate::gripper::{FingerPlane, SegmentFrame, SegmentPose};
 use glam::{DVec2, DVec3};
 
 /// Contact spring of a pad against another contact spring like it, as seen from one of them: small-strain stiffness
@@ -30,11 +31,13 @@ pub(super) fn in_series(stiffness: f64, height: f64) -> (f64, f64) {
 pub(super) struct Fronts([f64; 2]);
 
 impl Fronts {
-    pub(super) fn new(model: &PhysicsModel, segments: &[SegmentPose]) -> Self {
+    pub(super) fn new(model: &PhysicsModel, ws: &Workspace) -> Self {
         let n = model.chain.joints;
         Self([0, 1].map(|finger| {
-            let own = &segments[finger * (n + 1)..(finger + 1) * (n + 1)];
-            own.iter().zip(&model.chain.lengths).map(|(s, l)| front(model, s, *l)).fold(f64::NEG_INFINITY, f64::max)
+            let links = finger * (n + 1)..(finger + 1) * (n + 1);
+            let own = links.zip(&model.chain.lengths);
+            own.map(|(link, l)| front(model, finger, (&ws.segments[link], ws.frames().get(link), *l)))
+                .fold(f64::NEG_INFINITY, f64::max)
         }))
     }
 
@@ -43,10 +46,10 @@ impl Fronts {
         &self,
         model: &PhysicsModel,
         finger: usize,
-        segment: (&SegmentPose, f64),
+        segment: (&SegmentPose, Option<&SegmentFrame>, f64),
         margin: f64,
     ) -> bool {
-        front(model, segment.0, segment.1) + self.0[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
+        front(model, finger, segment) + self.0[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
     }
 
     /// Clearance between the fingers, seen from the side (m).
@@ -56,7 +59,19 @@ impl Fronts {
 }
 
 /// Most inward point of a segment, pad and bellows included (m).
-fn front(model: &PhysicsModel, segment: &SegmentPose, length: f64) -> f64 {
+fn front(
+    model: &PhysicsModel,
+    finger: usize,
+    (segment, frame, length): (&SegmentPose, Option<&SegmentFrame>, f64),
+) -> f64 {
+    if let Some(frame) = frame {
+        let plane = &model.planes[finger];
+        let inward = |v: DVec3| plane.sign * v.x;
+        let [along, across, up] = [frame.axes.x_axis, frame.axes.y_axis, frame.axes.z_axis].map(inward);
+        let faces = (model.skin.thickness * up).max(-model.skin.back * up);
+        let edge = 0.5 * model.skin.width * across.abs();
+        return inward(frame.start) + plane.half_gap + (length * along).max(0.0) + faces + edge;
+    }
     let faces = model.skin.thickness * segment.inward().x;
     let back = -model.skin.back * segment.inward().x;
     segment.start.x + (length * segment.along.x).max(0.0) + faces.max(back)
@@ -67,6 +82,8 @@ pub(super) struct OtherFinger<'a> {
     model: &'a PhysicsModel,
     plane: FingerPlane,
     segments: &'a [SegmentPose],
+    /// The same in space; none where it stays in its plane.
+    frames: &'a [SegmentFrame],
 }
 
 /// A point seen from a finger.
@@ -75,18 +92,22 @@ struct Place {
     segment: usize,
     /// Arc length from the tip, negative before it (m).
     beyond_tip: f64,
+    /// Distance from the middle of the pad, along y where the finger stays in its plane (m).
+    across: f64,
     /// Height above the neutral axis, towards the inner side (m).
     height: f64,
-    /// Direction in which the height grows.
-    up: DVec2,
+    /// Directions in which the height and the arc length grow.
+    up: DVec3,
+    ahead: DVec3,
 }
 
 impl<'a> OtherFinger<'a> {
     /// The finger opposite to `finger`.
-    pub(super) fn opposite(model: &'a PhysicsModel, segments: &'a [SegmentPose], finger: usize) -> Self {
+    pub(super) fn opposite(model: &'a PhysicsModel, ws: &'a Workspace, finger: usize) -> Self {
         let (other, n) = (1 - finger, model.chain.joints);
-        let segments = &segments[other * (n + 1)..(other + 1) * (n + 1)];
-        Self { model, plane: model.planes[other], segments }
+        let links = other * (n + 1)..(other + 1) * (n + 1);
+        let frames = ws.frames().get(links.clone()).unwrap_or_default();
+        Self { model, plane: model.planes[other], segments: &ws.segments[links], frames }
     }
 
     /// A point of the gripper frame in the finger's plane.
@@ -94,8 +115,11 @@ impl<'a> OtherFinger<'a> {
         DVec2::new(self.plane.sign * p.x + self.plane.half_gap, -p.z)
     }
 
-    fn place(&self, p: DVec3) -> Place {
-        let p = self.in_plane(p);
+    fn place(&self, at: DVec3) -> Place {
+        if !self.frames.is_empty() {
+            return self.place_in_space(at);
+        }
+        let p = self.in_plane(at);
         let (lengths, last) = (&self.model.chain.lengths, self.segments.len() - 1);
         let mut nearest = (f64::INFINITY, 0, 0.0, DVec2::ZERO);
         for (j, segment) in self.segments.iter().enumerate() {
@@ -118,21 +142,54 @@ impl<'a> OtherFinger<'a> {
         // On the axis itself the offset has no direction.
         let up = if size > 1e-12 { offset * (side / size) } else { inward };
         let remaining: f64 = lengths[segment..].iter().sum();
-        Place { segment, beyond_tip: along - remaining, height: side * size, up }
+        let direction = |d: DVec2| self.plane.direction(d);
+        Place {
+            segment,
+            beyond_tip: along - remaining,
+            across: at.y,
+            height: side * size,
+            up: direction(up),
+            ahead: direction(self.segments[segment].along),
+        }
+    }
+
+    /// The same among segments in space: lengths are those in the axes of each segment.
+    fn place_in_space(&self, p: DVec3) -> Place {
+        let (lengths, last) = (&self.model.chain.lengths, self.frames.len() - 1);
+        let mut nearest = (f64::INFINITY, 0, 0.0, DVec3::ZERO);
+        for (j, frame) in self.frames.iter().enumerate() {
+            let local = frame.axes.transpose() * (p - frame.start);
+            let low = if j == 0 { f64::NEG_INFINITY } else { 0.0 };
+            let high = if j == last { f64::INFINITY } else { lengths[j] };
+            let within = local.x.clamp(low, high);
+            let beside = (local.x - within).powi(2) + local.z.powi(2);
+            if beside < nearest.0 {
+                nearest = (beside, j, within, local);
+            }
+        }
+        let (squared, segment, along, local) = nearest;
+        let frame = &self.frames[segment];
+        let side = if local.z < 0.0 { -1.0 } else { 1.0 };
+        let size = squared.sqrt();
+        let offset = frame.axes.x_axis * (local.x - along) + frame.axes.z_axis * local.z;
+        let up = if size > 1e-12 { offset * (side / size) } else { frame.axes.z_axis };
+        let remaining: f64 = lengths[segment..].iter().sum();
+        let (across, ahead) = (local.y, frame.axes.x_axis);
+        Place { segment, beyond_tip: along - remaining, across, height: side * size, up, ahead }
     }
 
     /// Distance of a point beyond the core of the rounded box, along the finger and away from its middle (m).
-    fn excess(&self, place: &Place, across: f64) -> (f64, f64, bool) {
+    fn excess(&self, place: &Place) -> (f64, f64, bool) {
         let skin = &self.model.skin;
         let radius = self.model.springs.radius;
-        let front = place.height - (skin.height(across) - radius);
+        let front = place.height - (skin.height(place.across) - radius);
         let back = -place.height - (skin.back - radius).max(0.0);
         (place.beyond_tip + skin.last_row, front.max(back), front >= back)
     }
 
     /// Distance of a point from the skin (m), negative inside.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
-        let (along, away, _) = self.excess(&self.place(p), p.y);
+        let (along, away, _) = self.excess(&self.place(p));
         let outside = along.max(0.0).hypot(away.max(0.0));
         outside + along.max(away).min(0.0) - self.model.springs.radius
     }
@@ -140,10 +197,10 @@ impl<'a> OtherFinger<'a> {
     /// Outward normal of the skin nearest to a point.
     pub(super) fn normal(&self, p: DVec3) -> DVec3 {
         let place = self.place(p);
-        let (along, away, in_front) = self.excess(&place, p.y);
-        let ahead = self.segments[place.segment].along;
+        let (along, away, in_front) = self.excess(&place);
+        let ahead = place.ahead;
         let up = if in_front { place.up } else { -place.up };
-        let direction = match (along > 0.0, away > 0.0) {
+        match (along > 0.0, away > 0.0) {
             (true, true) => (ahead * along + up * away).normalize_or(up),
             (true, false) => ahead,
             (false, true) => up,
@@ -154,8 +211,7 @@ impl<'a> OtherFinger<'a> {
                     up
                 }
             }
-        };
-        self.plane.direction(direction)
+        }
     }
 
     /// The segment that a point touches.
@@ -173,7 +229,7 @@ impl<'a> OtherFinger<'a> {
         let length: f64 = self.model.chain.lengths.iter().sum();
         let cell = |share: f64, count: usize| ((share * count as f64).max(0.0) as usize).min(count - 1);
         let row = cell((place.beyond_tip + length) / length, skin.rows);
-        let column = cell(p.y / skin.width + 0.5, skin.columns);
+        let column = cell(place.across / skin.width + 0.5, skin.columns);
         Some(row * skin.columns + column)
     }
 }

@@ -57,13 +57,14 @@ use palpate_geometry::{DistanceField, Pose};
 use world::{Hand, Touch};
 
 /// Effects that this engine always or never has.
-const SETTLED: [(Effect, bool, &str); 6] = [
+const SETTLED: [(Effect, bool, &str); 7] = [
     (Effect::FingerInertia, true, "rapier's chains always have inertia"),
     (Effect::FingerContact, false, "rapier's fingers do not meet each other here"),
     (Effect::PneumaticLag, false, "rapier follows the line pressure without lag"),
     (Effect::Creep, false, "rapier's springs do not creep"),
     (Effect::Shaking, false, "rapier's hand stays where it is"),
     (Effect::SoftObject, false, "rapier's objects are rigid"),
+    (Effect::OutOfPlane, false, "rapier's fingers stay in their planes"),
 ];
 
 /// The plan as rapier carries it out.
