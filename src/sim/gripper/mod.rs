@@ -14,7 +14,7 @@ pub use bend::{BentFinger, FingerPlane, SegmentPose, bend};
 pub use finger::{Finger, Sideways};
 pub use pad::{Pad, PadLaw};
 pub use programme::{Phase, Programme};
-pub use space::{JointAxes, SegmentFrame, Sway, bend_in_space, sway_shares};
+pub use space::{JointAxes, PlacedFinger, SegmentFrame, Sway, bend_in_space, sway_shares};
 pub use taxels::TaxelGrid;
 
 use serde::{Deserialize, Serialize};

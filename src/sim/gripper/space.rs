@@ -11,7 +11,8 @@
 //! angle q in the plane, then sideways about "inward", then about "along", then the other half of q. Turns are whole
 //! rotations, so that no segment changes its length however far a finger goes.
 
-use super::bend::FingerPlane;
+use super::bend::{FingerPlane, SegmentPose, bend};
+use super::{GripperModel, Side};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -115,9 +116,68 @@ pub fn bend_in_space(
     }
 }
 
+/// A bent finger in the gripper frame, for those who need it now and then rather than in every step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedFinger {
+    /// Lengths of the N + 1 segments (m).
+    pub lengths: Vec<f64>,
+    shape: Shape,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Shape {
+    Planar(FingerPlane, Vec<SegmentPose>),
+    InSpace(Vec<SegmentFrame>),
+}
+
+impl PlacedFinger {
+    /// Bends a finger by N joint angles (rad) and a sway.
+    pub fn new(gripper: &GripperModel, side: Side, q: &[f64], sway: Sway) -> Self {
+        let lengths: Vec<f64> = gripper.finger.segment_lengths().collect();
+        let plane = gripper.plane(side);
+        let shape = if sway == Sway::NONE {
+            let mut segments = vec![SegmentPose::default(); lengths.len()];
+            bend(&lengths, q, &mut segments);
+            Shape::Planar(plane, segments)
+        } else {
+            let shares: Vec<[f64; 2]> = sway_shares(&lengths).collect();
+            let mut segments = vec![SegmentFrame::default(); lengths.len()];
+            let mut joints = vec![JointAxes::default(); q.len()];
+            bend_in_space(&plane, (&lengths, &shares), (q, sway), &mut segments, &mut joints);
+            Shape::InSpace(segments)
+        };
+        Self { lengths, shape }
+    }
+
+    /// A point along, across and inward of a segment's start (m).
+    pub fn point(&self, segment: usize, along: f64, across: f64, inward: f64) -> DVec3 {
+        match &self.shape {
+            Shape::Planar(plane, segments) => plane.point(segments[segment].point(along, inward), across),
+            Shape::InSpace(segments) => segments[segment].point(along, across, inward),
+        }
+    }
+
+    /// Unit vectors along a segment, across it and inward, as columns.
+    pub fn axes(&self, segment: usize) -> DMat3 {
+        match &self.shape {
+            Shape::Planar(plane, segments) => {
+                let SegmentPose { along, .. } = segments[segment];
+                let inward = plane.direction(segments[segment].inward());
+                DMat3::from_cols(plane.direction(along), DVec3::Y, inward)
+            }
+            Shape::InSpace(segments) => segments[segment].axes,
+        }
+    }
+
+    /// The joints, from the palm to the tip (m).
+    pub fn joints(&self) -> impl Iterator<Item = DVec3> + '_ {
+        (1..self.lengths.len()).map(|segment| self.point(segment, 0.0, 0.0, 0.0))
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Finger, SegmentPose, Side, bend};
+    use super::super::Finger;
     use super::*;
 
     fn laid_out(side: Side, q: &[f64], sway: Sway) -> (Vec<SegmentFrame>, Vec<JointAxes>) {

@@ -202,6 +202,7 @@ impl Simulation {
             line_bar: self.line_bar,
             phase: self.phase,
             q: self.state.q.clone(),
+            sways: self.state.sways,
             hand: self.model.world_from_gripper.direction(self.state.hand[0]),
             world_from_object: self.world_from_object(),
             taxels: self.taxel_loads(),

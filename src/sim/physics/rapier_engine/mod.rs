@@ -48,7 +48,7 @@ use super::placement::Placement;
 use super::simulation::Refinement;
 use super::step::NotFinite;
 use crate::frame::{Frame, Plan, Quality};
-use crate::gripper::{Actuation, FingerPlane, Phase, SegmentPose, Side};
+use crate::gripper::{Actuation, FingerPlane, Phase, SegmentPose, Side, Sway};
 use crate::objects::ObjectModel;
 use crate::scene::{Accuracy, Clock, Effect, Scene, SupportKind};
 use glam::{DVec2, DVec3};
@@ -273,6 +273,7 @@ impl Engine for RapierSimulation {
             line_bar: self.line_bar,
             phase: self.phase,
             q,
+            sways: [Sway::NONE; 2],
             hand: DVec3::ZERO,
             world_from_object: self.hand.gripper_from_object().map(|pose| self.world_from_gripper * pose),
             taxels,
