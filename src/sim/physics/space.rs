@@ -78,6 +78,18 @@ impl Sideways {
         0.5 * sway.to_array().iter().zip(self.stiffness).map(|(x, k)| k * x * x).sum::<f64>()
     }
 
+    /// Moments that shapes out of the plane stand under, summed, the larger of two states (N m); and elastic energy in
+    /// the first (J).
+    pub(super) fn strain(&self, before: &State, after: &State) -> (f64, f64) {
+        let mut moments = 0.0;
+        for (before, after) in before.sways.iter().zip(&after.sways) {
+            for (which, (x, y)) in before.to_array().into_iter().zip(after.to_array()).enumerate() {
+                moments += self.stiffness[which] / self.turns[which] * x.abs().max(y.abs());
+            }
+        }
+        (moments, before.sways.iter().map(|sway| self.energy(*sway)).sum())
+    }
+
     /// Bound of the turn of any segment (rad/s), from its rates.
     pub(super) fn turning(&self, rates: [f64; 2]) -> f64 {
         self.turns[0] * rates[0].abs() + self.turns[1] * rates[1].abs()
