@@ -222,7 +222,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             (None, world) => (world, Against::World),
         };
         if let Some(margin) = near.finger {
-            let other = OtherFinger::opposite(model, workspace, place.finger);
+            let other = OtherFinger::opposite(model, workspace, place.finger, spring.across);
             if let Some(met) = ray.cast_finger(&other, margin) {
                 // A contact in waiting gives way to all others.
                 let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));

@@ -13,7 +13,9 @@
 //!
 //! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
 //! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs.
-//! Where fingers leave their planes, along, across and height are those of the nearest segment as it is turned in space.
+//! Where fingers leave their planes, length and height are those of the nearest segment as it is turned in space. Across,
+//! the skin is as high as where the spring that meets it sits on its own pad: what lies beside each other is not seen, and a
+//! motion across does no work on the crown.
 
 use super::model::PhysicsModel;
 use super::workspace::Workspace;
@@ -84,6 +86,8 @@ pub(super) struct OtherFinger<'a> {
     segments: &'a [SegmentPose],
     /// The same in space; none where it stays in its plane.
     frames: &'a [SegmentFrame],
+    /// Distance from the middle of its pad of the contact spring that meets it (m).
+    met_at: f64,
 }
 
 /// A point seen from a finger.
@@ -102,12 +106,12 @@ struct Place {
 }
 
 impl<'a> OtherFinger<'a> {
-    /// The finger opposite to `finger`.
-    pub(super) fn opposite(model: &'a PhysicsModel, ws: &'a Workspace, finger: usize) -> Self {
+    /// The finger opposite to `finger`, as a contact spring at `met_at` across its pad (m) meets it.
+    pub(super) fn opposite(model: &'a PhysicsModel, ws: &'a Workspace, finger: usize, met_at: f64) -> Self {
         let (other, n) = (1 - finger, model.chain.joints);
         let links = other * (n + 1)..(other + 1) * (n + 1);
         let frames = ws.frames().get(links.clone()).unwrap_or_default();
-        Self { model, plane: model.planes[other], segments: &ws.segments[links], frames }
+        Self { model, plane: model.planes[other], segments: &ws.segments[links], frames, met_at }
     }
 
     /// A point of the gripper frame in the finger's plane.
@@ -182,7 +186,7 @@ impl<'a> OtherFinger<'a> {
     fn excess(&self, place: &Place) -> (f64, f64, bool) {
         let skin = &self.model.skin;
         let radius = self.model.springs.radius;
-        let front = place.height - (skin.height(place.across) - radius);
+        let front = place.height - (skin.height(self.met_at) - radius);
         let back = -place.height - (skin.back - radius).max(0.0);
         (place.beyond_tip + skin.last_row, front.max(back), front >= back)
     }

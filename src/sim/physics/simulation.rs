@@ -253,7 +253,7 @@ impl Simulation {
                 loads.push(self.taxel_load(side, spring, link, force));
             }
             if let Against::Finger(other) = contact.against {
-                let met = OtherFinger::opposite(&self.model, &self.workspace, side);
+                let met = OtherFinger::opposite(&self.model, &self.workspace, side, springs.all[spring].across);
                 if let Some(taxel) = met.taxel(contact.arm + self.workspace.reference) {
                     loads.push(self.taxel_load(1 - side, taxel, other, -force));
                 }
