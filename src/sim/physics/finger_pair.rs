@@ -14,8 +14,8 @@
 //! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
 //! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs.
 //! Where fingers leave their planes, length and height are those of the nearest segment as it is turned in space. Across,
-//! the skin is as high as where the spring that meets it sits on its own pad: what lies beside each other is not seen, and a
-//! motion across does no work on the crown.
+//! the skin is as high as where the spring that meets it sits on its own pad, so that a motion across does no work on the
+//! crown, and the box ends at the sides: fingers far enough beside each other pass.
 
 use super::model::PhysicsModel;
 use super::workspace::Workspace;
@@ -191,10 +191,26 @@ impl<'a> OtherFinger<'a> {
         (place.beyond_tip + skin.last_row, front.max(back), front >= back)
     }
 
+    /// Way of a point beyond the side of the core, and the direction out of it; only fingers in space have sides.
+    fn beside(&self, place: &Place) -> (f64, DVec3) {
+        match self.frames.get(place.segment) {
+            Some(frame) => {
+                let core = (0.5 * self.model.skin.width - self.model.springs.radius).max(0.0);
+                ((place.across.abs() - core).max(0.0), frame.axes.y_axis * place.across.signum())
+            }
+            None => (0.0, DVec3::ZERO),
+        }
+    }
+
     /// Distance of a point from the skin (m), negative inside.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
-        let (along, away, _) = self.excess(&self.place(p));
-        let outside = along.max(0.0).hypot(away.max(0.0));
+        let place = self.place(p);
+        let (along, away, _) = self.excess(&place);
+        let mut outside = along.max(0.0).hypot(away.max(0.0));
+        let (beside, _) = self.beside(&place);
+        if beside > 0.0 {
+            outside = outside.hypot(beside);
+        }
         outside + along.max(away).min(0.0) - self.model.springs.radius
     }
 
@@ -204,7 +220,13 @@ impl<'a> OtherFinger<'a> {
         let (along, away, in_front) = self.excess(&place);
         let ahead = place.ahead;
         let up = if in_front { place.up } else { -place.up };
+        let (beside, out) = self.beside(&place);
         match (along > 0.0, away > 0.0) {
+            _ if beside > 0.0 => {
+                let within = if along.max(away) > 0.0 { DVec3::ZERO } else { up };
+                (ahead * along.max(0.0) + up * away.max(0.0) + out * beside).normalize_or(up) + within
+            }
+            .normalize_or(up),
             (true, true) => (ahead * along + up * away).normalize_or(up),
             (true, false) => ahead,
             (false, true) => up,
