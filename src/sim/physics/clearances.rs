@@ -66,6 +66,7 @@ impl Clearances {
     /// Adds the ways from the last layout to this one.
     ///
     /// `object`: its rotation and its centre; `world`: its displacement (m).
+    #[inline]
     pub(super) fn follow(
         &mut self,
         model: &PhysicsModel,
@@ -85,20 +86,22 @@ impl Clearances {
             self.object_way += moved + turned * model.body.as_ref().map_or(0.0, |body| body.radius);
         }
         let mut farthest = [0.0f64; 2];
-        for (link, (now, before)) in segments.iter().zip(&mut self.segments).enumerate() {
-            let lever = model.chain.lengths[link % links] + depth;
-            let start = frames.get(link).map_or(model.planes[link / links].point(now.start, 0.0), |frame| frame.start);
-            let from_centre = start - centre;
-            let arm = from_centre.length() + lever + model.skin.width;
-            let own = match (frames.get(link), self.frames.get_mut(link)) {
-                (Some(now), Some(before)) => {
-                    let turned = (now.axes - before.axes).to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-                    let way = (now.start - before.start).length() + turned * (lever + model.skin.width);
-                    *before = *now;
-                    way
-                }
-                _ => (now.start - before.start).length() + (now.along - before.along).length() * lever,
-            };
+        if frames.is_empty() {
+            for (link, (now, before)) in segments.iter().zip(&mut self.segments).enumerate() {
+                let lever = model.chain.lengths[link % links] + depth;
+                let from_centre = model.planes[link / links].point(now.start, 0.0) - centre;
+                let arm = from_centre.length() + lever + model.skin.width;
+                let own = (now.start - before.start).length() + (now.along - before.along).length() * lever;
+                self.ways[link] += own + moved + turned * arm;
+                farthest[link / links] = farthest[link / links].max(own);
+                *before = *now;
+            }
+        }
+        for (link, (now, before)) in frames.iter().zip(&mut self.frames).enumerate() {
+            let lever = model.chain.lengths[link % links] + depth + model.skin.width;
+            let arm = (now.start - centre).length() + lever;
+            let axes = (now.axes - before.axes).to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+            let own = (now.start - before.start).length() + axes * lever;
             self.ways[link] += own + moved + turned * arm;
             farthest[link / links] = farthest[link / links].max(own);
             *before = *now;

@@ -27,7 +27,7 @@ use super::finger_pair::{Fronts, OtherFinger, in_series};
 use super::model::{Body, PhysicsModel};
 use super::state::State;
 use super::workspace::{Spatial, Workspace};
-use crate::gripper::{FingerPlane, PadLaw, SegmentFrame, SegmentPose};
+use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
 use glam::{DMat3, DVec3};
 use palpate_geometry::Pose;
 
@@ -96,11 +96,10 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
         for j in 0..=model.chain.joints {
             let link = first_link + j;
             let segment = workspace.segments[link];
-            let frame = workspace.frames().get(link).copied();
             if fronts.is_none() && workspace.clearances.of_link(link) > farthest {
                 continue;
             }
-            let middle = match &frame {
+            let middle = match workspace.frames().get(link) {
                 Some(frame) => frame.point(0.5 * model.chain.lengths[j], 0.0, 0.0),
                 None => model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0),
             };
@@ -118,7 +117,7 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
                 let margin = margin(workspace.step.h, speed + fastest[1 - finger]);
                 fronts
-                    .may_meet(model, finger, (&segment, frame.as_ref(), model.chain.lengths[j]), margin)
+                    .may_meet(model, finger, (&segment, workspace.frames().get(link), model.chain.lengths[j]), margin)
                     .then_some(margin)
             });
             if near_object.is_none() && !near_world && against_finger.is_none() {
@@ -133,7 +132,7 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
                 finger: against_finger,
                 least_to_world: to_world - reach,
             };
-            detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment, frame });
+            detect_segment(model, state, workspace, &near, Place { finger, segment_index: j, link, segment });
         }
     }
     if let Some(body) = model.free_body()
@@ -186,25 +185,23 @@ struct Place {
     segment_index: usize,
     link: usize,
     segment: SegmentPose,
-    /// The segment in space, where it leaves its plane.
-    frame: Option<SegmentFrame>,
 }
 
 fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
     let plane = model.planes[place.finger];
-    let local_axes = place.frame.map_or_else(|| segment_axes(&plane, &place.segment), |frame| frame.axes);
+    let in_space = workspace.space.is_some();
+    let local_axes = if in_space { workspace.frames()[place.link].axes } else { segment_axes(&plane, &place.segment) };
     for k in model.springs.of_segment(place.segment_index) {
         let spring = &model.springs.all[k];
         let site = place.finger * model.springs.all.len() + k;
         if near.finger.is_none() && workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest() {
             continue;
         }
-        let (foot, axis) = match &place.frame {
-            Some(frame) => spring.ray_in_space(frame),
-            None => {
-                let (foot, axis) = spring.ray(&place.segment);
-                (plane.point(foot, spring.across), plane.direction(axis))
-            }
+        let (foot, axis) = if in_space {
+            spring.ray_in_space(&workspace.frames()[place.link])
+        } else {
+            let (foot, axis) = spring.ray(&place.segment);
+            (plane.point(foot, spring.across), plane.direction(axis))
         };
         let ray = Ray { foot, axis, radius: model.springs.radius, rest: spring.height - model.springs.radius };
         let (to_object, clearance) = near.distances(ray.foot);

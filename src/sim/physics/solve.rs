@@ -10,7 +10,7 @@
 //! and angular velocity. Contact Hessians are summed per segment (6 x 6) before they go to joints: beyond joint i
 //! everything moves with column S_i, so that H_ij = S_i' (sum of blocks from the tip to the farther joint) S_j.
 
-use super::contact::{Acting, Against, Contact};
+use super::contact::{Acting, Against, Contact, ContactStep};
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
@@ -198,48 +198,58 @@ pub(super) struct Size {
     contacts: f64,
 }
 
-pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
-    let n = model.chain.joints;
+/// Hands over the load of each contact on the segments it acts on, as finger and segment, found by the finger's own
+/// contact springs (0) or by those of the other one (1); returns the sum that acts on the object.
+#[inline]
+fn add_up(
+    n: usize,
+    contacts: &[Contact],
+    step: ContactStep,
+    mut add: impl FnMut((usize, usize), usize, &Spatial),
+) -> Spatial {
     let (mut on_object, mut by_fingers) = (Spatial::default(), [Spatial::default(); 2]);
-    match &mut ws.space {
-        Some(space) => space.loads.fill(Spatial::default()),
-        None => ws.loads.fill([Planar::default(); 2]),
-    }
     let place = |link: u32| (link as usize / (n + 1), link as usize % (n + 1));
-    for contact in &ws.contacts {
-        let linear = contact.gradient(ws.step, contact.velocity);
+    for contact in contacts {
+        let linear = contact.gradient(step, contact.velocity);
         let load = Spatial { linear, angular: contact.arm.cross(linear) };
         match contact.acting {
             Acting::Segment(link) => {
                 let (finger, segment) = place(link);
-                match &mut ws.space {
-                    Some(space) => space.add_load(link, &load),
-                    None => ws.loads[segment][0].add_to(finger, &load),
-                }
+                add((finger, segment), 0, &load);
                 match contact.against {
                     Against::Object => by_fingers[finger] = by_fingers[finger].plus(&load),
                     Against::World => (),
-                    Against::Finger(other) => {
-                        let (finger, segment) = place(other);
-                        match &mut ws.space {
-                            Some(space) => space.add_load(other, &load.scaled(-1.0)),
-                            None => ws.loads[segment][1].add_to(finger, &load.scaled(-1.0)),
-                        }
-                    }
+                    Against::Finger(other) => add(place(other), 1, &load.scaled(-1.0)),
                 }
             }
             Acting::Object => on_object = on_object.plus(&load),
         }
     }
-    on_object = on_object.plus(&by_fingers[0].plus(&by_fingers[1]).scaled(-1.0));
+    on_object.plus(&by_fingers[0].plus(&by_fingers[1]).scaled(-1.0))
+}
+
+pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
+    let n = model.chain.joints;
+    let Workspace { contacts, loads, space, step, .. } = ws;
+    let on_object = match space {
+        Some(space) => {
+            space.loads.fill(Spatial::default());
+            add_up(n, contacts, *step, |(finger, segment), _, load| space.add_load(finger * (n + 1) + segment, load))
+        }
+        None => {
+            loads.fill([Planar::default(); 2]);
+            add_up(n, contacts, *step, |(finger, segment), found, load| loads[segment][found].add_to(finger, load))
+        }
+    };
     for ((g, a), r) in ws.gradient.iter_mut().zip(&ws.a_velocity).zip(&ws.rhs) {
         *g = a - r;
     }
     let mut contact_size = 0.0;
-    let limit = |k: usize, h: f64| h * model.chain.limit_torque(q[k] + h * velocity[k]).0;
     if let Some(space) = &ws.space {
         space.project(model, |k, from_contacts| {
-            let load = from_contacts + if k < 2 * n { limit(k, ws.step.h) } else { 0.0 };
+            let h = ws.step.h;
+            let limit = if k < 2 * n { h * model.chain.limit_torque(q[k] + h * velocity[k]).0 } else { 0.0 };
+            let load = from_contacts + limit;
             ws.gradient[k] += load;
             contact_size += load * load * ws.weights[k];
         });
@@ -250,7 +260,8 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
             beyond = beyond.plus(own).plus(met);
             let from_contacts = ws.columns[i].dot(&beyond).to_array();
             for (k, from_contacts) in [i, n + i].into_iter().zip(from_contacts) {
-                let load = from_contacts + limit(k, ws.step.h);
+                let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
+                let load = from_contacts + limit;
                 ws.gradient[k] += load;
                 contact_size += load * load * ws.weights[k];
             }
@@ -290,9 +301,12 @@ fn farthest_from_balance(model: &PhysicsModel, ws: &Workspace, allowed: f64) -> 
 #[inline]
 pub(super) fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
     let n = model.chain.joints;
-    if let Some(space) = ws.space.as_ref().filter(|_| k < 2 * n || k >= model.first_sway()) {
-        space.diagonal(model, k)
-    } else if k < 2 * n {
+    if let Some(space) = &ws.space
+        && let Some(entry) = space.diagonal(model, k)
+    {
+        return entry;
+    }
+    if k < 2 * n {
         let (finger, i) = (k / n, k % n);
         ws.finger_matrix[i * n + i].as_array()[finger]
     } else {
@@ -363,7 +377,8 @@ fn fill_planar(model: &PhysicsModel, limit: impl Fn(usize) -> f64, ws: &mut Work
         }
         row[i] += Lanes::new([limit(i), limit(n + i)]);
         if couples {
-            let [left, right] = [0, 1].map(|finger| beyond_object[finger].times(&column.of(finger)).to_array());
+            let left = beyond_object[0].times(&column.of(0)).to_array();
+            let right = beyond_object[1].times(&column.of(1)).to_array();
             for ((entry, left), right) in ws.hessian.border_mut(i).iter_mut().zip(left).zip(right) {
                 *entry = Lanes::new([-left, -right]);
             }

@@ -242,8 +242,8 @@ impl Space {
 
     /// Adds a load to a segment.
     #[inline]
-    pub(super) fn add_load(&mut self, link: u32, load: &Spatial) {
-        let sum = &mut self.loads[link as usize];
+    pub(super) fn add_load(&mut self, link: usize, load: &Spatial) {
+        let sum = &mut self.loads[link];
         *sum = sum.plus(load);
     }
 
@@ -272,10 +272,12 @@ impl Space {
         }
     }
 
-    /// Diagonal entry of A.
-    pub(super) fn diagonal(&self, model: &PhysicsModel, k: usize) -> f64 {
+    /// Diagonal entry of A; none for unknowns that are not the fingers'.
+    #[inline(never)]
+    pub(super) fn diagonal(&self, model: &PhysicsModel, k: usize) -> Option<f64> {
         let joints = model.joint_count();
-        self.diagonal[if k < joints { k } else { joints + k - model.first_sway() }]
+        let place = if k < joints { k } else { joints + k.checked_sub(model.first_sway())? };
+        self.diagonal.get(place).copied()
     }
 
     /// Kinetic energy (J).
@@ -330,7 +332,7 @@ impl Space {
                 at_joint += pull;
             }
             let (arm, force) = (self.tip(model, finger) - reference, -tips[finger]);
-            self.add_load(places.link(finger, n) as u32, &Spatial { linear: force, angular: arm.cross(force) });
+            self.add_load(places.link(finger, n), &Spatial { linear: force, angular: arm.cross(force) });
         }
         self.velocities = velocities;
     }
@@ -366,10 +368,10 @@ impl Space {
             let linear = contact.normal * normal + tangential;
             let load = Spatial { linear, angular: contact.arm.cross(linear) };
             if let Acting::Segment(link) = contact.acting {
-                pressed.add_load(link, &load);
+                pressed.add_load(link as usize, &load);
             }
             if let Against::Finger(link) = contact.against {
-                pressed.add_load(link, &load.scaled(-1.0));
+                pressed.add_load(link as usize, &load.scaled(-1.0));
             }
         }
         let (joints, mut largest) = (model.joint_count(), 0.0f64);

@@ -285,8 +285,8 @@ fn the_hessian_is_the_slope_of_the_gradient() {
                 let moved: Vec<f64> = velocity.iter().zip(&direction).map(|(v, d)| v + step * d).collect();
                 gradient(&moved, ws)
             });
-            for k in 0..velocity.len() {
-                let slope = (ends[0][k] - ends[1][k]) / (2.0 * step);
+            for (k, (plus, minus)) in ends[0].iter().zip(&ends[1]).enumerate() {
+                let slope = (plus - minus) / (2.0 * step);
                 let want = if k == unknown { 1.0 } else { 0.0 };
                 let scale = (diagonal(&model, ws, k) / diagonal(&model, ws, unknown)).sqrt();
                 assert!((slope - want).abs() < 1e-5 * scale.max(1.0), "meets {meets}: {k} along {unknown}: {slope}");

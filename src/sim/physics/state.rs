@@ -285,13 +285,22 @@ impl State {
         if let Some(i) = bad(&self.q).or_else(|| bad(&self.velocity[..2 * n])) {
             return Some(Self::place_of(model, i));
         }
-        let from = model.first_sway();
-        if let Some(i) = bad(&self.sways.map(Sway::to_array).concat()).or_else(|| bad(&self.velocity[from..])) {
-            return Some(Self::place_of(model, from + i));
+        if model.sideways.is_some()
+            && let Some(unknown) = self.sway_not_finite(model)
+        {
+            return Some(Self::place_of(model, unknown));
         }
         let (linear, angular) = self.body_velocity(model);
         let sound = self.body.is_finite() && linear.is_finite() && angular.is_finite();
         (!sound).then(|| Self::place_of(model, 2 * n))
+    }
+
+    /// The first unknown of a sway that is not finite.
+    fn sway_not_finite(&self, model: &PhysicsModel) -> Option<usize> {
+        let finite = |sway: &Sway| sway.curvature.is_finite() && sway.twist.is_finite();
+        let rates = &self.velocity[model.first_sway()..];
+        let shape = self.sways.iter().position(|sway| !finite(sway)).map(|finger| 2 * finger);
+        shape.or_else(|| rates.iter().position(|rate| !rate.is_finite())).map(|k| model.first_sway() + k)
     }
 
     /// Display name of the joint or body that an unknown of the step belongs to.
