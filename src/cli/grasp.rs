@@ -143,6 +143,10 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
         pair("hold force", hold.force_n, "N")?;
         pair("curvature", hold.curvature_per_m, "1/m")?;
         pair("pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa")?;
+        if let Some(shape) = &hold.out_of_plane {
+            pair("tips sideways", shape.tip_m.map(mm), "mm")?;
+            pair("tips twisted", shape.twist_rad.map(f64::to_degrees), "degrees")?;
+        }
     }
     if let Some(moved) = summary.object_moved_m {
         say(format!("object moved  {} mm", three_digits(mm(moved))))?;

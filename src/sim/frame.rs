@@ -1,6 +1,6 @@
 //! Samples of a simulation and their numerical quality: plain records, raw quantities only.
 
-use crate::gripper::{Phase, Side};
+use crate::gripper::{GripperModel, Phase, PlacedFinger, Side, Sway};
 use crate::scene::Accuracy;
 use glam::DVec3;
 use palpate_geometry::Pose;
@@ -32,6 +32,8 @@ pub struct Frame {
     pub phase: Phase,
     /// Joint angles, left finger then right, from palm to tip (rad).
     pub q: Vec<f64>,
+    /// Shape of the left and of the right finger out of its plane; none unless they bend sideways and twist.
+    pub sways: [Sway; 2],
     /// Way of the hand from where it began, in the world (m); zero unless it is shaken.
     pub hand: DVec3,
     /// The object's frame in the world; absent for an empty hand.
@@ -45,6 +47,11 @@ impl Frame {
     pub fn joints(&self, side: Side) -> &[f64] {
         let n = self.q.len() / 2;
         &self.q[side.index() * n..(side.index() + 1) * n]
+    }
+
+    /// A finger as it is bent, in the gripper frame.
+    pub fn placed(&self, gripper: &GripperModel, side: Side) -> PlacedFinger {
+        PlacedFinger::new(gripper, side, self.joints(side), self.sways[side.index()])
     }
 
     /// Pose of the gripper in the world, given the one in which the trial began.
@@ -324,6 +331,7 @@ mod tests {
             line_bar: 0.0,
             phase: Phase::Close,
             q: vec![1.0, 2.0, 3.0, 4.0],
+            sways: [Sway::NONE; 2],
             hand: DVec3::ZERO,
             world_from_object: None,
             taxels: vec![load(3, 1.0), load(9, 2.0), load(10, 4.0), load(19, 8.0)],

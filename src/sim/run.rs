@@ -298,6 +298,7 @@ mod tests {
                 line_bar: 1.0,
                 phase,
                 q: vec![],
+                sways: [crate::gripper::Sway::NONE; 2],
                 hand: DVec3::ZERO,
                 world_from_object: None,
                 taxels,

@@ -2,10 +2,11 @@
 //! mark. A second file lists every loaded taxel with its place in the world.
 //!
 //! Columns: `t_s`, `line_pressure (bar)`, `phase`, the channels of a sensor layout, joint angles, joint positions in the
-//! world frame (as the paper stores them, section IV-A), the object's pose. Joints are numbered from 1 at the palm.
+//! world frame (as the paper stores them, section IV-A), the object's pose, and where fingers leave their planes the
+//! sideways curvature at the palm and the twist of each. Joints are numbered from 1 at the palm.
 
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, Side};
+use palpate_sim::gripper::{Side, Sway};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, Signals};
@@ -33,9 +34,10 @@ pub fn contacts_path(path: &Path) -> PathBuf {
 /// Writes one row per sample.
 pub fn write_trial_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) -> Result<(), CsvError> {
     write_file(path, |out| {
-        out.write_record(header(scene, sensors, trial))?;
+        let sway = trial.frames().iter().any(|frame| frame.sways != [Sway::NONE; 2]);
+        out.write_record(header(scene, sensors, trial, sway))?;
         for frame in trial.frames() {
-            out.write_record(row(frame, trial, scene, sensors))?;
+            out.write_record(row(frame, trial, (scene, sensors), sway))?;
         }
         Ok(())
     })
@@ -74,11 +76,10 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
         out.write_record(header)?;
         for frame in trial.frames() {
             for side in Side::BOTH {
-                let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
+                let placed = frame.placed(&scene.gripper, side);
                 for (taxel, load) in frame.loads(side, grid.count()) {
                     let (segment, along) = grid.place(taxel, &scene.gripper.finger);
-                    let in_plane = bent.segments[segment].point(along, grid.height(taxel));
-                    let in_gripper = scene.gripper.plane(side).point(in_plane, grid.across(taxel));
+                    let in_gripper = placed.point(segment, along, grid.across(taxel), grid.height(taxel));
                     let place = frame.world_from_gripper(&trial.data.world_from_gripper).point(in_gripper);
                     let mut record = vec![number(frame.t), side.name().to_owned()];
                     record.extend([segment, taxel].map(|n| n.to_string()));
@@ -121,7 +122,8 @@ pub(super) fn number(x: f64) -> String {
     x.to_string()
 }
 
-fn header(scene: &Scene, sensors: &Sensors, trial: &SimulatedTrial) -> Vec<String> {
+/// `sway` adds the shapes of fingers that leave their planes.
+fn header(scene: &Scene, sensors: &Sensors, trial: &SimulatedTrial, sway: bool) -> Vec<String> {
     let mut names = vec!["t_s".to_owned(), "line_pressure [bar]".to_owned(), "phase".to_owned()];
     names.extend(sensors.channels().iter().map(|c| format!("{} [{}]", c.name(), c.quantity.unit())));
     let joints = || Side::BOTH.into_iter().flat_map(|side| (1..=scene.gripper.finger.joints).map(move |j| (side, j)));
@@ -133,24 +135,33 @@ fn header(scene: &Scene, sensors: &Sensors, trial: &SimulatedTrial) -> Vec<Strin
         names.extend(["x", "y", "z"].map(|axis| format!("object_{axis} [m]")));
         names.extend(["qx", "qy", "qz", "qw"].map(|part| format!("object_{part}")));
     }
+    if sway {
+        let shapes = |side: Side| {
+            [format!("sideways_{}_curvature [1/m]", side.name()), format!("twist_{} [rad/m]", side.name())]
+        };
+        names.extend(Side::BOTH.into_iter().flat_map(shapes));
+    }
     names
 }
 
-fn row(frame: &Frame, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) -> Vec<String> {
+/// `sway` adds the shapes of fingers that leave their planes.
+fn row(frame: &Frame, trial: &SimulatedTrial, (scene, sensors): (&Scene, &Sensors), sway: bool) -> Vec<String> {
     let mut fields = vec![number(frame.t), number(frame.line_bar), frame.phase.name().to_owned()];
     // An undefined pressure is an empty field.
     fields.extend(sensors.read(frame).into_iter().map(|v| v.map(number).unwrap_or_default()));
     fields.extend(frame.q.iter().copied().map(number));
     for side in Side::BOTH {
-        let plane = scene.gripper.plane(side);
-        let bent = BentFinger::new(&scene.gripper.finger, frame.joints(side));
+        let placed = frame.placed(&scene.gripper, side);
         let world_from_gripper = frame.world_from_gripper(&trial.data.world_from_gripper);
-        let places = bent.joints().map(|p| world_from_gripper.point(plane.point(p, 0.0)));
+        let places = placed.joints().map(|p| world_from_gripper.point(p));
         fields.extend(places.flat_map(|p| p.to_array().map(number)));
     }
     if let Some(pose) = frame.world_from_object {
         fields.extend(pose.position.to_array().map(number));
         fields.extend(pose.rotation.to_array().map(number));
+    }
+    if sway {
+        fields.extend(frame.sways.map(Sway::to_array).concat().into_iter().map(number));
     }
     fields
 }

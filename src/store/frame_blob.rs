@@ -4,7 +4,8 @@
 //! magic "PPF1"            4 bytes
 //! joints (both fingers)   u16
 //! has object              u8      0 or 1
-//! hand moves              u8      0 or 1; zero in all files of versions without shaking
+//! optional columns        u8      1 where the hand moves, plus 2 where fingers leave their planes; zero in all files of
+//!                                 versions without these effects
 //! frames                  u32
 //! per frame:
 //!   sample                u32
@@ -12,7 +13,8 @@
 //!   line pressure (bar)   f64
 //!   phase                 u8      0 close, 1 hold, 2 release
 //!   joint angles (rad)    f64 x joints
-//!   way of the hand (m)   f64 x 3                                       (only where hand moves is 1)
+//!   sways                 f64 x 4   left, right: curvature (1/m), twist (rad/m)   (only where fingers leave their planes)
+//!   way of the hand (m)   f64 x 3                                       (only where the hand moves)
 //!   object in the world   f64 x 7   x y z (m), quaternion x y z w       (only where has object is 1)
 //!   loaded taxels         u16
 //!   per taxel:            u16 taxel, f32 normal, f32 along, f32 across (N)
@@ -21,10 +23,13 @@
 use glam::{DQuat, DVec3};
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, TaxelLoad};
-use palpate_sim::gripper::Phase;
+use palpate_sim::gripper::{Phase, Sway};
 
 const MAGIC: &[u8; 4] = b"PPF1";
 const HEADER: usize = 12;
+/// Optional columns.
+const HAND_MOVES: u8 = 1;
+const FINGERS_SWAY: u8 = 2;
 
 /// Error of decoding frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -54,7 +59,9 @@ pub fn encode_frames(frames: &[Frame]) -> Vec<u8> {
     out.extend_from_slice(MAGIC);
     out.extend_from_slice(&(joints as u16).to_le_bytes());
     let hand_moves = frames.iter().any(|f| f.hand != DVec3::ZERO);
-    out.extend_from_slice(&[u8::from(has_object), u8::from(hand_moves)]);
+    let sway = frames.iter().any(|f| f.sways != [Sway::NONE; 2]);
+    let optional = u8::from(hand_moves) * HAND_MOVES + u8::from(sway) * FINGERS_SWAY;
+    out.extend_from_slice(&[u8::from(has_object), optional]);
     out.extend_from_slice(&(frames.len() as u32).to_le_bytes());
     for frame in frames {
         assert_eq!(frame.q.len(), joints, "all frames of a trial have the same joints");
@@ -64,6 +71,11 @@ pub fn encode_frames(frames: &[Frame]) -> Vec<u8> {
         out.push(phase_code(frame.phase));
         for q in &frame.q {
             out.extend_from_slice(&q.to_le_bytes());
+        }
+        if sway {
+            for x in frame.sways.map(Sway::to_array).concat() {
+                out.extend_from_slice(&x.to_le_bytes());
+            }
         }
         if hand_moves {
             for x in frame.hand.to_array() {
@@ -95,15 +107,15 @@ pub fn decode_frames(bytes: &[u8]) -> Result<Vec<Frame>, BlobError> {
         return Err(BlobError::Magic);
     }
     let joints = usize::from(u16::from_le_bytes(reader.take()?));
-    let [has_object, hand_moves] = reader.take()?;
+    let [has_object, optional] = reader.take()?;
     let count = u32::from_le_bytes(reader.take()?);
-    if has_object > 1 || hand_moves > 1 {
+    if has_object > 1 || optional > HAND_MOVES + FINGERS_SWAY {
         return Err(BlobError::Magic);
     }
     let mut frames = Vec::new();
     for index in 0..count {
         reader.frame = index;
-        frames.push(reader.frame(joints, has_object == 1, hand_moves == 1)?);
+        frames.push(reader.frame(joints, has_object == 1, optional)?);
     }
     if reader.at == bytes.len() { Ok(frames) } else { Err(BlobError::BadValue { frame: count }) }
 }
@@ -147,7 +159,7 @@ impl Reader<'_> {
         BlobError::BadValue { frame: self.frame }
     }
 
-    fn frame(&mut self, joints: usize, has_object: bool, hand_moves: bool) -> Result<Frame, BlobError> {
+    fn frame(&mut self, joints: usize, has_object: bool, optional: u8) -> Result<Frame, BlobError> {
         let sample = u32::from_le_bytes(self.take()?);
         let (t, line_bar) = (self.number()?, self.number()?);
         let [code] = self.take()?;
@@ -158,6 +170,8 @@ impl Reader<'_> {
             _ => return Err(self.bad()),
         };
         let q = (0..joints).map(|_| self.number()).collect::<Result<_, _>>()?;
+        let sways = if optional & FINGERS_SWAY != 0 { [self.sway()?, self.sway()?] } else { [Sway::NONE; 2] };
+        let hand_moves = optional & HAND_MOVES != 0;
         let hand = if hand_moves { DVec3::new(self.number()?, self.number()?, self.number()?) } else { DVec3::ZERO };
         let world_from_object = if has_object { Some(self.pose()?) } else { None };
         let count = u16::from_le_bytes(self.take()?);
@@ -170,7 +184,11 @@ impl Reader<'_> {
                 across: self.small_number()?,
             });
         }
-        Ok(Frame { sample, t, line_bar, phase, q, hand, world_from_object, taxels })
+        Ok(Frame { sample, t, line_bar, phase, q, sways, hand, world_from_object, taxels })
+    }
+
+    fn sway(&mut self) -> Result<Sway, BlobError> {
+        Ok(Sway { curvature: self.number()?, twist: self.number()? })
     }
 
     fn pose(&mut self) -> Result<Pose, BlobError> {
@@ -205,6 +223,17 @@ mod tests {
         assert!(frames.iter().any(|f| !f.taxels.is_empty()));
         assert!(decode_frames(&encode_frames(&frames)) == Ok(frames));
         assert_eq!(decode_frames(&encode_frames(&[])), Ok(vec![]));
+    }
+
+    #[test]
+    fn sideways_shapes_survive_and_cost_nothing_where_there_are_none() {
+        let planar = frames();
+        let mut swayed = planar.clone();
+        swayed[7].sways[1] = Sway { curvature: -0.25, twist: 1.5 };
+        swayed[9].hand = DVec3::new(0.0, 1e-3, 0.0);
+        let bytes = encode_frames(&swayed);
+        assert_eq!(bytes.len(), encode_frames(&planar).len() + planar.len() * 7 * 8);
+        assert!(decode_frames(&bytes) == Ok(swayed));
     }
 
     #[test]

@@ -149,6 +149,7 @@ mod tests {
             line_bar: 0.5,
             phase: Phase::Close,
             q: [vec![0.05; 10], vec![0.0; 10]].concat(),
+            sways: [palpate_sim::gripper::Sway::NONE; 2],
             hand: glam::DVec3::ZERO,
             world_from_object: None,
             // One taxel on the distal half of the right pad.

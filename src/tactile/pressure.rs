@@ -93,6 +93,7 @@ mod tests {
             line_bar: 0.0,
             phase: Phase::Hold,
             q: vec![0.0; 20],
+            sways: [palpate_sim::gripper::Sway::NONE; 2],
             hand: glam::DVec3::ZERO,
             world_from_object: None,
             taxels: loads

@@ -256,6 +256,7 @@ mod tests {
             line_bar: 1.0,
             phase,
             q: vec![q; 2],
+            sways: [palpate_sim::gripper::Sway::NONE; 2],
             hand: glam::DVec3::ZERO,
             world_from_object: Some(palpate_geometry::Pose::new(DVec3::new(0.0, 0.0, z), glam::DQuat::IDENTITY)),
             taxels: Vec::new(),

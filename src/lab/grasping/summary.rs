@@ -1,7 +1,7 @@
 //! Summary of a grasp in a few numbers: the object that `palpate grasp --json` prints.
 
 use palpate_sim::frame::{Frame, Quality};
-use palpate_sim::gripper::{Phase, Side};
+use palpate_sim::gripper::{Phase, Side, Sway};
 use palpate_sim::scene::{Effect, Scene};
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{ContactPatch, PressureArea, Span, curvature};
@@ -52,6 +52,17 @@ pub struct HoldSummary {
     pub curvature_per_m: [f64; 2],
     /// Pressure over the participation area of each pad (Pa).
     pub pressure_pa: [f64; 2],
+    /// Shape out of their planes; null for fingers that stay in them.
+    pub out_of_plane: Option<OutOfPlaneSummary>,
+}
+
+/// Fingers that have bent sideways and twisted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OutOfPlaneSummary {
+    /// Way of each tip along the gripper's y (m).
+    pub tip_m: [f64; 2],
+    /// Turn of each tip about its finger (rad).
+    pub twist_rad: [f64; 2],
 }
 
 impl GraspSummary {
@@ -101,7 +112,17 @@ impl HoldSummary {
             Side::BOTH.map(|side| frames.iter().map(|f| value(f, side)).sum::<f64>() / frames.len() as f64)
         };
         let patch = |frame: &Frame, side: Side| ContactPatch::new(frame, side, &grid, &Span::WHOLE);
+        let tip = |frame: &Frame, side: Side| {
+            let placed = frame.placed(gripper, side);
+            let last = placed.lengths.len() - 1;
+            placed.point(last, placed.lengths[last], 0.0, 0.0).y
+        };
+        let sways = frames.iter().any(|frame| frame.sways != [Sway::NONE; 2]);
         Some(Self {
+            out_of_plane: sways.then(|| OutOfPlaneSummary {
+                tip_m: mean(&tip),
+                twist_rad: mean(&|frame, side| frame.sways[side.index()].twist * gripper.finger.length),
+            }),
             force_n: mean(&|frame, side| patch(frame, side).force()),
             curvature_per_m: mean(&|frame, side| {
                 let q = frame.joints(side);
@@ -121,6 +142,21 @@ mod tests {
     use palpate_geometry::Primitive;
     use palpate_sim::objects::ObjectModel;
     use palpate_sim::scene::Setting;
+
+    #[test]
+    fn fingers_that_leave_their_planes_say_by_how_much() {
+        let mut scene = Scene::default();
+        scene.gripper.mount.offset = [0.0, 0.005, 0.0];
+        scene.gripper.finger.sideways = scene.gripper.finger.of_solid_section(scene.gripper.pad.thickness);
+        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+        let hold = |scene: &Scene| GraspSummary::new(&grasp(scene, Some(&ball), 0), scene).hold.expect("held");
+        let shape = hold(&scene).out_of_plane.expect("bends");
+        // The ball is at negative y, seen from the gripper: the pads turn away from what presses there.
+        assert!(shape.twist_rad.iter().all(|twist| (0.01..0.5).contains(twist)), "{shape:?}");
+        assert!(shape.tip_m.iter().all(|way| (1e-5..0.02).contains(&way.abs())), "{shape:?}");
+        scene.effects.set(Effect::OutOfPlane, Setting::Off);
+        assert_eq!(hold(&scene).out_of_plane, None);
+    }
 
     #[test]
     fn a_larger_ball_is_met_earlier_and_bends_the_fingers_less() {

@@ -3,7 +3,7 @@
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, TaxelField};
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, FingerPlane, GripperModel, SegmentPose, Side, TaxelGrid};
+use palpate_sim::gripper::{GripperModel, PlacedFinger, Side, TaxelGrid};
 
 /// Both fingers as draw-list items.
 pub(super) fn soft_fingers(
@@ -33,35 +33,33 @@ pub(super) fn soft_fingers(
 /// The palm, the middle of each whole segment, and the tip: a smooth curve through these with their directions
 /// passes where the rigid segments are.
 fn axis_frames(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, side: Side) -> Vec<FingerFrame> {
-    let bent = BentFinger::new(&gripper.finger, frame.joints(side));
-    let plane = gripper.plane(side);
-    let last = bent.segments.len() - 1;
+    let placed = frame.placed(gripper, side);
+    let last = placed.lengths.len() - 1;
     let mut frames = Vec::with_capacity(last + 2);
     let mut arc = 0.0;
-    for (j, (segment, length)) in bent.segments.iter().zip(&bent.lengths).enumerate() {
+    for (j, length) in placed.lengths.iter().enumerate() {
         let along = if j == 0 { 0.0 } else { 0.5 * length };
         if j < last {
-            frames.push(axis_frame(&plane, world_from_gripper, segment, along, arc + along));
+            frames.push(axis_frame(&placed, world_from_gripper, (j, along), arc + along));
         }
         arc += length;
     }
-    let (tip, length) = (&bent.segments[last], bent.lengths[last]);
-    frames.push(axis_frame(&plane, world_from_gripper, tip, length, arc));
+    frames.push(axis_frame(&placed, world_from_gripper, (last, placed.lengths[last]), arc));
     frames
 }
 
 fn axis_frame(
-    plane: &FingerPlane,
+    placed: &PlacedFinger,
     world_from_gripper: &Pose,
-    segment: &SegmentPose,
-    along: f64,
+    (segment, along): (usize, f64),
     arc: f64,
 ) -> FingerFrame {
+    let axes = placed.axes(segment);
     FingerFrame {
         arc: arc as f32,
-        position: world_from_gripper.point(plane.point(segment.point(along, 0.0), 0.0)).as_vec3(),
-        along: world_from_gripper.direction(plane.direction(segment.along)).as_vec3(),
-        inward: world_from_gripper.direction(plane.direction(segment.inward())).as_vec3(),
+        position: world_from_gripper.point(placed.point(segment, along, 0.0, 0.0)).as_vec3(),
+        along: world_from_gripper.direction(axes.x_axis).as_vec3(),
+        inward: world_from_gripper.direction(axes.z_axis).as_vec3(),
     }
 }
 
@@ -95,6 +93,7 @@ mod tests {
             line_bar: 0.0,
             phase: Phase::Close,
             q: vec![0.0; 20],
+            sways: [palpate_sim::gripper::Sway::NONE; 2],
             hand: glam::DVec3::ZERO,
             world_from_object: None,
             taxels: [1, 161].map(|taxel| TaxelLoad { taxel, normal: 0.1, along: 0.0, across: 0.0 }).into(),

@@ -5,7 +5,7 @@ use palpate_geometry::Pose;
 use palpate_geometry::drawing::Arrow;
 use palpate_geometry::palette::pressure_colour;
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{BentFinger, GripperModel, Side};
+use palpate_sim::gripper::{GripperModel, Side};
 
 /// Length of the arrow of one newton (m).
 const METRES_PER_NEWTON: f64 = 0.07;
@@ -23,17 +23,14 @@ pub(super) fn arrows(gripper: &GripperModel, world_from_gripper: &Pose, frame: &
     let grid = gripper.taxels();
     let mut arrows = Vec::new();
     for side in Side::BOTH {
-        let plane = gripper.plane(side);
-        let bent = BentFinger::new(&gripper.finger, frame.joints(side));
-        let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0.0); bent.segments.len()];
+        let placed = frame.placed(gripper, side);
+        let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0.0); placed.lengths.len()];
         for (taxel, load) in frame.loads(side, grid.count()) {
             let (segment_index, along) = grid.place(taxel, &gripper.finger);
-            let segment = &bent.segments[segment_index];
             let force = f64::from(load.normal);
             let skin = grid.height(taxel) - grid.compression(taxel, force);
-            let place = plane.point(segment.point(along, skin), grid.across(taxel));
-            let in_plane = segment.along * f64::from(load.along) - segment.inward() * force;
-            let vector = plane.direction(in_plane) + DVec3::Y * f64::from(load.across);
+            let place = placed.point(segment_index, along, grid.across(taxel), skin);
+            let vector = placed.axes(segment_index) * DVec3::new(f64::from(load.along), f64::from(load.across), -force);
             let (sum, moment, weight) = &mut sums[segment_index];
             *sum += vector;
             *moment += place * force;

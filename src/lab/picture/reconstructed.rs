@@ -1,7 +1,7 @@
 //! A real finger reconstructed from its flex strip: bent evenly, because one strip reads one number.
 
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{GripperModel, Phase, Side};
+use palpate_sim::gripper::{GripperModel, Phase, Side, Sway};
 
 /// A frame in which each finger is an arc of the curvature that its strip reads (1/m); straight where nothing is read.
 pub(super) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -> Frame {
@@ -14,6 +14,7 @@ pub(super) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -
         line_bar: 0.0,
         phase: Phase::Close,
         q,
+        sways: [Sway::NONE; 2],
         hand: glam::DVec3::ZERO,
         world_from_object: None,
         taxels: Vec::new(),

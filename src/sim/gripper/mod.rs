@@ -6,13 +6,15 @@ mod bend;
 mod finger;
 mod pad;
 mod programme;
+mod space;
 mod taxels;
 
 pub use actuation::{Actuation, TorquePoint};
 pub use bend::{BentFinger, FingerPlane, SegmentPose, bend};
-pub use finger::Finger;
+pub use finger::{Finger, Sideways};
 pub use pad::{Pad, PadLaw};
 pub use programme::{Phase, Programme};
+pub use space::{JointAxes, PlacedFinger, SegmentFrame, Sway, bend_in_space, sway_shares};
 pub use taxels::TaxelGrid;
 
 use serde::{Deserialize, Serialize};

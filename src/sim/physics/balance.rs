@@ -18,6 +18,10 @@ pub(super) fn static_residual(model: &PhysicsModel, state: &State, ws: &Workspac
     at_rest.velocity.fill(0.0);
     lay_out(model, &at_rest, &mut scratch);
     gather_dynamics(model, &at_rest, &mut scratch, drive);
+    if let (Some(space), Some(sideways)) = (&ws.space, &model.sideways) {
+        let known = scratch.rhs.iter().map(|r| r / ws.step.h).collect();
+        return space.imbalance(model, (sideways, ws), (&state.q, known)) / drive.torque.abs();
+    }
     let mut largest = 0.0f64;
     for k in 0..2 * n {
         // At rest r holds h (torque - k q - gravity).

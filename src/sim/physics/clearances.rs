@@ -2,7 +2,7 @@
 //! add up to what was free.
 
 use super::model::PhysicsModel;
-use crate::gripper::SegmentPose;
+use crate::gripper::{SegmentFrame, SegmentPose};
 use glam::{DMat3, DVec3};
 
 /// Distances as they were when last computed, and the ways gone.
@@ -17,6 +17,8 @@ pub(super) struct Clearances {
     fingers: f64,
     fingers_way: f64,
     segments: Vec<SegmentPose>,
+    /// The same in space; none where fingers stay in their planes.
+    frames: Vec<SegmentFrame>,
     object: (DMat3, DVec3),
     /// Way that any point of the object has gone, at most (m).
     object_way: f64,
@@ -48,6 +50,7 @@ impl Clearances {
             fingers: f64::NEG_INFINITY,
             fingers_way: 0.0,
             segments: vec![SegmentPose::default(); model.link_count()],
+            frames: vec![SegmentFrame::default(); if model.sideways.is_some() { model.link_count() } else { 0 }],
             object: (DMat3::IDENTITY, DVec3::ZERO),
             object_way: 0.0,
             resting: Nearby {
@@ -63,10 +66,11 @@ impl Clearances {
     /// Adds the ways from the last layout to this one.
     ///
     /// `object`: its rotation and its centre; `world`: its displacement (m).
+    #[inline]
     pub(super) fn follow(
         &mut self,
         model: &PhysicsModel,
-        segments: &[SegmentPose],
+        (segments, frames): (&[SegmentPose], &[SegmentFrame]),
         object: Option<(DMat3, DVec3)>,
         world: DVec3,
     ) {
@@ -82,11 +86,22 @@ impl Clearances {
             self.object_way += moved + turned * model.body.as_ref().map_or(0.0, |body| body.radius);
         }
         let mut farthest = [0.0f64; 2];
-        for (link, (now, before)) in segments.iter().zip(&mut self.segments).enumerate() {
-            let lever = model.chain.lengths[link % links] + depth;
-            let from_centre = model.planes[link / links].point(now.start, 0.0) - centre;
-            let arm = from_centre.length() + lever + model.skin.width;
-            let own = (now.start - before.start).length() + (now.along - before.along).length() * lever;
+        if frames.is_empty() {
+            for (link, (now, before)) in segments.iter().zip(&mut self.segments).enumerate() {
+                let lever = model.chain.lengths[link % links] + depth;
+                let from_centre = model.planes[link / links].point(now.start, 0.0) - centre;
+                let arm = from_centre.length() + lever + model.skin.width;
+                let own = (now.start - before.start).length() + (now.along - before.along).length() * lever;
+                self.ways[link] += own + moved + turned * arm;
+                farthest[link / links] = farthest[link / links].max(own);
+                *before = *now;
+            }
+        }
+        for (link, (now, before)) in frames.iter().zip(&mut self.frames).enumerate() {
+            let lever = model.chain.lengths[link % links] + depth + model.skin.width;
+            let arm = (now.start - centre).length() + lever;
+            let axes = (now.axes - before.axes).to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+            let own = (now.start - before.start).length() + axes * lever;
             self.ways[link] += own + moved + turned * arm;
             farthest[link / links] = farthest[link / links].max(own);
             *before = *now;

@@ -1,7 +1,7 @@
 //! The elastic contact springs of one finger: one under each taxel, and a few that guard the blunt end of the tip.
 
-use crate::gripper::{Finger, Pad, SegmentPose, TaxelGrid};
-use glam::DVec2;
+use crate::gripper::{Finger, Pad, SegmentFrame, SegmentPose, TaxelGrid};
+use glam::{DVec2, DVec3};
 use std::ops::Range;
 
 /// An elastic contact spring: a short rod with a round end that can be pushed in along its axis.
@@ -25,6 +25,13 @@ impl ContactSpring {
     pub(super) fn ray(&self, segment: &SegmentPose) -> (DVec2, DVec2) {
         let axis = if self.points_ahead { segment.along } else { segment.inward() };
         (segment.point(self.foot.x, self.foot.y), axis)
+    }
+
+    /// Foot and axis in space.
+    #[inline(never)]
+    pub(super) fn ray_in_space(&self, segment: &SegmentFrame) -> (DVec3, DVec3) {
+        let axis = if self.points_ahead { segment.axes.x_axis } else { segment.axes.z_axis };
+        (segment.point(self.foot.x, self.across, self.foot.y), axis)
     }
 }
 

@@ -18,6 +18,11 @@ pub(super) fn fill_coupling(model: &PhysicsModel, ws: &mut Workspace) {
     if !ws.fingers_meet {
         return;
     }
+    if let Some(space) = ws.space.take() {
+        space.fill_coupling(model, ws);
+        ws.space = Some(space);
+        return;
+    }
     let n = model.chain.joints;
     ws.coupling.fill(Spatial::default());
     for contact in &ws.contacts {

@@ -77,10 +77,15 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
     let environment = moved_world.as_ref().unwrap_or(&model.environment);
     let passing = workspace.passing.velocity.length();
     let pose = object.as_ref().map(|solid| (solid.object_from_gripper, solid.centre));
-    workspace.clearances.follow(model, &workspace.segments, pose, environment.way_from(&model.environment));
+    let frames = workspace.space.as_ref().map_or(&[][..], |space| &space.frames);
+    let world = environment.way_from(&model.environment);
+    workspace.clearances.follow(model, (&workspace.segments, frames), pose, world);
     // No segment is farther from its axis than this.
     let reach = model.springs.reach.iter().copied().fold(0.0, f64::max);
-    let turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
+    let mut turning: f64 = state.velocity[..model.joint_count()].iter().map(|rate| rate.abs()).sum();
+    if let Some(sideways) = &model.sideways {
+        turning += sideways.turning(state.sway_rates(model));
+    }
     let fastest = state.fastest(model) + turning * reach;
     let farthest = margin(h, fastest + passing);
     workspace.fingers_meet = false;
@@ -92,13 +97,16 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let link = first_link + j;
             let segment = workspace.segments[link];
             let may_meet = |margin: f64| {
-                let segment = (&segment, model.chain.lengths[j]);
+                let segment = (&segment, workspace.frames().get(link), model.chain.lengths[j]);
                 fronts.as_ref().is_some_and(|(fronts, _)| fronts.may_meet(model, finger, segment, margin))
             };
             if workspace.clearances.of_link(link) > farthest && !may_meet(margin(h, 2.0 * fastest)) {
                 continue;
             }
-            let middle = model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0);
+            let middle = match workspace.frames().get(link) {
+                Some(frame) => frame.point(0.5 * model.chain.lengths[j], 0.0, 0.0),
+                None => model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0),
+            };
             let reach = model.springs.reach[j] + model.springs.radius;
             let link_velocity = workspace.spatial[link];
             let speed =
@@ -183,7 +191,8 @@ struct Place {
 
 fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace, near: &Near<'_>, place: Place) {
     let plane = model.planes[place.finger];
-    let local_axes = segment_axes(&plane, &place.segment);
+    let in_space = workspace.space.is_some();
+    let local_axes = if in_space { workspace.frames()[place.link].axes } else { segment_axes(&plane, &place.segment) };
     for k in model.springs.of_segment(place.segment_index) {
         let spring = &model.springs.all[k];
         let site = place.finger * model.springs.all.len() + k;
@@ -191,20 +200,21 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
         if clear && near.finger.is_none() {
             continue;
         }
-        let (foot, axis) = spring.ray(&place.segment);
+        let (foot, axis, inward) = if in_space {
+            let (foot, axis) = spring.ray_in_space(&workspace.frames()[place.link]);
+            (foot, axis, f64::INFINITY)
+        } else {
+            let (foot, axis) = spring.ray(&place.segment);
+            (plane.point(foot, spring.across), plane.direction(axis), foot.x)
+        };
         let finger = near.finger.and_then(|(fronts, margin)| {
-            let gap = fronts.least_distance(model, place.finger, foot.x) - spring.height;
+            let gap = fronts.least_distance(model, place.finger, inward) - spring.height;
             (gap <= margin).then_some(margin)
         });
         if clear && finger.is_none() {
             continue;
         }
-        let ray = Ray {
-            foot: plane.point(foot, spring.across),
-            axis: plane.direction(axis),
-            radius: model.springs.radius,
-            rest: spring.height - model.springs.radius,
-        };
+        let ray = Ray { foot, axis, radius: model.springs.radius, rest: spring.height - model.springs.radius };
         let (mut hit, mut against) = (None, Against::World);
         if !clear {
             let (to_object, clearance) = near.distances(ray.foot);
@@ -222,7 +232,7 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
             }
         }
         if let Some(margin) = finger {
-            let other = OtherFinger::opposite(model, &workspace.segments, place.finger);
+            let other = OtherFinger::opposite(model, workspace, place.finger, spring.across);
             if let Some(met) = ray.cast_finger(&other, margin) {
                 // A contact in waiting gives way to all others.
                 let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));
@@ -290,14 +300,18 @@ fn fronts_of_near_fingers(model: &PhysicsModel, workspace: &mut Workspace) -> Op
     let fastest = [0, 1].map(|finger| {
         let speed = |j: usize| {
             let link = finger * links + j;
-            let middle = workspace.segments[link].point(0.5 * model.chain.lengths[j], 0.0);
-            let arm = model.planes[finger].point(middle, 0.0) - workspace.reference;
+            let half = 0.5 * model.chain.lengths[j];
+            let middle = match workspace.frames().get(link) {
+                Some(frame) => frame.point(half, 0.0, 0.0),
+                None => model.planes[finger].point(workspace.segments[link].point(half, 0.0), 0.0),
+            };
+            let arm = middle - workspace.reference;
             let velocity = &workspace.spatial[link];
             velocity.linear_at(arm).length() + velocity.angular.length() * model.springs.reach[j]
         };
         (0..links).map(speed).fold(0.0, f64::max)
     });
-    let fronts = Fronts::new(model, &workspace.segments);
+    let fronts = Fronts::new(model, workspace);
     let clearance = fronts.clearance(model);
     workspace.clearances.note_fingers(clearance);
     (clearance < margin(workspace.step.h, fastest[0] + fastest[1])).then_some((fronts, fastest))

@@ -20,12 +20,14 @@ fn small_ball() -> ObjectModel {
     ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.006 }, 500.0, 0.6)
 }
 
-/// A scene that calls for every effect: a small free ball off the middle, slow chambers, joints that soon creep.
+/// A scene that calls for every effect: a small free ball off the middle, slow chambers, joints that soon creep, fingers of
+/// solid rubber.
 fn everything() -> Scene {
     let mut scene = Scene::default();
     scene.gripper.mount.offset = [0.0, 0.010, -0.006];
     scene.gripper.actuation.filling_time = 0.05;
     scene.gripper.finger.creep_time = 1.0;
+    scene.gripper.finger.sideways = scene.gripper.finger.of_solid_section(scene.gripper.pad.thickness);
     (scene.object.modulus, scene.shaking.amplitude) = (Auto::Value(5e4), 0.01);
     scene
 }
@@ -90,7 +92,7 @@ fn off_is_the_same_as_constants_that_vanish() {
     let ball = small_ball();
     let placement = Placement::new(&everything(), Some(&ball));
     type Change = fn(&mut Scene);
-    let cases: [(Effect, Change); 8] = [
+    let cases: [(Effect, Change); 9] = [
         (Effect::FreeObject, |s| s.object.fixed = true),
         (Effect::FingerGravity, |s| s.world.gravity = 0.0),
         (Effect::Support, |s| s.support.kind = SupportKind::None),
@@ -101,6 +103,7 @@ fn off_is_the_same_as_constants_that_vanish() {
         (Effect::Creep, |s| s.gripper.finger.creep_share = 0.0),
         (Effect::Shaking, |s| s.shaking.amplitude = 0.0),
         (Effect::SoftObject, |s| s.object.modulus = Auto::Auto),
+        (Effect::OutOfPlane, |s| s.gripper.finger.sideways = Default::default()),
     ];
     for (effect, vanish) in cases {
         let mut scene = everything();

@@ -29,12 +29,18 @@ pub(super) fn mechanical_energy(model: &PhysicsModel, state: &State, ws: &mut Wo
     detect(model, state, ws);
     let n = model.chain.joints;
     let (mut total, mut spin) = (0.0, 0.0);
+    if let (Some(space), Some(sideways)) = (&mut ws.space, &model.sideways) {
+        total += space.kinetic_energy(model, &state.velocity);
+        total += state.sways.iter().map(|sway| sideways.energy(*sway)).sum::<f64>();
+    }
     for finger in 0..2 {
         let rates = &state.velocity[finger * n..(finger + 1) * n];
         for i in 0..n {
-            let row = &ws.finger_matrix[i * n..(i + 1) * n];
-            let row: f64 = row.iter().zip(rates).map(|(a, b)| a.as_array()[finger] * b).sum();
-            total += 0.5 * rates[i] * row;
+            if ws.space.is_none() {
+                let row = &ws.finger_matrix[i * n..(i + 1) * n];
+                let row: f64 = row.iter().zip(rates).map(|(a, b)| a.as_array()[finger] * b).sum();
+                total += 0.5 * rates[i] * row;
+            }
             let q = state.q[finger * n + i];
             if let Some(relaxation) = &model.relaxation {
                 total -= relaxation.energy_lost(q, state.crept[finger * n + i]);
@@ -44,7 +50,10 @@ pub(super) fn mechanical_energy(model: &PhysicsModel, state: &State, ws: &mut Wo
         }
         let segments = &ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
         for link in 1..=n {
-            let centre = model.planes[finger].point(model.chain.centre(segments, link), 0.0);
+            let centre = match &ws.space {
+                Some(space) => space.centre(model, finger, link),
+                None => model.planes[finger].point(model.chain.centre(segments, link), 0.0),
+            };
             total -= model.chain.masses[link] * model.finger_gravity.dot(centre);
         }
     }
@@ -73,6 +82,16 @@ pub(super) fn work_done(within: &Surroundings<'_>, from: &State, to: &State, ws:
     // Tips, and the sum of mass times place (kg m) of all that inertia acts on.
     let mut places = |state: &State| {
         let mut moments = model.free_body().map_or(DVec3::ZERO, |body| state.body.position * body.mass);
+        if let Some(space) = &mut ws.space {
+            space.lay_out(model, &state.q, state.sways, DVec3::ZERO);
+            let tips = [0, 1].map(|finger| {
+                for (link, mass) in model.chain.masses.iter().enumerate() {
+                    moments += space.centre(model, finger, link) * *mass;
+                }
+                space.tip(model, finger)
+            });
+            return (tips, moments);
+        }
         let tips = [0, 1].map(|finger| {
             let plane = &model.planes[finger];
             let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];

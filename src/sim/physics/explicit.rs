@@ -43,6 +43,9 @@ pub(super) fn explicit_step(
     for (force, rate) in force.iter_mut().zip(&state.velocity[..model.joint_count()]) {
         *force -= model.chain.damping * rate;
     }
+    for (force, resisted) in force[model.first_sway()..].iter_mut().zip(model.sway_damping(state)) {
+        *force -= resisted;
+    }
     for (force, impulse) in force.iter_mut().zip(contact_and_limit_impulses(model, state, ws)) {
         *force += impulse / INSTANT;
     }
@@ -88,9 +91,14 @@ fn contact_and_limit_impulses(model: &PhysicsModel, state: &State, ws: &mut Work
 fn fill_inertia(model: &PhysicsModel, ws: &mut Workspace) {
     let n = model.chain.joints;
     ws.hessian.couple(false);
-    for i in 0..n {
-        ws.hessian.row_mut(i).copy_from_slice(&ws.finger_matrix[i * n..][..=i]);
-        ws.hessian.border_mut(i).fill(Lanes::ZERO);
+    if let Some(space) = ws.space.take() {
+        space.fill_hessian(model, ws, false);
+        ws.space = Some(space);
+    } else {
+        for i in 0..n {
+            ws.hessian.row_mut(i).copy_from_slice(&ws.finger_matrix[i * n..][..=i]);
+            ws.hessian.border_mut(i).fill(Lanes::ZERO);
+        }
     }
     if let Some(body) = model.free_body() {
         for a in 0..6 {

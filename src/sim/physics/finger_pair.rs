@@ -13,10 +13,13 @@
 //!
 //! The other finger is seen unrolled: the nearest segment gives a point's arc length s and its height eta above the
 //! neutral axis, and in (s, eta) the finger is a box whose corners are as round as the ends of its contact springs.
-//! Both fingers bend in one plane, so that nothing moves across.
+//! Where fingers leave their planes, length and height are those of the nearest segment as it is turned in space. Across,
+//! the skin is as high as where the spring that meets it sits on its own pad, so that a motion across does no work on the
+//! crown, and the box ends at the sides: fingers far enough beside each other pass.
 
 use super::model::PhysicsModel;
-use crate::gripper::{FingerPlane, SegmentPose};
+use super::workspace::Workspace;
+use crate::gripper::{FingerPlane, SegmentFrame, SegmentPose};
 use glam::{DVec2, DVec3};
 
 /// Contact spring of a pad against another contact spring like it, as seen from one of them: small-strain stiffness
@@ -35,21 +38,23 @@ pub(super) struct Fronts {
 }
 
 impl Fronts {
-    pub(super) fn new(model: &PhysicsModel, segments: &[SegmentPose]) -> Self {
-        let own = |finger: usize| &segments[finger * (model.chain.joints + 1)..][..=model.chain.joints];
+    pub(super) fn new(model: &PhysicsModel, ws: &Workspace) -> Self {
+        let n = model.chain.joints;
+        let links = |finger: usize| finger * (n + 1)..(finger + 1) * (n + 1);
         let protruding = |finger: usize| {
-            let fronts = own(finger).iter().zip(&model.chain.lengths).map(|(s, l)| front(model, s, *l));
-            fronts.fold(f64::NEG_INFINITY, f64::max)
+            let own = links(finger).zip(&model.chain.lengths);
+            own.map(|(link, l)| front(model, finger, (&ws.segments[link], ws.frames().get(link), *l)))
+                .fold(f64::NEG_INFINITY, f64::max)
         };
         let rounding = |finger: usize| {
-            let straightness = own(finger).windows(2).map(|pair| pair[0].along.dot(pair[1].along));
+            let straightness = ws.segments[links(finger)].windows(2).map(|pair| pair[0].along.dot(pair[1].along));
             model.skin.thickness.max(model.skin.back) * (1.0 - straightness.fold(1.0, f64::min))
         };
         Self { segments: [0, 1].map(protruding), joints: [0, 1].map(rounding) }
     }
 
-    /// Distance of a point from the other finger's skin, at least (m). `inward`: of the point, from the straight neutral
-    /// axis of its own finger (m).
+    /// Distance of a point from the other finger's skin, at least (m), where the fingers stay in their planes. `inward`: of
+    /// the point, from the straight neutral axis of its own finger (m).
     pub(super) fn least_distance(&self, model: &PhysicsModel, finger: usize, inward: f64) -> f64 {
         let other = self.segments[1 - finger] + self.joints[1 - finger];
         2.0 * model.planes[finger].half_gap - other - inward
@@ -60,10 +65,10 @@ impl Fronts {
         &self,
         model: &PhysicsModel,
         finger: usize,
-        segment: (&SegmentPose, f64),
+        segment: (&SegmentPose, Option<&SegmentFrame>, f64),
         margin: f64,
     ) -> bool {
-        front(model, segment.0, segment.1) + self.segments[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
+        front(model, finger, segment) + self.segments[1 - finger] + margin > 2.0 * model.planes[finger].half_gap
     }
 
     /// Clearance between the fingers, seen from the side (m).
@@ -73,7 +78,19 @@ impl Fronts {
 }
 
 /// Most inward point of a segment, pad and bellows included (m).
-fn front(model: &PhysicsModel, segment: &SegmentPose, length: f64) -> f64 {
+fn front(
+    model: &PhysicsModel,
+    finger: usize,
+    (segment, frame, length): (&SegmentPose, Option<&SegmentFrame>, f64),
+) -> f64 {
+    if let Some(frame) = frame {
+        let plane = &model.planes[finger];
+        let inward = |v: DVec3| plane.sign * v.x;
+        let [along, across, up] = [frame.axes.x_axis, frame.axes.y_axis, frame.axes.z_axis].map(inward);
+        let faces = (model.skin.thickness * up).max(-model.skin.back * up);
+        let edge = 0.5 * model.skin.width * across.abs();
+        return inward(frame.start) + plane.half_gap + (length * along).max(0.0) + faces + edge;
+    }
     let faces = model.skin.thickness * segment.inward().x;
     let back = -model.skin.back * segment.inward().x;
     segment.start.x + (length * segment.along.x).max(0.0) + faces.max(back)
@@ -84,6 +101,10 @@ pub(super) struct OtherFinger<'a> {
     model: &'a PhysicsModel,
     plane: FingerPlane,
     segments: &'a [SegmentPose],
+    /// The same in space; none where it stays in its plane.
+    frames: &'a [SegmentFrame],
+    /// Distance from the middle of its pad of the contact spring that meets it (m).
+    met_at: f64,
 }
 
 /// A point seen from a finger.
@@ -92,18 +113,22 @@ struct Place {
     segment: usize,
     /// Arc length from the tip, negative before it (m).
     beyond_tip: f64,
+    /// Distance from the middle of the pad, along y where the finger stays in its plane (m).
+    across: f64,
     /// Height above the neutral axis, towards the inner side (m).
     height: f64,
-    /// Direction in which the height grows.
-    up: DVec2,
+    /// Directions in which the height and the arc length grow.
+    up: DVec3,
+    ahead: DVec3,
 }
 
 impl<'a> OtherFinger<'a> {
-    /// The finger opposite to `finger`.
-    pub(super) fn opposite(model: &'a PhysicsModel, segments: &'a [SegmentPose], finger: usize) -> Self {
+    /// The finger opposite to `finger`, as a contact spring at `met_at` across its pad (m) meets it.
+    pub(super) fn opposite(model: &'a PhysicsModel, ws: &'a Workspace, finger: usize, met_at: f64) -> Self {
         let (other, n) = (1 - finger, model.chain.joints);
-        let segments = &segments[other * (n + 1)..(other + 1) * (n + 1)];
-        Self { model, plane: model.planes[other], segments }
+        let links = other * (n + 1)..(other + 1) * (n + 1);
+        let frames = ws.frames().get(links.clone()).unwrap_or_default();
+        Self { model, plane: model.planes[other], segments: &ws.segments[links], frames, met_at }
     }
 
     /// A point of the gripper frame in the finger's plane.
@@ -111,8 +136,11 @@ impl<'a> OtherFinger<'a> {
         DVec2::new(self.plane.sign * p.x + self.plane.half_gap, -p.z)
     }
 
-    fn place(&self, p: DVec3) -> Place {
-        let p = self.in_plane(p);
+    fn place(&self, at: DVec3) -> Place {
+        if !self.frames.is_empty() {
+            return self.place_in_space(at);
+        }
+        let p = self.in_plane(at);
         let (lengths, last) = (&self.model.chain.lengths, self.segments.len() - 1);
         let mut nearest = (f64::INFINITY, 0, 0.0, DVec2::ZERO);
         for (j, segment) in self.segments.iter().enumerate() {
@@ -135,37 +163,91 @@ impl<'a> OtherFinger<'a> {
         // On the axis itself the offset has no direction.
         let up = if size > 1e-12 { offset * (side / size) } else { inward };
         let remaining: f64 = lengths[segment..].iter().sum();
-        Place { segment, beyond_tip: along - remaining, height: side * size, up }
+        let direction = |d: DVec2| self.plane.direction(d);
+        Place {
+            segment,
+            beyond_tip: along - remaining,
+            across: at.y,
+            height: side * size,
+            up: direction(up),
+            ahead: direction(self.segments[segment].along),
+        }
+    }
+
+    /// The same among segments in space: lengths are those in the axes of each segment.
+    fn place_in_space(&self, p: DVec3) -> Place {
+        let (lengths, last) = (&self.model.chain.lengths, self.frames.len() - 1);
+        let mut nearest = (f64::INFINITY, 0, 0.0, DVec3::ZERO);
+        for (j, frame) in self.frames.iter().enumerate() {
+            let local = frame.axes.transpose() * (p - frame.start);
+            let low = if j == 0 { f64::NEG_INFINITY } else { 0.0 };
+            let high = if j == last { f64::INFINITY } else { lengths[j] };
+            let within = local.x.clamp(low, high);
+            let beside = (local.x - within).powi(2) + local.z.powi(2);
+            if beside < nearest.0 {
+                nearest = (beside, j, within, local);
+            }
+        }
+        let (squared, segment, along, local) = nearest;
+        let frame = &self.frames[segment];
+        let side = if local.z < 0.0 { -1.0 } else { 1.0 };
+        let size = squared.sqrt();
+        let offset = frame.axes.x_axis * (local.x - along) + frame.axes.z_axis * local.z;
+        let up = if size > 1e-12 { offset * (side / size) } else { frame.axes.z_axis };
+        let remaining: f64 = lengths[segment..].iter().sum();
+        let (across, ahead) = (local.y, frame.axes.x_axis);
+        Place { segment, beyond_tip: along - remaining, across, height: side * size, up, ahead }
     }
 
     /// Distance of a point beyond the core of the rounded box, along the finger and away from its middle (m).
-    fn excess(&self, place: &Place, across: f64) -> (f64, f64, bool) {
+    fn excess(&self, place: &Place) -> (f64, f64, bool) {
         let skin = &self.model.skin;
         let radius = self.model.springs.radius;
-        let front = place.height - (skin.height(across) - radius);
+        let front = place.height - (skin.height(self.met_at) - radius);
         let back = -place.height - (skin.back - radius).max(0.0);
         (place.beyond_tip + skin.last_row, front.max(back), front >= back)
     }
 
-    /// Distance of a point from the skin (m), negative inside.
-    pub(super) fn distance(&self, p: DVec3) -> f64 {
-        let (along, away, _) = self.excess(&self.place(p), p.y);
-        self.beyond_core(along, away)
+    /// Way of a point beyond the side of the core, and the direction out of it; only fingers in space have sides.
+    fn beside(&self, place: &Place) -> (f64, DVec3) {
+        match self.frames.get(place.segment) {
+            Some(frame) => {
+                let core = (0.5 * self.model.skin.width - self.model.springs.radius).max(0.0);
+                ((place.across.abs() - core).max(0.0), frame.axes.y_axis * place.across.signum())
+            }
+            None => (0.0, DVec3::ZERO),
+        }
     }
 
-    /// Distance from the skin (m), given that beyond the core along the finger and away from its middle (m).
-    fn beyond_core(&self, along: f64, away: f64) -> f64 {
-        let outside = along.max(0.0).hypot(away.max(0.0));
+    /// Distance of a point from the skin (m), negative inside.
+    pub(super) fn distance(&self, p: DVec3) -> f64 {
+        let place = self.place(p);
+        let (along, away, _) = self.excess(&place);
+        self.beyond_core(along, away, self.beside(&place).0)
+    }
+
+    /// Distance from the skin (m), given that beyond the core along the finger, away from its middle and beside it (m).
+    fn beyond_core(&self, along: f64, away: f64, beside: f64) -> f64 {
+        let mut outside = along.max(0.0).hypot(away.max(0.0));
+        if beside > 0.0 {
+            outside = outside.hypot(beside);
+        }
         outside + along.max(away).min(0.0) - self.model.springs.radius
     }
 
     /// Distance of a point from the skin (m), and outward normal of the skin nearest to it.
     pub(super) fn surface(&self, p: DVec3) -> (f64, DVec3) {
         let place = self.place(p);
-        let (along, away, in_front) = self.excess(&place, p.y);
-        let ahead = self.segments[place.segment].along;
+        let (along, away, in_front) = self.excess(&place);
+        let ahead = place.ahead;
         let up = if in_front { place.up } else { -place.up };
+        let (beside, out) = self.beside(&place);
         let direction = match (along > 0.0, away > 0.0) {
+            _ if beside > 0.0 => {
+                let within = if along.max(away) > 0.0 { DVec3::ZERO } else { up };
+                (ahead * along.max(0.0) + up * away.max(0.0) + out * beside).normalize_or(up) + within
+            }
+            .normalize_or(up),
             (true, true) => (ahead * along + up * away).normalize_or(up),
             (true, false) => ahead,
             (false, true) => up,
@@ -177,7 +259,7 @@ impl<'a> OtherFinger<'a> {
                 }
             }
         };
-        (self.beyond_core(along, away), self.plane.direction(direction))
+        (self.beyond_core(along, away, beside), direction)
     }
 
     /// The segment that a point touches.
@@ -195,7 +277,7 @@ impl<'a> OtherFinger<'a> {
         let length: f64 = self.model.chain.lengths.iter().sum();
         let cell = |share: f64, count: usize| ((share * count as f64).max(0.0) as usize).min(count - 1);
         let row = cell((place.beyond_tip + length) / length, skin.rows);
-        let column = cell(p.y / skin.width + 0.5, skin.columns);
+        let column = cell(place.across / skin.width + 0.5, skin.columns);
         Some(row * skin.columns + column)
     }
 }

@@ -31,9 +31,11 @@ pub(super) struct Hessian {
 /// Pivots that rounding made non-positive are raised to this, so that the direction computed stays finite and downhill.
 const LEAST_PIVOT: f64 = 1e-300;
 
-/// Number of joints of the default finger and of unknowns of a free object, for which loops are unrolled.
+/// Number of joints of the default finger and of unknowns of a free object, alone or with fingers that leave their
+/// planes, for which loops are unrolled.
 const USUAL_JOINTS: usize = 10;
 const FREE_OBJECT: usize = 6;
+const FREE_OBJECT_AND_SWAYS: usize = 10;
 
 impl Hessian {
     /// Zeros for two fingers of `block` joints and `border` unknowns of the object.
@@ -87,6 +89,7 @@ impl Hessian {
         match (self.block, self.size - 2 * self.block) {
             (USUAL_JOINTS, FREE_OBJECT) => self.factorise_arrow::<USUAL_JOINTS, FREE_OBJECT>(),
             (USUAL_JOINTS, 0) => self.factorise_arrow::<USUAL_JOINTS, 0>(),
+            (USUAL_JOINTS, FREE_OBJECT_AND_SWAYS) => self.factorise_arrow::<USUAL_JOINTS, FREE_OBJECT_AND_SWAYS>(),
             _ => self.factorise_arrow::<0, 0>(),
         }
     }
@@ -163,6 +166,7 @@ impl Hessian {
         match (self.block, self.size - 2 * self.block) {
             (USUAL_JOINTS, FREE_OBJECT) => self.solve_arrow::<USUAL_JOINTS, FREE_OBJECT>(x),
             (USUAL_JOINTS, 0) => self.solve_arrow::<USUAL_JOINTS, 0>(x),
+            (USUAL_JOINTS, FREE_OBJECT_AND_SWAYS) => self.solve_arrow::<USUAL_JOINTS, FREE_OBJECT_AND_SWAYS>(x),
             _ => self.solve_arrow::<0, 0>(x),
         }
     }

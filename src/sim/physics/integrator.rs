@@ -21,6 +21,7 @@
 //! as SDIRK2 at equal cost), an error from taking each step whole and in halves (three times the cost).
 
 use super::model::PhysicsModel;
+use super::space::SWAYS;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
 use super::workspace::Workspace;
@@ -111,7 +112,7 @@ impl Integrator {
     }
 
     /// Size of the sum of velocities at start, after the first stage and now, with weights (s): the largest change of
-    /// a joint angle or of the object's orientation (rad), of a fingertip or of the object's position, and of the place of a hand
+    /// a joint angle, of the turn of a tip out of its plane or of the object's orientation (rad), of a fingertip or of the object's position, and of the place of a hand
     /// that moves, as shares of a finger's length.
     fn error(&self, state: &State, model: &PhysicsModel, weights: [f64; 3]) -> f64 {
         let n = model.chain.joints;
@@ -133,6 +134,11 @@ impl Integrator {
         if model.free_body().is_some() {
             let three = |k: usize| DVec3::new(at(k), at(k + 1), at(k + 2)).length();
             largest = largest.max(three(2 * n) / length).max(three(2 * n + 3));
+        }
+        if let Some(sideways) = &model.sideways {
+            for k in 0..SWAYS {
+                largest = largest.max(at(model.first_sway() + k).abs() * sideways.turns[k % 2]);
+            }
         }
         if model.hand_motion.is_some() {
             let velocities = [self.start.hand[1], self.middle_hand, state.hand[1]];

@@ -48,6 +48,9 @@ mod simulation;
 #[cfg(test)]
 mod softness_tests;
 mod solve;
+mod space;
+#[cfg(test)]
+mod space_tests;
 mod state;
 mod step;
 mod stepped;

@@ -6,6 +6,8 @@ use super::contact_springs::ContactSprings;
 use super::effects::{Chamber, FingerContact, Relaxation, Shell, plan};
 use super::environment::Environment;
 use super::placement::Placement;
+use super::space::{SWAYS, Sideways};
+use super::state::State;
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, GripperModel, PadLaw, Side};
 use crate::objects::{ObjectModel, Resting};
@@ -19,6 +21,8 @@ pub struct PhysicsModel {
     /// Contact constants; the step length is set at each step.
     pub(super) contact: ContactStep,
     pub(super) chain: ChainModel,
+    /// Fingers that bend sideways and twist.
+    pub(super) sideways: Option<Sideways>,
     pub(super) planes: [FingerPlane; 2],
     pub(super) springs: ContactSprings,
     pub(super) pad_law: PadLaw,
@@ -152,6 +156,9 @@ impl PhysicsModel {
                 shear_damping_time: gripper.pad.shear_damping_time,
             },
             chain: ChainModel::new(&gripper.finger, &gripper.pad),
+            sideways: (gripper.finger.sideways.stiffness())
+                .filter(|_| is_on(Effect::OutOfPlane))
+                .map(|stiffness| Sideways::new(&gripper.finger, &gripper.pad, stiffness)),
             planes: Side::BOTH.map(|side| gripper.plane(side)),
             springs: ContactSprings::new(&gripper.finger, &gripper.pad, &gripper.taxels()),
             pad_law: gripper.pad.law,
@@ -194,9 +201,23 @@ impl PhysicsModel {
         2 * (self.chain.joints + 1)
     }
 
-    /// Unknowns of a step: all joint rates, and six for a free object.
+    /// Unknowns of a step: all joint rates, six for a free object, and four where fingers leave their planes.
     pub(super) fn unknowns(&self) -> usize {
+        self.first_sway() + if self.sideways.is_some() { SWAYS } else { 0 }
+    }
+
+    /// The first unknown of fingers that leave their planes: sideways curvature and twist of the left one, then of the
+    /// right one.
+    pub(super) fn first_sway(&self) -> usize {
         self.joint_count() + if self.free_body().is_some() { 6 } else { 0 }
+    }
+
+    /// Resistance of dampers to the rates of sway: of the left finger, then of the right one; none where they stay in
+    /// their planes.
+    pub(super) fn sway_damping(&self, state: &State) -> Vec<f64> {
+        let of =
+            |sideways: &Sideways| [0, 1].map(|finger| sideways.resisted(state.sway_rates_of(self, finger))).concat();
+        self.sideways.as_ref().map_or_else(Vec::new, of)
     }
 
     /// The object, where it can move.

@@ -202,6 +202,7 @@ impl Simulation {
             line_bar: self.line_bar,
             phase: self.phase,
             q: self.state.q.clone(),
+            sways: self.state.sways,
             hand: self.model.world_from_gripper.direction(self.state.hand[0]),
             world_from_object: self.world_from_object(),
             taxels: self.taxel_loads(),
@@ -252,7 +253,7 @@ impl Simulation {
                 loads.push(self.taxel_load(side, spring, link, force));
             }
             if let Against::Finger(other) = contact.against {
-                let met = OtherFinger::opposite(&self.model, &self.workspace.segments, side);
+                let met = OtherFinger::opposite(&self.model, &self.workspace, side, springs.all[spring].across);
                 if let Some(taxel) = met.taxel(contact.arm + self.workspace.reference) {
                     loads.push(self.taxel_load(1 - side, taxel, other, -force));
                 }

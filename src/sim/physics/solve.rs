@@ -10,7 +10,7 @@
 //! and angular velocity. Contact Hessians are summed per segment (6 x 6) before they go to joints: beyond joint i
 //! everything moves with column S_i, so that H_ij = S_i' (sum of blocks from the tip to the farther joint) S_j.
 
-use super::contact::{Acting, Against, Contact};
+use super::contact::{Acting, Against, Contact, ContactStep};
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
@@ -120,13 +120,16 @@ pub(super) enum Product {
     OfDirection,
 }
 
-fn multiply_by_a(model: &PhysicsModel, ws: &mut Workspace, x: &[f64], which: Product) {
+pub(super) fn multiply_by_a(model: &PhysicsModel, ws: &mut Workspace, x: &[f64], which: Product) {
     let n = model.chain.joints;
     let out = match which {
         Product::OfVelocity => &mut ws.a_velocity,
         Product::OfDirection => &mut ws.a_direction,
     };
-    multiply(&ws.finger_matrix, &x[..2 * n], &mut ws.rates, |k, value| out[k] = value);
+    match &mut ws.space {
+        Some(space) => space.multiply_by_a(model, x, out),
+        None => multiply(&ws.finger_matrix, &x[..2 * n], &mut ws.rates, |k, value| out[k] = value),
+    }
     if let Some(body) = model.free_body() {
         let linear = object_part(x, 2 * n).linear * body.mass;
         let angular = ws.body_inertia * object_part(x, 2 * n).angular;
@@ -172,6 +175,10 @@ pub(super) fn relative_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Work
 
 /// Velocity of each segment for joint rates `x`, about the reference point.
 pub(super) fn segment_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Workspace) {
+    if let Some(space) = &ws.space {
+        space.segment_velocities(model, x, &mut ws.spatial);
+        return;
+    }
     let n = model.chain.joints;
     let (left, right) = ws.spatial.split_at_mut(n + 1);
     let mut velocity = Planar::default();
@@ -191,45 +198,73 @@ pub(super) struct Size {
     contacts: f64,
 }
 
-pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
-    let n = model.chain.joints;
+/// Hands over the load of each contact on the segments it acts on, as finger and segment, found by the finger's own
+/// contact springs (0) or by those of the other one (1); returns the sum that acts on the object.
+#[inline]
+fn add_up(
+    n: usize,
+    contacts: &[Contact],
+    step: ContactStep,
+    mut add: impl FnMut((usize, usize), usize, &Spatial),
+) -> Spatial {
     let (mut on_object, mut by_fingers) = (Spatial::default(), [Spatial::default(); 2]);
-    ws.loads.fill([Planar::default(); 2]);
     let place = |link: u32| (link as usize / (n + 1), link as usize % (n + 1));
-    for contact in &ws.contacts {
-        let linear = contact.gradient(ws.step, contact.velocity);
+    for contact in contacts {
+        let linear = contact.gradient(step, contact.velocity);
         let load = Spatial { linear, angular: contact.arm.cross(linear) };
         match contact.acting {
             Acting::Segment(link) => {
                 let (finger, segment) = place(link);
-                ws.loads[segment][0].add_to(finger, &load);
+                add((finger, segment), 0, &load);
                 match contact.against {
                     Against::Object => by_fingers[finger] = by_fingers[finger].plus(&load),
                     Against::World => (),
-                    Against::Finger(other) => {
-                        let (finger, segment) = place(other);
-                        ws.loads[segment][1].add_to(finger, &load.scaled(-1.0));
-                    }
+                    Against::Finger(other) => add(place(other), 1, &load.scaled(-1.0)),
                 }
             }
             Acting::Object => on_object = on_object.plus(&load),
         }
     }
-    on_object = on_object.plus(&by_fingers[0].plus(&by_fingers[1]).scaled(-1.0));
+    on_object.plus(&by_fingers[0].plus(&by_fingers[1]).scaled(-1.0))
+}
+
+pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) -> Size {
+    let n = model.chain.joints;
+    let Workspace { contacts, loads, space, step, .. } = ws;
+    let on_object = match space {
+        Some(space) => {
+            space.loads.fill(Spatial::default());
+            add_up(n, contacts, *step, |(finger, segment), _, load| space.add_load(finger * (n + 1) + segment, load))
+        }
+        None => {
+            loads.fill([Planar::default(); 2]);
+            add_up(n, contacts, *step, |(finger, segment), found, load| loads[segment][found].add_to(finger, load))
+        }
+    };
     for ((g, a), r) in ws.gradient.iter_mut().zip(&ws.a_velocity).zip(&ws.rhs) {
         *g = a - r;
     }
     let mut contact_size = 0.0;
-    let mut beyond = Planar::default();
-    for i in (0..n).rev() {
-        let [own, met] = &ws.loads[i + 1];
-        beyond = beyond.plus(own).plus(met);
-        let from_contacts = ws.columns[i].dot(&beyond).to_array();
-        for (k, from_contacts) in [i, n + i].into_iter().zip(from_contacts) {
-            let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
+    if let Some(space) = &ws.space {
+        space.project(model, |k, from_contacts| {
+            let h = ws.step.h;
+            let limit = if k < 2 * n { h * model.chain.limit_torque(q[k] + h * velocity[k]).0 } else { 0.0 };
             let load = from_contacts + limit;
             ws.gradient[k] += load;
             contact_size += load * load * ws.weights[k];
+        });
+    } else {
+        let mut beyond = Planar::default();
+        for i in (0..n).rev() {
+            let [own, met] = &ws.loads[i + 1];
+            beyond = beyond.plus(own).plus(met);
+            let from_contacts = ws.columns[i].dot(&beyond).to_array();
+            for (k, from_contacts) in [i, n + i].into_iter().zip(from_contacts) {
+                let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
+                let load = from_contacts + limit;
+                ws.gradient[k] += load;
+                contact_size += load * load * ws.weights[k];
+            }
         }
     }
     if model.free_body().is_some() {
@@ -264,8 +299,13 @@ fn farthest_from_balance(model: &PhysicsModel, ws: &Workspace, allowed: f64) -> 
 
 /// Diagonal entry of A.
 #[inline]
-fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
+pub(super) fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
     let n = model.chain.joints;
+    if let Some(space) = &ws.space
+        && let Some(entry) = space.diagonal(model, k)
+    {
+        return entry;
+    }
     if k < 2 * n {
         let (finger, i) = (k / n, k % n);
         ws.finger_matrix[i * n + i].as_array()[finger]
@@ -280,11 +320,39 @@ fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
     }
 }
 
-fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
+pub(super) fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Workspace) {
     let on_object = sum_blocks(ws);
+    let (n, h) = (model.chain.joints, ws.step.h);
+    let limit = |k: usize| h * h * model.chain.limit_torque(q[k] + h * velocity[k]).1;
+    if let Some(space) = ws.space.take() {
+        space.fill_hessian(model, ws, true);
+        ws.space = Some(space);
+        for i in 0..n {
+            ws.hessian.row_mut(i)[i] += Lanes::new([limit(i), limit(n + i)]);
+        }
+    } else {
+        fill_planar(model, limit, ws);
+    }
+    if let Some(body) = model.free_body() {
+        for a in 0..3 {
+            for b in 0..=a {
+                let mass = if a == b { body.mass } else { 0.0 };
+                *ws.hessian.at_mut(2 * n + a, 2 * n + b) = mass + on_object.linear.col(b)[a];
+                let inertia = ws.body_inertia.col(b)[a];
+                *ws.hessian.at_mut(2 * n + 3 + a, 2 * n + 3 + b) = inertia + on_object.angular.col(b)[a];
+            }
+            for b in 0..3 {
+                *ws.hessian.at_mut(2 * n + 3 + a, 2 * n + b) = on_object.mixed.col(b)[a];
+            }
+        }
+    }
+}
+
+/// Rows of fingers that stay in their planes, and what couples them to the object.
+#[inline]
+fn fill_planar(model: &PhysicsModel, limit: impl Fn(usize) -> f64, ws: &mut Workspace) {
     let n = model.chain.joints;
     let couples = model.free_body().is_some();
-    let h = ws.step.h;
     let mut beyond = PlanarBlock::default();
     let mut beyond_object = [Block::ZERO; 2];
     for i in (0..n).rev() {
@@ -307,25 +375,12 @@ fn fill_hessian(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &mut Work
         for ((row, matrix), column) in row.iter_mut().zip(matrix).zip(&ws.columns) {
             *row = *matrix + column.dot(&moved);
         }
-        let limit = |k: usize| h * h * model.chain.limit_torque(q[k] + h * velocity[k]).1;
         row[i] += Lanes::new([limit(i), limit(n + i)]);
         if couples {
-            let [left, right] = [0, 1].map(|finger| beyond_object[finger].times(&column.of(finger)).to_array());
+            let left = beyond_object[0].times(&column.of(0)).to_array();
+            let right = beyond_object[1].times(&column.of(1)).to_array();
             for ((entry, left), right) in ws.hessian.border_mut(i).iter_mut().zip(left).zip(right) {
                 *entry = Lanes::new([-left, -right]);
-            }
-        }
-    }
-    if let Some(body) = model.free_body() {
-        for a in 0..3 {
-            for b in 0..=a {
-                let mass = if a == b { body.mass } else { 0.0 };
-                *ws.hessian.at_mut(2 * n + a, 2 * n + b) = mass + on_object.linear.col(b)[a];
-                let inertia = ws.body_inertia.col(b)[a];
-                *ws.hessian.at_mut(2 * n + 3 + a, 2 * n + 3 + b) = inertia + on_object.angular.col(b)[a];
-            }
-            for b in 0..3 {
-                *ws.hessian.at_mut(2 * n + 3 + a, 2 * n + b) = on_object.mixed.col(b)[a];
             }
         }
     }

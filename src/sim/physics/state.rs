@@ -3,6 +3,7 @@
 use super::effects::went_on;
 use super::model::PhysicsModel;
 use super::placement::Placement;
+use crate::gripper::Sway;
 use glam::{DQuat, DVec3};
 use palpate_geometry::Pose;
 
@@ -11,8 +12,10 @@ use palpate_geometry::Pose;
 pub struct State {
     /// Joint angles, left finger then right, from palm to tip (rad).
     pub q: Vec<f64>,
+    /// Shape of each finger out of its plane; none where they stay in it.
+    pub sways: [Sway; 2],
     /// Joint rates (rad/s), then for a free object its velocity (m/s) and angular velocity (rad/s) in the gripper
-    /// frame.
+    /// frame, then the rates of both sways.
     pub velocity: Vec<f64>,
     /// The object's centre of mass and the axes of its frame, in the gripper frame.
     pub(super) body: Pose,
@@ -102,6 +105,7 @@ impl State {
         };
         Self {
             q: vec![0.0; model.joint_count()],
+            sways: [Sway::NONE; 2],
             velocity: vec![0.0; model.unknowns()],
             body,
             time: 0.0,
@@ -125,8 +129,9 @@ impl State {
 
     /// Becomes another state of the same model, without allocating.
     pub(super) fn copy_from(&mut self, other: &Self) {
-        let Self { q, velocity, body, time, hand, touched, lag_h, chamber_bar, filled_from_bar, crept } = other;
+        let Self { q, sways, velocity, body, time, hand, touched, lag_h, chamber_bar, filled_from_bar, crept } = other;
         self.q.copy_from_slice(q);
+        self.sways = *sways;
         self.velocity.copy_from_slice(velocity);
         self.body = *body;
         self.time = *time;
@@ -148,6 +153,10 @@ impl State {
         for (now, before) in self.q.iter_mut().zip(&start.q).chain(self.velocity.iter_mut().zip(&start.velocity)) {
             *now += share * (*now - before);
         }
+        for (now, before) in self.sways.iter_mut().zip(start.sways) {
+            now.curvature += share * (now.curvature - before.curvature);
+            now.twist += share * (now.twist - before.twist);
+        }
         for (now, before) in self.crept.iter_mut().zip(&start.crept) {
             *now += share * (*now - before);
         }
@@ -162,7 +171,7 @@ impl State {
         if let Some(body) = model.free_body() {
             let axes = self.body.matrix();
             let spin = axes * (body.inverse_inertia * (axes.transpose() * momentum));
-            self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
+            self.set_spin(model, spin);
         }
         self.touched.go_on_from(&start.touched, share);
     }
@@ -186,6 +195,9 @@ impl State {
             }
             fastest = fastest.max(tip);
         }
+        if let Some(sideways) = &model.sideways {
+            fastest += sideways.fastest(&self.sway_rates(model), &model.chain.lengths, model.skin.thickness);
+        }
         let (linear, angular) = self.body_velocity(model);
         let object = model.free_body().map_or(0.0, |body| linear.length() + angular.length() * body.radius);
         fastest + object
@@ -193,10 +205,36 @@ impl State {
 
     /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.
     pub(super) fn body_velocity(&self, model: &PhysicsModel) -> (DVec3, DVec3) {
-        match self.velocity.get(model.joint_count()..) {
+        match self.velocity.get(model.joint_count()..model.first_sway()) {
             Some([x, y, z, a, b, c]) => (DVec3::new(*x, *y, *z), DVec3::new(*a, *b, *c)),
             _ => (DVec3::ZERO, DVec3::ZERO),
         }
+    }
+
+    fn set_spin(&mut self, model: &PhysicsModel, spin: DVec3) {
+        let from = model.joint_count() + 3;
+        self.velocity[from..from + 3].copy_from_slice(&spin.to_array());
+    }
+
+    /// Rates of a finger's sway (1/(m s), rad/(m s)); zero where it stays in its plane.
+    pub(super) fn sway_rates_of(&self, model: &PhysicsModel, finger: usize) -> [f64; 2] {
+        let from = model.first_sway() + 2 * finger;
+        self.velocity.get(from..from + 2).map_or([0.0; 2], |rates| [rates[0], rates[1]])
+    }
+
+    /// The faster of both fingers' rates of sway.
+    pub(super) fn sway_rates(&self, model: &PhysicsModel) -> [f64; 2] {
+        let [left, right] = [0, 1].map(|finger| self.sway_rates_of(model, finger));
+        [left[0].abs().max(right[0].abs()), left[1].abs().max(right[1].abs())]
+    }
+
+    /// Sways after a time (s) at the present rates.
+    pub(super) fn sways_ahead(&self, model: &PhysicsModel, ahead: f64) -> [Sway; 2] {
+        [0, 1].map(|finger| {
+            let Sway { curvature, twist } = self.sways[finger];
+            let [a, b] = self.sway_rates_of(model, finger);
+            Sway { curvature: curvature + ahead * a, twist: twist + ahead * b }
+        })
     }
 
     /// Angular momentum of a free object about its centre of mass, in the gripper frame (kg m²/s); zero otherwise.
@@ -225,6 +263,9 @@ impl State {
         for (q, rate) in self.q.iter_mut().zip(&self.velocity) {
             *q += h * rate;
         }
+        if model.sideways.is_some() {
+            self.sways = self.sways_ahead(model, h);
+        }
         if let Some(body) = model.free_body() {
             let (linear, angular) = self.body_velocity(model);
             self.body.position += linear * h;
@@ -233,7 +274,7 @@ impl State {
             let after = self.body.matrix();
             let momentum = before * (body.inertia * (before.transpose() * angular));
             let spin = after * (body.inverse_inertia * (after.transpose() * momentum));
-            self.velocity[model.joint_count() + 3..].copy_from_slice(&spin.to_array());
+            self.set_spin(model, spin);
         }
     }
 
@@ -244,9 +285,22 @@ impl State {
         if let Some(i) = bad(&self.q).or_else(|| bad(&self.velocity[..2 * n])) {
             return Some(Self::place_of(model, i));
         }
+        if model.sideways.is_some()
+            && let Some(unknown) = self.sway_not_finite(model)
+        {
+            return Some(Self::place_of(model, unknown));
+        }
         let (linear, angular) = self.body_velocity(model);
         let sound = self.body.is_finite() && linear.is_finite() && angular.is_finite();
         (!sound).then(|| Self::place_of(model, 2 * n))
+    }
+
+    /// The first unknown of a sway that is not finite.
+    fn sway_not_finite(&self, model: &PhysicsModel) -> Option<usize> {
+        let finite = |sway: &Sway| sway.curvature.is_finite() && sway.twist.is_finite();
+        let rates = &self.velocity[model.first_sway()..];
+        let shape = self.sways.iter().position(|sway| !finite(sway)).map(|finger| 2 * finger);
+        shape.or_else(|| rates.iter().position(|rate| !rate.is_finite())).map(|k| model.first_sway() + k)
     }
 
     /// Display name of the joint or body that an unknown of the step belongs to.
@@ -255,7 +309,9 @@ impl State {
         match unknown / n {
             0 => format!("joint {} of the left finger", unknown + 1),
             1 => format!("joint {} of the right finger", unknown - n + 1),
-            _ => "the object".to_owned(),
+            _ if unknown < model.first_sway() => "the object".to_owned(),
+            _ if unknown < model.first_sway() + 2 => "the left finger, sideways".to_owned(),
+            _ => "the right finger, sideways".to_owned(),
         }
     }
 }

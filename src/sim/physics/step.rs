@@ -7,6 +7,7 @@ use super::effects::{move_world, note_passing};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
 use super::solve::{Product, Unbalanced, minimise, relative_velocities, segment_velocities};
+use super::space::gather;
 use super::state::State;
 use super::workspace::Workspace;
 use glam::{DQuat, DVec2, DVec3};
@@ -156,6 +157,9 @@ fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Works
         ws.body.rotation = (DQuat::from_scaled_axis(angular * ahead) * ws.body.rotation).normalize();
     }
     ws.reference = if model.body.is_some() { ws.body.position } else { DVec3::ZERO };
+    if let Some(space) = &mut ws.space {
+        space.lay_out(model, &ws.q, state.sways_ahead(model, ahead), ws.reference);
+    }
     for finger in 0..2 {
         let plane = model.planes[finger];
         let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
@@ -170,6 +174,26 @@ fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Works
 
 /// Fills A and r.
 pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
+    match model.sideways {
+        Some(_) => gather(model, state, ws, drive),
+        None => gather_planar(model, state, ws, drive),
+    }
+    let (n, h) = (model.chain.joints, ws.step.h);
+    if let Some(body) = model.free_body() {
+        let (linear, angular) = state.body_velocity(model);
+        let r = state.body.matrix();
+        ws.body_inertia = r * body.inertia * r.transpose();
+        let known_linear =
+            (linear + (model.object_gravity - ws.passing.acceleration) * h) * body.mass + drive.object_force * h;
+        // No gyroscopic torque: `State::integrate` carries the angular momentum over, which amounts to it.
+        let known_angular = ws.body_inertia * angular;
+        ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());
+        ws.rhs[2 * n + 3..2 * n + 6].copy_from_slice(&known_angular.to_array());
+    }
+}
+
+/// Fills A and r of fingers that stay in their planes.
+fn gather_planar(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     let (n, h) = (model.chain.joints, ws.step.h);
     let (left, right) = ws.segments.split_at(n + 1);
     if model.finger_inertia {
@@ -204,17 +228,6 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
     for entry in ws.finger_matrix.iter_mut().step_by(n + 1) {
         *entry += diagonal;
     }
-    if let Some(body) = model.free_body() {
-        let (linear, angular) = state.body_velocity(model);
-        let r = state.body.matrix();
-        ws.body_inertia = r * body.inertia * r.transpose();
-        let known_linear =
-            (linear + (model.object_gravity - ws.passing.acceleration) * h) * body.mass + drive.object_force * h;
-        // No gyroscopic torque: `State::integrate` carries the angular momentum over, which amounts to it.
-        let known_angular = ws.body_inertia * angular;
-        ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());
-        ws.rhs[2 * n + 3..].copy_from_slice(&known_angular.to_array());
-    }
 }
 
 /// Friction limits that add up to less than this (N) are too small for a meaningful mismatch.
@@ -243,6 +256,9 @@ pub(super) fn remember_contacts(model: &PhysicsModel, state: &mut State, ws: &Wo
 
 /// Axes of a segment in the gripper frame, as columns: along, across, inward.
 pub(super) fn segment_axes_of(model: &PhysicsModel, ws: &Workspace, link: u32) -> glam::DMat3 {
+    if let Some(frame) = ws.frames().get(link as usize) {
+        return frame.axes;
+    }
     let plane = &model.planes[link as usize / (model.chain.joints + 1)];
     segment_axes(plane, &ws.segments[link as usize])
 }

@@ -167,7 +167,8 @@ impl SteppedScene {
 
     /// Gives a free object a linear and an angular velocity (m/s, rad/s).
     pub fn throw_object(&mut self, linear: DVec3, angular: DVec3) {
-        if let Some(own) = self.state.velocity.get_mut(self.model.joint_count()..).filter(|own| own.len() == 6) {
+        let own = self.model.joint_count()..self.model.first_sway();
+        if let Some(own) = self.state.velocity.get_mut(own).filter(|own| own.len() == 6) {
             own[..3].copy_from_slice(&linear.to_array());
             own[3..].copy_from_slice(&angular.to_array());
         }

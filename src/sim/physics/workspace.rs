@@ -5,7 +5,8 @@ use super::contact::{Against, Contact, ContactStep};
 use super::environment::{Environment, Passing};
 use super::hessian::{Hessian, Lanes};
 use super::model::PhysicsModel;
-use crate::gripper::SegmentPose;
+use super::space::Space;
+use crate::gripper::{SegmentFrame, SegmentPose};
 use glam::{DMat3, DVec2, DVec3};
 use palpate_geometry::Pose;
 
@@ -178,6 +179,8 @@ pub struct Workspace {
     pub(super) body: Pose,
     /// Segments of both fingers in their planes.
     pub(super) segments: Vec<SegmentPose>,
+    /// Both fingers in space, where they leave their planes.
+    pub(super) space: Option<Box<Space>>,
     /// Point about which spatial velocities are taken: the object's centre of mass (m).
     pub(super) reference: DVec3,
     /// Velocity of everything beyond a joint of each finger per unit of its rate, about the reference.
@@ -235,6 +238,7 @@ impl Workspace {
             q: vec![0.0; 2 * n],
             body: Pose::IDENTITY,
             segments: vec![SegmentPose::default(); links],
+            space: model.sideways.as_ref().map(|_| Box::new(Space::new(model))),
             reference: DVec3::ZERO,
             columns: vec![Planar::default(); n],
             spatial: vec![Spatial::default(); links],
@@ -262,6 +266,12 @@ impl Workspace {
             coupling: vec![Spatial::default(); n * (n + 1)],
         }
     }
+    /// Segments in space, where they leave their planes; else none.
+    #[inline]
+    pub(super) fn frames(&self) -> &[SegmentFrame] {
+        self.space.as_ref().map_or(&[], |space| &space.frames)
+    }
+
     /// Force of the surroundings on fingers and object in the last step (N).
     pub(super) fn force_of_world(&self) -> DVec3 {
         let against_world = self.contacts.iter().filter(|contact| contact.against == Against::World);

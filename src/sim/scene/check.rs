@@ -126,6 +126,24 @@ impl Scene {
         ranges.number("gripper.finger.curvature_limit", finger.curvature_limit, 1e-3..=1e4);
         ranges.number("gripper.finger.creep_share", finger.creep_share, 0.0..=0.99);
         ranges.number("gripper.finger.creep_time", finger.creep_time, 1e-3..=1e6);
+        let sideways = &finger.sideways;
+        let (bending, torsion) =
+            ("gripper.finger.sideways.bending_stiffness", "gripper.finger.sideways.torsional_stiffness");
+        ranges.auto(bending, sideways.bending_stiffness, 1e-9..=1e6);
+        ranges.auto(torsion, sideways.torsional_stiffness, 1e-9..=1e6);
+        let given = |stiffness: Auto| stiffness.value().is_some();
+        for (key, own, other) in [
+            (bending, sideways.bending_stiffness, sideways.torsional_stiffness),
+            (torsion, sideways.torsional_stiffness, sideways.bending_stiffness),
+        ] {
+            if !given(own) && given(other) {
+                ranges.refuse(
+                    key,
+                    &"\"auto\"",
+                    "a number where the other stiffness out of the plane is one".to_owned(),
+                );
+            }
+        }
         let pad = &self.gripper.pad;
         ranges.number("gripper.pad.thickness", pad.thickness, 1e-4..=0.5);
         ranges.number("gripper.pad.modulus", pad.modulus, 1.0..=1e12);
@@ -212,6 +230,17 @@ mod tests {
     fn refusals_name_the_key() {
         assert!(refused(|s| s.gripper.pad.modulus = f64::NAN).contains("gripper.pad.modulus"));
         assert!(refused(|s| s.gripper.finger.joints = 81).contains("between 2 and 80"));
+        let half = |s: &mut Scene| s.gripper.finger.sideways.torsional_stiffness = Auto::Value(1e-3);
+        assert!(refused(half).contains("gripper.finger.sideways.bending_stiffness"));
+        let both = |bending| {
+            move |s: &mut Scene| {
+                half(s);
+                s.gripper.finger.sideways.bending_stiffness = Auto::Value(bending);
+            }
+        };
+        for bending in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(refused(both(bending)).contains("gripper.finger.sideways.bending_stiffness"), "{bending}");
+        }
         assert!(refused(|s| s.timing.sample_hz = 9973).contains("timing.sample_hz"));
         assert!(refused(|s| s.timing.duration_s = f64::INFINITY).contains("timing.duration_s"));
         assert!(refused(|s| s.programme.peak_bar = 1.6).contains("programme.peak_bar"));

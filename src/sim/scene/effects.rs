@@ -78,6 +78,8 @@ effects! {
     Shaking = "shaking",
     /// An object whose surface gives way.
     SoftObject = "soft-object",
+    /// Fingers that bend sideways and twist.
+    OutOfPlane = "out-of-plane",
 }
 
 /// The setting of every effect; all `auto` by default.

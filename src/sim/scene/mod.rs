@@ -4,7 +4,6 @@
 //! [`Scene::from_toml`] for reading and [`Scene::to_toml`] for the whole list with its defaults.
 
 mod accuracy;
-mod auto;
 mod check;
 mod effects;
 mod engine;
@@ -13,8 +12,8 @@ mod poses;
 mod shaking;
 mod timing;
 
+pub use crate::auto::Auto;
 pub use accuracy::{Accuracy, IntegrationMethod, Integrator, UnknownAccuracy};
-pub use auto::Auto;
 pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
 pub use file::{SceneError, SceneKey};

@@ -7,7 +7,7 @@ use crate::app::context::PanelContext;
 use crate::app::features::files::FileAction;
 use crate::app::features::simulation::SimulationAction;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
-use palpate_sim::gripper::{Finger, PadLaw};
+use palpate_sim::gripper::{Finger, PadLaw, Sideways};
 use palpate_sim::scene::{Auto, EngineKind, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -154,6 +154,7 @@ fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions
 }
 
 fn finger_ui(ui: &mut Ui, scene: &mut Scene) {
+    let pad_thickness = scene.gripper.pad.thickness;
     let finger = &mut scene.gripper.finger;
     let label = ui.label("joints");
     let range = Finger::FEWEST_JOINTS as usize..=Finger::MOST_JOINTS as usize;
@@ -165,6 +166,22 @@ fn finger_ui(ui: &mut Ui, scene: &mut Scene) {
     Number { name: "mass", unit: "g", factor: 1e3, range: [0.1, 500.0], speed: 0.2 }.ui(ui, &mut finger.mass);
     Number { name: "relaxation", unit: "ms", factor: 1e3, range: [0.0, 1000.0], speed: 0.5 }
         .ui(ui, &mut finger.damping_time);
+    sideways_ui(ui, finger, pad_thickness);
+}
+
+/// Rigid out of the plane, or the two stiffnesses; a solid section to begin with.
+fn sideways_ui(ui: &mut Ui, finger: &mut Finger, pad_thickness: f64) {
+    let mut bends = finger.sideways.stiffness().is_some();
+    choice(ui, "out of plane", &mut bends, &[(false, "rigid"), (true, "bends and twists")]);
+    if bends != finger.sideways.stiffness().is_some() {
+        finger.sideways = if bends { finger.of_solid_section(pad_thickness) } else { Sideways::default() };
+    }
+    let Sideways { bending_stiffness, torsional_stiffness } = &mut finger.sideways;
+    for (name, stiffness) in [("sideways EI", bending_stiffness), ("torsion GJ", torsional_stiffness)] {
+        if let Auto::Value(stiffness) = stiffness {
+            Number { name, unit: "N·cm²", factor: 1e4, range: [0.1, 10_000.0], speed: 0.2 }.ui(ui, stiffness);
+        }
+    }
 }
 
 fn pad_ui(ui: &mut Ui, scene: &mut Scene) {

@@ -160,7 +160,14 @@ const PLOTS: [(&str, &[Effect]); 2] = [
     ),
     (
         "Contact and material",
-        &[Effect::Support, Effect::Friction, Effect::FingerContact, Effect::Creep, Effect::SoftObject],
+        &[
+            Effect::Support,
+            Effect::Friction,
+            Effect::FingerContact,
+            Effect::Creep,
+            Effect::SoftObject,
+            Effect::OutOfPlane,
+        ],
     ),
 ];
 

@@ -1,6 +1,7 @@
 //! Random scenes: built-in objects in random poses, of random mass, softness and friction, before random grippers.
 //! Ranges reach to where an effect begins or ceases to matter, evenly over their logarithms.
 
+use palpate_sim::gripper::Sideways;
 use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue, load};
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::{Auto, Faces, PoseSpread, Scene, SupportKind};
@@ -19,13 +20,14 @@ pub(super) struct Drawn {
 }
 
 /// Share of scenes with an empty hand, with an object that is held, with a table, with a hand that is shaken, with a
-/// soft object, and with slow chambers.
+/// soft object, with slow chambers, and with fingers that bend sideways and twist.
 const EMPTY_SHARE: f64 = 0.06;
 const HELD_SHARE: f64 = 0.15;
 const TABLE_SHARE: f64 = 0.2;
 const SHAKEN_SHARE: f64 = 0.3;
 const SOFT_SHARE: f64 = 0.5;
 const SLOW_SHARE: f64 = 0.5;
+const SIDEWAYS_SHARE: f64 = 0.25;
 
 impl ObjectShelf {
     pub(super) fn load() -> Result<Self, ObjectError> {
@@ -50,6 +52,7 @@ impl ObjectShelf {
         }
         draw.gripper(&mut scene);
         draw.surroundings(&mut scene);
+        draw.sideways(&mut scene);
         // The widest shifts and turns of the presets, on whichever side it lies.
         scene.pose = PoseSpread { shift: [0.010; 3], yaw_deg: 90.0, faces: Faces::Nominal, ..PoseSpread::default() };
         let (scene, _) = jittered(&scene, model.as_ref(), u64::from(index) ^ seed);
@@ -78,6 +81,11 @@ fn flat(toml: &str) -> Vec<String> {
     settings
 }
 
+fn to_three_digits(x: f64) -> f64 {
+    let digits = 10f64.powi(2 - x.log10().floor() as i32);
+    (x * digits).round() / digits
+}
+
 struct Draw<'a> {
     random: &'a mut ChaCha8Rng,
 }
@@ -93,9 +101,7 @@ impl Draw<'_> {
 
     /// Evenly over the logarithm, to three digits, as a user would write it.
     fn between(&mut self, low: f64, high: f64) -> f64 {
-        let x = (low.ln() + (high / low).ln() * self.random.random::<f64>()).exp();
-        let digits = 10f64.powi(2 - x.log10().floor() as i32);
-        (x * digits).round() / digits
+        to_three_digits((low.ln() + (high / low).ln() * self.random.random::<f64>()).exp())
     }
 
     fn object(&mut self, scene: &mut Scene, model: Option<&mut ObjectModel>) {
@@ -133,6 +139,21 @@ impl Draw<'_> {
         scene.programme.close_bar_per_tick = self.between(0.03, 0.15);
         scene.programme.hold_ticks = self.between(5.0, 50.0).round() as u32;
         scene.timing.duration_s = 0.1 * f64::from(scene.programme.total_ticks() + 2);
+    }
+
+    /// Last, so that scenes with fingers that stay in their planes do not depend on it.
+    fn sideways(&mut self, scene: &mut Scene) {
+        if self.happens(SIDEWAYS_SHARE) {
+            let gripper = &mut scene.gripper;
+            let solid = gripper.finger.of_solid_section(gripper.pad.thickness);
+            let mut stiffened = |stiffness: Auto| {
+                Auto::Value(to_three_digits(stiffness.value().unwrap_or_default() * self.between(0.3, 3000.0)))
+            };
+            gripper.finger.sideways = Sideways {
+                bending_stiffness: stiffened(solid.bending_stiffness),
+                torsional_stiffness: stiffened(solid.torsional_stiffness),
+            };
+        }
     }
 
     fn surroundings(&mut self, scene: &mut Scene) {

@@ -15,6 +15,7 @@ mod finger_inertia;
 mod free_object;
 mod friction;
 mod object_gravity;
+mod out_of_plane;
 mod pneumatic_lag;
 mod shaking;
 mod situation;
@@ -69,6 +70,7 @@ pub fn rule_of(effect: Effect) -> &'static Rule {
         Effect::Creep => &creep::RULE,
         Effect::Shaking => &shaking::RULE,
         Effect::SoftObject => &soft_object::RULE,
+        Effect::OutOfPlane => &out_of_plane::RULE,
     }
 }
 

@@ -48,7 +48,7 @@ use super::placement::Placement;
 use super::simulation::Refinement;
 use super::step::NotFinite;
 use crate::frame::{Frame, Plan, Quality};
-use crate::gripper::{Actuation, FingerPlane, Phase, SegmentPose, Side};
+use crate::gripper::{Actuation, FingerPlane, Phase, SegmentPose, Side, Sway};
 use crate::objects::ObjectModel;
 use crate::scene::{Accuracy, Clock, Effect, Scene, SupportKind};
 use glam::{DVec2, DVec3};
@@ -57,13 +57,14 @@ use palpate_geometry::{DistanceField, Pose};
 use world::{Hand, Touch};
 
 /// Effects that this engine always or never has.
-const SETTLED: [(Effect, bool, &str); 6] = [
+const SETTLED: [(Effect, bool, &str); 7] = [
     (Effect::FingerInertia, true, "rapier's chains always have inertia"),
     (Effect::FingerContact, false, "rapier's fingers do not meet each other here"),
     (Effect::PneumaticLag, false, "rapier follows the line pressure without lag"),
     (Effect::Creep, false, "rapier's springs do not creep"),
     (Effect::Shaking, false, "rapier's hand stays where it is"),
     (Effect::SoftObject, false, "rapier's objects are rigid"),
+    (Effect::OutOfPlane, false, "rapier's fingers stay in their planes"),
 ];
 
 /// The plan as rapier carries it out.
@@ -272,6 +273,7 @@ impl Engine for RapierSimulation {
             line_bar: self.line_bar,
             phase: self.phase,
             q,
+            sways: [Sway::NONE; 2],
             hand: DVec3::ZERO,
             world_from_object: self.hand.gripper_from_object().map(|pose| self.world_from_gripper * pose),
             taxels,

@@ -5,6 +5,7 @@ use super::fingers::missed;
 use super::{FULL_TORQUE, bare, stepped, torque};
 use glam::DVec3;
 use palpate_geometry::Primitive;
+use palpate_sim::gripper::Sideways;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::{Drive, NotFinite, SteppedScene};
 use palpate_sim::scene::{Auto, Scene};
@@ -43,6 +44,37 @@ pub(super) fn squeezed_masses(conditions: &Conditions) -> Findings {
             findings.push(Measurement::at_most(format!("depth over the pad's thickness at {mass} kg"), depth, 1.0));
             findings.push(missed(&run));
         }
+    }
+    Ok(findings)
+}
+
+/// Beside the middle of the pads, so that the fingers are pushed sideways and twisted: squeezed, and let go.
+pub(super) fn soft_sideways(conditions: &Conditions) -> Findings {
+    let mut scene = Scene::default();
+    scene.gripper.mount.offset = [0.0, 0.005, 0.0];
+    let solid = scene.gripper.finger.of_solid_section(scene.gripper.pad.thickness);
+    let softened = |stiffness: Auto| stiffness.value().map_or(stiffness, |stiffness| Auto::Value(0.01 * stiffness));
+    scene.gripper.finger.sideways = Sideways {
+        bending_stiffness: softened(solid.bending_stiffness),
+        torsional_stiffness: softened(solid.torsional_stiffness),
+    };
+    let mut findings = Vec::new();
+    for mass in [1e-3, 0.01, 10.0] {
+        let object = of_mass(Primitive::Sphere { radius: 0.02 }, mass, 0.6);
+        let mut run = stepped(&scene, Some(&object), conditions);
+        run.cover(1.5, ramp)?;
+        let depth = run.deepest() / scene.gripper.pad.thickness;
+        let squeezed = run.energy();
+        let mut most = squeezed;
+        for _ in 0..(conditions.span(1.0) / run.h).round() as usize {
+            run.step(&Drive::default())?;
+            most = most.max(run.energy());
+        }
+        findings.push(Measurement::at_most(format!("depth over the pad's thickness at {mass} kg"), depth, 1.0));
+        findings.push(Measurement::at_most(format!("gain once let go at {mass} kg (J)"), most - squeezed, 1e-6));
+        let tip = run.state.sways.iter().map(|sway| sway.curvature.abs()).fold(0.0, f64::max);
+        findings.push(Measurement::at_least(format!("sideways curvature at {mass} kg (1/m)"), tip, 1e-6));
+        findings.push(missed(&run));
     }
     Ok(findings)
 }

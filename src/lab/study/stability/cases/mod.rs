@@ -43,6 +43,13 @@ pub const CASES: &[Case] = &[
         measure: fingers::explicit_step,
     },
     Case {
+        name: "soft sideways",
+        claim: "a hundredth of a solid finger's stiffness sideways and in twist, around 1 g .. 10 kg: no energy is gained, the \
+                pad keeps its bottom",
+        settings: EVERY,
+        measure: contact::soft_sideways,
+    },
+    Case {
         name: "squeezed masses",
         claim: "0.1 g .. 100 kg squeezed and pulled at: no creep, no ejection, the pad keeps its bottom",
         settings: EVERY,
