@@ -49,7 +49,6 @@
 //! either are refused with [`scene::SceneError::NeedsRapier`]. `bench` builds the benchmark: `cargo run --release
 //! -p palpate-sim --no-default-features --features bench`.
 
-mod auto;
 pub mod frame;
 pub mod gripper;
 pub mod objects;

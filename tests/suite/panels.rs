@@ -206,6 +206,31 @@ fn scene_settings_reach_the_simulation() {
 }
 
 #[test]
+fn fingers_are_let_bend_sideways() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "scene").unwrap();
+    let [dark, light] = Theme::ALL.map(|theme| {
+        let mut bench = bench(BenchSetup { theme, size: [300.0, 420.0], panel: Some(panel), ..BenchSetup::default() });
+        bench.until(|s| s.scene.gripper.finger.sideways.stiffness().is_none());
+        // Room for the section that is to be unfolded.
+        for section in ["Object", "Accuracy", "Gripper pose", "Programme"] {
+            bench.harness.get_by_label(section).click();
+            bench.harness.run_steps(8);
+        }
+        bench.harness.get_by_label("Finger").click();
+        bench.harness.run_steps(20);
+        bench.harness.get_by_role_and_label(Role::ComboBox, "out of plane").click();
+        bench.harness.run_steps(3);
+        bench.harness.get_by_label("bends and twists").click();
+        let bent = bench.until(|s| s.scene.gripper.finger.sideways.stiffness().is_some());
+        let (finger, pad) = (&bent.scene.gripper.finger, &bent.scene.gripper.pad);
+        assert_eq!(finger.sideways, finger.of_solid_section(pad.thickness));
+        bench.harness.run_steps(3);
+        bench.harness.render().unwrap()
+    });
+    compare("scene_sideways", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
 fn turning_the_accuracy_dial_moves_both_numbers() {
     let mut bench = whole_window();
     bench.harness.get_by_label("Scene").click();

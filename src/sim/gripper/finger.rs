@@ -4,7 +4,7 @@
 //! the palm and the last half segment is the tip: this layout converges at second order in N, where joints at
 //! segment starts converge at first order only (tip-load error 0.25 % against 15.5 % at N = 10).
 
-use crate::auto::Auto;
+use super::Auto;
 use serde::{Deserialize, Serialize};
 
 /// Description of a finger. Defaults follow the SoMo project's calibrated soft finger: 100 mm long, 30 g, 0.42 N m/rad

@@ -2,6 +2,7 @@
 //! the pressure programme. Plain data for the physics.
 
 mod actuation;
+mod auto;
 mod bend;
 mod finger;
 mod pad;
@@ -10,6 +11,7 @@ mod space;
 mod taxels;
 
 pub use actuation::{Actuation, TorquePoint};
+pub use auto::Auto;
 pub use bend::{BentFinger, FingerPlane, SegmentPose, bend};
 pub use finger::{Finger, Sideways};
 pub use pad::{Pad, PadLaw};

@@ -43,8 +43,11 @@ pub(super) fn explicit_step(
     for (force, rate) in force.iter_mut().zip(&state.velocity[..model.joint_count()]) {
         *force -= model.chain.damping * rate;
     }
-    for (force, resisted) in force[model.first_sway()..].iter_mut().zip(model.sway_damping(state)) {
-        *force -= resisted;
+    if let Some(sideways) = &model.sideways {
+        let resisted = [0, 1].map(|finger| sideways.resisted(state.sway_rates_of(model, finger)));
+        for (force, resisted) in force[model.first_sway()..].iter_mut().zip(resisted.iter().flatten()) {
+            *force -= resisted;
+        }
     }
     for (force, impulse) in force.iter_mut().zip(contact_and_limit_impulses(model, state, ws)) {
         *force += impulse / INSTANT;

@@ -21,7 +21,7 @@
 //! as SDIRK2 at equal cost), an error from taking each step whole and in halves (three times the cost).
 
 use super::model::PhysicsModel;
-use super::space::SWAYS;
+use super::sideways::SWAYS;
 use super::state::State;
 use super::step::{Drive, NotFinite, StepReport, step};
 use super::workspace::Workspace;

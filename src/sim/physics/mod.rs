@@ -44,13 +44,16 @@ mod rapier_engine;
 mod resting;
 #[cfg(test)]
 mod shaking_tests;
+mod sideways;
 mod simulation;
 #[cfg(test)]
 mod softness_tests;
 mod solve;
 mod space;
+mod space_step;
 #[cfg(test)]
 mod space_tests;
+mod spatial;
 mod state;
 mod step;
 mod stepped;

@@ -6,8 +6,7 @@ use super::contact_springs::ContactSprings;
 use super::effects::{Chamber, FingerContact, Relaxation, Shell, plan};
 use super::environment::Environment;
 use super::placement::Placement;
-use super::space::{SWAYS, Sideways};
-use super::state::State;
+use super::sideways::{SWAYS, Sideways};
 use crate::frame::Plan;
 use crate::gripper::{FingerPlane, GripperModel, PadLaw, Side};
 use crate::objects::{ObjectModel, Resting};
@@ -210,14 +209,6 @@ impl PhysicsModel {
     /// right one.
     pub(super) fn first_sway(&self) -> usize {
         self.joint_count() + if self.free_body().is_some() { 6 } else { 0 }
-    }
-
-    /// Resistance of dampers to the rates of sway: of the left finger, then of the right one; none where they stay in
-    /// their planes.
-    pub(super) fn sway_damping(&self, state: &State) -> Vec<f64> {
-        let of =
-            |sideways: &Sideways| [0, 1].map(|finger| sideways.resisted(state.sway_rates_of(self, finger))).concat();
-        self.sideways.as_ref().map_or_else(Vec::new, of)
     }
 
     /// The object, where it can move.

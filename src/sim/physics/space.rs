@@ -15,96 +15,11 @@
 //!
 //! The four unknowns stand last, in the border of the Hessian: a and b of the left finger, then of the right one.
 
-use super::contact::{Acting, Against};
 use super::model::PhysicsModel;
-use super::state::State;
-use super::step::Drive;
-use super::workspace::{Block, LinkBlocks, Spatial, Workspace};
-use crate::gripper::{Finger, JointAxes, Pad, SegmentFrame, Sway, bend_in_space, sway_shares};
+use super::sideways::SWAYS;
+use super::spatial::{Block, Spatial};
+use crate::gripper::{JointAxes, SegmentFrame, Sway, bend_in_space};
 use glam::{DMat3, DVec3};
-
-/// Unknowns of both fingers out of their planes.
-pub(super) const SWAYS: usize = 4;
-
-/// What a finger resists out of its plane; both fingers share it. Pairs are of sideways curvature and of twist.
-#[derive(Clone, Debug)]
-pub(super) struct Sideways {
-    /// Angle of each joint per unit of both (m).
-    shares: Vec<[f64; 2]>,
-    /// Sums of the above (m): the tip turns by these.
-    pub(super) turns: [f64; 2],
-    /// K_a (N m³) and K_b (N m³): moment per unit, times the shares.
-    pub(super) stiffness: [f64; 2],
-    damping: [f64; 2],
-    /// Inertia of each segment about its centre, along, across and inward (kg m²).
-    inertias: Vec<DVec3>,
-}
-
-impl Sideways {
-    /// `stiffness`: bending sideways and torsion (N m²).
-    pub(super) fn new(finger: &Finger, pad: &Pad, [bending, torsion]: [f64; 2]) -> Self {
-        let lengths: Vec<f64> = finger.segment_lengths().collect();
-        let shares: Vec<[f64; 2]> = sway_shares(&lengths).collect();
-        let sum = |of: &dyn Fn(&[f64; 2]) -> f64| shares.iter().map(of).sum::<f64>();
-        let each = finger.segment_length();
-        let stiffness = [bending * sum(&|s| s[0] * s[0] / each), torsion * sum(&|s| s[1] * s[1] / each)];
-        let thickness = finger.back + pad.thickness;
-        let squares = |a: f64, b: f64| (a * a + b * b) / 12.0;
-        let inertias = lengths.iter().map(|l| {
-            let mass = finger.mass * l / finger.length;
-            DVec3::new(squares(finger.width, thickness), squares(*l, thickness), squares(*l, finger.width)) * mass
-        });
-        Self {
-            turns: [sum(&|s| s[0]), sum(&|s| s[1])],
-            stiffness,
-            damping: stiffness.map(|k| finger.damping_time * k),
-            inertias: inertias.collect(),
-            shares,
-        }
-    }
-
-    /// Diagonal of h C + h² K.
-    fn resistance(&self, h: f64, which: usize) -> f64 {
-        h * self.damping[which] + h * h * self.stiffness[which]
-    }
-
-    /// Resistance of the dampers to rates.
-    pub(super) fn resisted(&self, rates: [f64; 2]) -> [f64; 2] {
-        [self.damping[0] * rates[0], self.damping[1] * rates[1]]
-    }
-
-    /// Elastic energy of a finger (J).
-    pub(super) fn energy(&self, sway: Sway) -> f64 {
-        0.5 * sway.to_array().iter().zip(self.stiffness).map(|(x, k)| k * x * x).sum::<f64>()
-    }
-
-    /// Moments that shapes out of the plane stand under, summed, the larger of two states (N m); and elastic energy in
-    /// the first (J).
-    pub(super) fn strain(&self, before: &State, after: &State) -> (f64, f64) {
-        let mut moments = 0.0;
-        for (before, after) in before.sways.iter().zip(&after.sways) {
-            for (which, (x, y)) in before.to_array().into_iter().zip(after.to_array()).enumerate() {
-                moments += self.stiffness[which] / self.turns[which] * x.abs().max(y.abs());
-            }
-        }
-        (moments, before.sways.iter().map(|sway| self.energy(*sway)).sum())
-    }
-
-    /// Bound of the turn of any segment (rad/s), from its rates.
-    pub(super) fn turning(&self, rates: [f64; 2]) -> f64 {
-        self.turns[0] * rates[0].abs() + self.turns[1] * rates[1].abs()
-    }
-
-    /// Bound of the speed (m/s) of any point of a finger within `reach` (m) of its tip's axis, from its rates.
-    pub(super) fn fastest(&self, rates: &[f64], lengths: &[f64], reach: f64) -> f64 {
-        let mut beyond = lengths.iter().sum::<f64>() + reach;
-        let arms = self.shares.iter().zip(lengths).map(|(shares, l)| {
-            beyond -= l;
-            (shares[0] * rates[0].abs() + shares[1] * rates[1].abs()) * beyond
-        });
-        arms.sum()
-    }
-}
 
 /// Scratch memory of a step in space.
 #[derive(Clone, Debug)]
@@ -119,30 +34,30 @@ pub(super) struct Space {
     /// Velocity of each segment per unit rate of sideways curvature and twist: sums of T.
     pub(super) carried: Vec<[Spatial; 2]>,
     /// Inertia of each segment about the reference; zero for fingers without.
-    masses: Vec<Block>,
+    pub(super) masses: Vec<Block>,
     /// Loads on each segment.
     pub(super) loads: Vec<Spatial>,
     /// Velocities of each segment that are not those of the present iterate.
     velocities: Vec<Spatial>,
     /// h C + h² K, and the diagonal of A, of all joints and then of the sways.
-    resistance: Vec<f64>,
+    pub(super) resistance: Vec<f64>,
     diagonal: Vec<f64>,
 }
 
 /// Index in the arrays above and among the unknowns.
 #[derive(Clone, Copy)]
-struct Places {
-    joints: usize,
+pub(super) struct Places {
+    pub(super) joints: usize,
     /// First unknown of the sways.
-    sways: usize,
+    pub(super) sways: usize,
 }
 
 impl Places {
-    fn new(model: &PhysicsModel) -> Self {
+    pub(super) fn new(model: &PhysicsModel) -> Self {
         Self { joints: model.chain.joints, sways: model.first_sway() }
     }
 
-    fn link(self, finger: usize, segment: usize) -> usize {
+    pub(super) fn link(self, finger: usize, segment: usize) -> usize {
         finger * (self.joints + 1) + segment
     }
 }
@@ -255,7 +170,7 @@ impl Space {
     }
 
     /// Fills the loads with the momenta of the segments for the unknowns `x`.
-    fn momentum(&mut self, model: &PhysicsModel, x: &[f64]) {
+    pub(super) fn momentum(&mut self, model: &PhysicsModel, x: &[f64]) {
         let mut velocities = std::mem::take(&mut self.velocities);
         self.segment_velocities(model, x, &mut velocities);
         for ((load, mass), velocity) in self.loads.iter_mut().zip(&self.masses).zip(&velocities) {
@@ -288,7 +203,7 @@ impl Space {
 
     /// Fills the loads with what inertia and gravity resist at zero acceleration of the unknowns `x`, less the forces at
     /// the tips. `gravity` is what falls freely (m/s²).
-    fn resist(
+    pub(super) fn resist(
         &mut self,
         model: &PhysicsModel,
         x: &[f64],
@@ -338,7 +253,7 @@ impl Space {
     }
 
     /// Fills the blocks of inertia.
-    fn fill_masses(&mut self, model: &PhysicsModel, reference: DVec3) {
+    pub(super) fn fill_masses(&mut self, model: &PhysicsModel, reference: DVec3) {
         let Some(sideways) = model.sideways.as_ref().filter(|_| model.finger_inertia) else { return };
         let places = Places::new(model);
         for finger in 0..2 {
@@ -353,40 +268,8 @@ impl Space {
         }
     }
 
-    /// Largest torque of a joint, or mean moment out of the plane, that `known` ones, contacts and joint limits leave
-    /// unbalanced (N m).
-    pub(super) fn imbalance(
-        &self,
-        model: &PhysicsModel,
-        (sideways, ws): (&Sideways, &Workspace),
-        (q, known): (&[f64], Vec<f64>),
-    ) -> f64 {
-        let mut pressed = self.clone();
-        pressed.loads.fill(Spatial::default());
-        for contact in &ws.contacts {
-            let (normal, tangential) = contact.force(ws.step);
-            let linear = contact.normal * normal + tangential;
-            let load = Spatial { linear, angular: contact.arm.cross(linear) };
-            if let Acting::Segment(link) = contact.acting {
-                pressed.add_load(link as usize, &load);
-            }
-            if let Against::Finger(link) = contact.against {
-                pressed.add_load(link as usize, &load.scaled(-1.0));
-            }
-        }
-        let (joints, mut largest) = (model.joint_count(), 0.0f64);
-        pressed.project(model, |k, from_contacts| {
-            let torque = known[k] + from_contacts;
-            largest = largest.max(match k.checked_sub(model.first_sway()) {
-                None => (torque - model.chain.limit_torque(q[k.min(joints - 1)]).0).abs(),
-                Some(sway) => torque.abs() / sideways.turns[sway % 2],
-            });
-        });
-        largest
-    }
-
     /// Fills h C + h² K, and the diagonal of A.
-    fn fill_diagonal(&mut self, model: &PhysicsModel, h: f64) {
+    pub(super) fn fill_diagonal(&mut self, model: &PhysicsModel, h: f64) {
         let Some(sideways) = &model.sideways else { return };
         let (n, places) = (model.chain.joints, Places::new(model));
         let lost = model.relaxation.as_ref().map_or(0.0, |relaxation| relaxation.diagonal_loss(h));
@@ -407,143 +290,9 @@ impl Space {
             }
         }
     }
-
-    /// Fills A, and where `blocks` are given those of contacts, into the Hessian.
-    pub(super) fn fill_hessian(&self, model: &PhysicsModel, ws: &mut Workspace, with_contacts: bool) {
-        let places = Places::new(model);
-        let (n, object) = (places.joints, if model.free_body().is_some() { 6 } else { 0 });
-        for finger in 0..2 {
-            let (mut beyond, mut beyond_object) = (Block::ZERO, Block::ZERO);
-            let (mut swayed, mut sway_on_object) = ([Spatial::default(); 2], [Spatial::default(); 2]);
-            let mut own = [[0.0; 2]; 2];
-            for i in (0..n).rev() {
-                let (j, link) = (finger * n + i, places.link(finger, i + 1));
-                let carried = &self.carried[link];
-                let mut block = self.masses[link];
-                if with_contacts && ws.loaded[link] {
-                    let LinkBlocks { object, world, met } = &ws.blocks[link];
-                    block.add(object);
-                    block.add(world);
-                    if ws.fingers_meet {
-                        block.add(met);
-                    }
-                    beyond_object.add(object);
-                    for (sum, carried) in sway_on_object.iter_mut().zip(carried) {
-                        *sum = sum.plus(&object.times(carried));
-                    }
-                }
-                beyond.add(&block);
-                for u in 0..2 {
-                    let load = block.times(&carried[u]);
-                    swayed[u] = swayed[u].plus(&load);
-                    for v in 0..=u {
-                        own[u][v] += carried[v].dot(&load);
-                    }
-                }
-                let moved = beyond.times(&self.columns[j]);
-                let row = ws.hessian.row_mut(i);
-                for (entry, column) in row.iter_mut().zip(&self.columns[finger * n..]) {
-                    entry.as_mut_array()[finger] = column.dot(&moved);
-                }
-                row[i].as_mut_array()[finger] += self.resistance[j];
-                let border = ws.hessian.border_mut(i);
-                let on_object = beyond_object.times(&self.columns[j]).to_array();
-                for (entry, value) in border[..object].iter_mut().zip(on_object) {
-                    entry.as_mut_array()[finger] = -value;
-                }
-                for (k, entry) in border[object..].iter_mut().enumerate() {
-                    let value = if k / 2 == finger { self.columns[j].dot(&swayed[k % 2]) } else { 0.0 };
-                    entry.as_mut_array()[finger] = value;
-                }
-            }
-            for u in 0..2 {
-                let row = places.sways + 2 * finger + u;
-                for (k, value) in sway_on_object[u].to_array().into_iter().enumerate().take(object) {
-                    *ws.hessian.at_mut(row, 2 * n + k) = -value;
-                }
-                for k in places.sways..=row {
-                    let which = (k - places.sways) / 2;
-                    *ws.hessian.at_mut(row, k) = if which == finger { own[u][(k - places.sways) % 2] } else { 0.0 };
-                }
-                *ws.hessian.at_mut(row, row) += self.resistance[2 * n + 2 * finger + u];
-            }
-        }
-    }
-
-    /// Fills the entries between the two fingers, while they touch each other; see `coupling`.
-    pub(super) fn fill_coupling(&self, model: &PhysicsModel, ws: &mut Workspace) {
-        let places = Places::new(model);
-        let (n, object) = (places.joints, places.sways - 2 * places.joints);
-        for i in 0..n {
-            for j in 0..n {
-                *ws.hessian.at_mut(n + j, i) = 0.0;
-            }
-        }
-        for contact in &ws.contacts {
-            let (Acting::Segment(acting), Against::Finger(against)) = (contact.acting, contact.against) else {
-                continue;
-            };
-            let links = [acting.min(against) as usize, acting.max(against) as usize];
-            let hessian = contact.hessian(ws.step);
-            let rights = [0, 1].map(|v| self.carried[links[1]][v].linear_at(contact.arm));
-            let before = |finger: usize| 0..links[finger] - places.link(finger, 0);
-            let couple = |left: DVec3, put: &mut dyn FnMut(Result<usize, usize>, f64)| {
-                let force = hessian * left;
-                for j in before(1) {
-                    put(Ok(j), -self.columns[n + j].linear_at(contact.arm).dot(force));
-                }
-                for (v, right) in rights.iter().enumerate() {
-                    put(Err(v), -right.dot(force));
-                }
-            };
-            for i in before(0) {
-                let left = self.columns[i].linear_at(contact.arm);
-                couple(left, &mut |right, value| match right {
-                    Ok(j) => *ws.hessian.at_mut(n + j, i) += value,
-                    Err(v) => ws.hessian.border_mut(i)[object + 2 + v].as_mut_array()[0] += value,
-                });
-            }
-            for u in 0..2 {
-                let left = self.carried[links[0]][u].linear_at(contact.arm);
-                couple(left, &mut |right, value| match right {
-                    Ok(j) => ws.hessian.border_mut(j)[object + u].as_mut_array()[1] += value,
-                    Err(v) => *ws.hessian.at_mut(places.sways + 2 + v, places.sways + u) += value,
-                });
-            }
-        }
-    }
 }
 
 /// Inertia of a segment about its centre, in the gripper frame (kg m²).
 fn inertia_of(frame: &SegmentFrame, own: DVec3) -> DMat3 {
     frame.axes * DMat3::from_diagonal(own) * frame.axes.transpose()
-}
-
-/// Fills A, and r of the fingers.
-pub(super) fn gather(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
-    let (Some(sideways), Some(mut space)) = (&model.sideways, ws.space.take()) else { return };
-    let (n, h, first_sway) = (model.chain.joints, ws.step.h, model.first_sway());
-    space.fill_masses(model, ws.reference);
-    space.fill_diagonal(model, h);
-    let gravity = model.finger_gravity - ws.passing.acceleration;
-    space.resist(model, &state.velocity, (h, ws.reference), gravity, drive.tip_force);
-    space.project(model, |k, resisted| ws.rhs[k] = -h * resisted);
-    for (k, q) in state.q.iter().enumerate() {
-        ws.rhs[k] += h * (drive.torque - model.chain.stiffness * q);
-    }
-    for (finger, sway) in state.sways.iter().enumerate() {
-        for (which, x) in sway.to_array().into_iter().enumerate() {
-            ws.rhs[first_sway + 2 * finger + which] -= h * sideways.stiffness[which] * x;
-        }
-    }
-    if let Some(relaxation) = &model.relaxation {
-        for joints in [0..n, n..2 * n] {
-            relaxation.soften(h, &state.q[joints.clone()], &state.crept[joints.clone()], &mut ws.rhs[joints]);
-        }
-    }
-    if model.finger_inertia {
-        space.momentum(model, &state.velocity);
-        space.project(model, |k, momentum| ws.rhs[k] += momentum);
-    }
-    ws.space = Some(space);
 }

@@ -7,7 +7,7 @@ use super::effects::{move_world, note_passing};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
 use super::solve::{Product, Unbalanced, minimise, relative_velocities, segment_velocities};
-use super::space::gather;
+use super::space_step::gather;
 use super::state::State;
 use super::workspace::Workspace;
 use glam::{DQuat, DVec2, DVec3};
@@ -175,7 +175,7 @@ fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Works
 /// Fills A and r.
 pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     match model.sideways {
-        Some(_) => gather(model, state, ws, drive),
+        Some(_) => gather(model, state, ws, (drive.torque, drive.tip_force)),
         None => gather_planar(model, state, ws, drive),
     }
     let (n, h) = (model.chain.joints, ws.step.h);

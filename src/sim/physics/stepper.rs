@@ -227,7 +227,8 @@ impl Control {
         let model = within.model;
         let share = h / self.longest;
         let bent: f64 = state.q.iter().zip(&self.origin.q).map(|(a, b)| a.abs().max(b.abs())).sum();
-        let swayed = model.sideways.as_ref().map_or((0.0, 0.0), |sideways| sideways.strain(&self.origin, state));
+        let swayed =
+            model.sideways.as_ref().map_or((0.0, 0.0), |sideways| sideways.strain(&self.origin.sways, &state.sways));
         let strained = (model.chain.stiffness * bent + swayed.0) * share;
         // A holds inertia and more.
         let moving: f64 = 0.5 * state.velocity.iter().zip(&within.ws.a_velocity).map(|(v, p)| v * p).sum::<f64>();

@@ -12,7 +12,7 @@ mod poses;
 mod shaking;
 mod timing;
 
-pub use crate::auto::Auto;
+pub use crate::gripper::Auto;
 pub use accuracy::{Accuracy, IntegrationMethod, Integrator, UnknownAccuracy};
 pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
