@@ -241,13 +241,7 @@ impl<'a> OtherFinger<'a> {
         let (along, away, in_front) = self.excess(&place);
         let ahead = place.ahead;
         let up = if in_front { place.up } else { -place.up };
-        let (beside, out) = self.beside(&place);
-        let direction = match (along > 0.0, away > 0.0) {
-            _ if beside > 0.0 => {
-                let within = if along.max(away) > 0.0 { DVec3::ZERO } else { up };
-                (ahead * along.max(0.0) + up * away.max(0.0) + out * beside).normalize_or(up) + within
-            }
-            .normalize_or(up),
+        let in_profile = match (along > 0.0, away > 0.0) {
             (true, true) => (ahead * along + up * away).normalize_or(up),
             (true, false) => ahead,
             (false, true) => up,
@@ -259,7 +253,15 @@ impl<'a> OtherFinger<'a> {
                 }
             }
         };
-        (self.beyond_core(along, away, beside), direction)
+        let (beside, out) = self.beside(&place);
+        let distance = self.beyond_core(along, away, beside);
+        if beside > 0.0 {
+            // Within the profile the distance is a sum, outside of it that to an edge.
+            let to_profile = along.max(0.0).hypot(away.max(0.0));
+            let way = if to_profile > 0.0 { in_profile * to_profile + out * beside } else { in_profile + out };
+            return (distance, way.normalize_or(up));
+        }
+        (distance, in_profile)
     }
 
     /// The segment that a point touches.
