@@ -17,6 +17,10 @@
 //! jump. A spring that could not give way sideways would press with k x / c, thrown off and springing back step by
 //! step, without end.
 //!
+//! The force acts where the axis touches. Energy would be conserved where the end sits in the way of least energy, beside
+//! that by 3 x sqrt(1 - c²) for small angles, with the surface's normal there: undamped fingers that bounce on a round
+//! object with the sides of their tips gain and lose energy, whatever the step (hard case "passive swing").
+//!
 //! Distances, normals and arms are those of the layout in the workspace, which is ahead of the state; see
 //! [`super::step`].
 
