@@ -93,23 +93,31 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
     let fastest = state.fastest(model) + turning * reach;
     let farthest = margin(h, fastest + passing);
     workspace.fingers_meet = false;
+    let in_space = workspace.space.is_some();
     let may_meet = workspace.clearances.of_fingers() <= margin(h, 2.0 * fastest);
     let fronts = if may_meet { fronts_of_near_fingers(model, workspace) } else { None };
     for finger in 0..2 {
         let first_link = finger * (model.chain.joints + 1);
         for j in 0..=model.chain.joints {
             let link = first_link + j;
-            let segment = workspace.segments[link];
-            let may_meet = |margin: f64| {
-                let segment = (&segment, workspace.frames().get(link), model.chain.lengths[j]);
-                fronts.as_ref().is_some_and(|(fronts, _)| fronts.may_meet(model, finger, segment, margin))
-            };
-            if workspace.clearances.of_link(link) > farthest && !may_meet(margin(h, 2.0 * fastest)) {
+            let clear = workspace.clearances.of_link(link) > farthest;
+            if clear && fronts.is_none() {
                 continue;
             }
-            let middle = match workspace.frames().get(link) {
-                Some(frame) => frame.point(0.5 * model.chain.lengths[j], 0.0, 0.0),
-                None => model.planes[finger].point(segment.point(0.5 * model.chain.lengths[j], 0.0), 0.0),
+            let segment = workspace.segments[link];
+            let may_meet = |fronts: &Fronts, margin: f64| {
+                let segment = (&segment, workspace.frames().get(link), model.chain.lengths[j]);
+                fronts.may_meet(model, finger, segment, margin)
+            };
+            let any_margin = margin(h, 2.0 * fastest);
+            if clear && !fronts.as_ref().is_some_and(|(fronts, _)| may_meet(fronts, any_margin)) {
+                continue;
+            }
+            let half = 0.5 * model.chain.lengths[j];
+            let middle = if in_space {
+                workspace.frames()[link].point(half, 0.0, 0.0)
+            } else {
+                model.planes[finger].point(segment.point(half, 0.0), 0.0)
             };
             let reach = model.springs.reach[j] + model.springs.radius;
             let link_velocity = workspace.spatial[link];
@@ -124,7 +132,7 @@ pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Worksp
             let near_world = to_world < reach + against_world;
             let against_finger = fronts.as_ref().and_then(|(fronts, fastest)| {
                 let margin = margin(h, speed + fastest[1 - finger]);
-                may_meet(margin).then_some((fronts, margin))
+                may_meet(fronts, margin).then_some((fronts, margin))
             });
             if near_object.is_none() && !near_world && against_finger.is_none() {
                 workspace.clearances.note_link(link, to_object.min(to_world) - reach);
@@ -200,41 +208,34 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
     for k in model.springs.of_segment(place.segment_index) {
         let spring = &model.springs.all[k];
         let site = place.finger * model.springs.all.len() + k;
-        let clear = workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest();
-        if clear && near.finger.is_none() {
+        if near.finger.is_none() && workspace.clearances.of_spring(site, place.link) > spring.height + near.farthest() {
             continue;
         }
-        let (foot, axis, inward) = if in_space {
-            let (foot, axis) = spring.ray_in_space(&workspace.frames()[place.link]);
-            (foot, axis, f64::INFINITY)
+        let (foot, axis) = if in_space {
+            spring.ray_in_space(&workspace.frames()[place.link])
         } else {
             let (foot, axis) = spring.ray(&place.segment);
-            (plane.point(foot, spring.across), plane.direction(axis), foot.x)
+            (plane.point(foot, spring.across), plane.direction(axis))
         };
-        let finger = near.finger.and_then(|(fronts, margin)| {
-            let gap = fronts.least_distance(model, place.finger, inward) - spring.height;
-            (gap <= margin).then_some(margin)
-        });
-        if clear && finger.is_none() {
-            continue;
-        }
         let ray = Ray { foot, axis, radius: model.springs.radius, rest: spring.height - model.springs.radius };
-        let (mut hit, mut against) = (None, Against::World);
-        if !clear {
-            let (to_object, clearance) = near.distances(ray.foot);
+        let finger = near.finger.and_then(|(fronts, margin)| {
+            let gap = fronts.least_distance(model, place.finger, foot) - spring.height;
+            (in_space || gap <= margin).then_some(margin)
+        });
+        let (to_object, clearance) = near.distances(ray.foot);
+        if finger.is_none() {
             workspace.clearances.note_spring(site, place.link, clearance);
-            if clearance <= spring.height + near.farthest() {
-                let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
-                let on_world = near.world.and_then(|margin| ray.cast_environment(near.environment, margin));
-                (hit, against) = match (on_object, on_world) {
-                    (Some(object), Some(world)) if world.compression > object.compression => {
-                        (Some(world), Against::World)
-                    }
-                    (Some(object), _) => (Some(object), Against::Object),
-                    (None, world) => (world, Against::World),
-                };
+            if clearance > spring.height + near.farthest() {
+                continue;
             }
         }
+        let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
+        let on_world = near.world.and_then(|margin| ray.cast_environment(near.environment, margin));
+        let (mut hit, mut against) = match (on_object, on_world) {
+            (Some(object), Some(world)) if world.compression > object.compression => (Some(world), Against::World),
+            (Some(object), _) => (Some(object), Against::Object),
+            (None, world) => (world, Against::World),
+        };
         if let Some(margin) = finger {
             let other = OtherFinger::opposite(model, workspace, place.finger, spring.across);
             if let Some(met) = ray.cast_finger(&other, margin) {
@@ -402,6 +403,7 @@ impl Ray {
         self.pressed(&touch, touch.cosine.max(0.0), margin)
     }
 
+    #[inline(never)]
     fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
         let gap = other.distance(self.foot) - self.radius;
         let (distance, surface) = (|p| other.distance(p), |p| other.surface(p));

@@ -53,11 +53,11 @@ impl Fronts {
         Self { segments: [0, 1].map(protruding), joints: [0, 1].map(rounding) }
     }
 
-    /// Distance of a point from the other finger's skin, at least (m), where the fingers stay in their planes. `inward`: of
-    /// the point, from the straight neutral axis of its own finger (m).
-    pub(super) fn least_distance(&self, model: &PhysicsModel, finger: usize, inward: f64) -> f64 {
+    /// Distance of a finger's point from the other's skin, at least (m), where the fingers stay in their planes.
+    pub(super) fn least_distance(&self, model: &PhysicsModel, finger: usize, point: DVec3) -> f64 {
+        let plane = &model.planes[finger];
         let other = self.segments[1 - finger] + self.joints[1 - finger];
-        2.0 * model.planes[finger].half_gap - other - inward
+        plane.half_gap - plane.sign * point.x - other
     }
 
     /// True where this segment of a finger may come within `margin` (m) of any of the other finger.

@@ -275,11 +275,10 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
         }
     }
     let (mut gradient, mut momentum, mut known) = (0.0, 0.0, 0.0);
-    for k in 0..ws.gradient.len() {
-        let weight = ws.weights[k];
-        gradient += ws.gradient[k] * ws.gradient[k] * weight;
-        momentum += ws.a_velocity[k] * ws.a_velocity[k] * weight;
-        known += ws.rhs[k] * ws.rhs[k] * weight;
+    for (((g, p), r), weight) in ws.gradient.iter().zip(&ws.a_velocity).zip(&ws.rhs).zip(&ws.weights) {
+        gradient += g * g * weight;
+        momentum += p * p * weight;
+        known += r * r * weight;
     }
     Size {
         gradient: gradient.sqrt(),
