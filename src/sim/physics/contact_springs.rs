@@ -29,7 +29,6 @@ impl ContactSpring {
 
     /// Foot and axis in space.
     #[inline(never)]
-    #[inline(never)]
     pub(super) fn ray_in_space(&self, segment: &SegmentFrame) -> (DVec3, DVec3) {
         let axis = if self.points_ahead { segment.axes.x_axis } else { segment.axes.z_axis };
         (segment.point(self.foot.x, self.across, self.foot.y), axis)
