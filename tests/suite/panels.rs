@@ -272,7 +272,7 @@ fn the_accuracy_dial_tells_stick_slip_and_what_reference_costs() {
     let fixed = measured(&mut bench);
     assert!(!fixed.cost.persists);
     assert!(bench.harness.query_by_label("stick-slip").is_none());
-    assert!(bench.harness.query_by_label("at reference").is_some());
+    assert!(bench.harness.query_by_label("reference").is_some());
     let shown = bench.harness.query_all_by_label_contains("×").count();
     assert!(shown >= 2, "real time, and the cost at reference beside that now");
     // A free cylinder on its side rolls one way or the other.

@@ -94,7 +94,7 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
     if context.scene.solver.accuracy != Accuracy::Reference {
         let text =
             at_reference.map(|(ms, factor)| format!("≈ {} ms, {}×", two_digits(ms * factor), two_digits(factor)));
-        row("at reference", text, "CPU time of a grasp at accuracy reference, from the stored study (panel Accuracy)");
+        row("reference", text, "CPU time of a grasp at accuracy reference, from the stored study (panel Accuracy)");
     }
     let hover = "Estimated numerical error over the grasp (RMS)";
     let error =
