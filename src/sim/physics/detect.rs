@@ -19,7 +19,9 @@
 //!
 //! The force acts where the axis touches. Energy would be conserved where the end sits in the way of least energy, beside
 //! that by 3 x sqrt(1 - c²) for small angles, with the surface's normal there: undamped fingers that bounce on a round
-//! object with the sides of their tips gain and lose energy, whatever the step (hard case "passive swing").
+//! object with the sides of their tips gain and lose energy, whatever the step (hard case "passive swing"). Finding that
+//! place by one to four rounds of projection onto the surface cures it, but at an edge the rounds jump from one side to
+//! the other, and more holds chatter.
 //!
 //! Distances, normals and arms are those of the layout in the workspace, which is ahead of the state; see
 //! [`super::step`].
