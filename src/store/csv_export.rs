@@ -206,4 +206,40 @@ mod tests {
         let height: f64 = first[6].parse().expect("a number");
         assert!((height - 0.07).abs() < 0.02, "contact at the height of the ball: {height}");
     }
+
+    #[test]
+    fn fingers_that_leave_their_planes_have_columns_and_joints_of_their_own() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut scene = Scene::default();
+        scene.timing.duration_s = 1.0;
+        let layout = SensorLayout::named("C1").expect("known");
+        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
+        let planar = grasp(&scene, None, 0);
+        let mut swayed = planar.clone();
+        swayed.data.frames[50].sways[1] = Sway { curvature: 1.5, twist: -0.25 };
+        let written = |trial: &SimulatedTrial| {
+            let path = folder.path().join("trial.csv");
+            write_trial_csv(&path, trial, &scene, &sensors).expect("writes");
+            let mut reader = csv::Reader::from_path(&path).expect("opens");
+            let header = reader.headers().expect("has one").clone();
+            let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().expect("even rows");
+            (header, rows)
+        };
+        let ((planar_header, planar_rows), (header, rows)) = (written(&planar), written(&swayed));
+        assert_eq!(header.len(), planar_header.len() + 4);
+        let at = |rows: &[csv::StringRecord], row: usize, name: &str| {
+            let column = header.iter().position(|h| h == name).unwrap_or_else(|| panic!("no {name}"));
+            rows[row][column].parse::<f64>().expect("a number")
+        };
+        assert_eq!(at(&rows, 50, "sideways_right_curvature [1/m]"), 1.5);
+        assert_eq!(at(&rows, 50, "twist_right [rad/m]"), -0.25);
+        assert_eq!(at(&rows, 50, "twist_left [rad/m]"), 0.0);
+        assert_eq!(at(&rows, 51, "sideways_right_curvature [1/m]"), 0.0);
+        // Positive curvature moves the tip along the gripper's y, which is the world's here.
+        let moved = |joint: &str| {
+            let name = format!("joint_{joint}_y [m]");
+            at(&rows, 50, &name) - at(&planar_rows, 50, &name)
+        };
+        assert!(moved("right_10") > 2e-3 && moved("left_10") == 0.0, "{} {}", moved("right_10"), moved("left_10"));
+    }
 }
