@@ -97,8 +97,7 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
         row("reference", text, "CPU time of a grasp at accuracy reference, from the stored study (panel Accuracy)");
     }
     let hover = "Estimated numerical error over the grasp (RMS)";
-    let error =
-        |size: f64, unit: &str, share: f64| format!("{} {unit}, {} %", two_digits(size), two_digits(share * 100.0));
+    let error = |size: f64, unit: &str, share: f64| format!("{} {unit}, {}%", two_digits(size), short_percent(share));
     let errors = cost.map(|c| &c.error);
     row("± curvature", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
     row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
@@ -127,4 +126,13 @@ fn reference_factor(context: &PanelContext<'_>) -> Option<f64> {
         solver.accuracy.step_tolerance(),
         context.scene.holds_object(),
     )
+}
+
+/// A share in percent, in four characters at most: the panel is narrow.
+fn short_percent(share: f64) -> String {
+    match 100.0 * share {
+        percent if percent < 0.1 => "<0.1".to_owned(),
+        percent if percent < 10.0 => format!("{percent:.1}"),
+        percent => two_digits(percent),
+    }
 }
