@@ -3,7 +3,7 @@
 
 use super::{Failure, report};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_lab::grasping::{CollectionPlan, Recompute, Shard, all_objects, collect};
+use palpate_lab::grasping::{CollectionPlan, collect};
 use palpate_lab::study::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
 use palpate_learn::{Dataset, Fitting, StopRule, method};
@@ -27,14 +27,7 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut sets = Vec::new();
     for (trials, seed) in TRIALS.into_iter().zip(SEEDS) {
-        let plan = CollectionPlan {
-            scene: scene.clone(),
-            objects: all_objects(),
-            trials,
-            seed,
-            shard: Shard::WHOLE,
-            recompute: Recompute::default(),
-        };
+        let plan = CollectionPlan::of_all_objects(scene.clone(), trials, seed);
         let report = collect(&plan, store, threads, &mut |_| ());
         let source = DatasetQuery { collection: Some(report?.collection), ..DatasetQuery::default() };
         sets.push(source.read(store, &SensorView::default(), &mut |_, _| ())?);

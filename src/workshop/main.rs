@@ -92,7 +92,7 @@ enum Command {
         /// Result.
         #[arg(long, default_value = "assets/studies/recognition.json")]
         out: PathBuf,
-        /// Trial store that receives the grasps, with the finished methods beside it; a second run goes on from them.
+        /// Trial store that receives the grasps, with the finished methods beside it; a second run computes only the others.
         #[arg(long)]
         store: PathBuf,
     },

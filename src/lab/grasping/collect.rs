@@ -116,6 +116,12 @@ pub fn all_objects() -> Vec<String> {
 }
 
 impl CollectionPlan {
+    /// Trials of the sixteen and the empty hand.
+    pub fn of_all_objects(scene: Scene, trials: u32, seed: u64) -> Self {
+        let (objects, recompute) = (all_objects(), Recompute::default());
+        Self { scene, objects, trials, seed, shard: Shard::WHOLE, recompute }
+    }
+
     /// Name of the collection: plans that differ in scene or seed have different names, parts of one plan the same.
     pub fn name(&self) -> String {
         let mut scene = self.scene.clone();

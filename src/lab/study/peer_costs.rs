@@ -1,5 +1,6 @@
-//! Tables of the manual about other engines, from `tests/peers/results/cost.json`, which `tests/peers/mujoco_discrete.py`
-//! writes.
+//! Tables of the manual about other engines, from `tests/peers/results/cost.json`.
+//!
+//! `tests/peers/mujoco_discrete.py` writes that file.
 
 use super::stored_study::{GeneratedSection, markdown_table};
 use serde::Deserialize;
@@ -116,7 +117,8 @@ pub(super) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
         |scene: &PeerScene, tolerance| scene.matched(tolerance).map_or_else(String::new, |matched| matched.cell());
     let cost = TOLERANCES.map(|tolerance| row(&format!("{tolerance:e}"), &|scene| cell(scene, tolerance)));
     let tables = format!(
-        "{}\n\nWhat the same error costs: error and cost of Palpate at a tolerance; cost of MuJoCo {} at that error: ratio.\n\n{}",
+        "{}\n\nWhat the same error costs: error and cost of Palpate at a tolerance; cost of MuJoCo {} at that \
+         error: ratio.\n\n{}",
         markdown_table(&header(""), &converged),
         costs.mujoco,
         markdown_table(&header("tolerance"), &cost)

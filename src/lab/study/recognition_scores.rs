@@ -5,7 +5,7 @@ use super::effects::Measuring;
 use super::result_file::{ResultFile, ResultFileError};
 use super::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
-use crate::grasping::{CollectionError, CollectionPlan, Recompute, Shard, all_objects, collect};
+use crate::grasping::{CollectionError, CollectionPlan, collect};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Dataset, Method, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
@@ -169,7 +169,7 @@ pub enum ScoreError {
 }
 
 /// Collects the grasps into a store, fits and judges the methods, and returns what is to be stored; `None` where it was
-/// cancelled. Finished methods are kept in a file of results, from which it goes on.
+/// cancelled. A file of results keeps finished methods; a second run computes only the others.
 pub fn measure_scores(
     store: &mut Store,
     results: &Path,
@@ -221,14 +221,7 @@ fn data_set(kind: &Kind, store: &mut Store, threads: usize) -> Result<Dataset, S
     let preset = PosePreset::named(kind.preset).ok_or(ScoreError::Gone(kind.preset))?;
     let mut scene = Scene { pose: preset.poses(), ..Scene::default() };
     scene.object.fixed = kind.fixed;
-    let plan = CollectionPlan {
-        scene,
-        objects: all_objects(),
-        trials: (TRAIN + TEST) as u32,
-        seed: POSES,
-        shard: Shard::WHOLE,
-        recompute: Recompute::default(),
-    };
+    let plan = CollectionPlan::of_all_objects(scene, (TRAIN + TEST) as u32, POSES);
     let collection = collect(&plan, store, threads, &mut |_| ())?.collection;
     let query = DatasetQuery { collection: Some(collection), without_empty: true, ..DatasetQuery::default() };
     let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors };

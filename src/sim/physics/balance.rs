@@ -2,9 +2,10 @@
 
 use super::contact::{Acting, Against, Contact};
 use super::model::PhysicsModel;
+use super::spatial::Spatial;
 use super::state::State;
 use super::step::{Drive, gather_dynamics, lay_out};
-use super::workspace::{Spatial, Workspace};
+use super::workspace::Workspace;
 
 /// The static residual |tau - K q - g + J'f|: the largest joint torque not balanced by springs, gravity and the
 /// contacts of the last step, as a share of the actuation torque. Zero where nothing is driven.

@@ -6,7 +6,8 @@
 
 use super::contact::{Acting, Against};
 use super::model::PhysicsModel;
-use super::workspace::{Spatial, Workspace};
+use super::spatial::Spatial;
+use super::workspace::Workspace;
 
 /// Couples the fingers, or takes them apart.
 pub(super) fn prepare_coupling(ws: &mut Workspace) {

@@ -112,8 +112,8 @@ impl Integrator {
     }
 
     /// Size of the sum of velocities at start, after the first stage and now, with weights (s): the largest change of
-    /// a joint angle, of the turn of a tip out of its plane or of the object's orientation (rad), of a fingertip or of the object's position, and of the place of a hand
-    /// that moves, as shares of a finger's length.
+    /// a joint angle, of the turn of a tip out of its plane or of the object's orientation (rad), of a fingertip or of the
+    /// object's position, and of the place of a hand that moves, as shares of a finger's length.
     fn error(&self, state: &State, model: &PhysicsModel, weights: [f64; 3]) -> f64 {
         let n = model.chain.joints;
         let length: f64 = model.chain.lengths.iter().sum();

@@ -14,7 +14,8 @@ use super::contact::{Acting, Against, Contact, ContactStep};
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
-use super::workspace::{Block, LinkBlocks, Planar, PlanarBlock, Spatial, Workspace};
+use super::spatial::{Block, Spatial};
+use super::workspace::{LinkBlocks, Planar, PlanarBlock, Workspace};
 use glam::DVec3;
 
 /// Statistics of a minimisation.
@@ -198,28 +199,24 @@ pub(super) struct Size {
     contacts: f64,
 }
 
-/// Hands over the load of each contact on the segments it acts on, as finger and segment, found by the finger's own
-/// contact springs (0) or by those of the other one (1); returns the sum that acts on the object.
+/// Hands over the load of each contact on the segments (by link) it acts on, found by the finger's own contact springs (0)
+/// or by those of the other one (1); returns the sum that acts on the object.
 #[inline]
-fn add_up(
-    n: usize,
-    contacts: &[Contact],
-    step: ContactStep,
-    mut add: impl FnMut((usize, usize), usize, &Spatial),
-) -> Spatial {
+fn add_up(n: usize, contacts: &[Contact], step: ContactStep, mut add: impl FnMut(usize, usize, &Spatial)) -> Spatial {
     let (mut on_object, mut by_fingers) = (Spatial::default(), [Spatial::default(); 2]);
-    let place = |link: u32| (link as usize / (n + 1), link as usize % (n + 1));
     for contact in contacts {
         let linear = contact.gradient(step, contact.velocity);
         let load = Spatial { linear, angular: contact.arm.cross(linear) };
         match contact.acting {
             Acting::Segment(link) => {
-                let (finger, segment) = place(link);
-                add((finger, segment), 0, &load);
+                add(link as usize, 0, &load);
                 match contact.against {
-                    Against::Object => by_fingers[finger] = by_fingers[finger].plus(&load),
+                    Against::Object => {
+                        let by_finger = &mut by_fingers[link as usize / (n + 1)];
+                        *by_finger = by_finger.plus(&load);
+                    }
                     Against::World => (),
-                    Against::Finger(other) => add(place(other), 1, &load.scaled(-1.0)),
+                    Against::Finger(other) => add(other as usize, 1, &load.scaled(-1.0)),
                 }
             }
             Acting::Object => on_object = on_object.plus(&load),
@@ -234,11 +231,11 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
     let on_object = match space {
         Some(space) => {
             space.loads.fill(Spatial::default());
-            add_up(n, contacts, *step, |(finger, segment), _, load| space.add_load(finger * (n + 1) + segment, load))
+            add_up(n, contacts, *step, |link, _, load| space.add_load(link, load))
         }
         None => {
             loads.fill([Planar::default(); 2]);
-            add_up(n, contacts, *step, |(finger, segment), found, load| loads[segment][found].add_to(finger, load))
+            add_up(n, contacts, *step, |link, found, load| loads[link % (n + 1)][found].add_to(link / (n + 1), load))
         }
     };
     for ((g, a), r) in ws.gradient.iter_mut().zip(&ws.a_velocity).zip(&ws.rhs) {

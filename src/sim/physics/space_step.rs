@@ -4,12 +4,13 @@ use super::contact::{Acting, Against};
 use super::model::PhysicsModel;
 use super::sideways::Sideways;
 use super::space::{Places, Space};
+use super::spatial::{Block, Spatial};
 use super::state::State;
-use super::workspace::{Block, LinkBlocks, Spatial, Workspace};
+use super::workspace::{LinkBlocks, Workspace};
 use glam::DVec3;
 
 impl Space {
-    /// Fills A, and where `blocks` are given those of contacts, into the Hessian.
+    /// Fills A into the Hessian, and adds the blocks of contacts if asked to.
     pub(super) fn fill_hessian(&self, model: &PhysicsModel, ws: &mut Workspace, with_contacts: bool) {
         let places = Places::new(model);
         let (n, object) = (places.joints, if model.free_body().is_some() { 6 } else { 0 });

@@ -6,7 +6,7 @@ use super::environment::{Environment, Passing};
 use super::hessian::{Hessian, Lanes};
 use super::model::PhysicsModel;
 use super::space::Space;
-pub(super) use super::spatial::{Block, Spatial};
+use super::spatial::{Block, Spatial};
 use crate::gripper::{SegmentFrame, SegmentPose};
 use glam::{DMat3, DVec2, DVec3};
 use palpate_geometry::Pose;
@@ -200,6 +200,7 @@ impl Workspace {
             coupling: vec![Spatial::default(); n * (n + 1)],
         }
     }
+
     /// Segments in space, where they leave their planes; else none.
     #[inline]
     pub(super) fn frames(&self) -> &[SegmentFrame] {
