@@ -149,6 +149,8 @@ mod tests {
                     line_bar: 0.5,
                     values: Box::new([grasp as f32, f32::NAN]),
                     errors: Box::default(),
+                    frame: None,
+                    answer: None,
                 });
             }
         }
@@ -158,7 +160,16 @@ mod tests {
         // Computed again.
         for t in [0.0, 0.1] {
             let values = Box::new([7.0, 7.0]);
-            traces.push(&TraceRow { grasp: 6, rolling: false, t, line_bar: 0.5, values, errors: Box::default() });
+            traces.push(&TraceRow {
+                grasp: 6,
+                rolling: false,
+                t,
+                line_bar: 0.5,
+                values,
+                errors: Box::default(),
+                frame: None,
+                answer: None,
+            });
         }
         let again = traces.current().map(|t| (t.grasp, t.t.clone(), t.channels[0].clone()));
         assert_eq!(again, Some((6, vec![0.0, 0.1], vec![7.0, 7.0])));
@@ -172,7 +183,16 @@ mod tests {
         let mut push = |t: f64, value: f32| {
             let line_bar = if value.is_nan() { f64::NAN } else { 0.0 };
             let values = Box::new([value]);
-            traces.push(&TraceRow { grasp: 1, rolling: true, t, line_bar, values, errors: Box::default() });
+            traces.push(&TraceRow {
+                grasp: 1,
+                rolling: true,
+                t,
+                line_bar,
+                values,
+                errors: Box::default(),
+                frame: None,
+                answer: None,
+            });
         };
         for k in 0..100_000u32 {
             push(0.01 * f64::from(k), 1.0);
@@ -185,14 +205,31 @@ mod tests {
         // A recording without an end is bounded as well.
         for k in 0..100_000u32 {
             let (t, values) = (0.01 * f64::from(k), Box::new([1.0]));
-            traces.push(&TraceRow { grasp: 9, rolling: false, t, line_bar: 0.0, values, errors: Box::default() });
+            traces.push(&TraceRow {
+                grasp: 9,
+                rolling: false,
+                t,
+                line_bar: 0.0,
+                values,
+                errors: Box::default(),
+                frame: None,
+                answer: None,
+            });
         }
         assert!(traces.current().is_some_and(|trace| (12_000..=15_001).contains(&trace.t.len())));
         traces.clear();
         // A grasp stays in sight where that is wanted.
         for (grasp, rolling) in [(2, false), (3, true)] {
-            let row =
-                TraceRow { grasp, rolling, t: 0.0, line_bar: 0.0, values: Box::new([1.0]), errors: Box::default() };
+            let row = TraceRow {
+                grasp,
+                rolling,
+                t: 0.0,
+                line_bar: 0.0,
+                values: Box::new([1.0]),
+                errors: Box::default(),
+                frame: None,
+                answer: None,
+            };
             traces.push(&row);
         }
         assert_eq!(traces.current().map(|trace| trace.grasp), Some(3));

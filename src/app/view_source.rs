@@ -2,7 +2,8 @@
 
 use crate::app::traces::{GraspTrace, TraceHistory};
 use palpate_lab::grasping::{IdentificationView, LEAD_S};
-use palpate_lab::workers::{GripperView, Snapshot, object_title};
+use palpate_lab::workers::{GripperView, Snapshot};
+use palpate_sim::objects::object_title;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::trial::Control;

@@ -29,7 +29,6 @@ use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
 use palpate_sim::objects::{catalogue, thumbnail};
 use palpate_sim::scene::Scene;
-use palpate_tactile::SensorLayout;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -58,8 +57,6 @@ pub struct WorkbenchSetup<'a> {
     pub render_state: Option<&'a egui_wgpu::RenderState>,
 }
 
-/// Sensor layout of the live traces: the paper's simplest, with force.
-const LIVE_LAYOUT: &str = "C1+F";
 /// Most grasps of an object: the paper's plateau is at three to four.
 const GRASPS: u32 = 4;
 
@@ -97,7 +94,7 @@ impl Workbench {
         let labelling = LabellingFeature::new(labeller, store.clone());
         let worker = SimWorker::start(SimWorkerSetup {
             scene: scene.clone(),
-            layout: SensorLayout::named(LIVE_LAYOUT).expect("is in the catalogue of layouts"),
+            sensors: view.sensors.clone(),
             store: store.clone(),
             recording: true,
             grasps: GRASPS,

@@ -41,7 +41,7 @@ fn parse_sensors(text: &str) -> Result<SensorModel, String> {
 
 impl DataArguments {
     pub(super) fn view(&self) -> SensorView {
-        SensorView { layout: self.layout.clone(), sensors: self.sensors }
+        SensorView { layout: self.layout.clone(), sensors: self.sensors, ..SensorView::default() }
     }
 
     /// Reads the grasps from the store.

@@ -6,7 +6,6 @@ use super::terminal::{say, say_json, table};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Verdict, shipped_model};
 use palpate_store::labels::shown_name;
-use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -87,15 +86,6 @@ pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
     })
 }
 
-/// Layout and sensor model a recogniser expects of simulated trials.
-pub(super) fn view_of(model: &Model) -> SensorView {
-    let data = &model.card.data;
-    SensorView {
-        layout: data.layout.clone().unwrap_or_else(|| SensorView::default().layout),
-        sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
-    }
-}
-
 /// Probabilities by name, for JSON.
 pub(super) fn named(model: &Model, pmf: &Pmf) -> BTreeMap<String, f64> {
     model.card.labels.classes.iter().map(|c| c.name.clone()).zip(pmf.probabilities().iter().copied()).collect()
@@ -108,7 +98,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let mut belief = Belief::default();
     let mut trials = Vec::new();
     for id in &arguments.trials {
-        let data = DatasetQuery::default().read_trial(&store, *id, &view_of(&model))?;
+        let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
         let grasp = &data.examples[0].grasp;
         let alone = model.recogniser.recognise(grasp, None);

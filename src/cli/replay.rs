@@ -5,7 +5,7 @@ use super::recognise::{StageOne, load_model, named};
 use super::setup::open_store;
 use super::terminal::{note, say, say_json};
 use palpate_device::serial::{LinkOptions, SerialLink};
-use palpate_lab::grasping::Row;
+use palpate_lab::grasping::{Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::Replay;
 use serde::Serialize;
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
     let model = Arc::new(load_model(arguments.model.as_deref())?);
     let store = open_store(store)?;
     let mut replay = match arguments.source.to_str().and_then(|text| text.parse().ok()) {
-        Some(id) => Replay::of_trial(&store, id, model)?,
+        Some(id) => Replay::of_trial(&store, id, Some(model))?,
         None => {
             let replay_speed = f64::INFINITY;
             let options = LinkOptions { path: Some(arguments.source.clone()), replay_speed, ..LinkOptions::default() };
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
                 let name = arguments.source.display();
                 return Err(format!("\"{name}\" is neither the number of a trial nor a file of captured bytes").into());
             }
-            Replay::of_capture(SerialGripper::new(Box::new(SerialLink::open(&options)?)), &store, model)?
+            Replay::of_capture(SerialGripper::new(Box::new(SerialLink::open(&options)?)), &store, Some(model))?
         }
     };
     let (mut rows, mut header, mut pace) = (Vec::new(), Vec::new(), None);
@@ -92,19 +92,20 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
         print(&row, answer)?;
     }
     let identification = replay.identification();
-    let not_recognised = match (identification.verdict(), replay.why_off()) {
+    let verdict = identification.and_then(Identification::verdict);
+    let not_recognised = match (verdict, replay.why_off()) {
         (Some(_), _) => None,
         (None, Some(cause)) => Some(cause.to_string()),
         (None, None) => Some("no grasp was found".to_owned()),
     };
     let decided = answer(&replay);
     if arguments.json {
-        let verdict = identification.verdict();
+        let model = identification.map(Identification::model);
         return say_json(&Report {
             rows,
             decided: decided.map(|(class, _)| class),
-            stage_one: verdict.and_then(|verdict| StageOne::of(verdict, &identification.model().card.labels)),
-            pmf: verdict.map(|verdict| named(identification.model(), &verdict.pmf)).unwrap_or_default(),
+            stage_one: verdict.zip(model).and_then(|(verdict, model)| StageOne::of(verdict, &model.card.labels)),
+            pmf: verdict.zip(model).map(|(verdict, model)| named(model, &verdict.pmf)).unwrap_or_default(),
             not_recognised,
         });
     }
@@ -117,7 +118,7 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
 
 /// The most likely class of the running or last grasp.
 fn answer(replay: &Replay) -> Option<(String, f64)> {
-    let identification = replay.identification();
+    let identification = replay.identification()?;
     let (class, probability) = identification.verdict()?.pmf.top();
     Some((identification.model().card.labels.classes[class].name.clone(), probability))
 }

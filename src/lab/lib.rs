@@ -25,7 +25,8 @@
 //! | 1 | [`grasping`] | the grasp controller, runs, computing again, collections, identification, error bands |
 //! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
 //! | 2 | [`study`] | measurements and comparisons as functions |
-//! | 3 | [`workers`] | threads for the window: commands in, snapshots and rows out |
+//! | 3 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
+//! | 4 | [`workers`] | threads for the window: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
 //!
@@ -51,6 +52,7 @@
 pub mod datasets;
 pub mod grasping;
 pub mod gripper;
+pub mod inspection;
 pub mod labelling;
 pub mod picture;
 pub mod recording;

@@ -302,6 +302,13 @@ impl Store {
         rows.map_err(|e| self.fault(&e))?.into_iter().collect()
     }
 
+    /// Time of a trial's beginning, UTC.
+    pub fn created(&self, id: TrialId) -> Result<String, StoreError> {
+        let sql = "SELECT created FROM trials WHERE id = ?1";
+        let found = self.connection.query_row(sql, [id], |row| row.get(0)).optional().map_err(|e| self.fault(&e))?;
+        found.ok_or_else(|| self.no_trial(id))
+    }
+
     /// One trial with its data.
     pub fn load(&self, id: TrialId) -> Result<Trial, StoreError> {
         let StoredHeader { source, header, simulation } = self.load_header(id)?;

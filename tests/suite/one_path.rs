@@ -20,7 +20,7 @@ use palpate_store::labels::Flag;
 use palpate_store::{ImportedTrial, Store};
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{Control, TrialId};
-use palpate_tactile::{Channel, SensorLayout, Signals};
+use palpate_tactile::{Channel, PressureArea, SensorLayout, Signals};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -186,7 +186,7 @@ fn the_same_fault_leaves_the_same_trial_from_the_command_line_and_from_the_windo
 fn played(mut replay: Replay) -> (Vec<String>, Option<Verdict>) {
     let row = || replay.next_row().unwrap().map(|row| format!("{row:?}"));
     let rows = std::iter::from_fn(row).collect();
-    (rows, replay.identification().verdict().cloned())
+    (rows, replay.identification().and_then(|own| own.verdict()).cloned())
 }
 
 #[test]
@@ -198,7 +198,9 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     let model = Arc::new(shipped_model().unwrap());
     let mut live = Identification::new(Arc::clone(&model), StopRule::default());
     let more = live.channels_on(&scene.gripper).unwrap();
-    let reader = FrameReader::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, &more).unwrap();
+    let reader =
+        FrameReader::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, PressureArea::default(), &more)
+            .unwrap();
     live.begin_grasp(reader.channels().iter().map(Channel::name).enumerate()).unwrap();
     let rows: Vec<_> = trial.frames().iter().map(|frame| reader.row(frame)).collect();
     for row in &rows {
@@ -207,7 +209,7 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     live.end_grasp();
     let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
     let id = store.insert(&trial).unwrap();
-    let (replayed, verdict) = played(Replay::of_trial(&store, id, model).unwrap());
+    let (replayed, verdict) = played(Replay::of_trial(&store, id, Some(model)).unwrap());
     assert!(verdict.is_some() && verdict.as_ref() == live.verdict());
     assert_eq!(replayed, rows.iter().map(|row| format!("{row:?}")).collect::<Vec<_>>());
     drop(store);
@@ -237,15 +239,15 @@ fn captured_bytes_replay_as_the_trial_that_is_recorded_from_them() {
     let model = Arc::new(shipped_model().unwrap());
     let options = LinkOptions { path: Some(bytes), replay_speed: f64::INFINITY, ..LinkOptions::default() };
     let gripper = SerialGripper::new(Box::new(SerialLink::open(&options).unwrap()));
-    let from_bytes = played(Replay::of_capture(gripper, &store, Arc::clone(&model)).unwrap());
-    let from_trial = played(Replay::of_trial(&store, 1, Arc::clone(&model)).unwrap());
+    let from_bytes = played(Replay::of_capture(gripper, &store, Some(Arc::clone(&model))).unwrap());
+    let from_trial = played(Replay::of_trial(&store, 1, Some(Arc::clone(&model))).unwrap());
     assert!(from_trial.0.len() > 500 && from_trial.1.is_some(), "{}", from_trial.0.len());
     assert_eq!(from_bytes, from_trial);
     // An imported trial has channels of its own.
     let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
     let (name, label) = ("1".to_owned(), "mug".to_owned());
     store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }]).unwrap();
-    let mut imported = Replay::of_trial(&store, 2, model).unwrap();
+    let mut imported = Replay::of_trial(&store, 2, Some(model)).unwrap();
     assert!(imported.why_off().is_some_and(|cause| cause.to_string().contains("curvature_left")));
     assert_eq!(imported.next_row().unwrap().map(|row| row.values[0]), Some(1.0));
 }

@@ -6,6 +6,7 @@ use crate::app::view_source::ViewSource;
 use egui_tiles::Tree;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
+use palpate_lab::datasets::SensorView;
 use palpate_lab::workers::Snapshot;
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,8 @@ pub struct ViewState {
     /// The key sheet is open.
     #[serde(skip)]
     pub keys_shown: bool,
+    /// Sensors that plots and recognisers read of the simulation and of stored trials.
+    pub sensors: SensorView,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
 }
@@ -100,6 +103,7 @@ impl Default for ViewState {
             gripper_model: None,
             time_window: None,
             keys_shown: false,
+            sensors: SensorView::default(),
             recent: Vec::new(),
         }
     }

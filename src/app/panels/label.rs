@@ -8,9 +8,10 @@ use crate::app::widgets::wrapped;
 use egui::text_edit::TextEditState;
 use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
 use palpate_lab::workers::{
-    GripperView, LabelCommand, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, object_title, parse_tags,
+    GripperView, LabelCommand, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
 use palpate_sim::objects::catalogue;
+use palpate_sim::objects::object_title;
 use palpate_store::labels::{LabelledTrial, NextTrial};
 
 /// Side of the picture of an object (points).

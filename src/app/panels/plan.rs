@@ -5,7 +5,8 @@ use crate::app::context::PanelContext;
 use crate::app::theme::{colour, veil};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::{LabelCommand, object_title};
+use palpate_lab::workers::LabelCommand;
+use palpate_sim::objects::object_title;
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
 
 /// Trials wanted of an added object (paper, section IV-B: 40 to 55).

@@ -5,7 +5,8 @@ use crate::app::context::PanelContext;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Trace;
-use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter, object_title};
+use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
+use palpate_sim::objects::object_title;
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::TrialId;
 

@@ -3,5 +3,6 @@
 mod query;
 mod saved_models;
 
+pub(crate) use query::noise_seed;
 pub use query::{DatasetError, DatasetQuery, SensorView, labels_of_catalogue, sequence_of};
 pub use saved_models::{SavedModel, models_folder, new_model_path, saved_models};

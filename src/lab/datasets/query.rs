@@ -1,12 +1,12 @@
 //! Data sets from the store: a query for trials, and the sensors through which simulated trials are read.
 
-use palpate_learn::{Class, DataCard, Dataset, Example, Labels, Sequence};
+use palpate_learn::{Class, DataCard, Dataset, Example, Labels, ModelCard, Sequence};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::{Between, PRESETS, PoseSpread};
 use palpate_store::{Store, StoreError, TrialRow};
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId, TrialSource};
+use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,11 +19,14 @@ pub struct SensorView {
     pub layout: String,
     /// Sensor model: ideal, or like those of the real gripper.
     pub sensors: SensorModel,
+    /// Area that force is divided by.
+    #[serde(default)]
+    pub area: PressureArea,
 }
 
 impl Default for SensorView {
     fn default() -> Self {
-        Self { layout: "C1+F".to_owned(), sensors: SensorModel::Virtual }
+        Self { layout: "C1+F".to_owned(), sensors: SensorModel::Virtual, area: PressureArea::Participation }
     }
 }
 
@@ -349,22 +352,33 @@ fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<Signal
 }
 
 impl SensorView {
+    /// Sensors that a recogniser expects of simulated trials.
+    pub fn of_model(card: &ModelCard) -> Self {
+        let usual = Self::default();
+        let data = &card.data;
+        Self {
+            layout: data.layout.clone().unwrap_or(usual.layout),
+            sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
+            area: usual.area,
+        }
+    }
+
     /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it
     /// differs between classes only by residues of integrators and dampers.
     pub fn signals(&self, trial: &SimulatedTrial) -> Result<Signals, LayoutError> {
         let layout = SensorLayout::named(&self.layout)?;
-        let sensors = Sensors::new(&layout, &trial.header.scene.gripper, PressureArea::Participation)?;
+        let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.area)?;
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
-        // Poses of different objects may share a seed; their noise must not. FNV-1a of the name: changing it would
-        // change every data set with noisy sensors.
-        let seed = trial
-            .header
-            .object
-            .bytes()
-            .fold(trial.header.seed, |seed, byte| (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
-        Ok(self.sensors.apply(&clean, seed).until(end))
+        Ok(self.sensors.apply(&clean, noise_seed(&trial.header)).until(end))
     }
+}
+
+/// Seed of the sensors' noise in a trial. Poses of different objects may share a seed; their noise must not. FNV-1a of the
+/// name: changing it would change every data set with noisy sensors.
+pub(crate) fn noise_seed(header: &TrialHeader) -> u64 {
+    let mix = |seed: u64, byte: u8| (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    header.object.bytes().fold(header.seed, mix)
 }
 
 /// Converts signals to the input of recognisers.

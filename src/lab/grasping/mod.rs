@@ -21,4 +21,5 @@ pub use identify::{Identification, IdentificationView, IdentifyError};
 pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;
+pub(crate) use summary::CONTACT_FORCE;
 pub use summary::{GraspSummary, HoldSummary, OutOfPlaneSummary, ShakenSummary};

@@ -37,9 +37,14 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Reads the channels of a layout, followed by those of `more` that it lacks.
-    pub fn new(layout: &SensorLayout, gripper: &GripperModel, more: &[Channel]) -> Result<Self, LayoutError> {
-        let mut sensors = Sensors::new(layout, gripper, PressureArea::Participation)?;
+    /// Reads the channels of a layout, followed by those of `more` that it lacks; force is divided by `area`.
+    pub fn new(
+        layout: &SensorLayout,
+        gripper: &GripperModel,
+        area: PressureArea,
+        more: &[Channel],
+    ) -> Result<Self, LayoutError> {
+        let mut sensors = Sensors::new(layout, gripper, area)?;
         sensors.add(more);
         Ok(Self { sensors })
     }

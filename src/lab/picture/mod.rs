@@ -9,6 +9,7 @@ mod gripper_model;
 mod reconstructed;
 
 pub use annotations::SCALE_STEPS;
+pub(crate) use reconstructed::evenly_bent;
 
 use glam::{Mat4, Vec2, Vec3};
 use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid};

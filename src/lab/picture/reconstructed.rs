@@ -4,7 +4,7 @@ use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Phase, Side, Sway};
 
 /// A frame in which each finger is an arc of the curvature that its strip reads (1/m); straight where nothing is read.
-pub(super) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -> Frame {
+pub(crate) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -> Frame {
     let (joints, segment) = (gripper.finger.joints, gripper.finger.segment_length());
     let angle = |side: Side| curvature[side.index()].filter(|kappa| kappa.is_finite()).unwrap_or(0.0) * segment;
     let q = Side::BOTH.into_iter().flat_map(|side| std::iter::repeat_n(angle(side), joints)).collect();

@@ -13,7 +13,7 @@ use palpate_store::{Serving, Store, StoreError};
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::Readout;
 use palpate_tactile::trial::{Control, PhaseMark, TrialData, TrialId};
-use palpate_tactile::{Channel, LayoutError, SensorLayout, whole_fingers};
+use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, whole_fingers};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -40,7 +40,8 @@ pub struct Replay {
     controller: GraspController,
     reader: RowReader,
     channels: Vec<String>,
-    identification: Identification,
+    /// None without a model.
+    identification: Option<Identification>,
     off: Option<IdentifyError>,
 }
 
@@ -65,8 +66,8 @@ struct BoardReader {
 }
 
 impl Replay {
-    /// Replays a stored trial of any source.
-    pub fn of_trial(store: &Store, id: TrialId, model: Arc<Model>) -> Result<Self, ReplayError> {
+    /// Replays a stored trial of any source; without a model nothing is recognised.
+    pub fn of_trial(store: &Store, id: TrialId, model: Option<Arc<Model>>) -> Result<Self, ReplayError> {
         let mut trial = store.load(id)?;
         let plan = GraspPlan::simulated(&trial.header.scene);
         Ok(match &mut trial.data {
@@ -81,8 +82,8 @@ impl Replay {
             }
             TrialData::Simulated(_) => {
                 let (gripper, identification) = (&trial.header.scene.gripper, identification(model));
-                let more = identification.channels_on(gripper).unwrap_or_default();
-                let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, &more)?;
+                let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
+                let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, PressureArea::default(), &more)?;
                 let names = reader.channels().iter().map(Channel::name).collect();
                 Self::of_rows(
                     ReplayedGripper::new(trial),
@@ -96,12 +97,17 @@ impl Replay {
     }
 
     /// Replays captured bytes, read by the calibrations of the mounted parts.
-    pub fn of_capture(gripper: SerialGripper, store: &Store, model: Arc<Model>) -> Result<Self, ReplayError> {
+    pub fn of_capture(gripper: SerialGripper, store: &Store, model: Option<Arc<Model>>) -> Result<Self, ReplayError> {
         let serving = store.calibrations().serving(None, &[])?;
         Ok(Self::of_board(Box::new(gripper), serving, VecDeque::new(), model))
     }
 
-    fn of_board(gripper: Box<dyn Gripper>, serving: Serving, marks: VecDeque<PhaseMark>, model: Arc<Model>) -> Self {
+    fn of_board(
+        gripper: Box<dyn Gripper>,
+        serving: Serving,
+        marks: VecDeque<PhaseMark>,
+        model: Option<Arc<Model>>,
+    ) -> Self {
         let segmenter = marks.is_empty().then(|| Segmenter::new(&Board::default()));
         let (readout, recent) = (Readout::default(), RecentEvents::default());
         let reader = BoardReader { serving, readout, recent, line_bar: None, marks, segmenter };
@@ -121,9 +127,10 @@ impl Replay {
         plan: GraspPlan,
         reader: RowReader,
         channels: Vec<String>,
-        mut identification: Identification,
+        mut identification: Option<Identification>,
     ) -> Self {
-        let off = identification.begin_grasp(channels.iter().cloned().enumerate()).err();
+        let begun = identification.as_mut().map(|own| own.begin_grasp(channels.iter().cloned().enumerate()));
+        let off = begun.and_then(Result::err);
         let controller = GraspController::new(plan, gripper.now_s());
         Self { gripper: Box::new(gripper), controller, reader, channels, identification, off }
     }
@@ -133,9 +140,9 @@ impl Replay {
         &self.channels
     }
 
-    /// The recogniser's answers so far.
-    pub fn identification(&self) -> &Identification {
-        &self.identification
+    /// The recogniser's answers so far; none without a model.
+    pub fn identification(&self) -> Option<&Identification> {
+        self.identification.as_ref()
     }
 
     /// Reason why nothing is recognised.
@@ -157,7 +164,7 @@ impl Replay {
                 },
                 (GripperEvent::Tick | GripperEvent::Sampled(_), _) => continue,
                 (GripperEvent::Finished, _) => {
-                    self.identification.end_grasp();
+                    self.end_grasp();
                     return Ok(None);
                 }
             };
@@ -168,7 +175,15 @@ impl Replay {
 
     fn recognise(&mut self, row: &Row) {
         if let Some(closing_s) = self.controller.closing_s().filter(|closing_s| row.t_s >= *closing_s) {
-            self.identification.push(row.t_s - closing_s, row);
+            if let Some(identification) = &mut self.identification {
+                identification.push(row.t_s - closing_s, row);
+            }
+        }
+    }
+
+    fn end_grasp(&mut self) {
+        if let Some(identification) = &mut self.identification {
+            identification.end_grasp();
         }
     }
 
@@ -190,7 +205,7 @@ impl Replay {
                 for mark in marks {
                     match self.controller.observe_phase(&mark) {
                         Some(Phase::Close) => self.begin_grasp(mark.from_s, reading.t_s),
-                        Some(Phase::Release) => self.identification.end_grasp(),
+                        Some(Phase::Release) => self.end_grasp(),
                         Some(Phase::Hold) | None => {}
                     }
                 }
@@ -208,8 +223,10 @@ impl Replay {
         reader.readout = reader.readout.clone().with_zero(reader.readout.zero_from(&rest));
         let calibrated: Vec<String> = reader.readout.channels().iter().map(Channel::name).collect();
         let columns = self.channels.iter().cloned().enumerate().filter(|(_, name)| calibrated.contains(name));
-        self.identification.start_over();
-        self.off = self.identification.begin_grasp(columns).err();
+        if let Some(identification) = &mut self.identification {
+            identification.start_over();
+            self.off = identification.begin_grasp(columns).err();
+        }
         let rows: Vec<Row> =
             reader.recent.between(closing_s, now_s).iter().map(|reading| reader.row(reading)).collect();
         rows.iter().for_each(|row| self.recognise(row));
@@ -249,6 +266,6 @@ fn untimed(now_s: f64) -> GraspController {
     GraspController::new(GraspPlan::recorded(&Scene::default(), Control::Free), now_s)
 }
 
-fn identification(model: Arc<Model>) -> Identification {
-    Identification::new(model, StopRule::default())
+fn identification(model: Option<Arc<Model>>) -> Option<Identification> {
+    Some(Identification::new(model?, StopRule::default()))
 }

@@ -224,7 +224,7 @@ fn data_set(kind: &Kind, store: &mut Store, threads: usize) -> Result<Dataset, S
     let plan = CollectionPlan::of_all_objects(scene, (TRAIN + TEST) as u32, POSES);
     let collection = collect(&plan, store, threads, &mut |_| ())?.collection;
     let query = DatasetQuery { collection: Some(collection), without_empty: true, ..DatasetQuery::default() };
-    let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors };
+    let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors, ..SensorView::default() };
     Ok(query.read(store, &view, &mut |_, _| ())?)
 }
 

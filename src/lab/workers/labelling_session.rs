@@ -10,7 +10,7 @@
 use super::gripper::GripperView;
 use super::labeller::{LabelCommand, LabelOutcome, LabelView};
 use crate::recording::TrialRequest;
-use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_sim::objects::{EMPTY, catalogue, object_title};
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
@@ -428,12 +428,6 @@ impl LabellingSession {
 /// Splits tags at commas.
 pub fn parse_tags(text: &str) -> Vec<String> {
     text.split(',').map(|tag| tag.trim().to_owned()).filter(|tag| !tag.is_empty()).collect()
-}
-
-/// Title of an object, by the name of its class.
-pub fn object_title(name: &str) -> String {
-    let built_in = catalogue().iter().find(|b| b.name == name).map(|b| b.title.as_str());
-    built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
 
 /// A folder beside the store that does not exist yet: export, export-2, export-3 ..

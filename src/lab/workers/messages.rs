@@ -1,5 +1,6 @@
 //! Messages of the simulation thread: commands in, snapshots, rows and notices out.
 
+use crate::datasets::SensorView;
 use crate::grasping::{GraspSummary, IdentificationView, Row};
 use crate::picture::Stage;
 use crate::study::AccuracyCost;
@@ -8,8 +9,8 @@ use palpate_learn::Model;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::{Accuracy, Scene};
+use palpate_tactile::Channel;
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{Channel, SensorLayout};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -35,6 +36,11 @@ pub enum Command {
     SetGrasps(u32),
     /// Probability from which a class counts as certain; clamped to [`super::THRESHOLDS`].
     SetThreshold(f64),
+    /// Sensors that are read from now on; restarts the grasp. Ideal ones only: a model of real sensors reads finished
+    /// trials.
+    SetSensors(SensorView),
+    /// Recogniser from now on; restarts the grasp.
+    SetModel(Option<Arc<Model>>),
     /// Whether trials are stored.
     SetRecording(bool),
     /// Whether a refined run accompanies each grasp for the numerical error band; restarts the grasp.
@@ -102,12 +108,24 @@ pub struct TraceRow {
     pub values: Box<[f32]>,
     /// Estimated numerical error of each value, in its unit; empty without a refined run.
     pub errors: Box<[f32]>,
+    /// Fingers and object at that time; none for a real gripper.
+    pub frame: Option<Arc<Frame>>,
+    /// The recogniser's answer at that time, where it has one.
+    pub answer: Option<Arc<IdentificationView>>,
 }
 
 impl TraceRow {
     /// Row of a board; time counts from `from_s`.
-    pub(super) fn placed(row: Row, grasp: u64, from_s: f64, rolling: bool) -> Self {
-        Self { grasp, rolling, t: row.t_s - from_s, line_bar: row.line_bar, values: row.values, errors: Box::default() }
+    pub(super) fn placed(
+        row: Row,
+        grasp: u64,
+        from_s: f64,
+        rolling: bool,
+        answer: Option<Arc<IdentificationView>>,
+    ) -> Self {
+        let Row { t_s, line_bar, values, .. } = row;
+        let (t, errors) = (t_s - from_s, Box::default());
+        Self { grasp, rolling, t, line_bar, values, errors, frame: None, answer }
     }
 }
 
@@ -227,8 +245,8 @@ impl Snapshot {
 pub struct SimWorkerSetup {
     /// First scene.
     pub scene: Scene,
-    /// Sensor layout of the traces.
-    pub layout: SensorLayout,
+    /// Sensors of the traces.
+    pub sensors: SensorView,
     /// Trial store.
     pub store: PathBuf,
     /// Whether trials are stored from the start.

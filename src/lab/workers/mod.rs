@@ -17,7 +17,7 @@
 //! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
+//! "inspect" opens stored trials ([`Inspector`]). "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -32,6 +32,7 @@ mod fitter;
 mod ghost;
 mod gripper;
 mod held_object;
+mod inspector;
 mod labeller;
 mod labelling_session;
 mod latest;
@@ -58,10 +59,11 @@ pub use gripper::{
     GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest, RunningCalibration, RunningCrosstalk,
     SensorJobError, TrialView,
 };
+pub use inspector::{Inspector, OpenRequest, Opened};
 pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
-    object_title, parse_tags,
+    parse_tags,
 };
 pub use latest::Latest;
 pub use listener::THRESHOLDS;

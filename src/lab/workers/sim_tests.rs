@@ -1,6 +1,7 @@
 //! The simulation's thread, watched as a window watches it.
 
 use super::{Command, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, TraceRow, Wake};
+use crate::datasets::SensorView;
 use crate::grasping::grasp;
 use glam::DVec3;
 use palpate_learn::Model;
@@ -8,7 +9,6 @@ use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::Store;
-use palpate_tactile::SensorLayout;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -29,9 +29,9 @@ pub(super) fn start_with(model: Option<Model>, scene: Scene, store: PathBuf, gra
         // The test may have stopped listening.
         let _heard = wake.send(());
     });
-    let layout = SensorLayout::named("C1").expect("in the catalogue");
+    let sensors = SensorView { layout: "C1".to_owned(), ..SensorView::default() };
     let model = model.map(Arc::new);
-    let setup = SimWorkerSetup { scene, layout, store, recording: true, grasps, model, playing: true, wake };
+    let setup = SimWorkerSetup { scene, sensors, store, recording: true, grasps, model, playing: true, wake };
     Watched { worker: SimWorker::start(setup).expect("starts"), woken }
 }
 

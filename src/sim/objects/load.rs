@@ -11,6 +11,12 @@ use std::path::Path;
 /// The name that stands for an empty hand.
 pub const EMPTY: &str = "empty";
 
+/// Title of an object, by the name of its class: that of a built-in one, or else the name itself.
+pub fn object_title(name: &str) -> String {
+    let built_in = catalogue().iter().find(|built_in| built_in.name == name).map(|built_in| built_in.title.as_str());
+    built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
+}
+
 /// A source that names the same object from any folder: files that exist get their whole path, names stay names.
 pub fn anchored(source: &str) -> String {
     let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);

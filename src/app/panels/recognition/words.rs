@@ -2,8 +2,8 @@
 
 use crate::app::view_source::Recognised;
 use palpate_lab::grasping::IdentificationView;
-use palpate_lab::workers::object_title;
 use palpate_learn::{Labels, Pmf, StopReason};
+use palpate_sim::objects::object_title;
 
 /// Least probability at which a running first grasp names its leader.
 const WORTH_NAMING: f64 = 0.4;

@@ -398,10 +398,10 @@ impl GripperSession {
     fn plot(&self, rows: Vec<Row>) {
         let (grasp, from_s) = self.stretch;
         let rolling = self.recording.is_none();
+        let answer = self.listener.as_ref().and_then(Listener::view);
         for row in rows {
-            if let Err(TrySendError::Full(_)) =
-                self.outlets.rows.try_send(TraceRow::placed(row, grasp, from_s, rolling))
-            {
+            let row = TraceRow::placed(row, grasp, from_s, rolling, answer.clone());
+            if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
                 self.outlets.rows_lost.store(true, Ordering::Relaxed);
             }
         }

@@ -81,8 +81,10 @@ impl Session {
         for frame in trial.frames() {
             let row = current.reader.row(frame);
             let values = row.values[..plotted].into();
-            let row =
-                TraceRow { grasp, rolling: false, t: row.t_s, line_bar: row.line_bar, values, errors: Box::default() };
+            let (t, line_bar, errors) = (row.t_s, row.line_bar, Box::default());
+            let frame = Some(Arc::new(frame.clone()));
+            // The recogniser has answered to the first computation only.
+            let row = TraceRow { grasp, rolling: false, t, line_bar, values, errors, frame, answer: None };
             self.outlets.send(row);
         }
         if let Some(frame) = trial.frames().last() {

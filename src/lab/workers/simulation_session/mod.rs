@@ -15,6 +15,7 @@ use super::messages::{
 };
 use super::pace::Pace;
 use super::refined_run::RefinedRun;
+use crate::datasets::SensorView;
 use crate::grasping::{EndState, FrameReader, GraspSummary, prepare};
 use crate::picture::Stage;
 use crate::recording::{Recorder, RecorderNotice};
@@ -76,7 +77,7 @@ pub(super) struct Session {
     /// Result of the checker that was taken last.
     checked: Option<Arc<CheckResult>>,
     listener: Option<Listener>,
-    layout: SensorLayout,
+    sensors: SensorView,
     nominal: Scene,
     object: Option<LoadedObject>,
     current: Option<Current>,
@@ -130,7 +131,7 @@ impl Session {
             subject: None,
             checked: None,
             listener: setup.model.map(|model| Listener::new(model, grasps)),
-            layout: setup.layout,
+            sensors: setup.sensors,
             nominal: setup.scene,
             object: None,
             current: None,
@@ -269,6 +270,17 @@ impl Session {
                     current.pull(force);
                 }
             }
+            Command::SetSensors(sensors) => {
+                if std::mem::replace(&mut self.sensors, sensors.clone()) != sensors {
+                    self.own_pose_done = false;
+                    self.begin_round();
+                }
+            }
+            Command::SetModel(model) => {
+                self.listener = model.map(|model| Listener::new(model, self.status.grasps));
+                self.own_pose_done = false;
+                self.begin_round();
+            }
             Command::SetGhost(wanted) => {
                 self.ghost.set_wanted(wanted);
                 self.begin_ghost();
@@ -347,7 +359,12 @@ impl Session {
             (self.nominal.clone(), 0)
         };
         let more = self.listener.as_ref().map(|listener| listener.channels_on(&scene.gripper)).unwrap_or_default();
-        let reader = match FrameReader::new(&self.layout, &scene.gripper, &more) {
+        let area = self.sensors.area;
+        let reader = SensorLayout::named(&self.sensors.layout).and_then(|layout| {
+            let plotted = layout.channels(&scene.gripper)?.len();
+            Ok((FrameReader::new(&layout, &scene.gripper, area, &more)?, plotted))
+        });
+        let (reader, plotted) = match reader {
             Ok(reader) => reader,
             Err(error) => return self.outlets.notify(Notice::Failed(error.to_string())),
         };
@@ -375,7 +392,6 @@ impl Session {
         self.grasp += 1;
         self.status.duration = scene.timing.duration_s;
         // What the recogniser reads beyond the layout is not plotted.
-        let plotted = self.layout.channels(&scene.gripper).map_or(0, |channels| channels.len());
         self.channels = reader.channels()[..plotted].into();
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), begun.data.world_from_gripper));
         let frame = Arc::new(run.gripper_mut().run_mut().first_look());
@@ -473,6 +489,8 @@ impl Session {
         let plotted = self.channels.len();
         let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, current.reader.sensors()));
         let errors: Box<[f32]> = errors.unwrap_or_default().into_iter().take(plotted).collect();
+        let frame = Arc::new(frame);
+        current.frame = Arc::clone(&frame);
         let row = TraceRow {
             grasp: self.grasp,
             rolling: false,
@@ -480,8 +498,9 @@ impl Session {
             line_bar: row.line_bar,
             values: row.values[..plotted].into(),
             errors,
+            frame: Some(frame),
+            answer: self.listener.as_ref().and_then(Listener::view),
         };
-        current.frame = Arc::new(frame);
         self.outlets.send(row);
     }
 

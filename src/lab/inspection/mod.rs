@@ -1,0 +1,12 @@
+//! Inspection: a stored trial of any source, opened for looking at: its channels over time, the fingers at each sample, the
+//! phases of the grasp, and what the recogniser answered.
+
+mod comparison;
+mod open_trial;
+mod phases;
+#[cfg(test)]
+pub(crate) mod test_trials;
+
+pub use comparison::{Alignment, MeanColumn, MeanTrial};
+pub use open_trial::{Column, Instant, OpenOptions, OpenTrial, OpenTrialError};
+pub use phases::{PhaseSpan, TouchPhase, phases_of_frames};

@@ -1,0 +1,471 @@
+//! A stored trial, opened: everything that plots, pictures and bars show of it, sample by sample.
+
+use super::phases::{PhaseSpan, PhaseTimes, TouchPhase, onset, phases_of_frames};
+use crate::datasets::{SensorView, noise_seed};
+use crate::grasping::{FrameReader, Identification, IdentificationView, Row, prepare};
+use crate::picture::{Stage, evenly_bent};
+use crate::recording::{Replay, ReplayError};
+use palpate_geometry::Pose;
+use palpate_learn::{Model, StopRule};
+use palpate_sim::frame::{Frame, Plan, Quality};
+use palpate_sim::gripper::{GripperModel, Side};
+use palpate_sim::objects::{EMPTY, object_title};
+use palpate_store::{Store, StoreError};
+use palpate_tactile::board::{Board, Gap};
+use palpate_tactile::trial::{SimulatedData, TrialData, TrialHeader, TrialId, TrialSource};
+use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Signals, whole_fingers};
+use std::sync::Arc;
+
+/// How a trial is opened.
+#[derive(Clone, Debug, Default)]
+pub struct OpenOptions {
+    /// Sensors through which a simulated trial is read.
+    pub sensors: SensorView,
+    /// Recogniser; none leaves out its answers.
+    pub model: Option<Arc<Model>>,
+    /// Most grasps of its stop rule, in place of the model's own.
+    pub grasps: Option<u32>,
+    /// Also prepares the 3-D view: the object's meshes, and the fingers at each sample.
+    pub scenery: bool,
+}
+
+/// Values of one channel over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Name, as in files: `pressure_left`; the board's own name for its counts.
+    pub name: String,
+    /// The channel; none for counts of a board and for channels of other programs.
+    pub channel: Option<Channel>,
+    /// Unit: `1/m`, `Pa`, `N`, `counts`; empty where unknown.
+    pub unit: &'static str,
+    /// A value per sample; NaN where it is undefined.
+    pub values: Vec<f32>,
+}
+
+/// A stored trial, opened.
+#[derive(Clone, Debug)]
+pub struct OpenTrial {
+    /// Number in its store.
+    pub id: TrialId,
+    /// Origin.
+    pub source: TrialSource,
+    /// Time of its beginning, UTC.
+    pub created: String,
+    /// Facts that trials of all sources have.
+    pub header: TrialHeader,
+    /// Title of the object: `Lemon`, or `unlabelled`.
+    pub title: String,
+    /// Sensors through which a simulated trial was read.
+    pub sensors: SensorView,
+    /// Times of the samples, rising (s); a simulated trial and one of a board count from their beginning.
+    pub t_s: Vec<f64>,
+    /// Line pressure at each sample (bar); NaN where it is unknown.
+    pub line_bar: Vec<f64>,
+    /// Channels; for a board, its raw counts follow those derived from them.
+    pub columns: Vec<Column>,
+    /// Board of a recorded trial.
+    pub board: Option<Board>,
+    /// Phases of the grasp.
+    pub phases: Vec<PhaseSpan>,
+    /// Numerical quality and effects of a simulated trial.
+    pub simulated: Option<(Quality, Plan)>,
+    /// Meshes of the 3-D view.
+    pub stage: Option<Arc<Stage>>,
+    /// Fingers and object over time, in their own samples. Those of a board are arcs of the curvature that its strips read.
+    pub frames: Vec<Arc<Frame>>,
+    /// Answer of the recogniser at each sample; empty without one.
+    pub answers: Vec<Arc<IdentificationView>>,
+    /// Why nothing was recognised.
+    pub recognition_off: Option<String>,
+    /// What is missing, in sentences: an object's file that is gone, sensors without calibration.
+    pub remarks: Vec<String>,
+}
+
+/// Reason why a trial cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenTrialError {
+    /// The store.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The sensor layout.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The replay of a board's trial.
+    #[error("trial {id} cannot be replayed: {cause}")]
+    Replay {
+        /// The trial.
+        id: TrialId,
+        /// Cause.
+        cause: String,
+    },
+}
+
+/// State of a trial at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct Instant<'a> {
+    /// The sample at that time, or the last before it.
+    pub sample: usize,
+    /// Fingers and object then.
+    pub frame: Option<&'a Arc<Frame>>,
+    /// The recogniser's answer then.
+    pub answer: Option<&'a Arc<IdentificationView>>,
+}
+
+impl OpenTrial {
+    /// Opens a trial of any source. The recogniser answers as it did live, from the samples alone.
+    pub fn open(store: &Store, id: TrialId, options: &OpenOptions) -> Result<Self, OpenTrialError> {
+        let trial = store.load(id)?;
+        let created = store.created(id)?;
+        let mut open = Self {
+            id,
+            source: trial.source(),
+            created,
+            title: match trial.header.object.as_str() {
+                "" => "unlabelled".to_owned(),
+                name => object_title(name),
+            },
+            header: trial.header,
+            sensors: options.sensors.clone(),
+            t_s: Vec::new(),
+            line_bar: Vec::new(),
+            columns: Vec::new(),
+            board: None,
+            phases: Vec::new(),
+            simulated: None,
+            stage: None,
+            frames: Vec::new(),
+            answers: Vec::new(),
+            recognition_off: None,
+            remarks: Vec::new(),
+        };
+        match trial.data {
+            TrialData::Simulated(data) => open.read_simulated(data, options)?,
+            TrialData::Recorded(log) => {
+                open.board = Some(log.course.board);
+                let marks = log.course.phases.iter().map(|mark| (mark.from_s - log.course.began_s, mark.phase));
+                let marks = PhaseTimes::of_samples(marks);
+                open.read_replayed(store, options, log.course.began_s, &log.gaps)?;
+                open.find_phases(marks);
+                open.reconstruct(options);
+            }
+            TrialData::Imported(_) => {
+                open.read_replayed(store, options, 0.0, &[])?;
+                open.find_phases(PhaseTimes::default());
+                open.reconstruct(options);
+            }
+        }
+        Ok(open)
+    }
+
+    /// Name of the source, in words.
+    pub fn source_title(&self) -> &'static str {
+        match self.source {
+            TrialSource::Simulated => "simulated",
+            TrialSource::Recorded => "real gripper",
+            TrialSource::Imported => "imported",
+        }
+    }
+
+    /// Its first and last time (s); zero without samples.
+    pub fn span_s(&self) -> [f64; 2] {
+        [self.t_s.first(), self.t_s.last()].map(|t| t.copied().unwrap_or(0.0))
+    }
+
+    /// A column by its name.
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// Beginning of a phase (s), where the grasp has it.
+    pub fn phase_from(&self, phase: TouchPhase) -> Option<f64> {
+        self.phases.iter().find(|span| span.phase == phase).map(|span| span.from_s)
+    }
+
+    /// State at a time (s): that of the last sample until then, or of the first one. None without samples.
+    pub fn at(&self, t_s: f64) -> Option<Instant<'_>> {
+        let sample = last_until(self.t_s.len(), |k| self.t_s[k], t_s)?;
+        let frame = last_until(self.frames.len(), |k| self.frames[k].t, t_s);
+        let frame = frame.and_then(|k| self.frames.get(k));
+        Some(Instant { sample, frame, answer: self.answers.get(sample) })
+    }
+
+    fn read_simulated(&mut self, data: SimulatedData, options: &OpenOptions) -> Result<(), OpenTrialError> {
+        let scene = self.header.scene.clone();
+        let gripper = &scene.gripper;
+        let mut identification = options.model.clone().map(|model| identification(model, options));
+        let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
+        let layout = SensorLayout::named(&options.sensors.layout)?;
+        let shown = layout.channels(gripper)?.len();
+        let reader = FrameReader::new(&layout, gripper, options.sensors.area, &more)?;
+        let rows = self.rows_of(&data.frames, &reader, options);
+        if let Some(identification) = &mut identification {
+            let names = reader.channels().iter().map(Channel::name).enumerate();
+            let off = identification.begin_grasp(names).err();
+            self.recognition_off = off.map(|cause| cause.to_string());
+        }
+        let identification = identification.filter(|_| self.recognition_off.is_none());
+        self.answers = answers(identification, &rows);
+        self.columns = reader.channels()[..shown].iter().map(column_of).collect();
+        for row in &rows {
+            self.push(row, row.t_s);
+        }
+        self.phases = phases_of_frames(data.frames.iter(), gripper);
+        if options.scenery {
+            let object = scene.load_object();
+            if let Err(cause) = &object {
+                self.remarks.push(format!("The object is not drawn: {cause}"));
+            }
+            let object = object.ok().flatten();
+            self.stage = Some(Arc::new(Stage::new(&scene, object.as_ref(), data.world_from_gripper)));
+            self.frames = data.frames.into_iter().map(Arc::new).collect();
+        }
+        self.simulated = Some((data.quality, data.plan));
+        Ok(())
+    }
+
+    /// Rows of frames: through ideal sensors one of each frame, as they were live; or by the sensors' own clock.
+    fn rows_of(&self, frames: &[Frame], reader: &FrameReader, options: &OpenOptions) -> Vec<Row> {
+        if options.sensors.sensors == Default::default() {
+            return frames.iter().map(|frame| reader.row(frame)).collect();
+        }
+        let clean = reader.sensors().signals(frames);
+        let read: Signals = options.sensors.sensors.apply(&clean, noise_seed(&self.header));
+        let row = |(k, t_s): (usize, &f64)| {
+            let frame = last_until(frames.len(), |k| frames[k].t, *t_s).and_then(|k| frames.get(k));
+            let line_bar = frame.map_or(f64::NAN, |frame| frame.line_bar);
+            Row { t_s: *t_s, line_bar, phase: frame.map(|frame| frame.phase), values: read.row(k).into() }
+        };
+        read.t_s.iter().enumerate().map(row).collect()
+    }
+
+    /// Takes the rows and answers that the live gripper gave.
+    fn read_replayed(
+        &mut self,
+        store: &Store,
+        options: &OpenOptions,
+        began_s: f64,
+        gaps: &[Gap],
+    ) -> Result<(), OpenTrialError> {
+        let id = self.id;
+        let failed = |cause: String| OpenTrialError::Replay { id, cause };
+        let mut replay = Replay::of_trial(store, id, options.model.clone()).map_err(|error| match error {
+            ReplayError::Store(error) => OpenTrialError::Store(error),
+            ReplayError::Layout(error) => OpenTrialError::Layout(error),
+        })?;
+        let mut gaps = gaps.iter().peekable();
+        let mut newest: Option<Arc<IdentificationView>> = None;
+        while let Some(row) = replay.next_row().map_err(|error| failed(error.to_string()))? {
+            while self.columns.len() < replay.channels().len() {
+                let name = &replay.channels()[self.columns.len()];
+                let channel = whole_fingers().into_iter().find(|channel| channel.name() == *name);
+                let unit = match (&channel, self.source) {
+                    (Some(channel), _) => channel.quantity.unit(),
+                    (None, TrialSource::Recorded) => "counts",
+                    (None, TrialSource::Simulated | TrialSource::Imported) => "",
+                };
+                let values = vec![f32::NAN; self.t_s.len()];
+                self.columns.push(Column { name: name.clone(), channel, unit, values });
+            }
+            while let Some(gap) = gaps.next_if(|gap| gap.from_s < row.t_s) {
+                self.push_gap(gap.from_s - began_s);
+                self.answers.extend(newest.clone());
+            }
+            self.push(&row, row.t_s - began_s);
+            if let Some(identification) = replay.identification() {
+                let view = identification.view();
+                if newest.as_deref() != Some(&view) {
+                    newest = Some(Arc::new(view));
+                }
+                self.answers.extend(newest.clone());
+            }
+        }
+        // The verdict of a grasp is known at its end.
+        if let (Some(identification), Some(last)) = (replay.identification(), self.answers.last_mut()) {
+            *last = Arc::new(identification.view());
+        }
+        let nothing = replay.identification().is_some_and(|own| own.verdict().is_none());
+        self.recognition_off = match replay.why_off() {
+            Some(cause) => Some(cause.to_string()),
+            None if nothing => Some("no grasp was found in it".to_owned()),
+            None => None,
+        };
+        let unread = |column: &Column| column.channel.is_some() && column.values.iter().all(|value| value.is_nan());
+        let unread: Vec<String> = self.columns.iter().filter(|column| unread(column)).map(|c| c.name.clone()).collect();
+        if !unread.is_empty() {
+            self.remarks.push(format!("Not calibrated: {}. The raw counts can be plotted.", unread.join(", ")));
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, row: &Row, t_s: f64) {
+        self.t_s.push(t_s);
+        self.line_bar.push(row.line_bar);
+        for (place, column) in self.columns.iter_mut().enumerate() {
+            column.values.push(row.values.get(place).copied().unwrap_or(f32::NAN));
+        }
+    }
+
+    /// Curves break where readings are missing.
+    fn push_gap(&mut self, from_s: f64) {
+        self.t_s.push(from_s + 1e-6);
+        self.line_bar.push(f64::NAN);
+        self.columns.iter_mut().for_each(|column| column.values.push(f32::NAN));
+    }
+
+    /// Phases of a grasp of a board: as marked, or else from the line pressure; contact from the pads.
+    fn find_phases(&mut self, marked: PhaseTimes) {
+        let line = PhaseTimes::of_line(&self.t_s, &self.line_bar);
+        let closing = marked.closing.or(line.closing);
+        let begin = closing.or(self.t_s.first().copied()).unwrap_or(0.0);
+        let loads = self.columns.iter().filter(|column| match &column.channel {
+            Some(channel) => channel.quantity == Quantity::Force,
+            None => self.source == TrialSource::Imported && column.name.contains("pressure"),
+        });
+        let contact = loads.filter_map(|column| onset(&self.t_s, &column.values, begin, 0.0)).reduce(f64::min);
+        let times = PhaseTimes {
+            closing: Some(begin),
+            contact,
+            hold: marked.hold.or(line.hold),
+            release: marked.release.or(line.release),
+        };
+        let [first_s, last_s] = self.span_s();
+        self.phases = times.spans(first_s, last_s);
+    }
+
+    /// Fingers as arcs of the curvature that was read, where it was.
+    fn reconstruct(&mut self, options: &OpenOptions) {
+        if !options.scenery {
+            return;
+        }
+        let gripper = GripperModel::default();
+        let columns = Side::BOTH.map(|side| {
+            let bends = |channel: &Channel| channel.quantity == Quantity::Curvature && channel.side == side;
+            self.columns.iter().find(|column| column.channel.as_ref().is_some_and(bends))
+        });
+        let read = |k: usize| columns.map(|column| column.map(|c| f64::from(c.values[k])).filter(|v| v.is_finite()));
+        if (0..self.t_s.len()).any(|k| read(k).iter().any(Option::is_some)) {
+            let frame = |(k, t_s): (usize, &f64)| {
+                let line_bar = self.line_bar[k];
+                Arc::new(Frame { t: *t_s, sample: k as u32, line_bar, ..evenly_bent(&gripper, read(k)) })
+            };
+            self.frames = self.t_s.iter().enumerate().map(frame).collect();
+            self.stage = Some(Arc::new(Stage::new(&self.header.scene, None, resting_pose(&self.header))));
+            self.remarks
+                .push("Fingers are arcs of the curvature that the strips read; the object is not drawn.".to_owned());
+        }
+    }
+}
+
+/// Pose of the gripper in the scene of a trial, without its object.
+fn resting_pose(header: &TrialHeader) -> Pose {
+    let mut scene = header.scene.clone();
+    EMPTY.clone_into(&mut scene.object.source);
+    prepare(&scene, None, header.seed).begun().data.world_from_gripper
+}
+
+fn column_of(channel: &Channel) -> Column {
+    let unit = channel.quantity.unit();
+    Column { name: channel.name(), unit, values: Vec::new(), channel: Some(channel.clone()) }
+}
+
+fn identification(model: Arc<Model>, options: &OpenOptions) -> Identification {
+    let own = model.card.stop;
+    let rule = StopRule { most_grasps: options.grasps.map_or(own.most_grasps, |grasps| grasps as usize), ..own };
+    Identification::new(model, rule)
+}
+
+/// Answers after each row; the last one is that after the grasp.
+fn answers(identification: Option<Identification>, rows: &[Row]) -> Vec<Arc<IdentificationView>> {
+    let Some(mut identification) = identification else { return Vec::new() };
+    let mut newest = Arc::new(identification.view());
+    let mut answers = Vec::with_capacity(rows.len());
+    for row in rows {
+        if identification.push(row.t_s, row) {
+            newest = Arc::new(identification.view());
+        }
+        answers.push(Arc::clone(&newest));
+    }
+    identification.end_grasp();
+    if let Some(last) = answers.last_mut() {
+        *last = Arc::new(identification.view());
+    }
+    answers
+}
+
+/// The last of `count` rising times that is not after `t_s`, or the first; none without any.
+fn last_until(count: usize, time: impl Fn(usize) -> f64, t_s: f64) -> Option<usize> {
+    let (mut low, mut high) = (0, count);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if time(middle) <= t_s + 1e-9 { low = middle + 1 } else { high = middle }
+    }
+    (count > 0).then(|| low.saturating_sub(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::grasp;
+    use palpate_sim::gripper::Phase;
+    use palpate_sim::scene::Scene;
+    use palpate_tactile::model::SensorModel;
+
+    fn stored(object: &str) -> (tempfile::TempDir, Store, TrialId) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut store = Store::open(&folder.path().join("trials.sqlite")).expect("opens");
+        let mut scene = Scene::default();
+        scene.object.source = object.to_owned();
+        let model = scene.load_object().expect("built in");
+        let id = store.insert(&grasp(&scene, model.as_ref(), 0)).expect("stored");
+        (folder, store, id)
+    }
+
+    #[test]
+    fn a_simulated_trial_opens_as_it_was() -> Result<(), Box<dyn std::error::Error>> {
+        let (_folder, store, id) = stored("lemon");
+        let model = Arc::new(palpate_learn::shipped_model()?);
+        let options = OpenOptions { model: Some(model), scenery: true, ..OpenOptions::default() };
+        let open = OpenTrial::open(&store, id, &options)?;
+        let trial = store.load(id)?;
+        assert_eq!((open.title.as_str(), open.source_title()), ("Lemon", "simulated"));
+        assert_eq!(open.t_s.len(), trial.frames().len());
+        assert_eq!((open.frames.len(), open.answers.len()), (open.t_s.len(), open.t_s.len()));
+        let names: Vec<_> = open.columns.iter().map(|column| (column.name.as_str(), column.unit)).collect();
+        assert_eq!(names[0], ("curvature_left", "1/m"));
+        assert!(names.contains(&("force_right", "N")) && names.len() == 6, "{names:?}");
+        assert!(open.columns.iter().all(|column| column.values.len() == open.t_s.len()));
+        // Every phase, in its order, each at the first sample that shows it.
+        let phases: Vec<TouchPhase> = open.phases.iter().map(|span| span.phase).collect();
+        assert_eq!(phases, TouchPhase::ALL);
+        let hold = trial.frames().iter().find(|frame| frame.phase == Phase::Hold).map(|frame| frame.t);
+        assert_eq!(open.phase_from(TouchPhase::Hold), hold);
+        // The state at a time is that of the last sample until then.
+        let now = open.at(1.0).expect("samples");
+        assert!(open.t_s[now.sample] <= 1.0 + 1e-9 && open.t_s[now.sample + 1] > 1.0);
+        assert_eq!(now.frame.map(|frame| frame.t), Some(open.t_s[now.sample]));
+        assert_eq!(open.at(-1.0).map(|now| now.sample), Some(0));
+        assert_eq!(open.at(99.0).map(|now| now.sample), Some(open.t_s.len() - 1));
+        // The last answer is the one after the grasp.
+        assert!(open.answers.last().is_some_and(|answer| answer.beliefs.len() == 1 && !answer.listening));
+        Ok(())
+    }
+
+    #[test]
+    fn other_sensors_read_the_same_trial_differently() -> Result<(), Box<dyn std::error::Error>> {
+        let (_folder, store, id) = stored("ball");
+        let open = |layout: &str, sensors| {
+            let sensors = SensorView { layout: layout.to_owned(), sensors, ..SensorView::default() };
+            OpenTrial::open(&store, id, &OpenOptions { sensors, ..OpenOptions::default() })
+        };
+        let halves = open("C6", SensorModel::Virtual)?;
+        assert!(halves.column("pressure_left_distal").is_some() && halves.column("force_left").is_none());
+        assert!(halves.answers.is_empty() && halves.frames.is_empty() && halves.stage.is_none());
+        let real = open("C1+F", SensorModel::PhysicalLike)?;
+        let clean = open("C1+F", SensorModel::Virtual)?;
+        assert_ne!(real.t_s.len(), clean.t_s.len(), "a board has a clock of its own");
+        assert_eq!(real.phases, clean.phases, "the phases belong to the grasp, not to its sensors");
+        assert!(matches!(open("C99", SensorModel::Virtual), Err(OpenTrialError::Layout(_))));
+        assert!(matches!(OpenTrial::open(&store, 99, &OpenOptions::default()), Err(OpenTrialError::Store(_))));
+        Ok(())
+    }
+}
