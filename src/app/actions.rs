@@ -2,6 +2,7 @@
 
 use crate::app::features::files::FileAction;
 use crate::app::features::gripper::GripperAction;
+use crate::app::features::inspect::InspectAction;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::features::tools::ToolAction;
@@ -22,6 +23,8 @@ pub enum Action {
     Recognition(RecognitionAction),
     /// Diagnostics, fit and training.
     Tool(ToolAction),
+    /// Stored trials that are looked at.
+    Inspect(InspectAction),
     /// View state.
     View(ViewAction),
     /// Files.
@@ -69,6 +72,7 @@ actions_from! {
     LabellingAction => |action| Self::Labelling(action);
     RecognitionAction => |action| Self::Recognition(action);
     ToolAction => |action| Self::Tool(action);
+    InspectAction => |action| Self::Inspect(action);
     ViewAction => |action| Self::View(action);
     FileAction => |action| Self::File(action);
     UserMessage => |message| Self::Tell(message);

@@ -5,16 +5,51 @@ use crate::app::plots::PlotCurve;
 use palpate_geometry::palette::Trace;
 use palpate_lab::grasping::band_half_width;
 use palpate_sim::gripper::Side;
-use palpate_tactile::{Channel, Quantity};
+use palpate_tactile::board::{Board, Sensor};
+use palpate_tactile::{Channel, Quantity, Span};
 
-/// Curves of all channels of a quantity, their values multiplied by `factor`.
-pub(super) fn channel_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {
-    let channels = context.shown().channels().iter().enumerate();
+/// Curves of all channels of a quantity, their values multiplied by `factor`, and their unit; or the raw counts of their
+/// sensors, where those are chosen.
+pub(super) fn channel_curves<'a>(
+    context: &PanelContext<'_>,
+    quantity: Quantity,
+    (factor, unit): (f64, &'a str),
+) -> (Vec<PlotCurve>, &'a str) {
+    match context.shown().board().filter(|_| context.view.raw) {
+        Some(board) => (raw_curves(context, board, quantity), "counts"),
+        None => (physical_curves(context, quantity, factor), unit),
+    }
+}
+
+/// Curves of the counts of the sensors that measure a quantity.
+fn raw_curves(context: &PanelContext<'_>, board: &Board, quantity: Quantity) -> Vec<PlotCurve> {
+    let sensors = match quantity {
+        Quantity::Curvature => [Sensor::FlexLeft, Sensor::FlexRight],
+        Quantity::Pressure | Quantity::Force => [Sensor::PadLeft, Sensor::PadRight],
+    };
+    let derived = context.shown().channels().iter().filter(|channel| channel.is_some()).count();
+    let curve = |(sensor, side): (Sensor, Side)| {
+        let column = derived + board.channel_of(sensor)?;
+        let channel = Channel { quantity, side, span: Span::WHOLE };
+        Some(PlotCurve {
+            name: label(&channel),
+            trace: colour_of(&channel),
+            dashed: side == Side::Right,
+            values: Box::new(move |trace, k| trace.channels.get(column)?.get(k).map(|value| f64::from(*value))),
+            half_width: Box::new(|_, _| None),
+        })
+    };
+    sensors.into_iter().zip(Side::BOTH).filter_map(curve).collect()
+}
+
+fn physical_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {
+    let channels = context.shown().channels();
+    let channels = channels.into_iter().enumerate().filter_map(|(index, channel)| Some((index, channel?)));
     channels
         .filter(|(_, channel)| channel.quantity == quantity)
         .map(|(index, channel)| PlotCurve {
             name: label(channel),
-            trace: trace_of(channel),
+            trace: colour_of(channel),
             dashed: channel.side == Side::Right,
             values: Box::new(move |trace, k| trace.channels.get(index)?.get(k).map(|value| f64::from(*value) * factor)),
             half_width: Box::new(move |trace, k| {
@@ -24,15 +59,14 @@ pub(super) fn channel_curves(context: &PanelContext<'_>, quantity: Quantity, fac
         .collect()
 }
 
-/// Span and finger; the legend shows only colours, so the name mentions a dashed line.
+/// Finger and span.
 fn label(channel: &Channel) -> String {
     let name = channel.name();
-    let place = name.trim_start_matches(channel.quantity.name()).trim_start_matches('_').replace('_', " ");
-    if channel.side == Side::Right { format!("{place}, dashed") } else { place }
+    name.trim_start_matches(channel.quantity.name()).trim_start_matches('_').replace('_', " ")
 }
 
 /// Colour by quantity and span.
-fn trace_of(channel: &Channel) -> Trace {
+pub(super) fn colour_of(channel: &Channel) -> Trace {
     let distal = channel.span.ends().0 >= 0.5;
     match (channel.quantity, distal) {
         (Quantity::Curvature, false) => Trace::Curvature,

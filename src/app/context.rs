@@ -1,9 +1,13 @@
 //! Read-only context of panels, bars and keys.
 
+use crate::app::features::inspect::{ComparedTrace, Inspected, Pinned};
 use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
+use crate::app::playback::Playback;
+use crate::app::shown::SourceData;
 use crate::app::traces::TraceHistory;
-use crate::app::view_source::{SourceData, ViewSource};
+use crate::app::view_source::ViewSource;
+use palpate_lab::inspection::Alignment;
 use palpate_lab::study::accuracy::AccuracyStudy;
 use palpate_lab::workers::{
     EffectsWorker, GripperView, LabelDraft, LabelView, MeasuredAccuracy, SceneAccuracyJob, Snapshot,
@@ -38,10 +42,18 @@ pub struct PanelContext<'a> {
     pub draft: &'a LabelDraft,
     /// The model's prediction is hidden until the label is given.
     pub blind: bool,
-    /// Gripper whose data are shown.
+    /// Source of the data that are shown.
     pub source: ViewSource,
-    /// Traces of that gripper.
+    /// Its traces.
     pub traces: &'a TraceHistory,
+    /// The stored trial that is open, and the time of it that is shown.
+    pub inspected: Option<Inspected<'a>>,
+    /// A trial is being opened.
+    pub opening: bool,
+    /// Comparison with other trials.
+    pub comparison: Comparison<'a>,
+    /// Cursor on the data that are shown.
+    pub(super) playback: &'a Playback,
     /// View state.
     pub view: &'a ViewState,
     /// Pictures of the built-in objects.
@@ -50,10 +62,31 @@ pub struct PanelContext<'a> {
     pub driver: Option<&'a str>,
 }
 
+/// Trials beside the one that is shown.
+#[derive(Clone, Copy)]
+pub struct Comparison<'a> {
+    /// The trials.
+    pub pinned: &'a [Pinned],
+    /// Their curves, or those of their classes.
+    pub traces: &'a [ComparedTrace],
+    /// Origin of time.
+    pub alignment: Alignment,
+    /// Mean and spread of each class in place of each trial.
+    pub spread: bool,
+}
+
 impl<'a> PanelContext<'a> {
-    /// Data of the gripper that is shown.
+    /// Data that are shown.
     pub(super) fn shown(&self) -> SourceData<'a> {
-        let Self { source, snapshot, gripper, traces, scene, .. } = *self;
-        SourceData { source, snapshot, gripper, traces, scene }
+        let Self { source, snapshot, gripper, inspected, playback, traces, scene, .. } = *self;
+        SourceData { source, snapshot, gripper, inspected, playback, traces, scene }
+    }
+
+    /// The other origin of time of compared trials.
+    pub(super) fn next_alignment(&self) -> Alignment {
+        match self.comparison.alignment {
+            Alignment::Closing => Alignment::Contact,
+            Alignment::Contact => Alignment::Closing,
+        }
     }
 }

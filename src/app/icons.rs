@@ -9,6 +9,7 @@ pub(super) enum Icon {
     Pause,
     Reset,
     Step,
+    StepBack,
     Sun,
     Moon,
     Eye,
@@ -48,12 +49,17 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, ink: Color32, ground: Color32) {
             bar(3.0);
         }
         Icon::Reset => {
-            bar(-5.0);
-            triangle(6.0, -1.0);
+            bar(-7.0);
+            triangle(2.0, -1.0);
+            triangle(8.0, -1.0);
         }
         Icon::Step => {
             triangle(-6.0, 1.0);
             bar(5.0);
+        }
+        Icon::StepBack => {
+            bar(-5.0);
+            triangle(6.0, -1.0);
         }
         Icon::Sun => {
             painter.circle_filled(middle, 3.6, ink);

@@ -11,15 +11,17 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `notices.rs` `modes/mode.rs` | look, graphics, messages |
-//! | source | `view_source.rs` `files.rs` | simulated or real data, file dialogs |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `notices.rs` `modes/mode.rs` | look, graphics, messages, time shown |
+//! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
+//! | inspect | `features/inspect.rs` | stored trials that are open or compared |
+//! | shown | `shown.rs` | simulated, real or stored data at the time shown |
 //! | simulation | `features/simulation.rs` | simulated gripper and its scene |
 //! | gripper | `features/gripper.rs` `features/files.rs` | real gripper; opening and saving |
 //! | workflow | `features/labelling.rs` `features/recognition.rs` | labelling session; recognition by both grippers |
 //! | actions | `actions.rs` `features/` | actions of all features |
 //! | context | `context.rs` | read-only context of panels |
-//! | parts | `widgets.rs` `plots.rs` `figure_plot.rs` `keys/binding.rs` | building blocks of panels and modes |
+//! | parts | `widgets.rs` `plots/` `figure_plot.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `modes/` | curves of channels; layout and keys of each mode |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
 //! | tiles | `tiling.rs` | panels beside each other |
@@ -36,6 +38,7 @@ mod actions;
 mod bars;
 mod channel_curves;
 mod context;
+mod derived;
 mod features;
 mod figure_plot;
 mod files;
@@ -44,7 +47,9 @@ mod keys;
 mod modes;
 mod notices;
 mod panels;
+mod playback;
 mod plots;
+mod shown;
 mod startup;
 mod theme;
 mod tiling;
@@ -56,8 +61,10 @@ mod workbench;
 
 pub use actions::{Action, Actions};
 pub use context::PanelContext;
+pub use derived::Derived;
 pub use features::files::FileAction;
 pub use features::gripper::GripperAction;
+pub use features::inspect::{ComparedTrace, InspectAction, Inspected, Pinned};
 pub use features::recognition::RecognitionAction;
 pub use features::simulation::SimulationAction;
 pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
@@ -65,6 +72,7 @@ pub use features::view::{ViewAction, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
 pub use panels::{ALL as ALL_PANELS, PanelKind};
+pub use playback::Seek;
 pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
 pub use view_source::ViewSource;
 pub use viewport::Viewport;

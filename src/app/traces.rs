@@ -1,7 +1,10 @@
 //! Traces of the current grasp and of the few before it, for the plots.
 
+use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::TraceRow;
+use palpate_sim::frame::Frame;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Grasps that are kept.
 const KEPT: usize = 4;
@@ -21,6 +24,10 @@ pub struct GraspTrace {
     pub channels: Vec<Vec<f32>>,
     /// Estimated numerical errors, channel by channel; empty without an error band.
     pub errors: Vec<Vec<f32>>,
+    /// Fingers and object, sample by sample; none of a real gripper.
+    pub frames: Vec<Option<Arc<Frame>>>,
+    /// Answers of the recogniser, sample by sample.
+    pub answers: Vec<Option<Arc<IdentificationView>>>,
 }
 
 /// Length kept of a live stream (s), and how much more may gather before it is cut (s).
@@ -29,6 +36,16 @@ const ROLLING_S: [f64; 2] = [12.0, 4.0];
 const GRASP_S: [f64; 2] = [120.0, 30.0];
 
 impl GraspTrace {
+    /// The sample at a time (s), or the last before it; none before the first.
+    pub fn sample_at(&self, t_s: f64) -> Option<usize> {
+        self.t.partition_point(|t| *t <= t_s + 1e-9).checked_sub(1)
+    }
+
+    /// First and last time (s); zero without samples.
+    pub fn span(&self) -> [f64; 2] {
+        [self.t.first(), self.t.last()].map(|t| t.copied().unwrap_or(0.0))
+    }
+
     /// Times without readings (s); a row without any number marks the beginning of each.
     pub fn gaps(&self) -> Vec<[f64; 2]> {
         let empty = |k: &usize| !self.channels.is_empty() && self.channels.iter().all(|channel| channel[*k].is_nan());
@@ -41,6 +58,8 @@ impl GraspTrace {
     fn clear(&mut self) {
         self.t.clear();
         self.line_bar.clear();
+        self.frames.clear();
+        self.answers.clear();
         self.channels.iter_mut().chain(&mut self.errors).for_each(Vec::clear);
     }
 
@@ -54,6 +73,8 @@ impl GraspTrace {
         let old = self.t.partition_point(|t| *t < last - kept);
         self.t.drain(..old);
         self.line_bar.drain(..old);
+        self.frames.drain(..old.min(self.frames.len()));
+        self.answers.drain(..old.min(self.answers.len()));
         for channel in self.channels.iter_mut().chain(&mut self.errors) {
             channel.drain(..old.min(channel.len()));
         }
@@ -77,6 +98,10 @@ impl TraceHistory {
             if self.grasps.len() == KEPT {
                 self.grasps.pop_front();
             }
+            // Only the current grasp is looked back on; the earlier ones are faint curves.
+            for earlier in &mut self.grasps {
+                (earlier.frames, earlier.answers) = Default::default();
+            }
             let channels = vec![Vec::new(); row.values.len()];
             let errors = vec![Vec::new(); row.errors.len()];
             self.grasps.push_back(GraspTrace {
@@ -94,6 +119,8 @@ impl TraceHistory {
         }
         last.t.push(row.t);
         last.line_bar.push(row.line_bar);
+        last.frames.push(row.frame.clone());
+        last.answers.push(row.answer.clone());
         // A changed layout has other channels; a trace never mixes two.
         for (channel, value) in last.channels.iter_mut().zip(row.values.iter()) {
             channel.push(*value);
@@ -102,6 +129,12 @@ impl TraceHistory {
             channel.push(*error);
         }
         last.cut();
+    }
+
+    /// Shows a whole grasp alone.
+    pub fn show(&mut self, trace: GraspTrace) {
+        self.grasps.clear();
+        self.grasps.push_back(trace);
     }
 
     /// Forgets everything.

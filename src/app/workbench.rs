@@ -2,9 +2,10 @@
 
 use crate::app::actions::{Action, Actions};
 use crate::app::bars;
-use crate::app::context::PanelContext;
+use crate::app::context::{Comparison, PanelContext};
 use crate::app::features::files::{FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
+use crate::app::features::inspect::{InspectAction, InspectFeature};
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
@@ -17,13 +18,14 @@ use crate::app::panels::PanelKind;
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::tiling::{Tiling, panel_frame};
+use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
-    EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelView, MeasuredAccuracy,
-    SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
+    Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, Inspector, LabelView,
+    MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
 };
 use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
@@ -68,6 +70,7 @@ pub struct Workbench {
     gripper: GripperFeature,
     labelling: LabellingFeature,
     recognition: RecognitionFeature,
+    inspect: InspectFeature,
     tools: GripperTools,
     files: FileFeature,
     thumbnails: BTreeMap<String, egui::TextureHandle>,
@@ -117,6 +120,9 @@ impl Workbench {
             wake: Arc::clone(&wake),
         })
         .map_err(ThreadError::of("the gripper's thread"))?;
+        let inspector = Inspector::start(store.clone(), Arc::clone(&wake))
+            .map_err(ThreadError::of("the thread that opens trials"))?;
+        let inspect = InspectFeature::new(inspector, model.cloned(), GRASPS);
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let mut tools = GripperTools::start(tools, &store, &wake)?;
         let driver = setup.render_state.map(|state| {
@@ -135,6 +141,7 @@ impl Workbench {
             gripper: GripperFeature::new(gripper, scene),
             labelling,
             recognition,
+            inspect,
             tools,
             files: FileFeature::new(wake),
             thumbnails: load_thumbnails(ctx),
@@ -245,39 +252,75 @@ impl Workbench {
             draft: self.labelling.session().draft(),
             blind: self.labelling.hides_prediction(gripper, labels, &self.view),
             source,
-            traces: match source {
-                ViewSource::Simulation => self.simulation.traces(),
-                ViewSource::Gripper => self.gripper.traces(),
+            traces: self.traces(),
+            inspected: self.inspect.inspected(),
+            opening: self.inspect.is_opening(),
+            comparison: Comparison {
+                pinned: self.inspect.pinned(),
+                traces: self.inspect.compared(),
+                alignment: self.inspect.alignment(),
+                spread: self.inspect.shows_spread(),
             },
+            playback: self.inspect.playback(source),
             view: &self.view,
             thumbnails: &self.thumbnails,
             driver: self.driver.as_deref(),
         }
     }
 
+    /// Traces of the source that is shown.
+    fn traces(&self) -> &TraceHistory {
+        match self.view.source {
+            ViewSource::Simulation => self.simulation.traces(),
+            ViewSource::Gripper => self.gripper.traces(),
+            ViewSource::Trial => self.inspect.history(),
+        }
+    }
+
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
-        let Self { view, notices, simulation, gripper, labelling, recognition, tools, files, .. } = self;
+        let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
         labelling.gather(gripper, simulation, view, notices);
-        recognition.gather(tools, gripper, view, notices);
+        recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, view, notices);
+        let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
+        inspect.gather(grasp, view, notices);
+        let published = self.published();
+        let context = self.context(&published);
+        let shown = context.shown();
+        let (names, phases) = (shown.column_names(), shown.phases());
+        let span = shown.traces.current().map_or([0.0; 2], GraspTrace::span);
+        self.inspect.move_cursor(ctx, self.view.source, span);
+        self.inspect.compare(names, &phases);
     }
 
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
-        let Self { view, notices, simulation, gripper, labelling, recognition, tools, files, .. } = self;
+        let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();
+        let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
         match action {
             Action::Simulation(action) => simulation.apply(action, view, notices),
             Action::Gripper(action) => gripper.apply(action, view, notices),
             Action::Labelling(action) => labelling.apply(action, gripper, view, notices),
             Action::Recognition(action) => {
-                recognition.apply(action, &mut Recognisers { simulation, gripper, tools }, view, notices);
+                recognition.apply(action, &mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
             }
             Action::Tool(action) => tools.apply(action, notices),
+            Action::Inspect(action) => {
+                // Looking back pauses what is being simulated.
+                if matches!(action, InspectAction::Seek(_)) && view.source == ViewSource::Simulation {
+                    simulation.send(Command::Pause, notices);
+                }
+                inspect.apply(action, &times, view, notices);
+            }
             Action::View(action) => {
-                if matches!(action, ViewAction::SetMode(_)) {
+                if let ViewAction::SetSensors(sensors) = &action {
+                    simulation.send(Command::SetSensors(sensors.clone()), notices);
+                }
+                if let ViewAction::SetMode(mode) = action {
                     labelling.refresh();
+                    inspect.enter_mode(mode, view);
                 }
                 view.apply(ctx, action, simulation.worker().snapshot().as_deref());
             }

@@ -1,20 +1,22 @@
 //! Bar above the panels (modes and data source) and below (time, or the running trial).
 
+mod timeline;
 mod trial;
 
-use crate::app::actions::Actions;
+use crate::app::actions::{Action, Actions};
 use crate::app::context::PanelContext;
-use crate::app::features::simulation::SPEEDS;
+use crate::app::features::inspect::InspectAction;
 use crate::app::features::view::ViewAction;
 use crate::app::icons::{self, Icon};
 use crate::app::modes;
 use crate::app::modes::mode::Mode;
-use crate::app::theme::{colour, veil};
+use crate::app::playback::{SPEEDS, Seek};
+use crate::app::theme::{accented, colour, veil};
 use crate::app::view_source::ViewSource;
 use crate::app::widgets::stop_button;
 use egui::{Align, Layout, RichText, Ui};
 use palpate_device::serial::LinkState;
-use palpate_geometry::palette::{Theme, Trace};
+use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::workers::{Command, GripperView, Status};
 
 /// A speed: ¼× is 0.25×.
@@ -72,38 +74,50 @@ fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.spacing_mut().item_spacing.x = 8.0;
 }
 
-/// Source of the data. While a gripper is connected, a click changes it.
+/// Sources of the data; with more than one, a click changes it.
 fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let colours = context.view.theme.colours();
     let link = context.gripper.and_then(|gripper| gripper.link.as_ref());
-    let Some(link) = link else {
-        return badge(ui, "SIMULATED", veil(colours.accent, 0.22), colour(colours.text));
-    };
-    let listening = link.state == LinkState::Listening;
-    let cadence = &link.cadence;
-    let real = match (listening, cadence.troubled) {
-        (true, true) => format!("REAL GRIPPER {:.0} Hz: many unreadable lines", cadence.rate_hz),
-        (true, false) => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
-        (false, _) => "REAL GRIPPER: no readings".to_owned(),
-    };
-    let remarks = [link.line_remarks(), link.wiring_remarks()].concat();
-    let trouble = !listening || cadence.troubled;
-    let about = format!("{}: {}", link.port.path.display(), link.state.sentence());
-    let about = std::iter::once(about).chain(remarks.iter().cloned()).collect::<Vec<_>>().join("\n");
-    for (source, text, about) in [
-        (ViewSource::Gripper, real, about),
-        (ViewSource::Simulation, "SIMULATED".to_owned(), "Show the simulation".to_owned()),
-    ] {
-        let chosen = context.source == source;
-        let ink = match source {
-            ViewSource::Gripper if trouble => colours.error,
-            ViewSource::Gripper if !remarks.is_empty() => colours.warning,
-            ViewSource::Gripper | ViewSource::Simulation => colours.text,
+    let mut sources: Vec<(ViewSource, String, String, Rgb)> = Vec::new();
+    if let Some(link) = link {
+        let cadence = &link.cadence;
+        let listening = link.state == LinkState::Listening;
+        let text = match (listening, cadence.troubled) {
+            (true, true) => format!("REAL GRIPPER {:.0} Hz: many unreadable lines", cadence.rate_hz),
+            (true, false) => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
+            (false, _) => "REAL GRIPPER: no readings".to_owned(),
         };
+        let remarks = [link.line_remarks(), link.wiring_remarks()].concat();
+        let about = format!("{}: {}", link.port.path.display(), link.state.sentence());
+        let about = std::iter::once(about).chain(remarks.iter().cloned()).collect::<Vec<_>>().join("\n");
+        let ink = match (!listening || cadence.troubled, remarks.is_empty()) {
+            (true, _) => colours.error,
+            (false, false) => colours.warning,
+            (false, true) => colours.text,
+        };
+        sources.push((ViewSource::Gripper, text, about, ink));
+    }
+    let simulated = "SIMULATED".to_owned();
+    sources.push((ViewSource::Simulation, simulated, "Show the simulated gripper".to_owned(), colours.text));
+    if let Some(inspected) = context.inspected {
+        let trial = inspected.trial;
+        let text = format!("TRIAL {}, {}", trial.id, trial.source_title().to_uppercase());
+        let about = format!("{}: show this stored trial", trial.title);
+        sources.push((ViewSource::Trial, text, about, colours.text));
+    }
+    if let [(_, text, ..)] = &sources[..] {
+        return badge(ui, text, veil(colours.accent, 0.22), colour(colours.text));
+    }
+    for (source, text, about, ink) in sources {
         let text = RichText::new(text).small().color(colour(ink));
-        if ui.selectable_label(chosen, text).on_hover_text(about).clicked() {
+        if ui.selectable_label(context.source == source, text).on_hover_text(about).clicked() {
             actions.push(ViewAction::Show(source));
         }
+    }
+    if context.source == ViewSource::Trial
+        && icons::button(ui, Icon::Cross, "Close the trial", "Close the trial and show the live gripper").clicked()
+    {
+        actions.push(InspectAction::Close);
     }
 }
 
@@ -128,20 +142,64 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
 }
 
 pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    if context.source == ViewSource::Gripper || context.view.mode == Mode::Label {
+    let shown = context.shown();
+    if context.source == ViewSource::Gripper
+        || (context.view.mode == Mode::Label && context.source != ViewSource::Trial)
+    {
         return trial::ui(ui, context, actions);
     }
     let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
-    let t = context.snapshot.map_or(0.0, |s| s.frame.t);
     ui.horizontal_centered(|ui| {
-        transport(ui, &status, actions);
+        if context.source == ViewSource::Trial || shown.looks_back() {
+            replay_buttons(ui, context, actions);
+        } else {
+            transport(ui, &status, actions);
+        }
         ui.separator();
-        speeds(ui, &status, actions);
+        speeds(ui, context, &status, actions);
         ui.separator();
-        recording(ui, &status, actions);
-        ui.separator();
-        progress(ui, context, &status, t);
+        if context.source == ViewSource::Simulation && ui.available_width() > 420.0 {
+            recording(ui, &status, actions);
+            ui.separator();
+        }
+        let [first, last] = shown.time_span();
+        let t = shown.time_s().unwrap_or(first);
+        ui.label(RichText::new(format!("{t:5.2} / {last:.2} s")).monospace());
+        if shown.looks_back() {
+            live_button(ui, context, actions);
+        }
+        timeline::ui(ui, context, actions);
     });
+}
+
+/// Back to the newest sample.
+fn live_button(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let button = egui::Button::new("Live").fill(accented(context.view.theme));
+    if ui.add(button).on_hover_text("Return to the newest sample (End)").clicked() {
+        actions.push(InspectAction::Seek(Seek::End));
+    }
+}
+
+/// Buttons of a stored trial, and of the past of a live gripper.
+fn replay_buttons(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let mut button = |icon: Icon, name: &str, hint: &str, action: InspectAction| {
+        if icons::button(ui, icon, name, hint).clicked() {
+            actions.push(action);
+        }
+    };
+    button(Icon::Reset, "To the start", "To the start (Home)", InspectAction::Seek(Seek::Start));
+    button(Icon::StepBack, "Step back", "One sample back (Ctrl+←)", InspectAction::Seek(Seek::Samples(-1)));
+    if context.playback.playing {
+        button(Icon::Pause, "Pause", "Pause (Space)", InspectAction::TogglePlaying);
+    } else {
+        button(Icon::Play, "Play", "Play (Space)", InspectAction::TogglePlaying);
+    }
+    button(Icon::Step, "Step", "One sample forward (Ctrl+→)", InspectAction::Seek(Seek::Samples(1)));
+    let repeated = context.playback.repeated.is_some();
+    let hint = "Repeat, between the marks A and B where both are set (L)";
+    if ui.selectable_label(repeated, "Loop").on_hover_text(hint).clicked() {
+        actions.push(InspectAction::ToggleRepeat);
+    }
 }
 
 fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
@@ -160,16 +218,25 @@ fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
     button(Icon::Step, "Step", "One sample forward (Ctrl+→)", Command::Step);
 }
 
-fn speeds(ui: &mut Ui, status: &Status, actions: &mut Actions) {
-    let combo = egui::ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_text(status.target_speed));
+/// Speed of the replay or of the simulation.
+fn speeds(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mut Actions) {
+    let replayed = context.source == ViewSource::Trial || context.shown().looks_back();
+    let target = if replayed { context.playback.speed } else { status.target_speed };
+    let combo = egui::ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_text(target));
     let shown = combo.show_ui(ui, |ui| {
         for speed in SPEEDS {
-            if ui.selectable_label(status.target_speed == speed, speed_text(speed)).clicked() {
-                actions.push(Command::SetSpeed(speed));
+            if ui.selectable_label(target == speed, speed_text(speed)).clicked() {
+                actions.push(match replayed {
+                    true => Action::from(InspectAction::SetSpeed(speed)),
+                    false => Command::SetSpeed(speed).into(),
+                });
             }
         }
     });
     shown.response.on_hover_text("Speed (- and =)");
+    if replayed {
+        return;
+    }
     let actual = if status.playing && status.actual_speed > 0.0 {
         format!("{:.2}×", status.actual_speed)
     } else {
@@ -191,37 +258,6 @@ fn recording(ui: &mut Ui, status: &Status, actions: &mut Actions) {
     }
 }
 
-/// Time and line pressure.
-fn progress(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, t: f64) {
-    let colours = context.view.theme.colours();
-    let duration = status.duration.max(1e-9);
-    ui.label(RichText::new(format!("{t:5.2} / {:.2} s", status.duration)).monospace());
-    if ui.available_width() < 60.0 {
-        return;
-    }
-    let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width() - 6.0, 16.0), egui::Sense::hover());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, "Time in the grasp"));
-    let painter = ui.painter_at(rect);
-    painter.rect_filled(rect, 3.0, colour(colours.raised));
-    // The filled height is the line pressure.
-    if let Some(trace) = context.traces.current() {
-        let top = context.scene.programme.peak_bar.max(1e-9);
-        let place = |k: usize| {
-            let x = rect.left() + rect.width() * (trace.t[k] / duration) as f32;
-            let y = rect.bottom() - rect.height() * (trace.line_bar[k] / top).clamp(0.0, 1.0) as f32;
-            egui::pos2(x, y)
-        };
-        let fill = veil(Trace::Line.colour(context.view.theme), 0.45);
-        for k in 1..trace.t.len() {
-            let (a, b) = (place(k - 1), place(k));
-            let column = egui::Rect::from_min_max(egui::pos2(a.x, b.y.min(a.y)), egui::pos2(b.x, rect.bottom()));
-            painter.rect_filled(column, 0.0, fill);
-        }
-    }
-    let x = rect.left() + rect.width() * (t / duration).clamp(0.0, 1.0) as f32;
-    painter.vline(x, rect.y_range(), egui::Stroke::new(2.0, colour(colours.accent)));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,6 +265,6 @@ mod tests {
     #[test]
     fn speeds_are_short() {
         let texts: Vec<String> = SPEEDS.iter().map(|s| speed_text(*s)).collect();
-        assert_eq!(texts, ["1/16×", "1/8×", "0.25×", "0.5×", "1×", "2×", "4×", "8×"]);
+        assert_eq!(texts, ["1/32×", "1/16×", "1/8×", "0.25×", "0.5×", "1×", "2×", "4×", "8×"]);
     }
 }

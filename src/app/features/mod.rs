@@ -3,6 +3,7 @@
 
 pub(super) mod files;
 pub(super) mod gripper;
+pub(super) mod inspect;
 pub(super) mod labelling;
 pub(super) mod recognition;
 pub(super) mod simulation;

@@ -1,6 +1,7 @@
 //! Recognition by both grippers: threshold, next object, and the model for the real one.
 
 use crate::app::features::gripper::GripperFeature;
+use crate::app::features::inspect::InspectFeature;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::features::tools::{GripperTools, ToolAction};
 use crate::app::features::view::ViewState;
@@ -8,6 +9,7 @@ use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
 use palpate_lab::workers::{Command, GripperCommand, TrainCommand, TrainedModel};
 use palpate_learn::Model;
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,14 +20,18 @@ pub enum RecognitionAction {
     SetThreshold(f64),
     /// Recognise another object: a random built-in one, or whatever the real gripper holds next.
     NextObject,
-    /// Use the model in this file for the real gripper; without one, the shipped model.
+    /// Use the model in this file for the real gripper and its trials; without one, the shipped model.
     UseModel(Option<PathBuf>),
+    /// Use the model in this file for the simulation and other trials; without one, the shipped model.
+    UseSimulationModel(Option<PathBuf>),
 }
 
 /// State of the recognition in the window.
 pub(in crate::app) struct RecognitionFeature {
     /// Model that comes with the program.
     shipped: Option<Arc<Model>>,
+    /// Models to be loaded, and for which gripper; the first one is being loaded.
+    loading: VecDeque<(PathBuf, ViewSource)>,
 }
 
 /// Features that recognition acts on.
@@ -33,6 +39,7 @@ pub(in crate::app) struct Recognisers<'a> {
     pub(in crate::app) simulation: &'a mut SimulationFeature,
     pub(in crate::app) gripper: &'a GripperFeature,
     pub(in crate::app) tools: &'a mut GripperTools,
+    pub(in crate::app) inspect: &'a mut InspectFeature,
 }
 
 impl RecognitionFeature {
@@ -43,14 +50,27 @@ impl RecognitionFeature {
         view: &mut ViewState,
         notices: &mut Notices,
     ) -> Self {
-        if let Some(path) = view.gripper_model.take() {
-            tools.apply(ToolAction::Train(TrainCommand::Load(path)), notices);
+        let mut feature = Self { shipped, loading: VecDeque::new() };
+        for (path, gripper) in
+            [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
+        {
+            if let Some(path) = path {
+                feature.load(path, gripper, tools, notices);
+            }
         }
-        Self { shipped }
+        feature
+    }
+
+    /// Loads a model after those that are being loaded.
+    fn load(&mut self, path: PathBuf, gripper: ViewSource, tools: &mut GripperTools, notices: &mut Notices) {
+        if self.loading.is_empty() {
+            tools.apply(ToolAction::Train(TrainCommand::Load(path.clone())), notices);
+        }
+        self.loading.push_back((path, gripper));
     }
 
     pub(in crate::app) fn apply(
-        &self,
+        &mut self,
         action: RecognitionAction,
         on: &mut Recognisers<'_>,
         view: &mut ViewState,
@@ -65,46 +85,63 @@ impl RecognitionFeature {
                 ViewSource::Gripper => {
                     on.gripper.worker().command(GripperCommand::AnotherObject);
                 }
-                ViewSource::Simulation => on.simulation.open_next(notices),
+                ViewSource::Simulation | ViewSource::Trial => on.simulation.open_next(notices),
             },
-            RecognitionAction::UseModel(Some(path)) => {
-                on.tools.apply(ToolAction::Train(TrainCommand::Load(path)), notices);
-            }
+            RecognitionAction::UseModel(Some(path)) => self.load(path, ViewSource::Gripper, on.tools, notices),
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
+                on.inspect.set_model(ViewSource::Gripper, self.shipped.clone());
                 on.gripper.worker().command(GripperCommand::SetModel(self.shipped.clone()));
+            }
+            RecognitionAction::UseSimulationModel(Some(path)) => {
+                self.load(path, ViewSource::Simulation, on.tools, notices);
+            }
+            RecognitionAction::UseSimulationModel(None) => {
+                view.simulation_model = None;
+                on.inspect.set_model(ViewSource::Simulation, self.shipped.clone());
+                on.simulation.send(Command::SetModel(self.shipped.clone()), notices);
             }
         }
     }
 
     /// Takes in models that were trained or loaded since the last frame.
-    pub(in crate::app) fn gather(
-        &self,
-        tools: &mut GripperTools,
-        gripper: &GripperFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) {
-        match tools.trained() {
+    pub(in crate::app) fn gather(&mut self, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
+        match on.tools.trained() {
             Some(Ok(finished)) => {
                 let f1 = finished.judged.evaluation.f1_macro;
                 notices.info(format!("Trained: macro F1 {f1:.2} on held-back trials."));
-                use_model(&finished.trained, gripper, view, notices);
+                use_for_gripper(&finished.trained, on, view, notices);
             }
             Some(Err(cause)) => notices.error(format!("Training failed: {cause}")),
             None => {}
         }
-        match tools.loaded() {
-            Some(Ok(trained)) => use_model(&trained, gripper, view, notices),
-            Some(Err(cause)) => notices.error(format!("Model not changed: {cause}")),
-            None => {}
+        let Some(outcome) = on.tools.loaded() else { return };
+        let gripper = self.loading.pop_front().map_or(ViewSource::Gripper, |(_, gripper)| gripper);
+        if let Some((next, _)) = self.loading.front() {
+            on.tools.apply(ToolAction::Train(TrainCommand::Load(next.clone())), notices);
+        }
+        match (outcome, gripper) {
+            (Ok(trained), ViewSource::Gripper) => use_for_gripper(&trained, on, view, notices),
+            (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {
+                use_for_simulation(&trained, on, view, notices)
+            }
+            (Err(cause), _) => notices.error(format!("Model not changed: {cause}")),
         }
     }
 }
 
+/// Uses a model for the simulation from now on.
+fn use_for_simulation(trained: &TrainedModel, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
+    view.simulation_model = Some(trained.path.clone());
+    on.inspect.set_model(ViewSource::Simulation, Some(Arc::clone(&trained.model)));
+    on.simulation.send(Command::SetModel(Some(Arc::clone(&trained.model))), notices);
+    notices.info(format!("Model for the simulation: {}", trained.about));
+}
+
 /// Uses a model for the real gripper from now on.
-fn use_model(trained: &TrainedModel, gripper: &GripperFeature, view: &mut ViewState, notices: &mut Notices) {
+fn use_for_gripper(trained: &TrainedModel, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
     view.gripper_model = Some(trained.path.clone());
-    gripper.worker().command(GripperCommand::SetModel(Some(Arc::clone(&trained.model))));
+    on.inspect.set_model(ViewSource::Gripper, Some(Arc::clone(&trained.model)));
+    on.gripper.worker().command(GripperCommand::SetModel(Some(Arc::clone(&trained.model))));
     notices.info(format!("Model for the real gripper: {}", trained.about));
 }

@@ -14,9 +14,6 @@ use palpate_sim::scene::Scene;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Speeds that can be chosen, as multiples of real time.
-pub(in crate::app) const SPEEDS: [f64; 8] = [1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-
 /// Seed of the sequence of objects.
 const DECK_SEED: u64 = 1;
 

@@ -1,5 +1,6 @@
 //! View state: camera, theme, layout and settings of the window. Remembered between runs, never written into a trial.
 
+use crate::app::derived::Derived;
 use crate::app::modes::mode::Mode;
 use crate::app::theme;
 use crate::app::view_source::ViewSource;
@@ -45,6 +46,8 @@ pub struct ViewState {
     pub blind: bool,
     /// Recognition model for the real gripper; the shipped one where none is named.
     pub gripper_model: Option<PathBuf>,
+    /// Recognition model for the simulation; the shipped one where none is named.
+    pub simulation_model: Option<PathBuf>,
     /// Time shown by all plots (s); `None` for the whole grasp.
     #[serde(skip)]
     pub time_window: Option<[f64; 2]>,
@@ -53,12 +56,16 @@ pub struct ViewState {
     pub keys_shown: bool,
     /// Sensors that plots and recognisers read of the simulation and of stored trials.
     pub sensors: SensorView,
+    /// What each plot derives from its channels.
+    pub derived: BTreeMap<String, Derived>,
+    /// Plots of the real gripper show raw counts in place of physical units.
+    pub raw: bool,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
 }
 
 /// Change of the view state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum ViewAction {
     /// Change to another mode.
     SetMode(Mode),
@@ -74,6 +81,12 @@ pub enum ViewAction {
     SetForces(bool),
     /// Time shown by all plots (s); `None` for the whole grasp.
     SetTimeWindow(Option<[f64; 2]>),
+    /// Sensors that plots and recognisers read.
+    SetSensors(SensorView),
+    /// What a plot derives from its channels.
+    Derive(String, Derived),
+    /// Show raw counts of the real gripper, or physical units.
+    ShowRaw(bool),
     /// Show or hide the true object.
     ShowTruth(bool),
     /// Show or hide the key sheet.
@@ -101,9 +114,12 @@ impl Default for ViewState {
             port: None,
             blind: true,
             gripper_model: None,
+            simulation_model: None,
             time_window: None,
             keys_shown: false,
             sensors: SensorView::default(),
+            derived: BTreeMap::new(),
+            raw: false,
             recent: Vec::new(),
         }
     }
@@ -126,6 +142,11 @@ impl ViewState {
             }
             ViewAction::SetForces(forces) => self.forces = forces,
             ViewAction::SetTimeWindow(window) => self.time_window = window,
+            ViewAction::SetSensors(sensors) => self.sensors = sensors,
+            ViewAction::Derive(plot, derived) => {
+                self.derived.insert(plot, derived);
+            }
+            ViewAction::ShowRaw(raw) => self.raw = raw,
             ViewAction::ShowTruth(shown) => self.truth_shown = shown,
             ViewAction::ShowKeys(shown) => self.keys_shown = shown,
             ViewAction::ResetLayout => self.layouts.clear(),

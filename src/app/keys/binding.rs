@@ -31,6 +31,9 @@ impl Binding {
 
     /// Acts repeatedly while held down.
     pub(in crate::app) fn repeats(&self) -> bool {
-        matches!(self.shortcut.logical_key, Key::ArrowUp | Key::ArrowDown | Key::ArrowRight | Key::Minus | Key::Equals)
+        matches!(
+            self.shortcut.logical_key,
+            Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Minus | Key::Equals
+        )
     }
 }

@@ -7,10 +7,13 @@ use crate::app::actions::{Action, Actions};
 use crate::app::context::PanelContext;
 use crate::app::features::files::FileAction;
 use crate::app::features::gripper::GripperAction;
-use crate::app::features::simulation::{SPEEDS, SimulationAction};
+use crate::app::features::inspect::InspectAction;
+use crate::app::features::simulation::SimulationAction;
 use crate::app::features::view::ViewAction;
 use crate::app::modes;
 use crate::app::modes::mode::Mode;
+use crate::app::playback::{Seek, next_speed};
+use crate::app::view_source::ViewSource;
 use binding::{Binding, key};
 use egui::{Key, Modifiers};
 use palpate_geometry::drawing::{Camera, StandardView};
@@ -20,7 +23,7 @@ use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingActio
 const COMMAND_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };
 
 /// Keys of all modes. Those with more modifiers come first, so that they win.
-static COMMON: [Binding; 26] = [
+static COMMON: [Binding; 30] = [
     key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or restart it", |_| {
         Some(LabellingAction::Record.into())
     }),
@@ -36,13 +39,26 @@ static COMMON: [Binding; 26] = [
     key(COMMAND_SHIFT, Key::Z, "redo", |_| Some(LabelCommand::Redo.into())),
     key(Modifiers::COMMAND, Key::Z, "undo the last label or discard", |_| Some(LabelCommand::Undo.into())),
     key(Modifiers::NONE, Key::Space, "play or pause", |c| {
+        if replays(c) {
+            return Some(InspectAction::TogglePlaying.into());
+        }
         let playing = c.snapshot?.status.playing;
         Some(if playing { Command::Pause } else { Command::Play }.into())
     }),
-    key(Modifiers::COMMAND, Key::ArrowRight, "one sample forward", |_| Some(Command::Step.into())),
-    key(Modifiers::NONE, Key::Backspace, "back to the start", |_| Some(Command::Reset.into())),
-    key(Modifiers::NONE, Key::Minus, "slower", |c| next_speed(c, -1)),
-    key(Modifiers::NONE, Key::Equals, "faster", |c| next_speed(c, 1)),
+    key(Modifiers::COMMAND, Key::ArrowRight, "one sample forward", |c| {
+        Some(if replays(c) { InspectAction::Seek(Seek::Samples(1)).into() } else { Command::Step.into() })
+    }),
+    key(Modifiers::COMMAND, Key::ArrowLeft, "one sample back", |_| Some(InspectAction::Seek(Seek::Samples(-1)).into())),
+    key(Modifiers::NONE, Key::ArrowRight, "0.1 s forward", |_| Some(InspectAction::Seek(Seek::By(0.1)).into())),
+    key(Modifiers::NONE, Key::ArrowLeft, "0.1 s back", |_| Some(InspectAction::Seek(Seek::By(-0.1)).into())),
+    key(Modifiers::NONE, Key::End, "last sample; of a live gripper, back to live", |_| {
+        Some(InspectAction::Seek(Seek::End).into())
+    }),
+    key(Modifiers::NONE, Key::Backspace, "back to the start", |c| {
+        Some(if replays(c) { InspectAction::Seek(Seek::Start).into() } else { Command::Reset.into() })
+    }),
+    key(Modifiers::NONE, Key::Minus, "slower", |c| faster(c, -1)),
+    key(Modifiers::NONE, Key::Equals, "faster", |c| faster(c, 1)),
     key(Modifiers::COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(FileAction::Open.into())),
     key(Modifiers::COMMAND, Key::S, "save the scene", |_| Some(FileAction::SaveScene.into())),
     key(Modifiers::COMMAND, Key::P, "save a picture of the 3-D view", |_| Some(FileAction::SavePicture.into())),
@@ -67,10 +83,11 @@ static COMMON: [Binding; 26] = [
 ];
 
 /// Mouse actions in the sheet.
-const MOUSE: [(&str, &str); 5] = [
+const MOUSE: [(&str, &str); 6] = [
     ("drag", "turn the view"),
     ("right drag", "move the view"),
     ("wheel", "zoom; in a plot, zoom time"),
+    ("drag in a plot or the time bar", "move the cursor; with Shift, move the time window"),
     ("double click", "show everything"),
     ("Ctrl+drag", "pull at the object"),
 ];
@@ -81,11 +98,17 @@ fn bindings(mode: Mode) -> impl Iterator<Item = &'static Binding> {
     modes::kind(mode).keys.iter().chain(open).chain(&COMMON)
 }
 
-fn next_speed(context: &PanelContext<'_>, by: isize) -> Option<Action> {
+/// True where a stored trial or the past of a live gripper is shown.
+fn replays(context: &PanelContext<'_>) -> bool {
+    context.source == ViewSource::Trial || context.shown().looks_back()
+}
+
+fn faster(context: &PanelContext<'_>, by: isize) -> Option<Action> {
+    if replays(context) {
+        return Some(InspectAction::ChangeSpeed(by).into());
+    }
     let now = context.snapshot?.status.target_speed;
-    let nearest = (0..SPEEDS.len()).min_by(|a, b| (SPEEDS[*a] - now).abs().total_cmp(&(SPEEDS[*b] - now).abs()))?;
-    let next = nearest.saturating_add_signed(by).min(SPEEDS.len() - 1);
-    Some(Command::SetSpeed(SPEEDS[next]).into())
+    Some(Command::SetSpeed(next_speed(now, by)).into())
 }
 
 fn turned(context: &PanelContext<'_>, view: StandardView) -> Option<Action> {

@@ -2,9 +2,11 @@
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
+use crate::app::features::inspect::InspectAction;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::view::ViewAction;
 use crate::app::keys::binding::{Binding, key};
+use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
 
@@ -18,7 +20,10 @@ pub(super) const KIND: ModeKind = ModeKind {
     typed: |_, _| None,
 };
 
-const KEYS: &[Binding] = &[key(Modifiers::NONE, Key::N, "next object", |_| Some(RecognitionAction::NextObject.into()))];
+const KEYS: &[Binding] = &[
+    key(Modifiers::NONE, Key::N, "next object", |_| Some(RecognitionAction::NextObject.into())),
+    key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
+];
 
 /// Objects and scene left, the view over two plots in the middle, results right.
 fn layout(tiles: &mut Tiles<String>) -> TileId {

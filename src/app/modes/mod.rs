@@ -2,6 +2,7 @@
 //! [`ModeKind`], and a line in [`ALL`].
 
 mod demo;
+mod inspect;
 mod label;
 pub(super) mod mode;
 
@@ -29,7 +30,7 @@ pub(super) struct ModeKind {
 }
 
 /// All modes, in the order of their tabs.
-pub(super) static ALL: [ModeKind; 2] = [demo::KIND, label::KIND];
+pub(super) static ALL: [ModeKind; 3] = [demo::KIND, inspect::KIND, label::KIND];
 
 /// Kind of a mode.
 pub(super) fn kind(mode: Mode) -> &'static ModeKind {

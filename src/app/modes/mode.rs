@@ -9,6 +9,8 @@ pub enum Mode {
     /// Grasp and recognise, live.
     #[default]
     Demo,
+    /// Look back: open, replay, compare and explain stored trials.
+    Inspect,
     /// Record and label trials of the real gripper.
     Label,
 }

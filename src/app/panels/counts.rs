@@ -3,34 +3,28 @@
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::plots::{PlotCurve, TimePlot, show};
-use crate::app::view_source::ViewSource;
 use palpate_geometry::palette::Trace;
 use palpate_tactile::board::Sensor;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let link = context.gripper.and_then(|gripper| gripper.link.as_ref());
-    let Some(link) = link.filter(|_| context.source == ViewSource::Gripper) else {
-        ui.weak("Raw ADC counts. Connect the board in the panel Gripper.");
+    let Some(board) = context.shown().board() else {
+        ui.weak("Raw ADC counts. Connect the board in the panel Gripper, or open a trial of it.");
         return;
     };
-    let derived = context.shown().channels().len();
-    let curves = link.board.channels.iter().enumerate().map(|(place, name)| {
-        let sensor = Sensor::ALL.into_iter().find(|sensor| link.board.channel_of(*sensor) == Some(place));
+    let derived = context.shown().channels().iter().filter(|channel| channel.is_some()).count();
+    let curves = board.channels.iter().enumerate().map(|(place, name)| {
+        let sensor = Sensor::ALL.into_iter().find(|sensor| board.channel_of(*sensor) == Some(place));
         let (trace, dashed) = look(sensor, place);
         PlotCurve {
-            name: if dashed { format!("{name}, dashed") } else { name.clone() },
+            name: name.clone(),
             trace,
             dashed,
             values: Box::new(move |trace, k| trace.channels.get(derived + place)?.get(k).map(|v| f64::from(*v))),
             half_width: Box::new(|_, _| None),
         }
     });
-    show(
-        ui,
-        context,
-        actions,
-        &TimePlot { id: "counts", unit: "counts", curves: curves.collect(), least: [0.0, 100.0] },
-    );
+    let curves = curves.collect();
+    show(ui, context, actions, TimePlot { id: "counts", unit: "counts", curves, least: [0.0, 100.0] });
 }
 
 /// Colour and dash: those of the sensor; other channels take turns.

@@ -7,6 +7,6 @@ use crate::app::plots::{TimePlot, show};
 use palpate_tactile::Quantity;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let curves = channel_curves(context, Quantity::Curvature, 1.0);
-    show(ui, context, actions, &TimePlot { id: "curvature", unit: "1/m", curves, least: [0.0, 8.0] });
+    let (curves, unit) = channel_curves(context, Quantity::Curvature, (1.0, "1/m"));
+    show(ui, context, actions, TimePlot { id: "curvature", unit, curves, least: [0.0, 8.0] });
 }

@@ -7,6 +7,6 @@ use crate::app::plots::{TimePlot, show};
 use palpate_tactile::Quantity;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let curves = channel_curves(context, Quantity::Force, 1.0);
-    show(ui, context, actions, &TimePlot { id: "force", unit: "N", curves, least: [0.0, 0.5] });
+    let (curves, unit) = channel_curves(context, Quantity::Force, (1.0, "N"));
+    show(ui, context, actions, TimePlot { id: "force", unit, curves, least: [0.0, 0.5] });
 }

@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod calibration;
+mod compared;
 mod console;
 mod counts;
 mod curvature;
@@ -12,6 +13,7 @@ mod fit;
 mod force;
 mod grasp;
 mod gripper;
+mod hysteresis;
 mod journal;
 mod label;
 mod line_pressure;
@@ -20,7 +22,9 @@ mod plan;
 mod pressure;
 mod recognition;
 mod scene;
+mod sensors;
 mod training;
+mod trial;
 mod trials;
 mod view3d;
 
@@ -39,7 +43,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 22] = [
+pub const ALL: [PanelKind; 26] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -61,6 +65,10 @@ pub const ALL: [PanelKind; 22] = [
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
     PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
     PanelKind { name: "fit", title: "Fit", ui: fit::ui },
+    PanelKind { name: "trial", title: "This trial", ui: trial::ui },
+    PanelKind { name: "compared", title: "Compared", ui: compared::ui },
+    PanelKind { name: "sensors", title: "Sensors", ui: sensors::ui },
+    PanelKind { name: "hysteresis", title: "Hysteresis", ui: hysteresis::ui },
     PanelKind { name: "training", title: "Training", ui: training::ui },
 ];
 

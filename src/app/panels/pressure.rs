@@ -7,6 +7,6 @@ use crate::app::plots::{TimePlot, show};
 use palpate_tactile::Quantity;
 
 pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let curves = channel_curves(context, Quantity::Pressure, 1e-3);
-    show(ui, context, actions, &TimePlot { id: "pressure", unit: "kPa", curves, least: [0.0, 10.0] });
+    let (curves, unit) = channel_curves(context, Quantity::Pressure, (1e-3, "kPa"));
+    show(ui, context, actions, TimePlot { id: "pressure", unit, curves, least: [0.0, 10.0] });
 }

@@ -5,6 +5,7 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::features::view::ViewAction;
+use crate::app::shown::Moment;
 use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};
@@ -12,7 +13,7 @@ use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_lab::picture::PictureView;
-use palpate_lab::workers::{Command, Snapshot};
+use palpate_lab::workers::Command;
 
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
@@ -24,18 +25,17 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let rect = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3-D view"));
-    let Some(snapshot) = context.snapshot else {
-        message(ui, rect, context, "Loading the object ..");
-        return;
+    let Some(moment) = context.shown().moment() else {
+        return message(ui, rect, context, why_nothing(context));
     };
     if context.driver.is_none() {
         message(ui, rect, context, "The 3-D view needs a graphics driver. Everything else works without.");
         return;
     }
     steer(ui, &response, context, actions);
-    paint(ui, rect, context, snapshot);
+    paint(ui, rect, context, moment);
     buttons(ui, rect, context, actions);
-    if let Some(loading) = &snapshot.status.loading {
+    if let Some(loading) = context.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
         let text = format!("Loading {loading} ..");
         ui.painter().text(
             rect.center_top() + egui::vec2(0.0, 30.0),
@@ -44,6 +44,19 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             egui::FontId::proportional(14.0),
             colour(context.view.theme.colours().text),
         );
+    }
+}
+
+/// Why there is nothing to draw.
+fn why_nothing(context: &PanelContext<'_>) -> &'static str {
+    match context.source {
+        ViewSource::Trial if context.opening => "Opening the trial ..",
+        ViewSource::Trial if context.inspected.is_some() => {
+            "Nothing to draw: this trial has no poses, and no calibrated flex strip from which the fingers could be \
+             reconstructed."
+        }
+        ViewSource::Trial => "Choose a trial in the library.",
+        ViewSource::Simulation | ViewSource::Gripper => "Loading the object ..",
     }
 }
 
@@ -94,7 +107,8 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
-fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
+fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) {
+    let Moment { grasp, stage, frame } = moment;
     let pixels_per_point = ui.ctx().pixels_per_point();
     let picture = PictureView {
         camera: context.view.camera,
@@ -104,33 +118,35 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, snapshot: &Snapshot) {
         ..PictureView::default()
     };
     let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
+    let ghost = context.ghost.filter(|_| context.source != ViewSource::Trial && !context.shown().looks_back());
     let key = PictureKey {
-        grasp: snapshot.grasp,
-        sample: snapshot.frame.t,
-        ghost: context.ghost.map(|ghost| ghost.t),
+        grasp,
+        sample: frame.t,
+        ghost: ghost.map(|ghost| ghost.t),
         real: real_curvature(context),
         view: picture.clone(),
         pixels,
         pixels_per_point,
     };
-    let mut list = snapshot.stage.draw(&snapshot.frame, &picture);
-    if let Some(ghost) = context.ghost {
-        list.ghosts = snapshot.stage.ghosts(ghost, context.view.theme);
+    let mut list = stage.draw(frame, &picture);
+    if let Some(ghost) = ghost {
+        list.ghosts = stage.ghosts(ghost, context.view.theme);
     }
     if let Some(curvature) = key.real {
-        list.ghosts.extend(snapshot.stage.reconstructed(curvature, context.view.theme));
+        list.ghosts.extend(stage.reconstructed(curvature, context.view.theme));
     }
-    let reconstructed = key.real.is_some();
+    let caption = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
+        Some(inspected) => inspected.trial.remarks.join(" "),
+        None if key.real.is_some() => {
+            "Translucent: real fingers, reconstructed from the flex strips. Solid: simulation.".to_owned()
+        }
+        None => String::new(),
+    };
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
-    if reconstructed {
-        let text = "Translucent: real fingers, reconstructed from the flex strips. Solid: simulation.";
+    if !caption.is_empty() {
         let ink = colour(context.view.theme.colours().text);
-        let galley = ui.painter().layout(
-            text.to_owned(),
-            egui::FontId::proportional(12.0),
-            ink,
-            (rect.width() - 24.0).max(80.0),
-        );
+        let galley =
+            ui.painter().layout(caption, egui::FontId::proportional(12.0), ink, (rect.width() - 24.0).max(80.0));
         let place = rect.left_bottom() + egui::vec2(12.0, -60.0 - galley.size().y);
         let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
         ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));

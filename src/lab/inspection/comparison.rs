@@ -1,7 +1,7 @@
 //! Comparison of trials: aligned in time, and mean and spread of several.
 
 use super::open_trial::{Column, OpenTrial};
-use super::phases::TouchPhase;
+use super::phases::{PhaseSpan, TouchPhase};
 
 /// Common origin of time of compared trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,9 +27,13 @@ impl Alignment {
 
     /// Origin of time of a trial (s).
     pub fn origin_s(self, trial: &OpenTrial) -> f64 {
-        let closing = trial.phases.first().map(|span| span.from_s);
-        let contact = trial.phase_from(TouchPhase::Contact).filter(|_| self == Self::Contact);
-        contact.or(closing).or(trial.t_s.first().copied()).unwrap_or(0.0)
+        self.origin_of(&trial.phases).or(trial.t_s.first().copied()).unwrap_or(0.0)
+    }
+
+    /// Origin of time of a grasp with these phases (s); none without any.
+    pub fn origin_of(self, phases: &[PhaseSpan]) -> Option<f64> {
+        let contact = phases.iter().find(|span| span.phase == TouchPhase::Contact && self == Self::Contact);
+        contact.or(phases.first()).map(|span| span.from_s)
     }
 }
 
@@ -124,7 +128,6 @@ impl OpenTrial {
 
 #[cfg(test)]
 mod tests {
-    use super::super::phases::PhaseSpan;
     use super::super::test_trials::open_trial;
     use super::*;
 

@@ -21,8 +21,10 @@ use std::sync::Arc;
 pub struct OpenOptions {
     /// Sensors through which a simulated trial is read.
     pub sensors: SensorView,
-    /// Recogniser; none leaves out its answers.
+    /// Recogniser of simulated and imported trials; none leaves out its answers.
     pub model: Option<Arc<Model>>,
+    /// Recogniser of trials of a board.
+    pub board_model: Option<Arc<Model>>,
     /// Most grasps of its stop rule, in place of the model's own.
     pub grasps: Option<u32>,
     /// Also prepares the 3-D view: the object's meshes, and the fingers at each sample.
@@ -247,8 +249,12 @@ impl OpenTrial {
         gaps: &[Gap],
     ) -> Result<(), OpenTrialError> {
         let id = self.id;
+        let model = match self.source {
+            TrialSource::Recorded => &options.board_model,
+            TrialSource::Simulated | TrialSource::Imported => &options.model,
+        };
         let failed = |cause: String| OpenTrialError::Replay { id, cause };
-        let mut replay = Replay::of_trial(store, id, options.model.clone()).map_err(|error| match error {
+        let mut replay = Replay::of_trial(store, id, model.clone()).map_err(|error| match error {
             ReplayError::Store(error) => OpenTrialError::Store(error),
             ReplayError::Layout(error) => OpenTrialError::Layout(error),
         })?;

@@ -11,8 +11,9 @@ use crate::app::context::PanelContext;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::view::ViewAction;
 use crate::app::icons::{self, Icon};
+use crate::app::shown::Recognised;
 use crate::app::theme::{accented, colour};
-use crate::app::view_source::{Recognised, ViewSource};
+use crate::app::view_source::ViewSource;
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
@@ -125,6 +126,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Actions) {
     let fill = accented(context.view.theme);
     let hint = match context.source {
+        ViewSource::Trial => return,
         ViewSource::Simulation => "Grasp another built-in object at random (N)",
         ViewSource::Gripper => "Start over with another object in the hand (N)",
     };

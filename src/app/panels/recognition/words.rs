@@ -1,6 +1,6 @@
 //! Texts of the recognition panel.
 
-use crate::app::view_source::Recognised;
+use crate::app::shown::Recognised;
 use palpate_lab::grasping::IdentificationView;
 use palpate_learn::{Labels, Pmf, StopReason};
 use palpate_sim::objects::object_title;

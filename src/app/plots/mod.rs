@@ -1,26 +1,35 @@
-//! Plots of traces over time. All show the same time; the mouse moves it in all of them: drag to move, wheel to zoom about
-//! the pointer, double click for the whole grasp.
+//! Plots of traces over time. All show the same time and one cursor. Click or drag: move the cursor; Shift and drag: move the
+//! time window; wheel: zoom about the pointer; double click: the whole grasp.
+
+mod derived;
+mod labels;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::derived::Derived;
+use crate::app::features::inspect::{ComparedTrace, InspectAction};
 use crate::app::features::view::ViewAction;
+use crate::app::playback::Seek;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
 use crate::app::view_source::ViewSource;
 use egui::{Color32, Ui};
 use egui_plot::{
-    AxisHints, FilledArea, GridInput, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform,
-    Span, Text, VLine,
+    AxisHints, FilledArea, GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform, Span,
+    Text, VLine,
 };
-use palpate_geometry::palette::{Theme, Trace};
+use labels::CurveLabel;
+use palpate_geometry::palette::{Rgb, Theme, Trace, series_colour};
 use palpate_geometry::units::three_digits;
+use palpate_lab::inspection::{PhaseSpan, TouchPhase};
+use palpate_tactile::trial::TrialSource;
 
 /// Value of one row of a trace; `None` where it is undefined.
 pub(super) type TraceValue = Box<dyn Fn(&GraspTrace, usize) -> Option<f64>>;
 
 /// One curve of a plot.
 pub(super) struct PlotCurve {
-    /// Name in the legend.
+    /// Name beside the plot.
     pub(super) name: String,
     /// Its colour.
     pub(super) trace: Trace,
@@ -51,19 +60,27 @@ const BAND: f32 = 0.3;
 /// Shortest time that can be shown (s).
 const NARROWEST: f64 = 0.05;
 
-pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, plot: &TimePlot<'_>) {
+pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, plot: TimePlot<'_>) {
     let span = context.shown().time_span();
     // A time window of a longer trial may show nothing of this one.
     let fits = |[from, to]: &[f64; 2]| *from >= span[0] && to - from >= 0.5 * NARROWEST && *to <= span[1] + 1e-9;
     let [from, to] = context.view.time_window.filter(fits).unwrap_or(span);
     let theme = context.view.theme;
-    let [low, high] = value_range(context, plot, [from, to]);
-    let unit = plot.unit;
-    let show_legend = ui.available_width() > 360.0 && ui.available_height() > 70.0;
+    let derived = context.view.derived.get(plot.id).copied().unwrap_or_default();
+    if ui.available_height() > ROOM_FOR_HEADER && ui.available_width() > ROOM_FOR_LABELS {
+        header_ui(ui, context, actions, plot.id, derived);
+    }
+    let unit = derived.unit(plot.unit);
+    let least = if derived == Derived::Values { plot.least } else { [0.0, 0.0] };
+    let plot = TimePlot { curves: derived::derive(derived, plot.curves), unit: &unit, least, ..plot };
+    let [low, high] = value_range(context, &plot, [from, to]);
+    let labelled = ui.available_width() > ROOM_FOR_LABELS;
+    let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
     let seconds = AxisHints::new_x()
         .formatter(|mark: GridMark, shown| seconds_at(mark.value, shown))
         .label_spacing(egui::Rangef::new(24.0, 40.0));
-    let mut widget = Plot::new(plot.id)
+    let widget = Plot::new(plot.id)
+        .width(width)
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)
@@ -71,34 +88,35 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
         .allow_double_click_reset(false)
         .allow_axis_zoom_drag(false)
         .show_background(false)
+        .show_x(false)
+        .show_y(false)
         .y_axis_min_width(44.0)
-        .y_axis_label(unit)
+        .y_axis_label(unit.clone())
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
         .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
         .custom_x_axes(vec![seconds])
         .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .set_margin_fraction(egui::Vec2::ZERO);
-    if show_legend {
-        let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
-        widget = widget.legend(legend.position(egui_plot::Corner::RightTop));
-    }
     let gaps = gaps(context);
     let response = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(from..=to);
         plot_ui.set_plot_bounds_y(low..=high);
-        add_hold(plot_ui, context, high - 0.04 * (high - low));
+        add_phases(plot_ui, context, [from, to], high - 0.04 * (high - low));
         add_gaps(plot_ui, &gaps, theme);
         for trace in context.traces.earlier() {
-            add_curves(plot_ui, trace, plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0, false);
+            add_curves(plot_ui, trace, &plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0);
+        }
+        for compared in context.comparison.traces {
+            let ink = series_colour(compared.colour, theme);
+            add_spread(plot_ui, compared, &plot, ink);
+            add_curves(plot_ui, &compared.trace, &plot, |_| colour(ink), 1.3);
         }
         if let Some(trace) = context.traces.current() {
-            add_bands(plot_ui, trace, plot, theme);
-            add_curves(plot_ui, trace, plot, |c| colour(c.trace.colour(theme)), 1.8, true);
-            if let Some(now) = trace.t.last() {
-                plot_ui.vline(VLine::new("", *now).color(veil(theme.colours().quiet_text, 0.5)).width(1.0));
-            }
+            add_bands(plot_ui, trace, &plot, theme);
+            add_curves(plot_ui, trace, &plot, |c| colour(c.trace.colour(theme)), 1.8);
         }
+        add_cursor(plot_ui, context);
         let bounds = plot_ui.plot_bounds();
         TimeDrag {
             pointer: plot_ui.pointer_coordinate().map(|p: PlotPoint| p.x),
@@ -108,7 +126,11 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
     });
     let shade = veil(theme.colours().error, 0.55);
     gaps.iter().for_each(|gap| hatch(ui, &response.transform, *gap, shade));
-    if let Some(why) = nothing_read(context, plot) {
+    if labelled {
+        let frame = *response.transform.frame();
+        labels::draw(ui, frame, theme.colours().quiet_text, curve_labels(context, &plot, &response.transform));
+    }
+    if let Some(why) = nothing_read(context, &plot) {
         let ink = colour(theme.colours().quiet_text);
         let room = response.response.rect.width() - 60.0;
         let galley = ui.painter().layout(why.to_owned(), egui::FontId::proportional(13.0), ink, room.max(60.0));
@@ -117,14 +139,82 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
     response
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, format!("{} over time", plot.id)));
+    if let Some(t) = sought(ui, &response.response, &response.inner) {
+        actions.push(InspectAction::Seek(Seek::To(t)));
+    }
     if let Some(window) = moved_window(ui, &response.response, &response.inner, [from, to], span) {
         actions.push(ViewAction::SetTimeWindow(window));
     }
 }
 
+/// Height from which on a plot has a line of choices above it, and width from which on it has names beside it (points).
+const ROOM_FOR_HEADER: f32 = 120.0;
+const ROOM_FOR_LABELS: f32 = 380.0;
+
+/// Choice of what is derived, and the times of cursor and marks.
+fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, id: &str, derived: Derived) {
+    ui.horizontal(|ui| {
+        let combo = egui::ComboBox::from_id_salt((id, "derived")).width(96.0);
+        let shown = combo.selected_text(egui::RichText::new(derived.name()).small()).show_ui(ui, |ui| {
+            for choice in Derived::ALL {
+                if ui.selectable_label(choice == derived, choice.name()).clicked() {
+                    actions.push(ViewAction::Derive(id.to_owned(), choice));
+                }
+            }
+        });
+        shown.response.on_hover_text("Values, sum or difference of both fingers, or change over time");
+        if context.shown().board().is_some() && id != "counts" && id != "line pressure" {
+            let mut raw = context.view.raw;
+            if ui.checkbox(&mut raw, egui::RichText::new("raw counts").small()).changed() {
+                actions.push(ViewAction::ShowRaw(raw));
+            }
+        }
+        let playback = context.playback;
+        let time = |name: &str, t: f64| format!("{name} {t:.3} s");
+        let mut times: Vec<String> = Vec::new();
+        if let [Some(a), Some(b)] = playback.marks {
+            times.push(time("B − A", b - a));
+        }
+        times.extend(playback.marks.iter().zip(["A", "B"]).rev().filter_map(|(t, name)| Some(time(name, (*t)?))));
+        times.extend(playback.cursor_s.map(|t| time("cursor", t)));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.add(
+                egui::Label::new(egui::RichText::new(times.into_iter().rev().collect::<Vec<_>>().join("   ")).small())
+                    .truncate(),
+            );
+        });
+    });
+}
+
+/// Names of all curves, with their values at the cursor.
+fn curve_labels(context: &PanelContext<'_>, plot: &TimePlot<'_>, transform: &PlotTransform) -> Vec<CurveLabel> {
+    let theme = context.view.theme;
+    let Some(now) = context.shown().time_s() else { return Vec::new() };
+    let marks = context.playback.marks;
+    let label = |trace: &GraspTrace, curve: &PlotCurve, ink: Color32| {
+        let at = |t: f64| (curve.values)(trace, trace.sample_at(t)?).filter(|value| value.is_finite());
+        let value = at(now);
+        let difference = marks[0].and_then(at).zip(marks[1].and_then(at)).map(|(a, b)| b - a);
+        let y = value.map(|value| transform.position_from_point(&PlotPoint::new(now, value)).y);
+        CurveLabel { name: curve.name.clone(), ink, value, difference, y }
+    };
+    let own = context.traces.current().into_iter();
+    let own = own.flat_map(|trace| plot.curves.iter().map(move |curve| (trace, curve)));
+    let own = own.map(|(trace, curve)| label(trace, curve, colour(curve.trace.colour(theme))));
+    let others = context.comparison.traces.iter().flat_map(|compared| plot.curves.iter().map(move |c| (compared, c)));
+    let others =
+        others.map(|(compared, curve)| label(&compared.trace, curve, colour(series_colour(compared.colour, theme))));
+    own.chain(others).collect()
+}
+
 /// Text where a connected gripper gives no curve to draw.
 fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
-    let trace = context.traces.current().filter(|_| context.source == ViewSource::Gripper)?;
+    let real = match context.source {
+        ViewSource::Simulation => false,
+        ViewSource::Gripper => true,
+        ViewSource::Trial => context.inspected.is_some_and(|own| own.trial.source == TrialSource::Recorded),
+    };
+    let trace = context.traces.current().filter(|_| real)?;
     let number = |k: usize| plot.curves.iter().any(|c| (c.values)(trace, k).is_some_and(f64::is_finite));
     let nothing = trace.t.len() > 5 && !(0..trace.t.len()).any(number);
     nothing.then_some(if plot.id == "line pressure" {
@@ -132,6 +222,12 @@ fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'sta
     } else {
         "Sensors not calibrated: see the Calibration panel in Label mode. Raw counts: Counts panel."
     })
+}
+
+/// Time that the mouse asks for: a click, or a drag without Shift.
+fn sought(ui: &Ui, response: &egui::Response, drag: &TimeDrag) -> Option<f64> {
+    let dragged = response.dragged_by(egui::PointerButton::Primary) && !ui.input(|input| input.modifiers.shift);
+    drag.pointer.filter(|_| response.clicked() || dragged)
 }
 
 struct TimeDrag {
@@ -155,7 +251,9 @@ fn moved_window(
         let by = by.clamp(first - from, (last - to).max(first - from));
         Some(Some([from + by, to + by]))
     };
-    if response.dragged() && drag.dragged != 0.0 {
+    let shift = ui.input(|input| input.modifiers.shift);
+    let panned = response.dragged() && (shift || !response.dragged_by(egui::PointerButton::Primary));
+    if panned && drag.dragged != 0.0 {
         return shifted(-drag.dragged);
     }
     let wheel = ui.input(|i| i.smooth_scroll_delta().y);
@@ -207,14 +305,69 @@ fn plain(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Shades the hold.
-fn add_hold(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, height: f64) {
-    let Some([closed, released]) = context.shown().hold() else { return };
+/// Shades the hold, and names the phases.
+fn add_phases(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, [from, to]: [f64; 2], height: f64) {
     let quiet = context.view.theme.colours().quiet_text;
-    plot_ui.add(Span::new("", closed..=released).fill(veil(quiet, 0.09)).border_width(0.0));
-    let place = PlotPoint::new(closed, height);
-    let word = egui::RichText::new(" hold").small();
-    plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
+    let width = f64::from(plot_ui.response().rect.width());
+    let mut phases = context.shown().phases();
+    if phases.is_empty() {
+        let hold = context.shown().hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
+        phases.extend(hold);
+    }
+    for span in phases {
+        if span.phase == TouchPhase::Hold {
+            plot_ui.add(Span::new("", span.from_s..=span.to_s).fill(veil(quiet, 0.09)).border_width(0.0));
+        } else {
+            plot_ui.vline(VLine::new("", span.from_s).color(veil(quiet, 0.35)).width(1.0).allow_hover(false));
+        }
+        let name = span.phase.name();
+        let room = (span.to_s.min(to) - span.from_s.max(from)) / (to - from) * width;
+        if room > 7.0 * name.len() as f64 {
+            let place = PlotPoint::new(span.from_s.max(from), height);
+            let word = egui::RichText::new(format!(" {name}")).small();
+            plot_ui.text(Text::new("", place, word).color(veil(quiet, 0.8)).anchor(egui::Align2::LEFT_TOP));
+        }
+    }
+}
+
+/// Cursor and marks.
+fn add_cursor(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>) {
+    let colours = context.view.theme.colours();
+    let line = |t: f64, ink: Color32, width: f32| VLine::new("", t).color(ink).width(width).allow_hover(false);
+    for mark in context.playback.marks.into_iter().flatten() {
+        plot_ui.vline(line(mark, colour(colours.warning), 1.0));
+    }
+    match (context.playback.cursor_s, context.shown().time_s()) {
+        (Some(t), _) => plot_ui.vline(line(t, colour(colours.accent), 1.5)),
+        (None, Some(now)) => plot_ui.vline(line(now, veil(colours.quiet_text, 0.5), 1.0)),
+        (None, None) => {}
+    }
+}
+
+/// Shades one standard deviation about the mean of a class.
+fn add_spread(plot_ui: &mut egui_plot::PlotUi<'_>, compared: &ComparedTrace, plot: &TimePlot<'_>, ink: Rgb) {
+    if compared.spread.is_empty() {
+        return;
+    }
+    let trace = &compared.trace;
+    let spread = GraspTrace { channels: compared.spread.clone(), ..trace.clone() };
+    for curve in &plot.curves {
+        let points: Vec<[f64; 3]> = (0..trace.t.len())
+            .filter_map(|k| {
+                let (mean, half) = ((curve.values)(trace, k)?, (curve.values)(&spread, k)?);
+                (mean.is_finite() && half.is_finite()).then(|| [trace.t[k], mean - half, mean + half])
+            })
+            .collect();
+        fill(plot_ui, &points, veil(ink, 0.16));
+    }
+}
+
+/// Fills between low and high: time, low, high.
+fn fill(plot_ui: &mut egui_plot::PlotUi<'_>, points: &[[f64; 3]], ink: Color32) {
+    let [t, low, high] = [0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect::<Vec<f64>>());
+    if t.len() > 1 {
+        plot_ui.add(FilledArea::new("", &t, &low, &high).fill_color(ink));
+    }
 }
 
 /// Times of the current grasp without readings (s).
@@ -263,26 +416,24 @@ fn add_curves(
     plot: &TimePlot<'_>,
     shade: impl Fn(&PlotCurve) -> Color32,
     width: f32,
-    named: bool,
 ) {
     for curve in &plot.curves {
         let style = if curve.dashed { LineStyle::Dashed { length: 7.0 } } else { LineStyle::Solid };
-        let name = if named { curve.name.as_str() } else { "" };
         for points in runs(trace, curve) {
             plot_ui.line(
-                Line::new(name, PlotPoints::from(points))
-                    .id(egui::Id::unique((&curve.name, trace.grasp)))
+                Line::new("", PlotPoints::from(points))
+                    .id(egui::Id::unique((&curve.name, trace.grasp, width.to_bits())))
                     .color(shade(curve))
                     .width(width)
                     .style(style)
-                    .allow_hover(named),
+                    .allow_hover(false),
             );
         }
     }
 }
 
 /// Parts of a curve where it is defined, as points of time (s) and value. Nothing is drawn between them: some line styles
-/// break off at a point that is not a number, others forbid it. The legend hides all parts, since they share name and id.
+/// break off at a point that is not a number, others forbid it.
 fn runs(trace: &GraspTrace, curve: &PlotCurve) -> Vec<Vec<[f64; 2]>> {
     let mut runs = vec![Vec::new()];
     for (k, t) in trace.t.iter().enumerate() {
@@ -305,17 +456,15 @@ fn add_bands(plot_ui: &mut egui_plot::PlotUi<'_>, trace: &GraspTrace, plot: &Tim
                 (value.is_finite() && half.is_finite()).then(|| [trace.t[k], value - half, value + half])
             })
             .collect();
-        let [t, low, high] = [0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect::<Vec<f64>>());
-        if t.len() > 1 {
-            plot_ui.add(FilledArea::new("", &t, &low, &high).fill_color(veil(curve.trace.colour(theme), BAND)));
-        }
+        fill(plot_ui, &points, veil(curve.trace.colour(theme), BAND));
     }
 }
 
 /// Range of the curves within the time shown, with a margin, and at least the plot's least range.
 fn value_range(context: &PanelContext<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2]) -> [f64; 2] {
     let [mut low, mut high] = plot.least;
-    for trace in context.traces.earlier().chain(context.traces.current()) {
+    let compared = context.comparison.traces.iter().map(|compared| &compared.trace);
+    for trace in context.traces.earlier().chain(context.traces.current()).chain(compared) {
         for (k, _) in trace.t.iter().enumerate().filter(|(_, t)| (from..=to).contains(*t)) {
             for value in plot.curves.iter().filter_map(|c| (c.values)(trace, k)).filter(|v| v.is_finite()) {
                 low = low.min(value);

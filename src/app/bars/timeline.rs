@@ -1,0 +1,88 @@
+//! Time bar: line pressure, phases, marks and the cursor; a drag moves the cursor. For a stored trial and for the past of a
+//! simulated grasp alike.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
+use crate::app::playback::Seek;
+use crate::app::theme::{colour, veil};
+use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
+use palpate_geometry::palette::Trace;
+
+/// Height of the bar (points).
+const HEIGHT: f32 = 26.0;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    if ui.available_width() < 60.0 {
+        return;
+    }
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width() - 6.0, HEIGHT), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Time bar"));
+    let shown = context.shown();
+    let [first, last] = shown.time_span();
+    let length = (last - first).max(1e-9);
+    let x_of = |t: f64| rect.left() + rect.width() * ((t - first) / length).clamp(0.0, 1.0) as f32;
+    if (response.dragged() || response.clicked())
+        && let Some(pointer) = response.interact_pointer_pos()
+    {
+        let share = f64::from((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        actions.push(InspectAction::Seek(Seek::To(first + share * length)));
+    }
+    let colours = context.view.theme.colours();
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 3.0, colour(colours.background));
+    line_pressure(&painter, rect, context, x_of);
+    for (place, span) in shown.phases().iter().enumerate() {
+        let [left, right] = [x_of(span.from_s), x_of(span.to_s)];
+        if place > 0 {
+            painter.vline(left, rect.y_range(), Stroke::new(1.0, veil(colours.text, 0.45)));
+        }
+        let font = FontId::proportional(10.5);
+        let word = painter.layout_no_wrap(span.phase.name().to_owned(), font, veil(colours.text, 0.85));
+        if word.size().x + 8.0 < right - left {
+            painter.galley(pos2(left + 4.0, rect.top() + 1.0), word, colour(colours.text));
+        }
+    }
+    let playback = context.playback;
+    if let Some([from, to]) = playback.repeated {
+        let part = Rect::from_x_y_ranges(x_of(from)..=x_of(to), rect.bottom() - 4.0..=rect.bottom());
+        painter.rect_filled(part, 0.0, colour(colours.accent));
+    }
+    for (mark, name) in playback.marks.iter().zip(["A", "B"]) {
+        if let Some(t) = mark {
+            let x = x_of(*t);
+            painter.vline(x, rect.y_range(), Stroke::new(1.5, colour(colours.warning)));
+            painter.text(
+                pos2(x + 2.0, rect.bottom() - 1.0),
+                Align2::LEFT_BOTTOM,
+                name,
+                FontId::proportional(10.5),
+                colour(colours.warning),
+            );
+        }
+    }
+    if let Some(t) = shown.time_s() {
+        painter.vline(x_of(t), rect.y_range(), Stroke::new(2.5, colour(colours.accent)));
+    }
+    response.on_hover_text("Drag to move through time (arrow keys: 0.1 s, with Ctrl a sample)");
+}
+
+/// Line pressure as a filled curve.
+fn line_pressure(painter: &egui::Painter, rect: Rect, context: &PanelContext<'_>, x_of: impl Fn(f64) -> f32) {
+    let Some(trace) = context.traces.current() else { return };
+    let top = trace.line_bar.iter().copied().filter(|bar| bar.is_finite()).fold(0.05, f64::max);
+    let fill = veil(Trace::Line.colour(context.view.theme), 0.40);
+    let height = |bar: f64| rect.height() * 0.92 * (bar / top).clamp(0.0, 1.0) as f32;
+    // At most one column per point: a long trial has more samples than that.
+    let mut drawn = f32::NEG_INFINITY;
+    for (pair, bars) in trace.t.windows(2).zip(trace.line_bar.windows(2)) {
+        let [left, right] = [x_of(pair[0]), x_of(pair[1])];
+        if right <= drawn + 0.5 || !bars[1].is_finite() {
+            continue;
+        }
+        let column =
+            Rect::from_min_max(pos2(left.max(drawn), rect.bottom() - height(bars[1])), pos2(right, rect.bottom()));
+        painter.rect_filled(column, 0.0, fill);
+        drawn = right;
+    }
+}

@@ -1,0 +1,45 @@
+//! Inspect mode: look back on stored trials.
+
+use super::mode::Mode;
+use super::{ModeKind, split, tabs};
+use crate::app::features::inspect::InspectAction;
+use crate::app::features::view::ViewAction;
+use crate::app::keys::binding::{Binding, key};
+use crate::app::playback::Seek;
+use egui::{Key, Modifiers};
+use egui_tiles::{LinearDir, TileId, Tiles};
+
+pub(super) const KIND: ModeKind = ModeKind {
+    mode: Mode::Inspect,
+    title: "Inspect",
+    about: "Open, replay, compare and explain stored trials (Ctrl+2)",
+    layout,
+    open: key(Modifiers::COMMAND, Key::Num2, "Inspect mode", |_| Some(ViewAction::SetMode(Mode::Inspect).into())),
+    keys: KEYS,
+    typed: |_, _| None,
+};
+
+const KEYS: &[Binding] = &[
+    key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
+    key(Modifiers::SHIFT, Key::A, "mark A at the cursor", |_| Some(InspectAction::PutMark(0).into())),
+    key(Modifiers::SHIFT, Key::B, "mark B at the cursor", |_| Some(InspectAction::PutMark(1).into())),
+    key(Modifiers::NONE, Key::L, "repeat, between the marks where both are set", |_| {
+        Some(InspectAction::ToggleRepeat.into())
+    }),
+    key(Modifiers::NONE, Key::M, "origin of compared trials: start or contact", |c| {
+        Some(InspectAction::Align(c.next_alignment()).into())
+    }),
+    key(Modifiers::NONE, Key::S, "mean and spread of each class, or each trial", |c| {
+        Some(InspectAction::ShowSpread(!c.comparison.spread).into())
+    }),
+];
+
+/// Trials left, the view over plots in the middle, answers and facts right.
+fn layout(tiles: &mut Tiles<String>) -> TileId {
+    let compared = tabs(tiles, &["compared", "sensors"]);
+    let [view, curvature] = ["view", "curvature"].map(|name| tabs(tiles, &[name]));
+    let loads = tabs(tiles, &["pressure", "force", "line", "counts", "hysteresis"]);
+    let right = tabs(tiles, &["recognition", "trial"]);
+    let middle = split(tiles, LinearDir::Vertical, [(view, 0.42), (curvature, 0.29), (loads, 0.29)]);
+    split(tiles, LinearDir::Horizontal, [(compared, 0.22), (middle, 0.52), (right, 0.26)])
+}

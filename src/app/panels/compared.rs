@@ -1,0 +1,80 @@
+//! Trials that are compared with the one shown: their colours, their origin of time, and whether each or the mean of its
+//! class is drawn.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
+use crate::app::icons::{self, Icon};
+use crate::app::theme::colour;
+use crate::app::widgets::wrapped;
+use egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
+use palpate_geometry::palette::series_colour;
+use palpate_lab::inspection::Alignment;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let comparison = context.comparison;
+    if comparison.pinned.is_empty() {
+        let text = "No trial is compared. Select trials in the library and press P, or choose Compare: each is drawn over \
+                    the one shown, in a colour of its own.";
+        wrapped(ui, RichText::new(text).weak());
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.label("Aligned at");
+        for alignment in Alignment::ALL {
+            let chosen = comparison.alignment == alignment;
+            if ui.selectable_label(chosen, alignment.name()).on_hover_text("Origin of time (M)").clicked() {
+                actions.push(InspectAction::Align(alignment));
+            }
+        }
+    });
+    let mut spread = comparison.spread;
+    let hint = "Draw the mean of each class, and its spread as a band, in place of each trial (S)";
+    if ui.checkbox(&mut spread, "Mean and spread of each class").on_hover_text(hint).changed() {
+        actions.push(InspectAction::ShowSpread(spread));
+    }
+    ui.separator();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        if comparison.spread {
+            for class in comparison.traces {
+                row_ui(ui, context, class.colour, &class.name);
+            }
+            ui.separator();
+        }
+        for pinned in comparison.pinned {
+            let trial = &pinned.trial;
+            ui.horizontal(|ui| {
+                let colour = if comparison.spread { None } else { Some(pinned.colour) };
+                let remove = format!("No longer compare trial {}", trial.id);
+                if icons::button(ui, Icon::Cross, &remove, &remove).clicked() {
+                    actions.push(InspectAction::Unpin(trial.id));
+                }
+                if let Some(colour) = colour {
+                    stroke_ui(ui, context, colour);
+                }
+                let name = format!("{}, trial {}, {}", trial.title, trial.id, trial.source_title());
+                let link = ui.add(Label::new(name).truncate().sense(Sense::click()));
+                if link.on_hover_text("Open this trial").clicked() {
+                    actions.push(InspectAction::Open(trial.id));
+                }
+            });
+        }
+        if comparison.pinned.len() > 1 && ui.button("Remove all").clicked() {
+            actions.push(InspectAction::UnpinAll);
+        }
+    });
+}
+
+fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, ink: usize, name: &str) {
+    ui.horizontal(|ui| {
+        stroke_ui(ui, context, ink);
+        ui.add(Label::new(name).truncate());
+    });
+}
+
+/// A stroke of the colour of a trial's curves.
+fn stroke_ui(ui: &mut Ui, context: &PanelContext<'_>, ink: usize) {
+    let (rect, _) = ui.allocate_exact_size(vec2(18.0, 12.0), Sense::hover());
+    let ink = colour(series_colour(ink, context.view.theme));
+    ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(3.0, ink));
+}

@@ -1,0 +1,166 @@
+//! What is read of the simulated gripper and of stored trials: sensor layout, area of pressure, sensor model, and the model
+//! that recognises; and in which poses the simulation grasps.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::recognition::RecognitionAction;
+use crate::app::features::simulation::SimulationAction;
+use crate::app::features::tools::ToolAction;
+use crate::app::features::view::ViewAction;
+
+use crate::app::widgets::{just_opened, wrapped};
+use egui::{ComboBox, RichText, ScrollArea, Ui};
+use palpate_lab::workers::TrainCommand;
+use palpate_sim::scene::{Between, PRESETS, PoseSpread};
+use palpate_tactile::model::SensorModel;
+use palpate_tactile::{CATALOGUE, PressureArea};
+use std::path::Path;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.strong("Sensors");
+        let now = &context.view.sensors;
+        let mut sensors = now.clone();
+        let (name, force) = match now.layout.strip_suffix("+F") {
+            Some(name) => (name.to_owned(), true),
+            None => (now.layout.clone(), false),
+        };
+        ui.horizontal_wrapped(|ui| {
+            let mut chosen = name.clone();
+            let combo = ComboBox::from_id_salt("layout").width(70.0).selected_text(&chosen);
+            let shown = combo.show_ui(ui, |ui| {
+                for layout in &CATALOGUE {
+                    ui.selectable_value(
+                        &mut chosen,
+                        layout.name.to_owned(),
+                        format!("{}: {}", layout.name, about(layout)),
+                    );
+                }
+            });
+            shown.response.on_hover_text("Sensor layout: stretches of a finger with a sensor of their own");
+            let mut with_force = force;
+            ui.checkbox(&mut with_force, "force (+F)").on_hover_text("Force as a channel beside each pressure");
+            sensors.layout = if with_force { format!("{chosen}+F") } else { chosen };
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Pressure over");
+            for (area, name, hint) in [
+                (PressureArea::Participation, "participation area", "Area of equally loaded taxels; always defined"),
+                (PressureArea::Hull, "convex hull", "Area of the paper (section IV-A1); undefined for points and rows"),
+            ] {
+                ui.selectable_value(&mut sensors.area, area, name).on_hover_text(hint);
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Stored trials through");
+            for model in SensorModel::BOTH {
+                let hint = match model {
+                    SensorModel::Virtual => "Ideal sensors, as in the paper's simulation",
+                    SensorModel::PhysicalLike => "Strips, pads and clock of a real gripper, with their noise and drift",
+                };
+                ui.selectable_value(&mut sensors.sensors, model, format!("{} sensors", model.name()))
+                    .on_hover_text(hint);
+            }
+        });
+        if sensors != *now {
+            actions.push(ViewAction::SetSensors(sensors));
+        }
+        ui.add_space(8.0);
+        ui.strong("Model");
+        model_ui(ui, context, actions);
+        ui.add_space(8.0);
+        ui.strong("Poses of the simulation");
+        poses_ui(ui, context, actions);
+    });
+}
+
+/// Choice of the recogniser of the simulation and of its trials.
+fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let chosen = context.view.simulation_model.as_ref();
+    if just_opened(ui, "sensors") {
+        actions.push(ToolAction::Train(TrainCommand::Look));
+    }
+    let view = context.tools.trainer.view();
+    let saved = view.as_ref().map_or(&[][..], |view| &view.models[..]);
+    let mut name = |path: &Path, about: &str| {
+        let file = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        if ui.radio(chosen.is_some_and(|own| own == path), file).on_hover_text(about).clicked() {
+            actions.push(RecognitionAction::UseSimulationModel(Some(path.to_owned())));
+        }
+    };
+    for model in saved {
+        name(&model.path, &model.about);
+    }
+    if let Some(path) = chosen.filter(|path| !saved.iter().any(|model| model.path == **path)) {
+        name(path, "Loaded from this file");
+    }
+    if ui
+        .radio(chosen.is_none(), "Shipped model")
+        .on_hover_text("Comes with Palpate; trained on simulated grasps")
+        .clicked()
+    {
+        actions.push(RecognitionAction::UseSimulationModel(None));
+    }
+    wrapped(
+        ui,
+        RichText::new(
+            "For the simulation and its trials. The model of the real gripper is chosen in the panel Training.",
+        )
+        .weak()
+        .small(),
+    );
+}
+
+/// What a layout measures, in words.
+fn about(layout: &palpate_tactile::SensorLayout) -> String {
+    use palpate_tactile::{CurvatureSplit, PressureSplit};
+    let curvature = match layout.curvature {
+        CurvatureSplit::Whole => "whole finger",
+        CurvatureSplit::Halves => "halves",
+    };
+    let pressure = match layout.pressure {
+        PressureSplit::Whole => "whole pad",
+        PressureSplit::Halves => "halves",
+        PressureSplit::Pairs => "pairs of joints",
+        PressureSplit::Joints => "every joint",
+    };
+    format!("curvature of {curvature}, pressure of {pressure}")
+}
+
+/// First line of a preset's file.
+fn about_preset(text: &str) -> &str {
+    text.lines().next().unwrap_or_default().trim_start_matches('#').trim()
+}
+
+fn poses_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let scene = context.scene;
+    let drawn = PoseSpread { between: Between::default(), ..scene.pose.clone() };
+    let now = PRESETS.iter().find(|preset| preset.poses() == drawn);
+    ui.horizontal_wrapped(|ui| {
+        for preset in &PRESETS {
+            let chosen = now.is_some_and(|now| now.name == preset.name);
+            if ui.selectable_label(chosen, preset.name).on_hover_text(about_preset(preset.text)).clicked() && !chosen {
+                let mut scene = scene.clone();
+                scene.pose = PoseSpread { between: scene.pose.between, ..preset.poses() };
+                actions.push(SimulationAction::SetScene(Box::new(scene)));
+            }
+        }
+    });
+    if now.is_none() {
+        wrapped(ui, RichText::new("The scene has poses of its own.").weak());
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.label("Between grasps");
+        for (between, name, hint) in [
+            (Between::Reposed, "re-posed", "Every grasp draws its pose anew"),
+            (Between::AsReleased, "as released", "The object stays as the grasp before left it"),
+        ] {
+            let chosen = scene.pose.between == between;
+            if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {
+                let mut scene = scene.clone();
+                scene.pose.between = between;
+                actions.push(SimulationAction::SetScene(Box::new(scene)));
+            }
+        }
+    });
+}

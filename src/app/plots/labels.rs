@@ -1,0 +1,112 @@
+//! Names of the curves at the right of a plot, each at the height of its value at the cursor, with that value. They take the
+//! place of a legend, which would cover curves.
+
+use crate::app::theme::colour;
+use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, pos2};
+use palpate_geometry::palette::Rgb;
+use palpate_geometry::units::three_digits;
+
+/// Width of the names beside a plot (points).
+pub(super) const WIDTH: f32 = 132.0;
+/// Distance between two lines (points).
+const LINE: f32 = 14.0;
+
+/// Name of a curve, and its values.
+pub(super) struct CurveLabel {
+    pub(super) name: String,
+    pub(super) ink: Color32,
+    /// Value at the cursor; none where it is undefined.
+    pub(super) value: Option<f64>,
+    /// Value at mark B less that at mark A, where both are set.
+    pub(super) difference: Option<f64>,
+    /// Height of the value on the screen; without a value, where there is room.
+    pub(super) y: Option<f32>,
+}
+
+impl CurveLabel {
+    fn text(&self) -> String {
+        let value = self.value.map_or("–".to_owned(), three_digits);
+        match self.difference {
+            Some(difference) => {
+                let sign = if difference > 0.0 { "+" } else { "" };
+                format!("{} {value}  Δ {sign}{}", self.name, three_digits(difference))
+            }
+            None => format!("{} {value}", self.name),
+        }
+    }
+}
+
+/// Draws the labels beside a plot whose frame this is; those that do not fit are left out, the last first.
+pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel>) {
+    let room = ((frame.height() / LINE).floor().max(1.0)) as usize;
+    let hidden = labels.len().saturating_sub(room);
+    labels.truncate(if hidden > 0 { room.saturating_sub(1) } else { room });
+    let wanted: Vec<f32> = labels.iter().map(|label| label.y.unwrap_or(frame.bottom())).collect();
+    let last = frame.bottom() - if hidden > 0 { LINE } else { 0.0 };
+    let places = spread(&wanted, frame.top() + 0.5 * LINE, last - 0.5 * LINE, LINE);
+    let clip = Rect::from_min_max(pos2(frame.right(), frame.top()), pos2(frame.right() + WIDTH, frame.bottom()));
+    let painter = ui.painter_at(clip);
+    for (label, y) in labels.iter().zip(places) {
+        if let Some(from) = label.y.filter(|from| (from - y).abs() > 1.0) {
+            let ends = [pos2(frame.right() + 1.0, from), pos2(frame.right() + 6.0, y)];
+            painter.line_segment(ends, Stroke::new(1.0, label.ink.gamma_multiply(0.6)));
+        }
+        let place: Pos2 = pos2(frame.right() + 8.0, y);
+        painter.text(place, Align2::LEFT_CENTER, label.text(), FontId::proportional(11.5), label.ink);
+    }
+    if hidden > 0 {
+        let place = pos2(frame.right() + 8.0, frame.bottom() - 0.5 * LINE);
+        let text = format!("and {} more", hidden + 1);
+        painter.text(place, Align2::LEFT_CENTER, text, FontId::proportional(11.0), colour(quiet));
+    }
+}
+
+/// Heights near the wanted ones, at least `line` apart and between `top` and `bottom` where there is room.
+fn spread(wanted: &[f32], top: f32, bottom: f32, line: f32) -> Vec<f32> {
+    let mut order: Vec<usize> = (0..wanted.len()).collect();
+    order.sort_by(|a, b| wanted[*a].total_cmp(&wanted[*b]));
+    let mut places = vec![0.0; wanted.len()];
+    let mut above = f32::NEG_INFINITY;
+    for k in &order {
+        places[*k] = wanted[*k].clamp(top, bottom.max(top)).max(above + line);
+        above = places[*k];
+    }
+    // What was pushed out at the bottom pushes back.
+    let mut below = bottom + line;
+    for k in order.iter().rev() {
+        places[*k] = places[*k].min(below - line);
+        below = places[*k];
+    }
+    places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_keep_their_distance_and_stay_within_the_plot() {
+        for wanted in [vec![10.0, 11.0, 12.0], vec![95.0, 99.0, 400.0], vec![-50.0, 50.0, 50.0], vec![f32::NAN, 1.0]] {
+            let places = spread(&wanted, 7.0, 93.0, 14.0);
+            let mut sorted = places.clone();
+            sorted.sort_by(f32::total_cmp);
+            assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] >= 13.99), "{places:?}");
+            assert!(sorted[0] >= 6.99 && sorted[sorted.len() - 1] <= 93.01, "{places:?}");
+        }
+        assert_eq!(spread(&[50.0], 7.0, 93.0, 14.0), [50.0]);
+        assert!(spread(&[], 7.0, 93.0, 14.0).is_empty());
+    }
+
+    #[test]
+    fn a_label_has_its_value_and_the_difference_between_the_marks() {
+        let label = CurveLabel {
+            name: "left".to_owned(),
+            ink: Color32::WHITE,
+            value: Some(1.234),
+            difference: Some(0.5),
+            y: None,
+        };
+        assert_eq!(label.text(), "left 1.23  Δ +0.500");
+        assert_eq!(CurveLabel { value: None, difference: None, ..label }.text(), "left –");
+    }
+}

@@ -1,0 +1,235 @@
+//! Source of the data that plots, 3-D view and recognition show: the simulated gripper, the real one, or a stored trial;
+//! and the time of them that is shown.
+
+use crate::app::features::inspect::Inspected;
+use crate::app::playback::Playback;
+use crate::app::traces::{GraspTrace, TraceHistory};
+use crate::app::view_source::ViewSource;
+use palpate_lab::grasping::{IdentificationView, LEAD_S};
+use palpate_lab::inspection::{PhaseSpan, TouchPhase, phases_of_frames};
+use palpate_lab::picture::Stage;
+use palpate_lab::workers::{GripperView, Snapshot};
+use palpate_sim::frame::Frame;
+use palpate_sim::objects::object_title;
+use palpate_sim::scene::Scene;
+use palpate_tactile::Channel;
+use palpate_tactile::board::Board;
+use palpate_tactile::trial::Control;
+use std::sync::Arc;
+
+/// Data of the source that is shown.
+#[derive(Clone, Copy)]
+pub(super) struct SourceData<'a> {
+    pub(super) source: ViewSource,
+    pub(super) snapshot: Option<&'a Snapshot>,
+    pub(super) gripper: Option<&'a GripperView>,
+    pub(super) inspected: Option<Inspected<'a>>,
+    pub(super) playback: &'a Playback,
+    pub(super) traces: &'a TraceHistory,
+    pub(super) scene: &'a Scene,
+}
+
+/// Recognition of the source that is shown.
+pub(super) struct Recognised<'a> {
+    /// Newest answers; none while recognition is off.
+    pub(super) view: Option<&'a Arc<IdentificationView>>,
+    /// Why recognition is off.
+    pub(super) off: Option<&'a str>,
+    /// Class name and title of the object in the hand, where known.
+    pub(super) truth: Option<(&'a str, String)>,
+    /// Text before the first answer.
+    pub(super) waiting: &'static str,
+    /// No further grasp follows automatically.
+    pub(super) finished: bool,
+}
+
+/// Picture of one time.
+#[derive(Clone, Copy)]
+pub(super) struct Moment<'a> {
+    /// Number that differs between grasps and trials.
+    pub(super) grasp: u64,
+    pub(super) stage: &'a Stage,
+    pub(super) frame: &'a Frame,
+}
+
+/// Tells the numbers of stored trials from those of grasps.
+const STORED: u64 = 1 << 63;
+
+/// Length of a live stream in the plots (s).
+const ROLLING_S: f64 = 10.0;
+/// Least length of a trial in the plots (s).
+const TRIAL_S: f64 = 4.0;
+
+impl<'a> SourceData<'a> {
+    /// Time that is shown (s): the cursor, or the newest sample.
+    pub(super) fn time_s(&self) -> Option<f64> {
+        self.playback.cursor_s.or_else(|| self.traces.current()?.t.last().copied())
+    }
+
+    /// Sample that is shown, or the last before it.
+    pub(super) fn sample(&self) -> Option<usize> {
+        self.traces.current()?.sample_at(self.time_s()?)
+    }
+
+    /// True while the past of a live gripper is shown.
+    pub(super) fn looks_back(&self) -> bool {
+        self.source != ViewSource::Trial && self.playback.cursor_s.is_some()
+    }
+
+    /// Fingers and object at the time that is shown.
+    pub(super) fn moment(&self) -> Option<Moment<'a>> {
+        if self.source == ViewSource::Trial {
+            let Inspected { trial, cursor_s, .. } = self.inspected?;
+            let frame = trial.at(cursor_s)?.frame?;
+            return Some(Moment { grasp: trial.id.unsigned_abs() | STORED, stage: trial.stage.as_deref()?, frame });
+        }
+        let snapshot = self.snapshot?;
+        let past = || {
+            let trace = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp)?;
+            trace.frames.get(trace.sample_at(self.playback.cursor_s?)?)?.as_deref()
+        };
+        let simulated = self.source == ViewSource::Simulation;
+        let frame = past().filter(|_| simulated).unwrap_or(&snapshot.frame);
+        Some(Moment { grasp: snapshot.grasp, stage: &snapshot.stage, frame })
+    }
+
+    /// Answer of the recogniser in the past of a live gripper, where it is shown and has one.
+    fn past_answer(&self) -> Option<&'a Arc<IdentificationView>> {
+        self.playback.cursor_s?;
+        self.traces.current()?.answers.get(self.sample()?)?.as_ref()
+    }
+
+    /// Phases of the grasp that is shown, as far as they are known.
+    pub(super) fn phases(&self) -> Vec<PhaseSpan> {
+        match self.source {
+            ViewSource::Trial => self.inspected.map(|own| own.trial.phases.clone()).unwrap_or_default(),
+            ViewSource::Simulation => {
+                let (Some(trace), Some(snapshot)) = (self.traces.current(), self.snapshot) else { return Vec::new() };
+                phases_of_frames(trace.frames.iter().flatten().map(Arc::as_ref), &snapshot.scene.gripper)
+            }
+            ViewSource::Gripper => {
+                let hold = self.hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
+                hold.into_iter().collect()
+            }
+        }
+    }
+
+    /// Board of the real gripper or of a recorded trial, where one is shown.
+    pub(super) fn board(&self) -> Option<&'a Board> {
+        match self.source {
+            ViewSource::Simulation => None,
+            ViewSource::Gripper => self.gripper?.link.as_ref().map(|link| &link.board),
+            ViewSource::Trial => self.inspected?.trial.board.as_ref(),
+        }
+    }
+
+    /// Names of the columns of the traces, as in files.
+    pub(super) fn column_names(&self) -> Vec<String> {
+        match self.source {
+            ViewSource::Trial => {
+                let columns = self.inspected.map(|own| own.trial.columns.iter().map(|c| c.name.clone()).collect());
+                columns.unwrap_or_default()
+            }
+            ViewSource::Simulation | ViewSource::Gripper => {
+                let board = self.gripper.filter(|_| self.source == ViewSource::Gripper);
+                let counts = board.and_then(|gripper| gripper.link.as_ref()).map(|link| link.board.channels.clone());
+                let channels =
+                    self.channels().into_iter().map(|channel| channel.map_or_else(String::new, Channel::name));
+                channels.chain(counts.unwrap_or_default()).collect()
+            }
+        }
+    }
+
+    /// Recognition, once the source has a state.
+    pub(super) fn recognised(&self) -> Option<Recognised<'a>> {
+        match self.source {
+            ViewSource::Trial => self.inspected.map(|Inspected { trial, cursor_s, .. }| {
+                let object = trial.header.object.as_str();
+                Recognised {
+                    view: trial.at(cursor_s).and_then(|now| now.answer),
+                    off: trial.recognition_off.as_deref(),
+                    truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
+                    waiting: "no contact yet",
+                    finished: true,
+                }
+            }),
+            ViewSource::Simulation => self.snapshot.map(|snapshot| {
+                let truth = snapshot.truth();
+                let title = snapshot.object.as_ref().map_or_else(|| object_title(truth), |object| object.title.clone());
+                Recognised {
+                    view: self.past_answer().or(snapshot.identification.as_ref()),
+                    off: snapshot.recognition_off.as_deref(),
+                    truth: Some((truth, title)),
+                    waiting: if snapshot.status.playing { "fingers closing" } else { "press play to start a grasp" },
+                    finished: snapshot.status.finished,
+                }
+            }),
+            ViewSource::Gripper => self.gripper.map(|gripper| Recognised {
+                view: self.past_answer().or(gripper.identification.as_ref()),
+                off: gripper.recognition_off.as_deref(),
+                truth: None,
+                waiting: if gripper.trial.is_some() { "fingers closing" } else { "press R to start a grasp" },
+                finished: false,
+            }),
+        }
+    }
+
+    /// Channels of the traces, column by column; none for columns without one, such as counts of a board.
+    pub(super) fn channels(&self) -> Vec<Option<&'a Channel>> {
+        match self.source {
+            ViewSource::Simulation => self.snapshot.map(|snapshot| snapshot.channels.iter().map(Some).collect()),
+            ViewSource::Gripper => self.gripper.map(|gripper| gripper.channels.iter().map(Some).collect()),
+            ViewSource::Trial => {
+                self.inspected.map(|own| own.trial.columns.iter().map(|column| column.channel.as_ref()).collect())
+            }
+        }
+        .unwrap_or_default()
+    }
+
+    /// All the time that plots can show (s).
+    pub(super) fn time_span(&self) -> [f64; 2] {
+        match self.source {
+            ViewSource::Simulation => [0.0, self.snapshot.map_or(4.0, |snapshot| snapshot.status.duration)],
+            ViewSource::Gripper => gripper_span(self.traces.current()),
+            ViewSource::Trial => self.inspected.map_or([0.0, 4.0], |own| own.trial.span_s()),
+        }
+    }
+
+    /// Beginning and end of the hold (s), where known.
+    pub(super) fn hold(&self) -> Option<[f64; 2]> {
+        if self.source == ViewSource::Trial {
+            let phases = self.inspected.map(|own| own.trial.phases.as_slice())?;
+            return phases.iter().find(|span| span.phase == TouchPhase::Hold).map(|span| [span.from_s, span.to_s]);
+        }
+        if self.source == ViewSource::Gripper {
+            // Only timed trials follow the programme.
+            let gripper = self.gripper?;
+            let ended = || gripper.ended.as_ref().map(|ended| ended.request.control);
+            let control = gripper.trial.as_ref().map(|trial| trial.request.control).or_else(ended);
+            let rolling = self.traces.current().is_none_or(|trace| trace.rolling);
+            if rolling || control.is_none_or(|control| control == Control::Free) {
+                return None;
+            }
+        }
+        let scene = match self.source {
+            ViewSource::Simulation => &self.snapshot?.scene,
+            ViewSource::Gripper | ViewSource::Trial => self.scene,
+        };
+        let tick = 1.0 / f64::from(scene.timing.actuation_hz.max(1));
+        let closed = f64::from(scene.programme.close_ticks()) * tick;
+        let released = (closed + f64::from(scene.programme.hold_ticks) * tick).min(self.time_span()[1]);
+        (closed < released).then_some([closed, released])
+    }
+}
+
+/// Time of a trial from its rest before closing on, or the last seconds of a stream (s).
+fn gripper_span(trace: Option<&GraspTrace>) -> [f64; 2] {
+    let last = |trace: &GraspTrace| trace.t.last().copied().unwrap_or(0.0);
+    match trace {
+        Some(trace) if !trace.rolling => {
+            [trace.t.first().copied().unwrap_or(0.0).max(-LEAD_S), last(trace).max(TRIAL_S)]
+        }
+        Some(trace) => [last(trace).max(ROLLING_S) - ROLLING_S, last(trace).max(ROLLING_S)],
+        None => [0.0, ROLLING_S],
+    }
+}
