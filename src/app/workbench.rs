@@ -5,7 +5,7 @@ use crate::app::bars;
 use crate::app::context::{Comparison, PanelContext};
 use crate::app::features::files::{FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
-use crate::app::features::inspect::{InspectAction, InspectFeature};
+use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
@@ -164,6 +164,11 @@ impl Workbench {
     /// Newest state of the simulation.
     pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
         self.simulation.worker().snapshot()
+    }
+
+    /// The stored trial that is open, the time shown, and trials compared with it.
+    pub fn inspected(&self) -> Option<Inspected<'_>> {
+        self.inspect.inspected()
     }
 
     /// Cost and error of the last scene measured.

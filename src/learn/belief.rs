@@ -19,6 +19,20 @@ impl Belief {
         self.alone.push(alone);
     }
 
+    /// The belief after grasps with these probabilities: combined with those before, and alone. None where their numbers of
+    /// classes differ.
+    pub fn resumed(judged: &[[Vec<f64>; 2]], classes: usize) -> Option<Self> {
+        let fits =
+            judged.iter().flatten().all(|pmf| pmf.len() == classes && pmf.iter().all(|p| (0.0..=1.0).contains(p)));
+        let all = |which: usize| judged.iter().map(|pair| Pmf::as_stored(&pair[which])).collect();
+        fits.then(|| Self { steps: all(0), alone: all(1) })
+    }
+
+    /// Probabilities of each grasp, for [`Self::resumed`].
+    pub fn judged(&self) -> Vec<[Vec<f64>; 2]> {
+        self.pairs().map(|(step, alone)| [step, alone].map(|pmf| pmf.probabilities().to_vec())).collect()
+    }
+
     /// Current belief; `None` before the first grasp.
     pub fn now(&self) -> Option<&Pmf> {
         self.steps.last()

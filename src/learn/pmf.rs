@@ -36,6 +36,11 @@ impl Pmf {
         }
     }
 
+    /// The PMF with these probabilities, bit for bit.
+    pub(crate) fn as_stored(probabilities: &[f64]) -> Self {
+        if probabilities.is_empty() { Self::uniform(1) } else { Self(probabilities.to_vec()) }
+    }
+
     /// Probability of each class.
     pub fn probabilities(&self) -> &[f64] {
         &self.0

@@ -333,18 +333,19 @@ impl Store {
     /// Header of a trial, with its source and the columns that only simulated trials use.
     fn load_header(&self, id: TrialId) -> Result<StoredHeader, StoreError> {
         let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
-                   collection, plan FROM trials WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 3], String, String, Option<String>);
+                   collection, plan, earlier FROM trials WHERE id = ?1 AND deleted IS NULL";
+        type Columns = (String, String, i64, String, [String; 3], String, String, [Option<String>; 2]);
         let found: Option<Columns> = self
             .connection
             .query_row(sql, [id], |row| {
                 let simulation = [row.get(4)?, row.get(5)?, row.get(9)?];
                 let scene = row.get(3)?;
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, scene, simulation, row.get(6)?, row.get(7)?, row.get(8)?))
+                let optional = [row.get(8)?, row.get(10)?];
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, scene, simulation, row.get(6)?, row.get(7)?, optional))
             })
             .optional()
             .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, simulation, warnings, version, collection)) = found else {
+        let Some((rig, object, seed, scene, simulation, warnings, version, [collection, earlier])) = found else {
             return Err(self.no_trial(id));
         };
         let header = TrialHeader {
@@ -355,6 +356,7 @@ impl Store {
             scene: Scene::from_toml(&scene).map_err(|cause| StoreError::Scene { id, cause })?,
             warnings: serde_json::from_str(&warnings).map_err(|e| StoreError::BadInfo { id, cause: e.to_string() })?,
             version,
+            earlier: earlier.as_deref().and_then(|earlier| serde_json::from_str(earlier).ok()),
         };
         Ok(StoredHeader { source: source_named(id, &rig)?, header, simulation })
     }
@@ -443,7 +445,7 @@ fn insert_header(
 ) -> rusqlite::Result<TrialId> {
     transaction.execute(
         "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection, \
-         plan) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+         plan, earlier) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
         params![
             source.name(),
             header.object,
@@ -455,6 +457,7 @@ fn insert_header(
             header.version,
             header.collection,
             json(plan),
+            header.earlier.as_ref().map(json),
         ],
     )?;
     Ok(transaction.last_insert_rowid())

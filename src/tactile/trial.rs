@@ -92,6 +92,17 @@ pub struct TrialHeader {
     pub warnings: Vec<String>,
     /// Version of the program that made it.
     pub version: String,
+    /// Grasps of the same object before it, where a recogniser has judged them.
+    pub earlier: Option<EarlierGrasps>,
+}
+
+/// Grasps of the same object before a trial, as a recogniser judged them: its answers to the trial build on them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EarlierGrasps {
+    /// Description of the recogniser.
+    pub model: String,
+    /// Probabilities of its classes after each grasp: combined with the grasps before, and of the grasp alone.
+    pub judged: Vec<[Vec<f64>; 2]>,
 }
 
 impl TrialHeader {
@@ -104,6 +115,7 @@ impl TrialHeader {
             scene,
             warnings: Vec::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
+            earlier: None,
         }
     }
 }

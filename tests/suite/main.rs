@@ -20,6 +20,7 @@
 //! - `desk`: a labelling afternoon in the window, by keys alone.
 //! - `one_path`: the same fault recorded from the command line and from the window.
 //! - `studies`: stored results of studies, and what is made from them.
+//! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -44,6 +45,7 @@ mod golden;
 mod gripper;
 mod gripper_tools;
 mod imports;
+mod inspect;
 mod labelling;
 mod learning;
 mod one_path;

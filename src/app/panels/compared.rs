@@ -6,8 +6,9 @@ use crate::app::context::PanelContext;
 use crate::app::features::inspect::InspectAction;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
+use crate::app::view_source::ViewSource;
 use crate::app::widgets::wrapped;
-use egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{Color32, Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::series_colour;
 use palpate_lab::inspection::Alignment;
 
@@ -35,6 +36,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     }
     ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        if let Some(shown) = shown_name(context) {
+            ui.horizontal(|ui| {
+                stroke_ui(ui, colour(context.view.theme.colours().text));
+                ui.add(Label::new(shown).truncate());
+            });
+        }
         if comparison.spread {
             for class in comparison.traces {
                 row_ui(ui, context, class.colour, &class.name);
@@ -50,10 +57,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                     actions.push(InspectAction::Unpin(trial.id));
                 }
                 if let Some(colour) = colour {
-                    stroke_ui(ui, context, colour);
+                    stroke_ui(ui, ink_of(context, colour));
                 }
                 let name = format!("{}, trial {}, {}", trial.title, trial.id, trial.source_title());
-                let link = ui.add(Label::new(name).truncate().sense(Sense::click()));
+                let link = ui.add(Label::new(&name).truncate().sense(Sense::click()));
+                link.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
                 if link.on_hover_text("Open this trial").clicked() {
                     actions.push(InspectAction::Open(trial.id));
                 }
@@ -65,16 +73,28 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     });
 }
 
+/// Name of what is shown.
+fn shown_name(context: &PanelContext<'_>) -> Option<String> {
+    match context.source {
+        ViewSource::Trial => context.inspected.map(|own| format!("{}, trial {}, shown", own.trial.title, own.trial.id)),
+        ViewSource::Simulation => Some("Simulation, live".to_owned()),
+        ViewSource::Gripper => Some("Real gripper, live".to_owned()),
+    }
+}
+
 fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, ink: usize, name: &str) {
     ui.horizontal(|ui| {
-        stroke_ui(ui, context, ink);
+        stroke_ui(ui, ink_of(context, ink));
         ui.add(Label::new(name).truncate());
     });
 }
 
-/// A stroke of the colour of a trial's curves.
-fn stroke_ui(ui: &mut Ui, context: &PanelContext<'_>, ink: usize) {
+fn ink_of(context: &PanelContext<'_>, ink: usize) -> Color32 {
+    colour(series_colour(ink, context.view.theme))
+}
+
+/// A stroke in the colour of a trial's curves.
+fn stroke_ui(ui: &mut Ui, ink: Color32) {
     let (rect, _) = ui.allocate_exact_size(vec2(18.0, 12.0), Sense::hover());
-    let ink = colour(series_colour(ink, context.view.theme));
     ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(3.0, ink));
 }

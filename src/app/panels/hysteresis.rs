@@ -55,7 +55,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
                 }
             }
             for finger in &fingers {
-                add_loop(plot_ui, trace, finger, finger.ink, 1.8);
+                let alone = context.comparison.traces.is_empty();
+                let ink = if alone { finger.ink } else { colour(theme.colours().text) };
+                add_loop(plot_ui, trace, finger, ink, 1.8);
                 let Some(place) = now.and_then(|k| point(trace, finger, k)) else { continue };
                 let filled = finger.side == Side::Left;
                 let dot = Points::new("", vec![place]).radius(4.5).filled(filled).color(finger.ink);

@@ -1,8 +1,8 @@
-//! Names of the curves at the right of a plot, each at the height of its value at the cursor, with that value. They take the
+//! Names of the curves at the right of a plot with their values at the cursor, in the order of their heights. They take the
 //! place of a legend, which would cover curves.
 
 use crate::app::theme::colour;
-use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, pos2};
+use egui::{Align2, Color32, FontId, Pos2, Rect, Ui, pos2};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::three_digits;
 
@@ -47,10 +47,6 @@ pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel>
     let clip = Rect::from_min_max(pos2(frame.right(), frame.top()), pos2(frame.right() + WIDTH, frame.bottom()));
     let painter = ui.painter_at(clip);
     for (label, y) in labels.iter().zip(places) {
-        if let Some(from) = label.y.filter(|from| (from - y).abs() > 1.0) {
-            let ends = [pos2(frame.right() + 1.0, from), pos2(frame.right() + 6.0, y)];
-            painter.line_segment(ends, Stroke::new(1.0, label.ink.gamma_multiply(0.6)));
-        }
         let place: Pos2 = pos2(frame.right() + 8.0, y);
         painter.text(place, Align2::LEFT_CENTER, label.text(), FontId::proportional(11.5), label.ink);
     }

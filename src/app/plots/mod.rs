@@ -114,7 +114,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
         }
         if let Some(trace) = context.traces.current() {
             add_bands(plot_ui, trace, &plot, theme);
-            add_curves(plot_ui, trace, &plot, |c| colour(c.trace.colour(theme)), 1.8);
+            add_curves(plot_ui, trace, &plot, |c| own_ink(context, c), 1.8);
         }
         add_cursor(plot_ui, context);
         let bounds = plot_ui.plot_bounds();
@@ -178,12 +178,17 @@ fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, id:
         times.extend(playback.marks.iter().zip(["A", "B"]).rev().filter_map(|(t, name)| Some(time(name, (*t)?))));
         times.extend(playback.cursor_s.map(|t| time("cursor", t)));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.add(
-                egui::Label::new(egui::RichText::new(times.into_iter().rev().collect::<Vec<_>>().join("   ")).small())
-                    .truncate(),
-            );
+            times.into_iter().for_each(|time| {
+                ui.label(egui::RichText::new(time).small());
+            });
         });
     });
+}
+
+/// Colour of a curve of what is shown: that of its sensor, or beside trials in colours of their own that of text.
+fn own_ink(context: &PanelContext<'_>, curve: &PlotCurve) -> Color32 {
+    let theme = context.view.theme;
+    colour(if context.comparison.traces.is_empty() { curve.trace.colour(theme) } else { theme.colours().text })
 }
 
 /// Names of all curves, with their values at the cursor.
@@ -200,7 +205,7 @@ fn curve_labels(context: &PanelContext<'_>, plot: &TimePlot<'_>, transform: &Plo
     };
     let own = context.traces.current().into_iter();
     let own = own.flat_map(|trace| plot.curves.iter().map(move |curve| (trace, curve)));
-    let own = own.map(|(trace, curve)| label(trace, curve, colour(curve.trace.colour(theme))));
+    let own = own.map(|(trace, curve)| label(trace, curve, own_ink(context, curve)));
     let others = context.comparison.traces.iter().flat_map(|compared| plot.curves.iter().map(move |c| (compared, c)));
     let others =
         others.map(|(compared, curve)| label(&compared.trace, curve, colour(series_colour(compared.colour, theme))));

@@ -4,6 +4,7 @@
 use super::row::Row;
 use palpate_learn::{Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, StopReason, StopRule, Verdict};
 use palpate_sim::gripper::{GripperModel, Phase};
+use palpate_tactile::trial::EarlierGrasps;
 use palpate_tactile::{Channel, LayoutError, SensorLayout};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -111,6 +112,21 @@ impl Identification {
         self.verdict = None;
         self.decision = None;
         self.closed = true;
+    }
+
+    /// Continues after grasps that this model judged before; without effect on those of another model.
+    pub fn resume(&mut self, earlier: &EarlierGrasps) {
+        if earlier.model == self.model.card.described()
+            && let Some(belief) = Belief::resumed(&earlier.judged, self.labels.classes.len())
+        {
+            self.belief = belief;
+        }
+    }
+
+    /// The grasps so far, for [`Self::resume`]; none before the first.
+    pub fn earlier(&self) -> Option<EarlierGrasps> {
+        let judged = self.belief.judged();
+        (!judged.is_empty()).then(|| EarlierGrasps { model: self.model.card.described(), judged })
     }
 
     /// Sets the stop rule. A decision stands; between two grasps it may turn out that no other is needed.

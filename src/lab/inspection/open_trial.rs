@@ -201,6 +201,9 @@ impl OpenTrial {
         let reader = FrameReader::new(&layout, gripper, options.sensors.area, &more)?;
         let rows = self.rows_of(&data.frames, &reader, options);
         if let Some(identification) = &mut identification {
+            if let Some(earlier) = &self.header.earlier {
+                identification.resume(earlier);
+            }
             let names = reader.channels().iter().map(Channel::name).enumerate();
             let off = identification.begin_grasp(names).err();
             self.recognition_off = off.map(|cause| cause.to_string());

@@ -6,6 +6,7 @@ use crate::picture::Stage;
 use glam::DVec3;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::scene::Scene;
+use palpate_tactile::trial::EarlierGrasps;
 use std::sync::Arc;
 
 /// The grasp that is going on.
@@ -18,6 +19,8 @@ pub(super) struct Current {
     pub(super) stage: Arc<Stage>,
     pub(super) reader: FrameReader,
     pub(super) frame: Arc<Frame>,
+    /// Grasps of the same object before it.
+    pub(super) earlier: Option<EarlierGrasps>,
     /// Warnings at its beginning; those that come later are warned at its end.
     pub(super) warned: usize,
     /// The user has pulled at the object.

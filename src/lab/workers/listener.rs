@@ -4,6 +4,7 @@ use crate::grasping::{Identification, IdentificationView, IdentifyError, Row};
 use palpate_learn::{Model, StopReason, StopRule};
 use palpate_sim::gripper::GripperModel;
 use palpate_tactile::Channel;
+use palpate_tactile::trial::EarlierGrasps;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -106,6 +107,11 @@ impl Listener {
 
     fn refresh(&mut self) {
         self.view = Arc::new(self.identification.view());
+    }
+
+    /// The grasps so far, for the trial that builds on them.
+    pub(super) fn earlier(&self) -> Option<EarlierGrasps> {
+        self.identification.earlier().filter(|_| self.off.is_none())
     }
 
     /// Reason to stop grasping, once there is one.

@@ -224,6 +224,10 @@ impl Part<'_, '_> {
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
+            // A stored trial keeps no secret.
+            None if shown && self.context.source == ViewSource::Trial => {
+                (title.clone(), format!("Truth: {title}"), None)
+            }
             None => {
                 let text = if shown { "shown after the decision" } else { "hidden" };
                 (text.to_owned(), format!("Truth: {text}"), None)

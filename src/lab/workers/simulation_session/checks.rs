@@ -72,7 +72,9 @@ impl Session {
         let accuracy = scene.solver.accuracy;
         self.last = Some(Arc::new(FinishedGrasp { grasp, summary, accuracy, repeatable }));
         if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
-            recorder.replace(trial.clone());
+            let mut trial = trial.clone();
+            trial.header.earlier = self.current.as_ref().and_then(|current| current.earlier.clone());
+            recorder.replace(trial);
         }
         let Some(current) = self.current.as_mut().filter(|current| current.ended && self.grasp == grasp) else {
             return;

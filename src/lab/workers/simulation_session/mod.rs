@@ -372,7 +372,8 @@ impl Session {
             accuracy_job.measure(&scene, model.clone());
         }
         let mut run = prepare(&scene, model.as_deref(), seed);
-        let begun = run.begun();
+        let mut begun = run.begun();
+        begun.header.earlier = self.listener.as_ref().and_then(Listener::earlier);
         if !again {
             for warning in &begun.header.warnings {
                 self.outlets.notify(Notice::Warning(warning.clone()));
@@ -399,8 +400,19 @@ impl Session {
         let (warned, scene, plan) = (begun.header.warnings.len(), Arc::new(scene), Arc::new(begun.data.plan));
         let channels = reader.channels().len();
         let refined_run = self.status.error_band.then(|| RefinedRun::new(&scene, model.as_deref(), seed, channels));
-        self.current =
-            Some(Current { run, refined_run, plan, scene, stage, reader, frame, warned, pulled: false, ended: false });
+        self.current = Some(Current {
+            earlier: begun.header.earlier,
+            run,
+            refined_run,
+            plan,
+            scene,
+            stage,
+            reader,
+            frame,
+            warned,
+            pulled: false,
+            ended: false,
+        });
         self.pace = Pace::starting_at(0.0);
         self.begin_ghost();
         self.publish();
