@@ -100,6 +100,12 @@ fn inspecting(id: i64) -> Bench {
 }
 
 impl Bench {
+    /// Draws what an action has changed: once to apply it, once to show it.
+    fn look(&mut self) {
+        self.harness.step();
+        self.harness.step();
+    }
+
     fn cursor(&mut self) -> f64 {
         self.harness.step();
         self.workbench().inspected().expect("a trial is open").cursor_s
@@ -135,8 +141,10 @@ fn a_trial_is_stepped_through_by_keys_and_closed() {
     bench.key(Modifiers::SHIFT, Key::A);
     bench.key(none, Key::End);
     bench.key(Modifiers::SHIFT, Key::B);
+    bench.look();
     bench.until_shown(true, "B − A");
     bench.harness.get_by_label("Close the trial").click();
+    bench.look();
     bench.until_shown(false, "TRIAL 2");
     assert_eq!(bench.workbench().view().source, ViewSource::Simulation);
 }
@@ -150,8 +158,10 @@ fn compared_trials_have_a_line_each_or_a_mean() {
     bench.until_shown(true, "Tomato, trial 2, simulated");
     bench.until_shown(true, "Lemon, trial 3, simulated");
     bench.tell(InspectAction::ShowSpread(true));
+    bench.look();
     bench.until_shown(true, "Lemon, simulated, mean of 1");
     bench.harness.get_by_label("No longer compare trial 3").click();
+    bench.look();
     bench.until_shown(false, "Lemon, trial 3");
     // A trial that does not exist is refused, and what is open stays.
     bench.tell(InspectAction::Open(99));
@@ -182,6 +192,7 @@ fn the_past_of_a_running_grasp_is_looked_back_on() {
     bench.advance_to(2.0);
     bench.until_shown(false, "Live");
     bench.tell(InspectAction::Seek(Seek::To(1.0)));
+    bench.look();
     bench.until_shown(true, "Live");
     bench.harness.get_by_label("Play").click();
     bench.harness.step();
@@ -189,6 +200,7 @@ fn the_past_of_a_running_grasp_is_looked_back_on() {
     bench.harness.get_by_label("Pause").click();
     bench.harness.step();
     bench.harness.get_by_label("Live").click();
+    bench.look();
     bench.until_shown(false, "Live");
     // The next sample is that of the grasp, which has waited.
     bench.advance_to(2.1);

@@ -143,9 +143,12 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
 
 pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let shown = context.shown();
-    if context.source == ViewSource::Gripper
-        || (context.view.mode == Mode::Label && context.source != ViewSource::Trial)
-    {
+    let records = match context.source {
+        ViewSource::Gripper => true,
+        ViewSource::Simulation => context.view.mode == Mode::Label,
+        ViewSource::Trial => false,
+    };
+    if records && !shown.looks_back() {
         return trial::ui(ui, context, actions);
     }
     let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
