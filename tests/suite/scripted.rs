@@ -24,9 +24,10 @@ pub(crate) fn model() -> Arc<Model> {
         parameters: 0,
         train_cpu_s: 0.0,
         metrics: serde_json::Value::Null,
+        signature_grasps: None,
         version: String::new(),
     };
-    Arc::new(Model { card, recogniser: Arc::new(Script) })
+    Arc::new(Model { card, recogniser: Arc::new(Script), signatures: None })
 }
 
 struct Script;
