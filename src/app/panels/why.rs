@@ -3,6 +3,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::theme::{colour, veil};
 use crate::app::widgets::wrapped;
@@ -56,7 +57,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             }
         }
         if view.why.is_ok() {
-            nearest_ui(ui, context, &view.nearest);
+            nearest_ui(ui, context, &view.nearest, actions);
         }
     });
 }
@@ -225,7 +226,7 @@ fn put(ui: &Ui, text: &str, place: Rect, align: Align2, ink: Color32) {
     ui.painter().galley(align.align_size_within_rect(galley.size(), place).min, galley, ink);
 }
 
-fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, nearest: &NearestState) {
+fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, nearest: &NearestState, actions: &mut Actions) {
     heading(ui, "Nearest stored trials", "By the root mean square difference of all channels over the grasp");
     match nearest {
         NearestState::Comparing(_, 0) => {
@@ -238,11 +239,11 @@ fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, nearest: &NearestState) {
             let ink = colour(context.view.theme.colours().error);
             wrapped(ui, RichText::new(format!("The store cannot be read: {cause}.")).color(ink));
         }
-        NearestState::Ready(report) => report_ui(ui, context, report),
+        NearestState::Ready(report) => report_ui(ui, context, report, actions),
     }
 }
 
-fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport) {
+fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport, actions: &mut Actions) {
     if report.trials.is_empty() {
         wrapped(ui, RichText::new("No stored trial has these channels. Record grasps, or run palpate collect.").weak());
         return;
@@ -252,7 +253,12 @@ fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport) {
         let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { object_title(&trial.label) };
         let same = if trial.distance < SAME { ", same readings" } else { "" };
         let text = format!("Trial {}, {name}, {}, distance {:.2}{same}", trial.id, trial.source, trial.distance);
-        let (rect, response) = row(ui, &text);
+        let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+        response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &text));
+        if response.hovered() || response.has_focus() {
+            let ground = colours.background.mix(colours.accent, 0.15);
+            ui.painter().rect_filled(rect, 3.0, colour(ground));
+        }
         let picture = Rect::from_min_size(rect.min, vec2(ROW, ROW));
         if let Some(texture) = context.thumbnails.get(&trial.label) {
             egui::Image::new(texture).corner_radius(3.0).paint_at(ui, picture.shrink(1.0));
@@ -266,7 +272,9 @@ fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport) {
             colour(colours.text),
         );
         put(ui, &format!("{:.2}", trial.distance), rect, Align2::RIGHT_CENTER, colour(colours.text));
-        response.on_hover_text(text);
+        if response.on_hover_text(format!("{text}; click to open it")).clicked() {
+            actions.push(InspectAction::Open(trial.id));
+        }
     }
     let left_out =
         if report.left_out > 0 { format!("; {} have other channels", report.left_out) } else { String::new() };

@@ -44,8 +44,9 @@ pub struct RecognisedGrasp {
 impl PartialEq for RecognisedGrasp {
     /// Two are equal if the same model read the same.
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.model, &other.model)
-            && (&self.grasp, self.hold_s, &self.belief) == (&other.grasp, other.hold_s, &other.belief)
+        std::ptr::eq(self, other)
+            || (Arc::ptr_eq(&self.model, &other.model)
+                && (&self.grasp, self.hold_s, &self.belief) == (&other.grasp, other.hold_s, &other.belief))
     }
 }
 

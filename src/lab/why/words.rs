@@ -1,7 +1,7 @@
 //! Sentences about the evidence.
 
 use super::occlusion::{Attribution, Evidence};
-use crate::inspection::PhaseSpan;
+use crate::inspection::{PhaseSpan, TouchPhase};
 use palpate_sim::objects::object_title;
 use palpate_tactile::Quantity;
 
@@ -94,15 +94,13 @@ fn strongest(parts: &[(String, Evidence)], sign: f64) -> Vec<Reason> {
 }
 
 /// Where a phase is, in a sentence: `in the hold`.
-fn phase_words(span: &PhaseSpan) -> String {
-    use crate::inspection::TouchPhase;
+fn phase_words(span: &PhaseSpan) -> &'static str {
     match span.phase {
         TouchPhase::PreShaping => "while pre-shaping",
         TouchPhase::Contact => "in contact",
         TouchPhase::Hold => "in the hold",
         TouchPhase::Release => "in the release",
     }
-    .to_owned()
 }
 
 /// A channel in words: `left pad pressure, distal` for `pressure_left_distal`.
@@ -139,7 +137,6 @@ pub fn percent(p: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inspection::TouchPhase;
     use crate::why::occlusion::ClassShare;
 
     fn evidence(points: f64) -> Evidence {
