@@ -31,7 +31,7 @@ pub(crate) fn model() -> Arc<Model> {
     Arc::new(Model { card, recogniser: Arc::new(Script), signatures: None })
 }
 
-/// Knows lemon from tomato by the force on the left pad, and has signatures: nothing before contact, then 1 N and 0.2 N.
+/// Knows lemon from tomato by the force on the left pad, and has signatures: nothing before contact, then 0.5 N and 0.1 N.
 pub(crate) fn weighing() -> Arc<Model> {
     let scripted = model();
     let channels = scripted.card.channels.clone();
@@ -46,7 +46,7 @@ pub(crate) fn weighing() -> Arc<Model> {
         };
         Arc::new(Sequence { values: t_s.iter().flat_map(row).collect(), t_s })
     };
-    let levels = [("lemon", 1.0), ("tomato", 0.2)].into_iter().enumerate();
+    let levels = [("lemon", 0.5), ("tomato", 0.1)].into_iter().enumerate();
     let examples = levels.filter_map(|(k, (name, newtons))| {
         Some(Example { id: k as i64, class: labels.class(name)?, grasp: grasp(newtons) })
     });
@@ -70,8 +70,8 @@ impl Recogniser for Weighing {
     fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
         let mean = grasp.rows().map(|(_, row)| f64::from(row[self.force])).sum::<f64>() / grasp.len().max(1) as f64;
         let pmf = Pmf::from_scores(self.labels.classes.iter().map(|class| match class.name.as_str() {
-            "lemon" => 4.0 * mean,
-            "tomato" => 2.0,
+            "lemon" => 16.0 * mean,
+            "tomato" => 4.0,
             _ => -2.0,
         }));
         Verdict { pmf: before.map_or(pmf.clone(), |before| before.times(&pmf)), properties: None }

@@ -97,12 +97,13 @@ fn fill(store: &mut Store) {
 #[test]
 fn the_panel_shows_evidence_and_the_nearest_trials() {
     let model = Ok(scripted::weighing());
-    let size = [280.0, 600.0];
+    let size = [280.0, 760.0];
     let setup = BenchSetup { panel: Some(panel()), model, fill, theme: Theme::Light, size, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
     assert!(bench.harness.query_by_label_contains("once a grasp is finished: press play").is_some());
     run_out(&mut bench);
     bench.until_shown(true, "Trial 1, Lemon, sim, distance 0.00, same readings");
+    compare("why_found", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
     // The model weighs the pads alone: curvature counts nothing, in no phase.
     for label in ["left curvature: 0 points", "left curvature, hold: 0 points", "pre-shaping: "] {
         assert!(bench.harness.query_all_by_label_contains(label).next().is_some(), "no {label}");
@@ -111,7 +112,6 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     assert!(of_force.rect().right() <= size[0], "nothing is cut off");
     assert!(bench.harness.query_by_label_contains("For Lemon: left pad force").is_some());
     assert!(bench.harness.query_by_label_contains("Trial 2, Earphone case").is_some());
-    compare("why_found", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
 }
 
 #[test]

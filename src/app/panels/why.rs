@@ -27,6 +27,9 @@ const LEAST_SCALE: f64 = 10.0;
 const SAME: f64 = 0.005;
 /// Letters of rows (points).
 const LETTERS: f32 = 12.5;
+const LEAST_LETTERS: f32 = 9.0;
+/// Letters above columns (points).
+const HEADERS: f32 = 10.5;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if context.blind {
@@ -172,7 +175,7 @@ impl Rows {
             (0..why.phases.len()).map(|k| Rect::from_min_size(place(k), vec2(width - 2.0, rect.height()))).collect()
         };
         for (span, cell) in why.phases.iter().zip(cells(head)) {
-            put(ui, span.phase.name(), cell, Align2::CENTER_CENTER, self.quiet);
+            put_sized(ui, (span.phase.name(), HEADERS), cell, Align2::CENTER_CENTER, self.quiet);
         }
         for (channel, evidence) in why.channels.iter().zip(&why.by_both) {
             let name = channel_words(channel);
@@ -218,9 +221,16 @@ fn names_width(width: f32) -> f32 {
     (NAMES.0 * width).min(NAMES.1)
 }
 
-/// Paints a line of text, cut off with dots where it does not fit.
+/// Paints a line of text.
 fn put(ui: &Ui, text: &str, place: Rect, align: Align2, ink: Color32) {
-    let mut job = egui::text::LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(LETTERS), ink);
+    put_sized(ui, (text, LETTERS), place, align, ink);
+}
+
+/// Paints a line of text, made smaller to fit its place, and cut off with dots below the least size.
+fn put_sized(ui: &Ui, (text, most): (&str, f32), place: Rect, align: Align2, ink: Color32) {
+    let width = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(most), ink).size().x;
+    let letters = (most * place.width() / width.max(1.0) - 0.2).clamp(LEAST_LETTERS, most);
+    let mut job = egui::text::LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(letters), ink);
     job.wrap = egui::text::TextWrapping::truncate_at_width(place.width().max(1.0));
     let galley = ui.painter().layout_job(job);
     ui.painter().galley(align.align_size_within_rect(galley.size(), place).min, galley, ink);
@@ -278,11 +288,12 @@ fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport, ac
     }
     let left_out =
         if report.left_out > 0 { format!("; {} have other channels", report.left_out) } else { String::new() };
-    let older = if report.older > 0 { format!("; {} older ones are not", report.older) } else { String::new() };
+    let compared = match report.older {
+        0 => format!("{} trials are compared", report.compared),
+        older => format!("The newest {} trials are compared, {older} older ones are not", report.compared),
+    };
     let about = format!(
-        "Distance in spreads within a class: two grasps of one class are about 1.4 apart. {} newest trials are compared\
-         {older}{left_out}.",
-        report.compared
+        "Distance in spreads within a class: two grasps of one class are about 1.4 apart. {compared}{left_out}."
     );
     wrapped(ui, RichText::new(about).small().weak());
 }
