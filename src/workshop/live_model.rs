@@ -50,7 +50,7 @@ pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failur
     let (now, then) = (&grasps.about, &model.card.data);
     report(format_args!(
         "{} grasps of collection {}; trained on {} of {}",
-        now.grasps - now.left_out,
+        now.grasps,
         now.collections.join(", "),
         then.grasps,
         then.collections.join(", ")

@@ -54,7 +54,7 @@ impl Explainer {
     /// Starts the thread; trials come from the store at `store`.
     pub fn start(store: PathBuf, wake: Wake) -> std::io::Result<Self> {
         let mut service = ExplainService { store, index: TrialIndex::default() };
-        Self::spawn("why", wake, move |request, stop, outlet| service.handle(request, stop, outlet))
+        Self::spawn("why", wake, move |request, stop, outlet| service.handle(&request, stop, outlet))
     }
 }
 
@@ -65,7 +65,7 @@ struct ExplainService {
 }
 
 impl ExplainService {
-    fn handle(&mut self, request: ExplainRequest, stop: &AtomicBool, outlet: &Outlet<ExplainedGrasp>) {
+    fn handle(&mut self, request: &ExplainRequest, stop: &AtomicBool, outlet: &Outlet<ExplainedGrasp>) {
         let why = explain(&request.grasp, stop).map(Arc::new);
         if stop.load(Ordering::Relaxed) {
             return;
