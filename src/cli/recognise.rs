@@ -170,7 +170,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     for (id, why) in explained() {
         why.say(id, arguments.together)?;
     }
-    match explained().last() {
+    match explained().next_back() {
         Some((_, why)) => why::say_how(why.calls()),
         None => Ok(()),
     }
