@@ -6,7 +6,7 @@ use crate::golden::compare;
 use crate::program::{json, refused, run};
 use crate::scripted;
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{ALL_PANELS, PanelKind};
+use palpate::app::{ALL_PANELS, Mode, PanelKind, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
 use palpate_lab::workers::Command;
@@ -115,13 +115,23 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
 
 #[test]
 fn a_link_beside_the_answer_opens_the_panel() {
-    let mut bench =
-        Bench::new(BenchSetup { model: Ok(scripted::weighing()), ..BenchSetup::default() }, CpuRenderer::default());
+    let mut bench = Bench::new(
+        BenchSetup { model: Ok(scripted::weighing()), fill, size: [1280.0, 1400.0], ..BenchSetup::default() },
+        CpuRenderer::default(),
+    );
     assert!(bench.harness.query_by_label("Why?").is_none(), "no answer yet");
     run_out(&mut bench);
     bench.harness.run_steps(2);
     bench.harness.get_by_label("Why?").click();
     bench.until_shown(true, "Channel by phase");
+    // A nearest trial opens in Inspect mode, and is explained there; it is not among its own nearest.
+    bench.until_shown(true, "Trial 1, Lemon, sim");
+    bench.harness.get_by_label_contains("Trial 1, Lemon, sim").click();
+    bench.harness.run_steps(2);
+    assert_eq!(bench.workbench().view().mode, Mode::Inspect);
+    bench.tell(ViewAction::ShowPanel("why"));
+    bench.until_shown(false, "Trial 1, Lemon, sim");
+    bench.until_shown(true, "Trial 2, Earphone case, sim");
     // A model without signatures says what to do.
     let setup = BenchSetup { panel: Some(panel()), ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
