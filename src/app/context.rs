@@ -9,12 +9,18 @@ use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::Alignment;
 use palpate_lab::study::accuracy::AccuracyStudy;
+use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{
-    EffectsWorker, GripperView, LabelDraft, LabelView, MeasuredAccuracy, SceneAccuracyJob, Snapshot,
+    EffectsWorker, ExplainRequest, ExplainedGrasp, GripperView, LabelDraft, LabelView, MeasuredAccuracy,
+    SceneAccuracyJob, Snapshot,
 };
 use palpate_sim::frame::Frame;
 use palpate_sim::scene::Scene;
+use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
+
+/// Probability from which on the likeliest class of a running grasp has a band: before, it changes with every answer.
+const LEAST_FOR_BANDS: f64 = 0.4;
 
 /// Everything a panel may read.
 pub struct PanelContext<'a> {
@@ -36,6 +42,8 @@ pub struct PanelContext<'a> {
     pub gripper: Option<&'a GripperView>,
     /// Diagnostics, fit and training.
     pub tools: &'a GripperTools,
+    /// Newest explanation of an answer.
+    pub explained: Option<&'a ExplainedGrasp>,
     /// Labels, plan and journal; absent until the store has been read.
     pub labels: Option<&'a LabelView>,
     /// Label being chosen.
@@ -88,5 +96,48 @@ impl<'a> PanelContext<'a> {
             Alignment::Closing => Alignment::Contact,
             Alignment::Contact => Alignment::Closing,
         }
+    }
+
+    /// Last finished grasp of the gripper that is shown, or a sentence that says why there is none.
+    pub(super) fn grasp_to_explain(&self) -> Result<ExplainRequest, String> {
+        if let (ViewSource::Trial, Some(Inspected { trial, .. })) = (self.source, self.inspected) {
+            // The answer to the whole grasp, wherever the cursor is.
+            let last = trial.answers.last().and_then(|answer| answer.last.clone());
+            let off = trial.recognition_off.as_deref().unwrap_or("the trial has no finished grasp");
+            let grasp = last.ok_or_else(|| format!("No answer to explain: {off}."))?;
+            return Ok(ExplainRequest { grasp, trial: Some(trial.id) });
+        }
+        let Some(recognised) = self.shown().recognised() else {
+            return Err("Waiting for the first grasp ..".to_owned());
+        };
+        let Some(view) = recognised.view else {
+            let off = recognised.off.unwrap_or("there is no recognition model");
+            return Err(format!("Recognition is off: {off}. Without an answer there is nothing to explain."));
+        };
+        let Some(grasp) = view.last.clone() else {
+            let start = match self.source {
+                ViewSource::Simulation => "press play (Space)",
+                ViewSource::Gripper => "record a trial (R)",
+                ViewSource::Trial => "open a trial",
+            };
+            return Err(format!("Here is why the model gave its answer, once a grasp is finished: {start}."));
+        };
+        Ok(ExplainRequest { grasp, trial: None })
+    }
+
+    /// Mean and spread of the two likeliest classes in a channel, on the time of the plots; none while the answer is open or
+    /// hidden, and for models without class signatures.
+    pub fn bands_for(&self, channel: &str) -> Option<[Band; 2]> {
+        let view = self.shown().recognised()?.view.filter(|_| !self.blind)?;
+        let pmf = view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())?;
+        let open = view.listening && pmf.top().1 < LEAST_FOR_BANDS;
+        let mut bands = bands_for(view.signatures.as_deref().filter(|_| !open)?, &view.labels, pmf, channel)?;
+        // A recorded trial counts its time from the rest before the closing, a signature from the closing.
+        let recorded = |own: &Inspected<'_>| own.trial.source == TrialSource::Recorded;
+        if let Some(own) = self.inspected.filter(|own| self.source == ViewSource::Trial && recorded(own)) {
+            let closing_s = Alignment::Closing.origin_s(own.trial);
+            bands.iter_mut().flat_map(|band| &mut band.t_s).for_each(|t| *t += closing_s);
+        }
+        Some(bands)
     }
 }

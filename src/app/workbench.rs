@@ -24,8 +24,9 @@ use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
-    Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, Inspector, LabelView,
-    MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
+    Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
+    Inspector, LabelView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
+    start_labeller,
 };
 use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
@@ -84,6 +85,7 @@ struct Published {
     ghost: Option<Arc<GhostGrasp>>,
     gripper: Option<Arc<GripperView>>,
     labels: Option<Arc<LabelView>>,
+    explained: Option<Arc<ExplainedGrasp>>,
 }
 
 impl Workbench {
@@ -133,7 +135,8 @@ impl Workbench {
         view.layouts.retain(|mode, layout| modes::is_complete(*mode, layout));
         theme::apply(ctx, view.theme);
         let mut notices = Notices::default();
-        let recognition = RecognitionFeature::new(model.cloned(), &mut tools, &mut view, &mut notices);
+        let explainer = Explainer::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("explanations"))?;
+        let recognition = RecognitionFeature::new(model.cloned(), explainer, &mut tools, &mut view, &mut notices);
         let mut workbench = Self {
             view,
             notices,
@@ -236,11 +239,12 @@ impl Workbench {
             ghost: self.simulation.ghost(&self.view),
             gripper: self.gripper.worker().view(),
             labels: self.labelling.labeller().view(),
+            explained: self.recognition.explained(),
         }
     }
 
     fn context<'a>(&'a self, published: &'a Published) -> PanelContext<'a> {
-        let Published { snapshot, accuracy, ghost, gripper, labels } = published;
+        let Published { snapshot, accuracy, ghost, gripper, labels, explained } = published;
         let (snapshot, gripper, labels) = (snapshot.as_deref(), gripper.as_deref(), labels.as_deref());
         let source = self.view.source;
         PanelContext {
@@ -253,6 +257,7 @@ impl Workbench {
             ghost: ghost_frame(snapshot, ghost.as_deref()),
             gripper,
             tools: &self.tools,
+            explained: explained.as_deref(),
             labels,
             draft: self.labelling.session().draft(),
             blind: self.labelling.hides_prediction(gripper, labels, &self.view),

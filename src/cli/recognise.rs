@@ -1,5 +1,7 @@
 //! `palpate recognise`: recognises the objects of stored trials, one by one or all together.
 
+mod why;
+
 use super::Failure;
 use super::setup::open_store;
 use super::terminal::{say, say_json, table};
@@ -10,12 +12,14 @@ use palpate_tactile::trial::TrialId;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use why::{Explanations, WhyReport};
 
 /// Arguments of `palpate recognise`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   palpate recognise 1
   palpate recognise 1 2 3 --together
+  palpate recognise 1 --why
   palpate recognise 7 --model mine.safetensors --json")]
 pub(super) struct RecogniseArguments {
     /// Trial numbers.
@@ -27,6 +31,12 @@ pub(super) struct RecogniseArguments {
     /// Treat the trials as grasps of one object, and also combine them.
     #[arg(long)]
     together: bool,
+    /// Say what spoke for and against each answer, by channel and phase, and which stored trials are nearest.
+    #[arg(long)]
+    why: bool,
+    /// Number of nearest stored trials with --why, among the newest 2000; 0 for none.
+    #[arg(long, value_name = "COUNT", default_value_t = 3, requires = "why")]
+    nearest: usize,
     /// Print JSON instead of text.
     #[arg(long)]
     json: bool,
@@ -42,6 +52,9 @@ struct TrialReport {
     probability: f64,
     stage_one: Option<StageOne>,
     pmf: BTreeMap<String, f64>,
+    /// With `--why`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<WhyReport>,
 }
 
 /// Size and shape.
@@ -97,6 +110,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let labels = &model.card.labels;
     let mut belief = Belief::default();
     let mut trials = Vec::new();
+    let mut explanations = arguments.why.then(|| Explanations::new(&model, arguments.nearest));
     for id in &arguments.trials {
         let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
@@ -106,6 +120,15 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             .now()
             .map_or_else(|| alone.pmf.clone(), |before| model.recogniser.recognise(grasp, Some(before)).pmf);
         belief.add(with, alone.pmf.clone());
+        let why = match &mut explanations {
+            Some(explanations) => {
+                let mut single = Belief::default();
+                single.add(alone.pmf.clone(), alone.pmf.clone());
+                let explained = if arguments.together { &belief } else { &single };
+                Some(explanations.of(&store, *id, grasp, explained)?)
+            }
+            None => None,
+        };
         let (class, probability) = alone.pmf.top();
         let stage_one = StageOne::of(&alone, labels);
         trials.push(TrialReport {
@@ -115,6 +138,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             probability,
             stage_one,
             pmf: named(&model, &alone.pmf),
+            why,
         });
     }
     let together = belief.now().filter(|_| arguments.together).map(|pmf| Together {
@@ -139,8 +163,15 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         })
         .collect();
     table(&["trial", "label", "stage one", "recognised as", "probability"], &cells)?;
-    match together {
-        Some(all) => say(format!("together: {} ({:.0} %)", all.decided, 100.0 * all.probability)),
+    if let Some(all) = together {
+        say(format!("together: {} ({:.0} %)", all.decided, 100.0 * all.probability))?;
+    }
+    let explained = || trials.iter().filter_map(|trial| Some((trial.trial, trial.why.as_ref()?)));
+    for (id, why) in explained() {
+        why.say(id, arguments.together)?;
+    }
+    match explained().next_back() {
+        Some((_, why)) => why::say_how(why.calls()),
         None => Ok(()),
     }
 }

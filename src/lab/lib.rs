@@ -26,7 +26,8 @@
 //! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
 //! | 2 | [`study`] | measurements and comparisons as functions |
 //! | 3 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
-//! | 4 | [`workers`] | threads for the window: commands in, snapshots and rows out |
+//! | 4 | [`why`] | why a model gave its answer: class signatures, evidence, nearest trials |
+//! | 5 | [`workers`] | threads for the window: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
 //!
@@ -57,4 +58,5 @@ pub mod labelling;
 pub mod picture;
 pub mod recording;
 pub mod study;
+pub mod why;
 pub mod workers;

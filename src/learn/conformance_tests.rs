@@ -4,7 +4,7 @@ use crate::evaluation::{MOST_GRASPS, answer, evaluate, product_of_experts, round
 use crate::metrics::{Bootstrap, Confusion};
 use crate::{
     ArrayError, Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, LoadError, METHODS, Method, Model,
-    ModelCard, ModelError, Numbers, Pmf, Sequence, StopRule, method, shipped_model,
+    ModelCard, ModelError, Numbers, Pmf, Sequence, Signatures, StopRule, method, shipped_model,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -68,6 +68,7 @@ fn every_method_learns_repeatably_and_reloads_exactly() {
         let again = trained(method, &train);
         let loaded = Model::from_bytes("model", &model.to_bytes().expect("writes")).expect(method.key);
         assert_eq!(loaded.card, model.card, "{}", method.key);
+        assert!(loaded.signatures.is_some() && loaded.signatures == model.signatures, "{}", method.key);
         for example in &test.examples {
             let verdict = model.recogniser.recognise(&example.grasp, None);
             assert!((verdict.pmf.probabilities().iter().sum::<f64>() - 1.0).abs() < 1e-9);
@@ -254,6 +255,34 @@ fn saved_models_of_version_0_1_still_load_with_the_same_results() {
             assert!(!differs, "{key}: {pmf:?} instead of {expected:?}");
         }
     }
+}
+
+#[test]
+fn damaged_signatures_are_refused_and_absent_ones_change_no_answer() {
+    let (_, bytes) = SAVED[4];
+    let old = Model::from_bytes("old", bytes).expect("valid");
+    assert!(old.signatures.is_none() && old.card.signature_grasps.is_none());
+    let data = made_up(3, 1);
+    let with = old.clone().with_signatures(Signatures::of(&data));
+    let encoded = with.to_bytes().expect("encodes");
+    let loaded = Model::from_bytes("with", &encoded).expect("valid");
+    assert_eq!((&loaded.signatures, &loaded.card), (&with.signatures, &with.card));
+    for example in &data.examples {
+        let [before, after] = [&old, &loaded].map(|model| model.recogniser.recognise(&example.grasp, None));
+        assert_eq!(before, after);
+    }
+    // Signatures without their entry on the card, with another number of classes, or without the arrays.
+    let mut altered = with.clone();
+    altered.card.signature_grasps = None;
+    let text = Model::from_bytes("altered", &altered.to_bytes().expect("encodes")).expect_err("refused").to_string();
+    assert!(text.contains("signatures/mean"), "{text}");
+    altered.card.signature_grasps = Some(vec![3; 3]);
+    let text = Model::from_bytes("altered", &altered.to_bytes().expect("encodes")).expect_err("refused").to_string();
+    assert!(text.contains("grasps in the signatures"), "{text}");
+    let mut none = old.clone();
+    none.card.signature_grasps = Some(vec![3; 4]);
+    let text = Model::from_bytes("none", &none.to_bytes().expect("encodes")).expect_err("refused").to_string();
+    assert!(text.contains("signatures/t_s\" is missing"), "{text}");
 }
 
 /// Decodes a model after a change of its arrays.

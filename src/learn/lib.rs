@@ -15,6 +15,7 @@
 //! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
 //! | 1 | `features` | a grasp as a row of features |
+//! | 1 | `signatures` | mean and spread of each class over time |
 //! | 2 | `recogniser` | the interface of recognisers |
 //! | 2 | `forest` | decision trees and their ensembles |
 //! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
@@ -68,6 +69,7 @@ mod model_file;
 pub mod network;
 mod pmf;
 mod recogniser;
+mod signatures;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
 pub use belief::{Belief, Rejection, StopReason, StopRule};
@@ -78,3 +80,4 @@ pub use model::{LoadError, Model, ModelCard, ModelError};
 pub use model_file::shipped_model;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
+pub use signatures::{SIGNATURE_STEPS, Signatures};

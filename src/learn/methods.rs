@@ -8,6 +8,7 @@ use crate::fitting::{Fitting, LearnError};
 use crate::model::{LoadError, Model, ModelCard};
 use crate::network::{Recipe, TactileNetwork};
 use crate::recogniser::Recogniser;
+use crate::signatures::Signatures;
 use std::sync::Arc;
 
 /// Group of a method in tables.
@@ -87,7 +88,7 @@ macro_rules! tabular {
 }
 
 impl Method {
-    /// Fits a model to data and fills in its card. Runs on one thread, whose CPU time is recorded.
+    /// Fits a model to data, fills in its card and adds the class signatures. Runs on one thread, whose CPU time is recorded.
     pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, LearnError> {
         // candle and smartcore would spread over all cores, which is slower for models this small.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(LearnError::failed)?;
@@ -108,9 +109,11 @@ impl Method {
             parameters: recogniser.parameters(),
             train_cpu_s,
             metrics: serde_json::Value::Null,
+            signature_grasps: None,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
-        Ok(Model { card, recogniser: Arc::from(recogniser) })
+        let model = Model { card, recogniser: Arc::from(recogniser), signatures: None };
+        Ok(model.with_signatures(Signatures::of(data)))
     }
 }
 

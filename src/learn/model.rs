@@ -5,6 +5,7 @@ use crate::belief::{Rejection, StopRule};
 use crate::data::{DataCard, Labels};
 use crate::fitting::LearnError;
 use crate::recogniser::Recogniser;
+use crate::signatures::Signatures;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -39,6 +40,9 @@ pub struct ModelCard {
     /// Results on test grasps; null if not measured.
     #[serde(default)]
     pub metrics: serde_json::Value,
+    /// Training grasps of each class in the signatures; absent without signatures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub signature_grasps: Option<Vec<usize>>,
     /// Program version that trained it.
     pub version: String,
 }
@@ -57,6 +61,8 @@ pub struct Model {
     pub card: ModelCard,
     /// Recogniser.
     pub recogniser: Arc<dyn Recogniser>,
+    /// Class signatures; `None` in files of older versions.
+    pub signatures: Option<Arc<Signatures>>,
 }
 
 impl std::fmt::Debug for Model {
@@ -66,6 +72,13 @@ impl std::fmt::Debug for Model {
 }
 
 impl Model {
+    /// Adds class signatures; the recogniser and its answers stay as they are.
+    pub fn with_signatures(mut self, signatures: Option<Signatures>) -> Self {
+        self.card.signature_grasps = signatures.as_ref().map(|signatures| signatures.grasps().to_vec());
+        self.signatures = signatures.map(Arc::new);
+        self
+    }
+
     /// Compares the model's channels with those available. The error names missing and unknown channels.
     pub fn check_channels(&self, channels: &[String]) -> Result<(), ModelError> {
         let own = &self.card.channels;

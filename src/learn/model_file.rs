@@ -5,6 +5,7 @@ use crate::arrays::{Array, ArrayError, Arrays, Numbers};
 use crate::data::{Class, Labels};
 use crate::methods::method;
 use crate::model::{LoadError, Model, ModelCard, ModelError};
+use crate::signatures::Signatures;
 use safetensors::{Dtype, SafeTensors, View};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -29,7 +30,11 @@ impl Model {
         let failed = |cause: String| ModelError::Malformed { name: self.card.method.clone(), cause };
         let card = serde_json::to_string(&self.card).map_err(|e| failed(e.to_string()))?;
         let header = HashMap::from([(CARD_KEY.to_owned(), card)]);
-        safetensors::serialize(&self.recogniser.arrays().0, Some(header)).map_err(|e| failed(e.to_string()))
+        let mut arrays = self.recogniser.arrays();
+        if let Some(signatures) = &self.signatures {
+            signatures.put_into(&mut arrays);
+        }
+        safetensors::serialize(&arrays.0, Some(header)).map_err(|e| failed(e.to_string()))
     }
 
     /// Writes the model and its card. Interrupted writes leave the old file intact.
@@ -68,13 +73,20 @@ impl Model {
         };
         let load = || -> Result<_, LoadError> {
             card.labels.check()?;
-            let arrays = read_arrays(&file)?;
+            let mut arrays = read_arrays(&file)?;
+            let signatures = match &card.signature_grasps {
+                Some(grasps) if grasps.len() != card.labels.classes.len() => {
+                    return Err(LoadError::Card { part: "the number of grasps in the signatures" });
+                }
+                Some(grasps) => Some(Signatures::take_from(&mut arrays, &card.channels, grasps)?),
+                None => None,
+            };
             let recogniser = (method.load)(&card, &arrays)?;
             arrays.require_same_form(&recogniser.arrays())?;
-            Ok(recogniser)
+            Ok((recogniser, signatures))
         };
-        let recogniser = load().map_err(|cause| ModelError::Invalid { name: name.to_owned(), cause })?;
-        Ok(Self { card, recogniser: Arc::from(recogniser) })
+        let (recogniser, signatures) = load().map_err(|cause| ModelError::Invalid { name: name.to_owned(), cause })?;
+        Ok(Self { card, recogniser: Arc::from(recogniser), signatures: signatures.map(Arc::new) })
     }
 }
 

@@ -21,6 +21,8 @@ pub struct BoardSignals {
     pub line: Vec<(f64, f64)>,
     /// Beginning of the closing (s), where known.
     pub closing_s: Option<f64>,
+    /// Beginning of the hold (s), where known.
+    pub hold_s: Option<f64>,
     /// Beginning of the release (s), where known.
     pub release_s: Option<f64>,
 }
@@ -51,6 +53,7 @@ impl Store {
             found.map(|mark| mark.from_s - began)
         };
         let closing_s = from(Phase::Close, f64::NEG_INFINITY);
+        let hold_s = from(Phase::Hold, closing_s.unwrap_or(f64::NEG_INFINITY));
         let release_s = from(Phase::Release, closing_s.unwrap_or(f64::NEG_INFINITY));
         let serving = self.calibrations().serving(Some(id), asked)?;
         let readout = Readout::new(&trial.course.board, &serving.calibrations)
@@ -62,7 +65,7 @@ impl Store {
         let reported: Vec<(f64, f64)> =
             trial.readings.iter().filter_map(|reading| Some((reading.t_s, reading.line_bar?))).collect();
         let line = if follows_commands(&commanded, &reported) { commanded } else { reported };
-        Ok(Some(BoardSignals { derived, serving, line, closing_s, release_s }))
+        Ok(Some(BoardSignals { derived, serving, line, closing_s, hold_s, release_s }))
     }
 }
 

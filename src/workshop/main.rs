@@ -5,6 +5,7 @@
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
+//! | `cargo run --release -p palpate-workshop -- signatures --store FILE` | the class signatures of that model; its weights stay |
 //! | `cargo run --release -p palpate-workshop -- scores --store FILE` | the scores of all methods, into `assets/studies/recognition.json`; resumes |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README, from the stored results in `assets/studies` |
 //! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
@@ -87,6 +88,15 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
+    /// Collect the training grasps again and store their class signatures in the shipped model, whose weights stay.
+    Signatures {
+        /// Folder of the model.
+        #[arg(long, default_value = "models")]
+        out: PathBuf,
+        /// Trial store that receives the grasps; a second run reuses them.
+        #[arg(long)]
+        store: PathBuf,
+    },
     /// Collect grasps, fit all methods and judge them.
     Scores {
         /// Result.
@@ -123,6 +133,7 @@ fn main() -> Result<(), Failure> {
             report(format_args!("{count} thumbnails in {}", out.display()));
         }
         Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
+        Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
         Command::Scores { out, store } => write_scores(&out, &store)?,
         Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,

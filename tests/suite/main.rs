@@ -62,3 +62,4 @@ mod streams;
 mod studies;
 mod training;
 mod trust;
+mod why;

@@ -3,7 +3,8 @@
 
 use palpate_lab::datasets::labels_of_catalogue;
 use palpate_learn::{
-    Arrays, DataCard, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser, Sequence, StopRule, Verdict,
+    Arrays, DataCard, Dataset, Example, Labels, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser,
+    Sequence, Signatures, StopRule, Verdict,
 };
 use std::sync::Arc;
 
@@ -24,9 +25,69 @@ pub(crate) fn model() -> Arc<Model> {
         parameters: 0,
         train_cpu_s: 0.0,
         metrics: serde_json::Value::Null,
+        signature_grasps: None,
         version: String::new(),
     };
-    Arc::new(Model { card, recogniser: Arc::new(Script) })
+    Arc::new(Model { card, recogniser: Arc::new(Script), signatures: None })
+}
+
+/// Knows lemon from tomato by the force on the left pad, and has signatures: nothing before contact, then 0.5 N and 0.1 N.
+pub(crate) fn weighing() -> Arc<Model> {
+    let scripted = model();
+    let channels = scripted.card.channels.clone();
+    let force = channels.iter().position(|name| name == "force_left").expect("a channel");
+    let labels = scripted.card.labels.clone();
+    let grasp = |newtons: f32| {
+        let t_s: Vec<f32> = (0..60).map(|k| 0.05 * k as f32).collect();
+        let row = |t: &f32| {
+            let mut row = vec![0.0; channels.len()];
+            row[force] = if *t < CONTACT { 0.0 } else { newtons };
+            row
+        };
+        Arc::new(Sequence { values: t_s.iter().flat_map(row).collect(), t_s })
+    };
+    let levels = [("lemon", 0.5), ("tomato", 0.1)].into_iter().enumerate();
+    let examples = levels.filter_map(|(k, (name, newtons))| {
+        Some(Example { id: k as i64, class: labels.class(name)?, grasp: grasp(newtons) })
+    });
+    let data = Dataset {
+        channels: channels.clone(),
+        labels: labels.clone(),
+        examples: examples.collect(),
+        ..Dataset::default()
+    };
+    let recogniser = Arc::new(Weighing { force, labels });
+    Arc::new(Model { card: scripted.card.clone(), recogniser, signatures: None }.with_signatures(Signatures::of(&data)))
+}
+
+/// Says lemon, the surer the larger the mean force on the left pad.
+struct Weighing {
+    force: usize,
+    labels: Labels,
+}
+
+impl Recogniser for Weighing {
+    fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
+        let mean = grasp.rows().map(|(_, row)| f64::from(row[self.force])).sum::<f64>() / grasp.len().max(1) as f64;
+        let pmf = Pmf::from_scores(self.labels.classes.iter().map(|class| match class.name.as_str() {
+            "lemon" => 16.0 * mean,
+            "tomato" => 4.0,
+            _ => -2.0,
+        }));
+        Verdict { pmf: before.map_or(pmf.clone(), |before| before.times(&pmf)), properties: None }
+    }
+
+    fn arrays(&self) -> Arrays {
+        Arrays::default()
+    }
+
+    fn parameters(&self) -> usize {
+        1
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
 }
 
 struct Script;

@@ -7,7 +7,9 @@ use crate::app::features::tools::{GripperTools, ToolAction};
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
-use palpate_lab::workers::{Command, GripperCommand, TrainCommand, TrainedModel};
+use palpate_lab::workers::{
+    Command, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TrainCommand, TrainedModel,
+};
 use palpate_learn::Model;
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -20,6 +22,8 @@ pub enum RecognitionAction {
     SetThreshold(f64),
     /// Recognise another object: a random built-in one, or whatever the real gripper holds next.
     NextObject,
+    /// Explain the answer to a grasp, for the panel Why.
+    Explain(ExplainRequest),
     /// Use the model in this file for the real gripper and its trials; without one, the shipped model.
     UseModel(Option<PathBuf>),
     /// Use the model in this file for the simulation and other trials; without one, the shipped model.
@@ -32,6 +36,9 @@ pub(in crate::app) struct RecognitionFeature {
     shipped: Option<Arc<Model>>,
     /// Models to be loaded, and for which gripper; the first one is being loaded.
     loading: VecDeque<(PathBuf, ViewSource)>,
+    explainer: Explainer,
+    /// Grasp explained last.
+    asked: Option<ExplainRequest>,
 }
 
 /// Features that recognition acts on.
@@ -46,11 +53,12 @@ impl RecognitionFeature {
     /// Loads the model of the last run, which is remembered again once it is loaded.
     pub(in crate::app) fn new(
         shipped: Option<Arc<Model>>,
+        explainer: Explainer,
         tools: &mut GripperTools,
         view: &mut ViewState,
         notices: &mut Notices,
     ) -> Self {
-        let mut feature = Self { shipped, loading: VecDeque::new() };
+        let mut feature = Self { shipped, loading: VecDeque::new(), explainer, asked: None };
         for (path, gripper) in
             [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
         {
@@ -67,6 +75,11 @@ impl RecognitionFeature {
             tools.apply(ToolAction::Train(TrainCommand::Load(path.clone())), notices);
         }
         self.loading.push_back((path, gripper));
+    }
+
+    /// Newest explanation.
+    pub(in crate::app) fn explained(&self) -> Option<Arc<ExplainedGrasp>> {
+        self.explainer.view()
     }
 
     pub(in crate::app) fn apply(
@@ -87,6 +100,7 @@ impl RecognitionFeature {
                 }
                 ViewSource::Simulation | ViewSource::Trial => on.simulation.open_next(notices),
             },
+            RecognitionAction::Explain(request) => self.explain(request),
             RecognitionAction::UseModel(Some(path)) => self.load(path, ViewSource::Gripper, on.tools, notices),
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
@@ -101,6 +115,17 @@ impl RecognitionFeature {
                 on.inspect.set_model(ViewSource::Simulation, self.shipped.clone());
                 on.simulation.send(Command::SetModel(self.shipped.clone()), notices);
             }
+        }
+    }
+
+    /// Explains a grasp instead of the one before, unless it is the same.
+    fn explain(&mut self, request: ExplainRequest) {
+        let is_same =
+            |asked: &ExplainRequest| asked.trial == request.trial && Arc::ptr_eq(&asked.grasp, &request.grasp);
+        if !self.asked.as_ref().is_some_and(is_same) {
+            self.explainer.give_up();
+            self.explainer.ask(request.clone());
+            self.asked = Some(request);
         }
     }
 

@@ -87,7 +87,7 @@ fn layout(tiles: &mut Tiles<String>) -> TileId {
     let [curvature, view] = ["curvature", "view"].map(|name| tabs(tiles, &[name]));
     let loads = tabs(tiles, &["pressure", "force", "line", "counts"]);
     let middle = split(tiles, LinearDir::Vertical, [(curvature, 0.28), (loads, 0.28), (view, 0.44)]);
-    let label = tabs(tiles, &["label", "recognition"]);
+    let label = tabs(tiles, &["label", "recognition", "why"]);
     let gripper = tabs(tiles, &["gripper", "calibration", "doctor", "fit", "training", "console"]);
     let right = split(tiles, LinearDir::Vertical, [(label, 0.56), (gripper, 0.44)]);
     split(tiles, LinearDir::Horizontal, [(left, 0.22), (middle, 0.48), (right, 0.30)])

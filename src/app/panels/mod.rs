@@ -27,6 +27,7 @@ mod training;
 mod trial;
 mod trials;
 mod view3d;
+mod why;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
@@ -43,7 +44,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 26] = [
+pub const ALL: [PanelKind; 27] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -51,6 +52,7 @@ pub const ALL: [PanelKind; 26] = [
     PanelKind { name: "force", title: "Force", ui: force::ui },
     PanelKind { name: "line", title: "Line pressure", ui: line_pressure::ui },
     PanelKind { name: "recognition", title: "Recognition", ui: recognition::ui },
+    PanelKind { name: "why", title: "Why", ui: why::ui },
     PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
     PanelKind { name: "scene", title: "Scene", ui: scene::ui },
     PanelKind { name: "effects", title: "Effects", ui: effects::ui },

@@ -4,5 +4,7 @@ mod query;
 mod saved_models;
 
 pub(crate) use query::noise_seed;
-pub use query::{DatasetError, DatasetQuery, SensorView, labels_of_catalogue, sequence_of};
+pub use query::{
+    DatasetError, DatasetQuery, SensorView, TrialSignals, labels_of_catalogue, sequence_of, trial_signals,
+};
 pub use saved_models::{SavedModel, models_folder, new_model_path, saved_models};

@@ -236,7 +236,7 @@ impl DatasetQuery {
         let (mut origins, mut uncalibrated, mut missing) = (BTreeSet::new(), 0, String::new());
         for (k, row) in rows.iter().enumerate() {
             progress(k, rows.len());
-            let (signals, origin) = match signals_of(store, row, view) {
+            let (TrialSignals { signals, .. }, origin) = match signals_of(store, row.id, row.source, view) {
                 // Skip boards without a calibration, unless it is the only trial.
                 Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
                     if uncalibrated == 0 {
@@ -318,37 +318,63 @@ fn known_properties(row: &TrialRow) -> Option<(String, String)> {
     row.properties.clone().or_else(of_catalogue)
 }
 
+/// Signals of one trial, as recognisers read them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialSignals {
+    /// Signals from the start of the closing to the end of the hold.
+    pub signals: Signals,
+    /// Start of the hold, on the clock of the signals (s), where known.
+    pub hold_s: Option<f64>,
+}
+
 /// Reads the signals of a trial: its own channels if imported, calibrated ones if recorded, those of the view if
 /// simulated.
-fn signals_of(store: &Store, row: &TrialRow, view: &SensorView) -> Result<(Signals, Origin), DatasetError> {
-    if row.source == TrialSource::Recorded {
-        return Ok((board_signals(store, row.id, view)?, Origin::Recorded));
+pub fn trial_signals(
+    store: &Store,
+    id: TrialId,
+    source: TrialSource,
+    view: &SensorView,
+) -> Result<TrialSignals, DatasetError> {
+    Ok(signals_of(store, id, source, view)?.0)
+}
+
+fn signals_of(
+    store: &Store,
+    id: TrialId,
+    source: TrialSource,
+    view: &SensorView,
+) -> Result<(TrialSignals, Origin), DatasetError> {
+    if source == TrialSource::Recorded {
+        return Ok((board_signals(store, id, view)?, Origin::Recorded));
     }
-    let Trial { header, data } = store.load(row.id).map_err(|cause| DatasetError::Store { cause })?;
+    let Trial { header, data } = store.load(id).map_err(|cause| DatasetError::Store { cause })?;
     let trial = match data {
         TrialData::Simulated(data) => SimulatedTrial { header, data },
-        TrialData::Imported(signals) => return Ok((signals, Origin::Recorded)),
-        TrialData::Recorded(_) => return Ok((board_signals(store, row.id, view)?, Origin::Recorded)),
+        TrialData::Imported(signals) => return Ok((TrialSignals { signals, hold_s: None }, Origin::Recorded)),
+        TrialData::Recorded(_) => return Ok((board_signals(store, id, view)?, Origin::Recorded)),
     };
     let scene = &trial.header.scene;
     let drawn_as = PoseSpread { between: Between::default(), ..scene.pose.clone() };
     let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
     let signals = view.signals(&trial).map_err(|cause| DatasetError::Layout { cause })?;
-    Ok((signals, Origin::Simulated { preset, fixed: scene.holds_object() }))
+    let hold_s = trial.frames().iter().find(|frame| frame.phase == Phase::Hold).map(|frame| frame.t);
+    Ok((TrialSignals { signals, hold_s }, Origin::Simulated { preset, fixed: scene.holds_object() }))
 }
 
 /// Reads the signals of a real gripper, calibrated, in the channels of the layout.
-fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<Signals, DatasetError> {
+fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<TrialSignals, DatasetError> {
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
     let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
     let channels = layout.channels(&GripperModel::default()).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
-    read.grasp(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
+    let signals = read.grasp(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
         id,
         layout: layout.full_name(),
         why: read.derived.warnings.join("; "),
-    })
+    })?;
+    let hold_s = read.hold_s.map(|hold_s| hold_s - read.closing_s.unwrap_or(0.0));
+    Ok(TrialSignals { signals, hold_s })
 }
 
 impl SensorView {

@@ -2,7 +2,9 @@
 //! Shared by window, commands and both grippers.
 
 use super::row::Row;
-use palpate_learn::{Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, StopReason, StopRule, Verdict};
+use palpate_learn::{
+    Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, Signatures, StopReason, StopRule, Verdict,
+};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::trial::EarlierGrasps;
 use palpate_tactile::{Channel, LayoutError, SensorLayout};
@@ -26,6 +28,43 @@ pub enum IdentifyError {
     },
 }
 
+/// A finished grasp as a model read it, and the model's answers.
+#[derive(Clone, Debug)]
+pub struct RecognisedGrasp {
+    /// The model.
+    pub model: Arc<Model>,
+    /// Readings in the model's channels.
+    pub grasp: Sequence,
+    /// Start of the hold (s), where known.
+    pub hold_s: Option<f64>,
+    /// Belief after this grasp and those of the same object before it.
+    pub belief: Belief,
+}
+
+impl PartialEq for RecognisedGrasp {
+    /// Two are equal if the same model read the same.
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+            || (Arc::ptr_eq(&self.model, &other.model)
+                && (&self.grasp, self.hold_s, &self.belief) == (&other.grasp, other.hold_s, &other.belief))
+    }
+}
+
+impl RecognisedGrasp {
+    /// Recognises a grasp that no other came before.
+    pub fn alone(model: Arc<Model>, grasp: Sequence, hold_s: Option<f64>) -> Self {
+        let mut belief = Belief::default();
+        let pmf = model.recogniser.recognise(&grasp, None).pmf;
+        belief.add(pmf.clone(), pmf);
+        Self { model, grasp, hold_s, belief }
+    }
+
+    /// Belief before this grasp; none before the first.
+    pub fn before(&self) -> Option<&Pmf> {
+        self.belief.steps().iter().rev().nth(1)
+    }
+}
+
 /// A model at work on successive grasps of one object.
 pub struct Identification {
     model: Arc<Model>,
@@ -39,6 +78,10 @@ pub struct Identification {
     /// Readings of the running grasp, for a verdict on this grasp alone.
     readings: Sequence,
     belief: Belief,
+    /// Start of the hold in the running grasp (s).
+    hold_s: Option<f64>,
+    /// The last finished grasp.
+    last: Option<Arc<RecognisedGrasp>>,
     /// The newest verdict on the running grasp.
     verdict: Option<Verdict>,
     /// The hold has ended; later rows are ignored.
@@ -69,6 +112,10 @@ pub struct IdentificationView {
     pub beliefs: Vec<Pmf>,
     /// Reason to stop, once there is one.
     pub decision: Option<StopReason>,
+    /// Class signatures of the model, where its file has them.
+    pub signatures: Option<Arc<Signatures>>,
+    /// The last finished grasp of this object.
+    pub last: Option<Arc<RecognisedGrasp>>,
 }
 
 impl IdentificationView {
@@ -94,6 +141,8 @@ impl Identification {
             columned: Vec::new(),
             live,
             readings: Sequence::default(),
+            hold_s: None,
+            last: None,
             belief: Belief::default(),
             verdict: None,
             closed: true,
@@ -109,6 +158,7 @@ impl Identification {
     /// Forgets all grasps: another object is in the hand.
     pub fn start_over(&mut self) {
         self.belief = Belief::default();
+        self.last = None;
         self.verdict = None;
         self.decision = None;
         self.closed = true;
@@ -155,6 +205,7 @@ impl Identification {
         let found: Vec<String> = wanted.iter().filter(|name| named.contains_key(*name)).cloned().collect();
         self.model.check_channels(&found).map_err(|cause| IdentifyError::Channels { cause })?;
         self.readings = Sequence::default();
+        self.hold_s = None;
         self.verdict = None;
         self.closed = false;
         if let Some(live) = &mut self.live {
@@ -172,6 +223,9 @@ impl Identification {
         if row.phase == Some(Phase::Release) {
             self.end_grasp();
             return true;
+        }
+        if row.phase == Some(Phase::Hold) {
+            self.hold_s.get_or_insert(t);
         }
         self.columned.clear();
         self.columned.extend(self.columns.iter().map(|column| row.values[*column]));
@@ -200,6 +254,12 @@ impl Identification {
         };
         self.belief.add(verdict.pmf.clone(), alone);
         self.verdict = Some(verdict);
+        self.last = Some(Arc::new(RecognisedGrasp {
+            model: Arc::clone(&self.model),
+            grasp: self.readings.clone(),
+            hold_s: self.hold_s,
+            belief: self.belief.clone(),
+        }));
         self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
     }
 
@@ -228,6 +288,8 @@ impl Identification {
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
+            signatures: self.model.signatures.clone(),
+            last: self.last.clone(),
         }
     }
 }

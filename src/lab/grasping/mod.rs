@@ -17,7 +17,7 @@ pub use agreement::{
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
-pub use identify::{Identification, IdentificationView, IdentifyError};
+pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

@@ -9,4 +9,5 @@ pub(crate) mod test_trials;
 
 pub use comparison::{Alignment, MeanColumn, MeanTrial};
 pub use open_trial::{Column, Instant, OpenOptions, OpenTrial, OpenTrialError};
+pub(crate) use phases::onset;
 pub use phases::{PhaseSpan, TouchPhase, phases_of_frames};

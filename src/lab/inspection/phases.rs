@@ -127,7 +127,7 @@ const LEAST_SHARE: f64 = 0.02;
 
 /// First time at which a load rises above its rest before the closing (s): rest and noise are measured before `closing_s`.
 /// NaN where nothing was read. Loads are those of one pad, in any unit.
-pub(super) fn onset(t_s: &[f64], loads: &[f32], closing_s: f64, least: f64) -> Option<f64> {
+pub(crate) fn onset(t_s: &[f64], loads: &[f32], closing_s: f64, least: f64) -> Option<f64> {
     let rest: Vec<f64> = t_s
         .iter()
         .zip(loads)

@@ -55,9 +55,10 @@ impl Parrot {
             parameters: 0,
             train_cpu_s: 0.0,
             metrics: serde_json::Value::Null,
+            signature_grasps: None,
             version: String::new(),
         };
-        (Model { card, recogniser: Arc::new(parrot) }, rows)
+        (Model { card, recogniser: Arc::new(parrot), signatures: None }, rows)
     }
 }
 

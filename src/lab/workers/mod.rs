@@ -17,7 +17,8 @@
 //! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "inspect" opens stored trials ([`Inspector`]). "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
+//! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it.
+//! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
@@ -28,6 +29,7 @@ mod check_job;
 mod current;
 mod diagnostics_job;
 mod effects;
+mod explainer;
 mod fitter;
 mod ghost;
 mod gripper;
@@ -52,6 +54,7 @@ mod trainer;
 pub use background_job::BackgroundJob;
 pub use diagnostics_job::{DiagnosticsJob, DiagnosticsReport, DiagnosticsView, Examine, ExamineRequest, examine_port};
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
+pub use explainer::{ExplainRequest, ExplainedGrasp, Explainer, NearestState};
 pub use fitter::{FitCommand, FitTrials, FitTrialsError, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{

@@ -289,6 +289,14 @@ impl Part<'_, '_> {
             if ui.add(drag).labelled_by(label.id).on_hover_text(hint).changed() {
                 self.actions.push(RecognitionAction::SetThreshold(classes::stepped(threshold / 100.0)));
             }
+            if self.view.last.is_some() {
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    let hint = "What spoke for and against this answer (panel Why)";
+                    if ui.link("Why?").on_hover_text(hint).clicked() {
+                        self.actions.push(ViewAction::ShowPanel("why"));
+                    }
+                });
+            }
         });
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::app::shown::Recognised;
 use palpate_lab::grasping::IdentificationView;
+pub(super) use palpate_lab::why::percent;
 use palpate_learn::{Labels, Pmf, StopReason};
 use palpate_sim::objects::object_title;
 
@@ -90,13 +91,7 @@ pub(super) fn title(labels: &Labels, class: usize) -> String {
     labels.classes.get(class).map_or_else(String::new, |class| object_title(&class.name))
 }
 
-/// Percentage, rounded down so that a probability below a threshold never seems to reach it; above 99 % with a decimal.
-pub(super) fn percent(p: f64) -> String {
-    let tenths = (p * 1e3 + 1e-6).floor().clamp(0.0, 999.0);
-    if tenths > 990.0 { format!("{:.1} %", tenths / 10.0) } else { format!("{:.0} %", (tenths / 10.0).floor()) }
-}
-
-/// The same without decimals.
+/// Percentage without decimals.
 pub(super) fn whole_percent(p: f64) -> String {
     percent(p.min(0.99))
 }
@@ -143,6 +138,8 @@ mod tests {
             listening: false,
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
+            signatures: None,
+            last: None,
         }
     }
 

@@ -1,0 +1,299 @@
+//! Why the model gave its answer to the last grasp: sentences, bars of evidence per channel and phase, a table of channel
+//! by phase, the course of the belief, and the nearest stored trials.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
+use crate::app::features::recognition::RecognitionAction;
+use crate::app::theme::{colour, veil};
+use crate::app::widgets::wrapped;
+use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use palpate_geometry::palette::Rgb;
+use palpate_lab::inspection::TouchPhase;
+use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
+use palpate_lab::workers::{ExplainRequest, ExplainedGrasp, NearestState};
+use palpate_sim::objects::object_title;
+use std::sync::Arc;
+
+/// Height of a row (points).
+const ROW: f32 = 20.0;
+/// Width of names, as a share of the panel and at most (points).
+const NAMES: (f32, f32) = (0.42, 170.0);
+/// Width of a number beside a bar (points).
+const NUMBER: f32 = 40.0;
+/// Evidence of a full bar, at least (percent points): small evidence looks small.
+const LEAST_SCALE: f64 = 10.0;
+/// Distance below which two grasps read the same.
+const SAME: f64 = 0.005;
+/// Letters of rows (points).
+const LETTERS: f32 = 12.5;
+const LEAST_LETTERS: f32 = 9.0;
+/// Letters above columns (points).
+const HEADERS: f32 = 10.5;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    if context.blind {
+        ui.heading("Blind");
+        wrapped(ui, "The model's prediction is hidden until you label the trial.".into());
+        return;
+    }
+    let request = match context.grasp_to_explain() {
+        Ok(request) => request,
+        Err(nothing) => {
+            wrapped(ui, RichText::new(nothing).weak());
+            return;
+        }
+    };
+    let asked = |view: &ExplainedGrasp| same(&view.request, &request);
+    let Some(view) = context.explained.filter(|view| asked(view)) else {
+        actions.push(RecognitionAction::Explain(request));
+        ui.weak("Leaving out channels and phases ..");
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 3.0;
+        match &view.why {
+            Ok(why) => evidence_ui(ui, context, why),
+            Err(cause) => {
+                ui.heading("No explanation");
+                wrapped(ui, RichText::new(capitalised(&cause.to_string())));
+            }
+        }
+        if view.why.is_ok() {
+            nearest_ui(ui, context, &view.nearest, actions);
+        }
+    });
+}
+
+/// True for requests about the same grasp.
+fn same(a: &ExplainRequest, b: &ExplainRequest) -> bool {
+    a.trial == b.trial && Arc::ptr_eq(&a.grasp, &b.grasp)
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(char::to_uppercase).into_iter().flatten();
+    first.chain(letters).collect::<String>() + "."
+}
+
+fn evidence_ui(ui: &mut Ui, context: &PanelContext<'_>, why: &Attribution) {
+    ui.add(egui::Label::new(RichText::new(why.answer()).heading()).wrap());
+    for sentence in why.sentences() {
+        wrapped(ui, RichText::new(sentence));
+    }
+    let title = object_title(&why.first.name);
+    let rows = Rows::new(context, why);
+    heading(ui, "Channels", &format!("Percent points of {title} that the answer loses without this channel"));
+    for (channel, evidence) in why.channels.iter().zip(&why.by_channel) {
+        rows.bar_ui(ui, &channel_words(channel), evidence);
+    }
+    heading(ui, "Phases", &format!("Percent points of {title} that the answer loses without this phase"));
+    for (span, evidence) in why.phases.iter().zip(&why.by_phase) {
+        rows.bar_ui(ui, span.phase.name(), evidence);
+    }
+    heading(ui, "Channel by phase", &format!("Percent points of {title} that each channel brings in each phase"));
+    rows.table_ui(ui, why);
+    if why.grasps.len() > 1 {
+        heading(ui, "Grasps", &format!("Probability of {title} after each grasp"));
+        for (k, step) in why.grasps.iter().enumerate() {
+            let [before, alone, after] = [step.before, step.alone, step.after].map(|two| percent(two[0]));
+            let moved = Evidence { points: 100.0 * (step.after[0] - step.before[0]), decibans: 0.0 };
+            let name = format!("grasp {}", k + 1);
+            let hint = format!("{title}: {before} before it, {alone} by it alone, {after} after it");
+            rows.plain_bar_ui(ui, &name, moved.points).on_hover_text(hint);
+        }
+    }
+    ui.add_space(2.0);
+    let how = format!("{MEASURED_HOW} {} answers of the model.", why.calls);
+    wrapped(ui, RichText::new(how).small().weak());
+}
+
+fn heading(ui: &mut Ui, text: &str, hint: &str) {
+    ui.add_space(6.0);
+    ui.label(RichText::new(text).strong()).on_hover_text(hint);
+}
+
+/// Common measures of all rows.
+struct Rows {
+    /// Evidence of a full bar (percent points).
+    scale: f64,
+    /// Spoke for, spoke against.
+    signs: [Rgb; 2],
+    ground: Color32,
+    ink: Color32,
+    quiet: Color32,
+}
+
+impl Rows {
+    fn new(context: &PanelContext<'_>, why: &Attribution) -> Self {
+        let parts = why.by_channel.iter().chain(&why.by_phase).chain(why.by_both.iter().flatten());
+        let scale = parts.map(|evidence| evidence.points.abs()).fold(LEAST_SCALE, f64::max);
+        let colours = context.view.theme.colours();
+        Self {
+            scale,
+            signs: [colours.accent, colours.warning],
+            ground: colour(colours.raised),
+            ink: colour(colours.text),
+            quiet: colour(colours.quiet_text),
+        }
+    }
+
+    fn sign(&self, points: f64) -> Rgb {
+        self.signs[usize::from(points < 0.0)]
+    }
+
+    fn bar_ui(&self, ui: &mut Ui, name: &str, evidence: &Evidence) {
+        self.plain_bar_ui(ui, name, evidence.points).on_hover_text(hint_of(name, evidence));
+    }
+
+    /// Name, bar from the middle to the right (for) or left (against), number.
+    fn plain_bar_ui(&self, ui: &mut Ui, name: &str, points: f64) -> Response {
+        let (rect, response) = row(ui, &format!("{name}: {}", spoken(points)));
+        let names = names_width(rect.width());
+        put(ui, name, rect.with_max_x(rect.left() + names), Align2::LEFT_CENTER, self.ink);
+        let track = Rect::from_min_max(
+            pos2(rect.left() + names + 4.0, rect.top() + 4.0),
+            pos2(rect.right() - NUMBER, rect.bottom() - 4.0),
+        );
+        ui.painter().rect_filled(track, 2.0, self.ground);
+        let middle = track.center().x;
+        let reach = 0.5 * track.width() * (points / self.scale).clamp(-1.0, 1.0) as f32;
+        let bar = Rect::from_x_y_ranges(middle.min(middle + reach)..=middle.max(middle + reach), track.y_range());
+        ui.painter().rect_filled(bar, 1.0, colour(self.sign(points)));
+        ui.painter().vline(middle, track.y_range(), (1.0, self.quiet));
+        put(ui, &points_words(points), rect, Align2::RIGHT_CENTER, self.ink);
+        response
+    }
+
+    /// Cells coloured by their evidence, a row per channel and a column per phase.
+    fn table_ui(&self, ui: &mut Ui, why: &Attribution) {
+        let (head, _) = row(ui, "channel by phase");
+        let cells = |rect: Rect| -> Vec<Rect> {
+            let left = rect.left() + names_width(rect.width()) + 4.0;
+            let width = (rect.right() - left) / why.phases.len().max(1) as f32;
+            let place = |k: usize| pos2(left + width * k as f32, rect.top());
+            (0..why.phases.len()).map(|k| Rect::from_min_size(place(k), vec2(width - 2.0, rect.height()))).collect()
+        };
+        for (span, cell) in why.phases.iter().zip(cells(head)) {
+            put_sized(ui, (span.phase.name(), HEADERS), cell, Align2::CENTER_CENTER, self.quiet);
+        }
+        for (channel, evidence) in why.channels.iter().zip(&why.by_both) {
+            let name = channel_words(channel);
+            let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+            put(ui, &name, rect.with_max_x(rect.left() + names_width(rect.width())), Align2::LEFT_CENTER, self.ink);
+            for ((span, own), cell) in why.phases.iter().zip(evidence).zip(cells(rect)) {
+                self.cell_ui(ui, (&name, span.phase), own, cell);
+            }
+        }
+    }
+
+    fn cell_ui(&self, ui: &Ui, (channel, phase): (&str, TouchPhase), evidence: &Evidence, cell: Rect) {
+        let name = format!("{channel}, {}", phase.name());
+        let text = format!("{name}: {}", spoken(evidence.points));
+        let response = ui.interact(cell, ui.scope_id().with(("cell", channel, phase)), Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(egui::Role::Label, true, &text));
+        let share = (evidence.points.abs() / self.scale).clamp(0.0, 1.0) as f32;
+        ui.painter().rect_filled(cell, 2.0, self.ground);
+        ui.painter().rect_filled(cell, 2.0, veil(self.sign(evidence.points), 0.6 * share));
+        put(ui, &points_words(evidence.points), cell, Align2::CENTER_CENTER, self.ink);
+        response.on_hover_text(hint_of(&name, evidence));
+    }
+}
+
+fn spoken(points: f64) -> String {
+    format!("{} points", points_words(points))
+}
+
+fn hint_of(name: &str, evidence: &Evidence) -> String {
+    let side = if evidence.points < 0.0 { "against" } else { "for" };
+    let points = points_words(evidence.points);
+    format!("{name}: {points} points {side} the answer, {:+.1} decibans against the second class", evidence.decibans)
+}
+
+/// Row over the whole width, with its text for screen readers.
+fn row(ui: &mut Ui, text: &str) -> (Rect, Response) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(egui::Role::Label, true, text));
+    (rect, response)
+}
+
+fn names_width(width: f32) -> f32 {
+    (NAMES.0 * width).min(NAMES.1)
+}
+
+/// Paints a line of text.
+fn put(ui: &Ui, text: &str, place: Rect, align: Align2, ink: Color32) {
+    put_sized(ui, (text, LETTERS), place, align, ink);
+}
+
+/// Paints a line of text, made smaller to fit its place, and cut off with dots below the least size.
+fn put_sized(ui: &Ui, (text, most): (&str, f32), place: Rect, align: Align2, ink: Color32) {
+    let width = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(most), ink).size().x;
+    let letters = (most * place.width() / width.max(1.0) - 0.2).clamp(LEAST_LETTERS, most);
+    let mut job = egui::text::LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(letters), ink);
+    job.wrap = egui::text::TextWrapping::truncate_at_width(place.width().max(1.0));
+    let galley = ui.painter().layout_job(job);
+    ui.painter().galley(align.align_size_within_rect(galley.size(), place).min, galley, ink);
+}
+
+fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, nearest: &NearestState, actions: &mut Actions) {
+    heading(ui, "Nearest stored trials", "By the root mean square difference of all channels over the grasp");
+    match nearest {
+        NearestState::Comparing(_, 0) => {
+            ui.weak("Reading the store ..");
+        }
+        NearestState::Comparing(done, of) => {
+            ui.weak(format!("Comparing .. {done} of {of}"));
+        }
+        NearestState::Failed(cause) => {
+            let ink = colour(context.view.theme.colours().error);
+            wrapped(ui, RichText::new(format!("The store cannot be read: {cause}.")).color(ink));
+        }
+        NearestState::Ready(report) => report_ui(ui, context, report, actions),
+    }
+}
+
+fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport, actions: &mut Actions) {
+    if report.trials.is_empty() {
+        wrapped(ui, RichText::new("No stored trial has these channels. Record grasps, or run palpate collect.").weak());
+        return;
+    }
+    let colours = context.view.theme.colours();
+    for trial in &report.trials {
+        let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { object_title(&trial.label) };
+        let same = if trial.distance < SAME { ", same readings" } else { "" };
+        let text = format!("Trial {}, {name}, {}, distance {:.2}{same}", trial.id, trial.source, trial.distance);
+        let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+        response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &text));
+        if response.hovered() || response.has_focus() {
+            let ground = colours.background.mix(colours.accent, 0.15);
+            ui.painter().rect_filled(rect, 3.0, colour(ground));
+        }
+        let picture = Rect::from_min_size(rect.min, vec2(ROW, ROW));
+        if let Some(texture) = context.thumbnails.get(&trial.label) {
+            egui::Image::new(texture).corner_radius(3.0).paint_at(ui, picture.shrink(1.0));
+        }
+        let words = rect.with_min_x(picture.right() + 6.0).with_max_x(rect.right() - NUMBER);
+        put(
+            ui,
+            &format!("{name}  {} {}{same}", trial.source, trial.id),
+            words,
+            Align2::LEFT_CENTER,
+            colour(colours.text),
+        );
+        put(ui, &format!("{:.2}", trial.distance), rect, Align2::RIGHT_CENTER, colour(colours.text));
+        if response.on_hover_text(format!("{text}; click to open it")).clicked() {
+            actions.push(InspectAction::Open(trial.id));
+        }
+    }
+    let left_out =
+        if report.left_out > 0 { format!("; {} have other channels", report.left_out) } else { String::new() };
+    let compared = match report.older {
+        0 => format!("{} trials are compared", report.compared),
+        older => format!("The newest {} trials are compared, {older} older ones are not", report.compared),
+    };
+    let about = format!(
+        "Distance in spreads within a class: two grasps of one class are about 1.4 apart. {compared}{left_out}."
+    );
+    wrapped(ui, RichText::new(about).small().weak());
+}
