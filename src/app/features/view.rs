@@ -8,6 +8,7 @@ use egui_tiles::Tree;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
+use palpate_lab::picture::{BendUnit, LoadUnit};
 use palpate_lab::workers::Snapshot;
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,12 @@ pub struct ViewState {
     pub framed: Option<Camera>,
     /// Force arrows are drawn.
     pub forces: bool,
+    /// Contact path on the object.
+    pub path: PathLayer,
+    /// Unit of loads in heat maps.
+    pub load_unit: LoadUnit,
+    /// Unit of bending in heat maps.
+    pub bend_unit: BendUnit,
     /// Fingers and object of the other engine are drawn.
     pub ghost: bool,
     /// The true object is shown beside the recognised one.
@@ -64,6 +71,39 @@ pub struct ViewState {
     pub recent: Vec<String>,
 }
 
+/// Contact path on the object: not drawn, or by what it is coloured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PathLayer {
+    /// Not drawn.
+    #[default]
+    Off,
+    /// Coloured by the time of the first touch.
+    Time,
+    /// Coloured by the largest pressure.
+    Pressure,
+}
+
+impl PathLayer {
+    /// The next one: off, time, pressure.
+    pub fn next(self) -> Self {
+        match self {
+            Self::Off => Self::Time,
+            Self::Time => Self::Pressure,
+            Self::Pressure => Self::Off,
+        }
+    }
+
+    /// Text on its button.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Off => "Path",
+            Self::Time => "Path: time",
+            Self::Pressure => "Path: pressure",
+        }
+    }
+}
+
 /// Change of the view state.
 #[derive(Clone, Debug)]
 pub enum ViewAction {
@@ -79,6 +119,12 @@ pub enum ViewAction {
     SetTheme(Theme),
     /// Show or hide force arrows.
     SetForces(bool),
+    /// Draw the contact path, or do not.
+    SetPath(PathLayer),
+    /// Unit of loads in heat maps.
+    SetLoadUnit(LoadUnit),
+    /// Unit of bending in heat maps.
+    SetBendUnit(BendUnit),
     /// Time shown by all plots (s); `None` for the whole grasp.
     SetTimeWindow(Option<[f64; 2]>),
     /// Sensors that plots and recognisers read.
@@ -105,6 +151,9 @@ impl Default for ViewState {
             camera: Camera::default(),
             framed: None,
             forces: true,
+            path: PathLayer::default(),
+            load_unit: LoadUnit::default(),
+            bend_unit: BendUnit::default(),
             ghost: false,
             truth_shown: true,
             mode: Mode::default(),
@@ -141,6 +190,9 @@ impl ViewState {
                 theme::apply(ctx, theme);
             }
             ViewAction::SetForces(forces) => self.forces = forces,
+            ViewAction::SetPath(path) => self.path = path,
+            ViewAction::SetLoadUnit(unit) => self.load_unit = unit,
+            ViewAction::SetBendUnit(unit) => self.bend_unit = unit,
             ViewAction::SetTimeWindow(window) => self.time_window = window,
             ViewAction::SetSensors(sensors) => self.sensors = sensors,
             ViewAction::Derive(plot, derived) => {

@@ -237,8 +237,8 @@ mod tests {
     fn straight_fingers_touch_where_their_taxels_are() {
         let gripper = GripperModel::default();
         let grid = gripper.taxels();
-        // Both middle columns of one row of the left pad, then nothing, then a row lower on an object that sank by 2 mm.
-        let lower = DVec3::new(0.0, 0.0, -0.002);
+        // Both middle columns of one row of the left pad, then nothing, then a row lower on an object that sank by 5 mm.
+        let lower = DVec3::new(0.0, 0.0, -0.005);
         let frames = [frame(0.1, &[41, 42], DVec3::ZERO), frame(0.2, &[], DVec3::ZERO), frame(0.3, &[45, 46], lower)];
         let path = contact_path(&gripper, &Pose::IDENTITY, &frames);
         assert_eq!((path.frames(), path.touched().count(), path.courses(Side::Right).len()), (3, 4, 0));
@@ -249,7 +249,7 @@ mod tests {
         assert!((first[0].at.as_dvec3() - expected).length() < 1e-7, "{} and {expected}", first[0].at);
         // The object sank, so that the place on it is higher.
         let moved = (second[0].at - first[0].at).as_dvec3();
-        assert!((moved - DVec3::new(0.0, 0.0, 0.002 - grid.row_pitch())).length() < 1e-7, "{moved}");
+        assert!((moved - DVec3::new(0.0, 0.0, 0.005 - grid.row_pitch())).length() < 1e-7, "{moved}");
         let pressure = 0.1 / grid.area();
         assert!(path.touched().all(|place| (f64::from(place.pressure) / pressure - 1.0).abs() < 1e-6));
         // Frame by frame, or all at once.
@@ -285,7 +285,7 @@ mod tests {
         let path = contact_path(&scene.gripper, &trial.data.world_from_gripper, trial.frames());
         let radius = 0.5 * object.bounds.size().max_element();
         let middle = object.bounds.centre();
-        assert!(path.touched().count() > 20);
+        assert!(path.touched().count() >= 4, "{}", path.touched().count());
         let courses = Side::BOTH.into_iter().flat_map(|side| path.courses(side).iter().flatten());
         for place in path.touched().chain(courses) {
             let off = (place.at.as_dvec3() - middle).length() - radius;

@@ -12,8 +12,8 @@ use std::borrow::Borrow;
 
 /// Pressure that has the brightest colour (Pa): taxel pressures of an ordinary hold reach some 30 kPa.
 pub const PAD_FULL_SCALE: f32 = 40e3;
-/// Bending that has the strongest colour, as a share of the curvature at which the bellows close up.
-const BEND_SHARE: f64 = 0.5;
+/// Curvature that has the strongest colour (1/m): a radius of 50 mm.
+const STRONGEST_BEND: f64 = 20.0;
 
 /// Unit of the loads in heat maps of pads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -112,10 +112,24 @@ pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit) -> [HeatMa
     })
 }
 
+/// Both pads of a gripper that reads one force on each (N), NaN where it is unknown, over an area (m²): a single cell.
+pub fn whole_pads(gripper: &GripperModel, force: [f64; 2], area: f64, unit: LoadUnit) -> [HeatMap; 2] {
+    let half_width = 0.5 * mm(gripper.finger.width);
+    Side::BOTH.map(|side| HeatMap {
+        title: side.name().to_owned(),
+        quantity: format!("pad {}", unit.quantity()),
+        unit: unit.symbol().to_owned(),
+        x: axis("across", "mm", 1, [-half_width, half_width]),
+        y: axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)]),
+        values: vec![(force[side.index()] * unit.factor(area)) as f32],
+        scale: unit.scale(area),
+    })
+}
+
 /// Bending of every joint over time, left and right: rows from the palm to the tip, a column for each frame.
 pub fn joints_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F], unit: BendUnit) -> [HeatMap; 2] {
     let (joints, segment) = (gripper.finger.joints, gripper.finger.segment_length());
-    let strongest = BEND_SHARE * gripper.finger.curvature_limit * segment;
+    let strongest = STRONGEST_BEND * segment;
     Side::BOTH.map(|side| {
         let values = over_time(frames, joints, |frame, row| {
             frame.joints(side).get(row).map_or(f32::NAN, |q| unit.value(*q, segment) as f32)
@@ -152,6 +166,55 @@ pub fn pad_rows_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F]
             y: rows(gripper),
             values,
             scale: unit.scale(area),
+        }
+    })
+}
+
+/// Quantity of sensors that are shown over time, a row for each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SensorRows {
+    /// Curvature in 1/m.
+    Curvature,
+    /// Pressure in Pa, shown in kPa.
+    Pressure,
+    /// Force in N on a pad of that area (m²).
+    Force(f64),
+}
+
+/// Sensors over time, left and right, a row for each. Samples come at any times `t_s` (s); each holds until the next one,
+/// and NaN where nothing was read. At most `most` columns; each keeps the value farthest from zero.
+pub fn channels_over_time(t_s: &[f64], sides: [&[&[f32]]; 2], rows: SensorRows, most: usize) -> [HeatMap; 2] {
+    let (quantity, unit, factor, scale) = match rows {
+        SensorRows::Curvature => ("curvature", "1/m", 1.0, ColourScale::Signed(STRONGEST_BEND as f32)),
+        SensorRows::Pressure => ("pressure", "kPa", 1e-3, LoadUnit::Pressure.scale(1.0)),
+        SensorRows::Force(area) => ("force", "N", 1.0, LoadUnit::Force.scale(area)),
+    };
+    let range = [t_s.first(), t_s.last()].map(|t| t.copied().unwrap_or(0.0));
+    let columns = most.min(t_s.len());
+    let time = axis("time", "s", columns, range);
+    Side::BOTH.map(|side| {
+        let sensors = sides[side.index()];
+        let mut values = vec![f32::NAN; sensors.len() * columns];
+        for (row, sensor) in sensors.iter().enumerate() {
+            let row = &mut values[row * columns..(row + 1) * columns];
+            for (k, value) in sensor.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+                let Some(from) = t_s.get(k).and_then(|t| time.cell(*t)) else { continue };
+                let until = t_s.get(k + 1).and_then(|t| time.cell(*t)).unwrap_or(from);
+                for cell in &mut row[from..until.max(from + 1)] {
+                    if cell.is_nan() || value.abs() * factor > cell.abs() {
+                        *cell = value * factor;
+                    }
+                }
+            }
+        }
+        HeatMap {
+            title: side.name().to_owned(),
+            quantity: quantity.to_owned(),
+            unit: unit.to_owned(),
+            x: time.clone(),
+            y: axis("sensor", "", sensors.len(), [0.5, sensors.len() as f64 + 0.5]),
+            values,
+            scale,
         }
     })
 }
@@ -221,6 +284,30 @@ mod tests {
         assert!((pressure.value(1, 2) - 20.0).abs() < 1e-5, "{}", pressure.value(1, 2));
         // The colour does not depend on the unit.
         assert_eq!((left.scale, pressure.scale), (ColourScale::Load(0.5), ColourScale::Load(40.0)));
+    }
+
+    #[test]
+    fn a_pad_that_reads_one_force_has_one_cell() {
+        let [left, right] = whole_pads(&GripperModel::default(), [2.0, f64::NAN], 1e-4, LoadUnit::Pressure);
+        assert_eq!((left.value(0, 0), left.x.count, left.y.count), (20.0, 1, 1));
+        assert!(right.value(0, 0).is_nan() && right.scale.colour(right.value(0, 0)).is_none());
+    }
+
+    #[test]
+    fn sensors_hold_their_value_until_the_next_sample() {
+        // Ten even columns over a second; nothing is read from 0.4 s to 0.8 s.
+        let t = [0.0, 0.1, 0.25, 0.4, 0.8, 0.95, 1.0];
+        let strip = [1.0, 2.0, 3.0, f32::NAN, 5.0, -6.0, 4.0];
+        let most = 5;
+        let [left, right] = channels_over_time(&t, [&[&strip], &[]], SensorRows::Curvature, most);
+        let shown: Vec<f32> = (0..most).map(|column| left.value(0, column)).collect();
+        assert!(shown[2].is_nan() && shown[3].is_nan(), "{shown:?}");
+        assert_eq!([shown[0], shown[1], shown[4]], [2.0, 3.0, -6.0]);
+        assert_eq!((left.y.text(0), right.y.count, right.values.len()), ("sensor 1".to_owned(), 0, 0));
+        let pressure = &channels_over_time(&[0.0, 1.0], [&[&[20e3, 10e3]], &[]], SensorRows::Pressure, most)[0];
+        assert_eq!((pressure.values.as_slice(), pressure.scale), (&[20.0, 10.0][..], ColourScale::Load(40.0)));
+        let nothing = channels_over_time(&[], [&[&[]], &[&[]]], SensorRows::Force(1e-4), most);
+        assert_eq!((nothing[0].x.count, nothing[0].values.len()), (0, 0));
     }
 
     #[test]

@@ -10,9 +10,12 @@ mod gripper_model;
 mod heat_maps;
 mod reconstructed;
 
-pub use annotations::SCALE_STEPS;
+pub use annotations::{SCALE_STEPS, legend_room};
 pub use contact_path::{ContactPath, PathColour, TouchedPlace, contact_path};
-pub use heat_maps::{BendUnit, LoadUnit, PAD_FULL_SCALE, joints_over_time, pad_rows_over_time, pads_at};
+pub use heat_maps::{
+    BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, joints_over_time, pad_rows_over_time, pads_at,
+    whole_pads,
+};
 pub(crate) use reconstructed::evenly_bent;
 
 use glam::{Mat4, Vec2, Vec3};
@@ -133,6 +136,11 @@ impl Stage {
         ghosts
     }
 
+    /// Adds a frame to the contact path of its trial.
+    pub fn extend_path(&self, path: &mut ContactPath, frame: &Frame) {
+        path.push(&self.gripper, &self.world_from_gripper, frame);
+    }
+
     /// Contact path on the object of a frame, for [`DrawList::solids`]; none for an empty hand.
     pub fn path(&self, mesh: &Arc<SurfaceMesh>, frame: &Frame) -> Option<Solid> {
         let pose = frame.world_from_object.as_ref()?;
@@ -140,7 +148,7 @@ impl Stage {
     }
 
     /// Draws the fingers of a picture translucent, so that what they cover is seen.
-    pub fn unveil(&self, list: &mut DrawList, theme: Theme) {
+    pub fn unveil(list: &mut DrawList, theme: Theme) {
         let colour = theme.colours().accent;
         let fingers = std::mem::take(&mut list.fingers);
         let veils = fingers.iter().map(|finger| Arc::new(ghost::finger(finger, colour)));
