@@ -44,12 +44,7 @@ pub(super) struct MapsKey {
 }
 
 /// Maps made for `key`, or the same as before where the key is.
-pub(super) fn shown_maps(
-    ui: &Ui,
-    name: &'static str,
-    key: MapsKey,
-    make: impl FnOnce() -> [HeatMap; 2],
-) -> ShownMaps {
+pub(super) fn shown_maps(ui: &Ui, name: &'static str, key: MapsKey, make: impl FnOnce() -> [HeatMap; 2]) -> ShownMaps {
     let id = egui::Id::unique(("heat maps", name));
     let known = ui.data(|data| data.get_temp::<(MapsKey, ShownMaps)>(id)).filter(|(known, _)| *known == key);
     if let Some((_, shown)) = known {
@@ -135,7 +130,7 @@ fn hatch(painter: &egui::Painter, rect: Rect, shade: Color32) {
 pub(super) fn pad_ui(ui: &Ui, theme: Theme, rect: Rect, shown: &ShownMaps, side: usize, about: &str) -> Response {
     let map = &shown.maps[side];
     cells(ui, theme, rect, (map, &shown.textures[side]), map.x.range);
-    let response = ui.interact(rect, egui::Id::unique(("pad", ui.id(), side)), Sense::hover());
+    let response = ui.interact(rect, egui::Id::unique(("pad", ui.scope_id(), side)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, about));
     let Some(at) = response.hover_pos() else { return response };
     let share = (at - rect.min) / rect.size();
@@ -211,9 +206,10 @@ pub(super) fn over_time_ui(ui: &mut Ui, over_time: &OverTime<'_>, height: f32) -
         if let Some(cursor) = cursor_s {
             line(&painter, x(cursor), strip, 1.6, [colour(colours.background), colour(colours.accent)]);
         }
-        let id = egui::Id::unique(("over time", ui.id(), &map.quantity, side));
+        let id = egui::Id::unique(("over time", ui.scope_id(), &map.quantity, side));
         let response = ui.interact(strip, id, Sense::click_and_drag());
-        let name = format!("{} over time, {} finger", capital(&map.quantity), map.title);
+        let cursor = cursor_s.map(|t| format!(", cursor at {}\u{2009}s", three_digits(t))).unwrap_or_default();
+        let name = format!("{} over time, {} finger{cursor}", capital(&map.quantity), map.title);
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &name));
         let pointer = response.interact_pointer_pos().or(response.hover_pos());
         let at = pointer.map(|at| time[0] + (time[1] - time[0]) * f64::from((at.x - room.start()) / width));

@@ -22,6 +22,7 @@
 //! - `studies`: stored results of studies, and what is made from them.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
+//! - `signatures`: pads and heat maps over time in the window, clicked and switched.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
 //!
 //! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
@@ -55,6 +56,7 @@ mod program;
 mod recognition_panel;
 mod scripted;
 mod serial;
+mod signatures;
 mod store;
 mod streams;
 mod studies;

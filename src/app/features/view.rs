@@ -98,8 +98,8 @@ impl PathLayer {
     pub fn title(self) -> &'static str {
         match self {
             Self::Off => "Path",
-            Self::Time => "Path: time",
-            Self::Pressure => "Path: pressure",
+            Self::Time => "Path: s",
+            Self::Pressure => "Path: kPa",
         }
     }
 }

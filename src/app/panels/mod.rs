@@ -18,15 +18,18 @@ mod journal;
 mod label;
 mod line_pressure;
 mod objects;
+mod pads;
 mod plan;
 mod pressure;
 mod recognition;
 mod scene;
 mod sensors;
+mod signature;
 mod training;
 mod trial;
 mod trials;
 mod view3d;
+mod view_layers;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
@@ -43,7 +46,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 26] = [
+pub const ALL: [PanelKind; 28] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -65,6 +68,8 @@ pub const ALL: [PanelKind; 26] = [
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
     PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
     PanelKind { name: "fit", title: "Fit", ui: fit::ui },
+    PanelKind { name: "pads", title: "Pads", ui: pads::ui },
+    PanelKind { name: "signature", title: "Signature", ui: signature::ui },
     PanelKind { name: "trial", title: "This trial", ui: trial::ui },
     PanelKind { name: "compared", title: "Compared", ui: compared::ui },
     PanelKind { name: "sensors", title: "Sensors", ui: sensors::ui },

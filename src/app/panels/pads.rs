@@ -23,7 +23,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let shown = shown_pads(ui, "pads", &grasp, unit);
     let [map, _] = &*shown.maps;
     let (header, _) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::hover());
-    let mut switch = ui.new_child(egui::UiBuilder::new().max_rect(header).layout(egui::Layout::left_to_right(egui::Align::Center)));
+    let mut switch =
+        ui.new_child(egui::UiBuilder::new().max_rect(header).layout(egui::Layout::left_to_right(egui::Align::Center)));
     load_switch(&mut switch, unit, actions);
     colour_bar(ui, theme, header.right_center(), (0.25 * header.width()).clamp(30.0, 160.0), map.scale, &map.unit);
     let colours = theme.colours();
@@ -38,7 +39,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     for (side, pad) in grasp.pads().iter().enumerate() {
         let left = begin + side as f32 * (width + 28.0);
         let place = Rect::from_min_size(pos2(left, top), vec2(width, height));
-        ui.painter().text(pos2(place.center().x, rect.top() + 7.0), Align2::CENTER_CENTER, &shown.maps[side].title, font.clone(), ink);
+        ui.painter().text(
+            pos2(place.center().x, rect.top() + 7.0),
+            Align2::CENTER_CENTER,
+            &shown.maps[side].title,
+            font.clone(),
+            ink,
+        );
         pad_ui(ui, theme, place, &shown, side, &pad.about(&shown.maps[side].title));
         let below = place.center_bottom() + vec2(0.0, 3.0);
         ui.painter().text(below, Align2::CENTER_TOP, pad.force_text(), font.clone(), ink);

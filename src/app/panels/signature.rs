@@ -22,7 +22,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     ui.horizontal(|ui| {
         load_switch(ui, load_unit, actions);
         ui.separator();
-        for (choice, about) in [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")]
+        for (choice, about) in
+            [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")]
         {
             if ui.selectable_label(bend_unit == choice, choice.symbol()).on_hover_text(about).clicked() {
                 actions.push(ViewAction::SetBendUnit(choice));
