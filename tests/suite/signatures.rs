@@ -3,7 +3,7 @@
 use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use egui::Key;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::{ALL_PANELS, PathLayer};
 use palpate_geometry::palette::Theme;
 use palpate_lab::picture::{BendUnit, LoadUnit};
@@ -47,7 +47,8 @@ fn units_are_switched() {
 fn pads_say_their_force_in_words() {
     let mut bench = panel("pads", Theme::Dark, [280.0, 300.0]);
     let force = |bench: &Bench, side: &str| -> f64 {
-        let pad = bench.harness.get_by_label_contains(&format!("{side} pad: "));
+        let wanted = format!("{side} pad: ");
+        let pad = bench.harness.get_by_label_contains(&wanted);
         let text = pad.accesskit_node().label().expect("a label");
         text.split(": ")
             .nth(1)

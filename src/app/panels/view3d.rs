@@ -1,7 +1,8 @@
 //! 3-D view: drag turns, the right or middle button moves, the wheel zooms, a double click shows everything, Ctrl and drag
 //! pulls at the object.
 
-use super::view_layers::{path_colour, path_mesh, small_pads};
+use super::contact_path::{path_colour, path_mesh};
+use super::small_pads::small_pads;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::simulation::SimulationAction;

@@ -20,7 +20,7 @@ const SCALE_BAR: f32 = 46.0;
 const BUTTONS: f32 = 620.0;
 
 /// Draws both pads where nothing else is; leaves them out where the view is too small.
-pub(in crate::app::panels) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: &PictureView) {
+pub(super) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: &PictureView) {
     let Some(grasp) = ShownGrasp::of(context) else { return };
     let legends = legend_room(view);
     let below = rect.height() - legends.y - SCALE_BAR - TEXTS;

@@ -19,7 +19,7 @@ struct DrawnPath {
 }
 
 /// Colours of a layer, where it is drawn.
-pub(in crate::app::panels) fn path_colour(layer: PathLayer, grasp: &ShownGrasp<'_>) -> Option<PathColour> {
+pub(super) fn path_colour(layer: PathLayer, grasp: &ShownGrasp<'_>) -> Option<PathColour> {
     match layer {
         PathLayer::Off => None,
         PathLayer::Time => Some(PathColour::Time(grasp.span_s.map(|t| t as f32))),
@@ -28,7 +28,7 @@ pub(in crate::app::panels) fn path_colour(layer: PathLayer, grasp: &ShownGrasp<'
 }
 
 /// Where the fingers touched the object until the time shown.
-pub(in crate::app::panels) fn path_mesh(
+pub(super) fn path_mesh(
     ctx: &egui::Context,
     stage: &Stage,
     grasp: &ShownGrasp<'_>,
