@@ -69,7 +69,7 @@ fn pads_say_their_force_in_words() {
 fn a_key_draws_the_contact_path() {
     let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
     for layer in [PathLayer::Time, PathLayer::Pressure, PathLayer::Off] {
-        bench.harness.key_press(Key::P);
+        bench.harness.key_press(Key::C);
         bench.harness.step();
         assert_eq!(bench.workbench().view().path, layer);
     }

@@ -65,7 +65,7 @@ static COMMON: [Binding; 31] = [
     key(Modifiers::SHIFT, Key::Z, "show everything", |_| Some(ViewAction::FrameAll.into())),
     key(Modifiers::NONE, Key::Z, "show the object", |c| Some(ViewAction::SetCamera(object_framed(c)?).into())),
     key(Modifiers::NONE, Key::F, "force arrows", |c| Some(ViewAction::SetForces(!c.view.forces).into())),
-    key(Modifiers::NONE, Key::P, "contact path on the object: by time, by pressure, off", |c| {
+    key(Modifiers::NONE, Key::C, "contact path on the object: by time, by pressure, off", |c| {
         Some(ViewAction::SetPath(c.view.path.next()).into())
     }),
     key(Modifiers::NONE, Key::G, "ghost: result of the other engine", |c| {

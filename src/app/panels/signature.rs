@@ -11,12 +11,9 @@ use egui::{RichText, Ui, vec2};
 use palpate_lab::picture::BendUnit;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let grasp = match ShownGrasp::of(context).filter(ShownGrasp::has_course) {
-        Some(grasp) => grasp,
-        None => {
-            ui.add(egui::Label::new(RichText::new(ShownGrasp::missing(context)).weak()).wrap());
-            return;
-        }
+    let Some(grasp) = ShownGrasp::of(context).filter(ShownGrasp::has_course) else {
+        ui.add(egui::Label::new(RichText::new(ShownGrasp::missing(context)).weak()).wrap());
+        return;
     };
     let (load_unit, bend_unit) = (context.view.load_unit, context.view.bend_unit);
     ui.horizontal(|ui| {

@@ -16,6 +16,8 @@ const EACH: f32 = 54.0;
 /// Height of the texts above and below a pad, and of the scale bar at the foot of the picture (points).
 const TEXTS: f32 = 34.0;
 const SCALE_BAR: f32 = 46.0;
+/// A picture whose legends are lower has none (points).
+const LEGEND: f32 = 40.0;
 /// Width below which the view has no buttons in its upper left corner (points).
 const BUTTONS: f32 = 620.0;
 
@@ -41,6 +43,11 @@ pub(super) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: 
     let size = vec2((WIDTH * height).max(14.0), height);
     let shown = shown_pads(ui, "small pads", &grasp, LoadUnit::Pressure);
     let (ink, font) = (colour(theme.colours().text), FontId::proportional(12.0));
+    if legends.y < LEGEND {
+        let [_, full] = shown.maps[0].scale.limits();
+        let text = format!("0 to {full:.0}\u{2009}kPa");
+        ui.painter().text(pos2(right - EACH, top + height + 40.0), Align2::CENTER_CENTER, text, font.clone(), ink);
+    }
     for (side, pad) in grasp.pads().iter().enumerate() {
         let middle = right - EACH * (1.5 - side as f32);
         let title = &shown.maps[side].title;

@@ -209,7 +209,7 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ac
     }
     let path = bar
         .selectable_label(context.view.path != PathLayer::Off, context.view.path.title())
-        .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (P)");
+        .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
     if path.clicked() {
         actions.push(ViewAction::SetPath(context.view.path.next()));
     }
