@@ -37,6 +37,7 @@ fn raw_curves(context: &PanelContext<'_>, board: &Board, quantity: Quantity) -> 
             dashed: side == Side::Right,
             values: Box::new(move |trace, k| trace.channels.get(column)?.get(k).map(|value| f64::from(*value))),
             half_width: Box::new(|_, _| None),
+            channel: None,
         })
     };
     sensors.into_iter().zip(Side::BOTH).filter_map(curve).collect()
@@ -55,6 +56,7 @@ fn physical_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) 
             half_width: Box::new(move |trace, k| {
                 band_half_width(&trace.t, trace.errors.get(index)?, k).map(|half| half * factor)
             }),
+            channel: Some((channel.name(), factor)),
         })
         .collect()
 }

@@ -59,7 +59,7 @@ pub struct PanelContext<'a> {
     /// A trial is being opened.
     pub opening: bool,
     /// Comparison with other trials.
-    pub comparison: Comparison<'a>,
+    pub comparison: ComparedTrials<'a>,
     /// Cursor on the data that are shown.
     pub(super) playback: &'a Playback,
     /// View state.
@@ -72,7 +72,7 @@ pub struct PanelContext<'a> {
 
 /// Trials beside the one that is shown.
 #[derive(Clone, Copy)]
-pub struct Comparison<'a> {
+pub struct ComparedTrials<'a> {
     /// The trials.
     pub pinned: &'a [Pinned],
     /// Their curves, or those of their classes.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What a plot shows of its channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Derived {
+pub enum Derivation {
     /// Their values.
     #[default]
     Values,
@@ -17,7 +17,7 @@ pub enum Derived {
     Derivative,
 }
 
-impl Derived {
+impl Derivation {
     /// All.
     pub const ALL: [Self; 4] = [Self::Values, Self::Sum, Self::Difference, Self::Derivative];
 

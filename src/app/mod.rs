@@ -21,8 +21,8 @@
 //! | workflow | `features/labelling.rs` `features/recognition.rs` | labelling session; recognition by both grippers |
 //! | actions | `actions.rs` `features/` | actions of all features |
 //! | context | `context.rs` | read-only context of panels |
-//! | parts | `widgets.rs` `plots/` `figure_plot.rs` `keys/binding.rs` | building blocks of panels and modes |
-//! | curves | `channel_curves.rs` `modes/` | curves of channels; layout and keys of each mode |
+//! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` `keys/binding.rs` | building blocks of panels and modes |
+//! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
 //! | tiles | `tiling.rs` | panels beside each other |
 //! | workbench | `workbench.rs` | owner of all features |
@@ -42,6 +42,7 @@ mod derived;
 mod features;
 mod figure_plot;
 mod files;
+mod heat_map;
 mod icons;
 mod keys;
 mod modes;
@@ -50,6 +51,7 @@ mod panels;
 mod playback;
 mod plots;
 mod shown;
+mod shown_grasp;
 mod startup;
 mod theme;
 mod tiling;
@@ -61,14 +63,14 @@ mod workbench;
 
 pub use actions::{Action, Actions};
 pub use context::PanelContext;
-pub use derived::Derived;
+pub use derived::Derivation;
 pub use features::files::FileAction;
 pub use features::gripper::GripperAction;
 pub use features::inspect::{ComparedTrace, InspectAction, Inspected, Pinned};
 pub use features::recognition::RecognitionAction;
 pub use features::simulation::SimulationAction;
 pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
-pub use features::view::{ViewAction, ViewState};
+pub use features::view::{PathLayer, ViewAction, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
 pub use panels::{ALL as ALL_PANELS, PanelKind};

@@ -2,7 +2,7 @@
 
 use crate::app::actions::{Action, Actions};
 use crate::app::bars;
-use crate::app::context::{Comparison, PanelContext};
+use crate::app::context::{ComparedTrials, PanelContext};
 use crate::app::features::files::{FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
@@ -265,7 +265,7 @@ impl Workbench {
             traces: self.traces(),
             inspected: self.inspect.inspected(),
             opening: self.inspect.is_opening(),
-            comparison: Comparison {
+            comparison: ComparedTrials {
                 pinned: self.inspect.pinned(),
                 traces: self.inspect.compared(),
                 alignment: self.inspect.alignment(),

@@ -15,7 +15,7 @@
 //! | 2 | `modelling`, `repair`, `support_points`, `mass` | meshes made and repaired, extreme points, mass properties |
 //! | 3 | `primitive`, `convex`, `surface` | closed-form solids, convex hulls, meshes to draw |
 //! | 4 | `distance` | signed distance of solids |
-//! | 4 | [`drawing`] | draw list, camera, two-dimensional overlay; figures with axes |
+//! | 4 | [`drawing`] | draw list, camera, two-dimensional overlay; figures with axes; heat maps |
 //! | 5 | `bake` | distance grids of meshes |
 //!
 //! # Example

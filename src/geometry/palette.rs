@@ -67,10 +67,52 @@ pub const PRESSURE_MAP: [Rgb; 17] = [
 
 /// Colour of a share of full scale; clipped at both ends, NaN is the lowest.
 pub fn pressure_colour(share: f32) -> Rgb {
-    let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
-    let at = share * (PRESSURE_MAP.len() - 1) as f32;
-    let low = (at as usize).min(PRESSURE_MAP.len() - 2);
-    PRESSURE_MAP[low].mix(PRESSURE_MAP[low + 1], at - low as f32)
+    between(&PRESSURE_MAP, if share.is_nan() { 0.0 } else { share })
+}
+
+/// Colour at a share of a map of even steps; clipped at both ends.
+fn between(map: &[Rgb], share: f32) -> Rgb {
+    let at = share.clamp(0.0, 1.0) * (map.len() - 1) as f32;
+    let low = (at as usize).min(map.len() - 2);
+    map[low].mix(map[low + 1], at - low as f32)
+}
+
+/// The silicone of a pad.
+pub const SILICONE: Rgb = Rgb(232, 222, 206);
+
+/// Colour of a load on a pad, as a share of full scale: that of [`pressure_colour`], and the silicone's own below 1.5 %.
+/// The same as in `shaders/skin.wgsl`, which adds light and shadow.
+pub fn load_colour(share: f32) -> Rgb {
+    let t = ((share - 0.015) / (0.06 - 0.015)).clamp(0.0, 1.0);
+    let t = if t.is_nan() { 0.0 } else { t * t * (3.0 - 2.0 * t) };
+    SILICONE.mix(pressure_colour(share), t)
+}
+
+/// The map from a signed share of full scale to a colour, at 17 even steps: blue, white in the middle, orange. Straight
+/// lines in CIELAB from the ends of ColorBrewer's PuOr and RdBu maps, both ends equally dark.
+pub const SIGNED_MAP: [Rgb; 17] = [
+    Rgb(33, 102, 172),
+    Rgb(73, 118, 181),
+    Rgb(101, 135, 190),
+    Rgb(127, 152, 199),
+    Rgb(151, 170, 208),
+    Rgb(175, 188, 217),
+    Rgb(198, 206, 226),
+    Rgb(221, 225, 235),
+    Rgb(244, 244, 244),
+    Rgb(239, 222, 212),
+    Rgb(232, 200, 181),
+    Rgb(223, 178, 150),
+    Rgb(214, 157, 120),
+    Rgb(203, 136, 91),
+    Rgb(191, 116, 62),
+    Rgb(177, 95, 31),
+    Rgb(163, 75, 0),
+];
+
+/// Colour of a share between -1 and 1; clipped at both ends, NaN is the middle.
+pub fn signed_colour(share: f32) -> Rgb {
+    between(&SIGNED_MAP, 0.5 + 0.5 * if share.is_nan() { 0.0 } else { share })
 }
 
 /// Theme.
@@ -250,6 +292,24 @@ mod tests {
         assert_eq!(pressure_colour(-3.0), PRESSURE_MAP[0]);
         assert_eq!(pressure_colour(7.0), PRESSURE_MAP[16]);
         assert_eq!(pressure_colour(f32::NAN), PRESSURE_MAP[0]);
+    }
+
+    #[test]
+    fn the_signed_map_is_neutral_in_the_middle_and_darkens_evenly_to_both_ends() {
+        assert_eq!(signed_colour(0.0), Rgb(244, 244, 244));
+        assert_eq!((signed_colour(-7.0), signed_colour(7.0)), (SIGNED_MAP[0], SIGNED_MAP[16]));
+        assert_eq!(signed_colour(f32::NAN), SIGNED_MAP[8]);
+        for sign in [-1.0, 1.0] {
+            let shades: Vec<f32> = (0..=32).map(|i| signed_colour(sign * i as f32 / 32.0).luminance()).collect();
+            assert!(shades.windows(2).all(|pair| pair[1] < pair[0] + 2e-3), "{sign}: {shades:?}");
+        }
+        assert!((SIGNED_MAP[0].luminance() - SIGNED_MAP[16].luminance()).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_light_load_has_the_silicone_s_colour_and_a_heavy_one_that_of_the_map() {
+        assert_eq!([0.0, 0.015, f32::NAN].map(load_colour), [SILICONE; 3]);
+        assert_eq!([0.06, 0.5, 2.0].map(load_colour), [0.06, 0.5, 2.0].map(pressure_colour));
     }
 
     #[test]

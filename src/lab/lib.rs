@@ -21,7 +21,7 @@
 //! | 0 | [`gripper`] | the trait [`gripper::Gripper`]; simulated, serial and replayed grippers |
 //! | 0 | [`labelling`] | flags of a trial, begin and end of a grasp, trials to review |
 //! | 0 | [`datasets`] | trials of a store as a data set; saved models |
-//! | 0 | [`picture`] | scene and frame to a draw list |
+//! | 0 | [`picture`] | scene and frame to a draw list; frames to heat maps |
 //! | 1 | [`grasping`] | the grasp controller, runs, computing again, collections, identification, error bands |
 //! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
 //! | 2 | [`study`] | measurements and comparisons as functions |

@@ -23,6 +23,7 @@
 //! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
+//! - `signatures`: pads and heat maps over time in the window, clicked and switched.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
 //!
 //! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
@@ -57,6 +58,7 @@ mod program;
 mod recognition_panel;
 mod scripted;
 mod serial;
+mod signatures;
 mod store;
 mod streams;
 mod studies;

@@ -1,6 +1,6 @@
 //! View state: camera, theme, layout and settings of the window. Remembered between runs, never written into a trial.
 
-use crate::app::derived::Derived;
+use crate::app::derived::Derivation;
 use crate::app::modes::mode::Mode;
 use crate::app::theme;
 use crate::app::view_source::ViewSource;
@@ -8,6 +8,7 @@ use egui_tiles::{Tile, Tree};
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
+use palpate_lab::picture::{BendUnit, LoadUnit};
 use palpate_lab::workers::Snapshot;
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,12 @@ pub struct ViewState {
     pub framed: Option<Camera>,
     /// Force arrows are drawn.
     pub forces: bool,
+    /// Contact path on the object.
+    pub path: PathLayer,
+    /// Unit of loads in heat maps.
+    pub load_unit: LoadUnit,
+    /// Unit of bending in heat maps.
+    pub bend_unit: BendUnit,
     /// Fingers and object of the other engine are drawn.
     pub ghost: bool,
     /// The true object is shown beside the recognised one.
@@ -57,11 +64,46 @@ pub struct ViewState {
     /// Sensors that plots and recognisers read of the simulation and of stored trials.
     pub sensors: SensorView,
     /// What each plot derives from its channels.
-    pub derived: BTreeMap<String, Derived>,
+    pub derived: BTreeMap<String, Derivation>,
+    /// Plots show mean and spread of the two likeliest classes.
+    pub class_bands: bool,
     /// Plots of the real gripper show raw counts in place of physical units.
     pub raw: bool,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
+}
+
+/// Contact path on the object: not drawn, or by what it is coloured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PathLayer {
+    /// Not drawn.
+    #[default]
+    Off,
+    /// Coloured by the time of the first touch.
+    Time,
+    /// Coloured by the largest pressure.
+    Pressure,
+}
+
+impl PathLayer {
+    /// The next one: off, time, pressure.
+    pub fn next(self) -> Self {
+        match self {
+            Self::Off => Self::Time,
+            Self::Time => Self::Pressure,
+            Self::Pressure => Self::Off,
+        }
+    }
+
+    /// Text on its button.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Off => "Path",
+            Self::Time => "Path: s",
+            Self::Pressure => "Path: kPa",
+        }
+    }
 }
 
 /// Change of the view state.
@@ -79,12 +121,20 @@ pub enum ViewAction {
     SetTheme(Theme),
     /// Show or hide force arrows.
     SetForces(bool),
+    /// Draw the contact path, or do not.
+    SetPath(PathLayer),
+    /// Unit of loads in heat maps.
+    SetLoadUnit(LoadUnit),
+    /// Unit of bending in heat maps.
+    SetBendUnit(BendUnit),
     /// Time shown by all plots (s); `None` for the whole grasp.
     SetTimeWindow(Option<[f64; 2]>),
     /// Sensors that plots and recognisers read.
     SetSensors(SensorView),
     /// What a plot derives from its channels.
-    Derive(String, Derived),
+    Derive(String, Derivation),
+    /// Show or hide mean and spread of the two likeliest classes.
+    ShowClassBands(bool),
     /// Show raw counts of the real gripper, or physical units.
     ShowRaw(bool),
     /// Show or hide the true object.
@@ -107,6 +157,9 @@ impl Default for ViewState {
             camera: Camera::default(),
             framed: None,
             forces: true,
+            path: PathLayer::default(),
+            load_unit: LoadUnit::default(),
+            bend_unit: BendUnit::default(),
             ghost: false,
             truth_shown: true,
             mode: Mode::default(),
@@ -121,6 +174,7 @@ impl Default for ViewState {
             keys_shown: false,
             sensors: SensorView::default(),
             derived: BTreeMap::new(),
+            class_bands: false,
             raw: false,
             recent: Vec::new(),
         }
@@ -143,11 +197,15 @@ impl ViewState {
                 theme::apply(ctx, theme);
             }
             ViewAction::SetForces(forces) => self.forces = forces,
+            ViewAction::SetPath(path) => self.path = path,
+            ViewAction::SetLoadUnit(unit) => self.load_unit = unit,
+            ViewAction::SetBendUnit(unit) => self.bend_unit = unit,
             ViewAction::SetTimeWindow(window) => self.time_window = window,
             ViewAction::SetSensors(sensors) => self.sensors = sensors,
             ViewAction::Derive(plot, derived) => {
                 self.derived.insert(plot, derived);
             }
+            ViewAction::ShowClassBands(shown) => self.class_bands = shown,
             ViewAction::ShowRaw(raw) => self.raw = raw,
             ViewAction::ShowTruth(shown) => self.truth_shown = shown,
             ViewAction::ShowPanel(panel) => {

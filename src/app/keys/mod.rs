@@ -23,7 +23,7 @@ use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingActio
 const COMMAND_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };
 
 /// Keys of all modes. Those with more modifiers come first, so that they win.
-static COMMON: [Binding; 30] = [
+static COMMON: [Binding; 31] = [
     key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or restart it", |_| {
         Some(LabellingAction::Record.into())
     }),
@@ -65,6 +65,9 @@ static COMMON: [Binding; 30] = [
     key(Modifiers::SHIFT, Key::Z, "show everything", |_| Some(ViewAction::FrameAll.into())),
     key(Modifiers::NONE, Key::Z, "show the object", |c| Some(ViewAction::SetCamera(object_framed(c)?).into())),
     key(Modifiers::NONE, Key::F, "force arrows", |c| Some(ViewAction::SetForces(!c.view.forces).into())),
+    key(Modifiers::NONE, Key::C, "contact path on the object: by time, by pressure, off", |c| {
+        Some(ViewAction::SetPath(c.view.path.next()).into())
+    }),
     key(Modifiers::NONE, Key::G, "ghost: result of the other engine", |c| {
         Some(SimulationAction::SetGhost(!c.view.ghost).into())
     }),

@@ -37,8 +37,8 @@ const KEYS: &[Binding] = &[
 /// Trials left, the view over plots in the middle, answers and facts right.
 fn layout(tiles: &mut Tiles<String>) -> TileId {
     let compared = tabs(tiles, &["compared", "sensors"]);
-    let [view, curvature] = ["view", "curvature"].map(|name| tabs(tiles, &[name]));
-    let loads = tabs(tiles, &["pressure", "force", "line", "counts", "hysteresis"]);
+    let [view, curvature] = [&["view"][..], &["curvature", "signature"]].map(|names| tabs(tiles, names));
+    let loads = tabs(tiles, &["pressure", "force", "line", "counts", "hysteresis", "pads"]);
     let right = tabs(tiles, &["recognition", "why", "trial"]);
     let middle = split(tiles, LinearDir::Vertical, [(view, 0.42), (curvature, 0.29), (loads, 0.29)]);
     split(tiles, LinearDir::Horizontal, [(compared, 0.22), (middle, 0.52), (right, 0.26)])

@@ -21,6 +21,7 @@ pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Ac
             dashed,
             values: Box::new(move |trace, k| trace.channels.get(derived + place)?.get(k).map(|v| f64::from(*v))),
             half_width: Box::new(|_, _| None),
+            channel: None,
         }
     });
     let curves = curves.collect();

@@ -12,6 +12,7 @@ pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Ac
         dashed: false,
         values: Box::new(|trace, k| trace.line_bar.get(k).copied()),
         half_width: Box::new(|_, _| None),
+        channel: None,
     };
     show(ui, context, actions, TimePlot { id: "line pressure", unit: "bar", curves: vec![curve], least: [0.0, 1.0] });
 }

@@ -5,6 +5,7 @@ mod accuracy;
 mod calibration;
 mod compared;
 mod console;
+mod contact_path;
 mod counts;
 mod curvature;
 mod doctor;
@@ -18,11 +19,14 @@ mod journal;
 mod label;
 mod line_pressure;
 mod objects;
+mod pads;
 mod plan;
 mod pressure;
 mod recognition;
 mod scene;
 mod sensors;
+mod signature;
+mod small_pads;
 mod training;
 mod trial;
 mod trials;
@@ -44,7 +48,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 27] = [
+pub const ALL: [PanelKind; 29] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -67,6 +71,8 @@ pub const ALL: [PanelKind; 27] = [
     PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
     PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
     PanelKind { name: "fit", title: "Fit", ui: fit::ui },
+    PanelKind { name: "pads", title: "Pads", ui: pads::ui },
+    PanelKind { name: "signature", title: "Signature", ui: signature::ui },
     PanelKind { name: "trial", title: "This trial", ui: trial::ui },
     PanelKind { name: "compared", title: "Compared", ui: compared::ui },
     PanelKind { name: "sensors", title: "Sensors", ui: sensors::ui },

@@ -1,18 +1,21 @@
 //! 3-D view: drag turns, the right or middle button moves, the wheel zooms, a double click shows everything, Ctrl and drag
 //! pulls at the object.
 
+use super::contact_path::{path_colour, path_mesh};
+use super::small_pads::small_pads;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::simulation::SimulationAction;
-use crate::app::features::view::ViewAction;
+use crate::app::features::view::{PathLayer, ViewAction};
 use crate::app::shown::Moment;
+use crate::app::shown_grasp::ShownGrasp;
 use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Camera, StandardView};
-use palpate_lab::picture::PictureView;
+use palpate_lab::picture::{PictureView, Stage};
 use palpate_lab::workers::Command;
 
 /// Force of a pull across the height of the picture (N).
@@ -33,7 +36,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         return;
     }
     steer(ui, &response, context, actions);
-    paint(ui, rect, context, moment);
+    let picture = paint(ui, rect, context, moment);
+    small_pads(ui, rect, context, &picture);
     buttons(ui, rect, context, actions);
     if let Some(loading) = context.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
         let text = format!("Loading {loading} ..");
@@ -107,14 +111,19 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
-fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) {
+/// Draws the picture; returns what it was drawn by.
+fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) -> PictureView {
     let Moment { grasp, stage, frame } = moment;
+    // Nothing is known of where a real gripper touched.
+    let course = ShownGrasp::of(context).filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
+    let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
     let pixels_per_point = ui.ctx().pixels_per_point();
     let picture = PictureView {
         camera: context.view.camera,
         theme: context.view.theme,
         size: Vec2::new(rect.width(), rect.height()),
         forces: context.view.forces,
+        path: grasp_path.as_ref().map(|(_, colour)| *colour),
         ..PictureView::default()
     };
     let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
@@ -135,6 +144,10 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) {
     if let Some(curvature) = key.real {
         list.ghosts.extend(stage.reconstructed(curvature, context.view.theme));
     }
+    if let Some((shown, colour)) = &grasp_path {
+        list.solids.extend(stage.path(&path_mesh(ui.ctx(), stage, shown, *colour), frame));
+        Stage::unveil(&mut list, context.view.theme);
+    }
     let caption = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
         Some(inspected) => inspected.trial.remarks.join(" "),
         None if key.real.is_some() => {
@@ -152,6 +165,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) {
         ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
         ui.painter().galley(place, galley, ink);
     }
+    picture
 }
 
 /// Curvature of the real fingers (1/m), while they are shown.
@@ -192,6 +206,12 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ac
     let forces = bar.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
     if forces.clicked() {
         actions.push(ViewAction::SetForces(!context.view.forces));
+    }
+    let path = bar
+        .selectable_label(context.view.path != PathLayer::Off, context.view.path.title())
+        .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
+    if path.clicked() {
+        actions.push(ViewAction::SetPath(context.view.path.next()));
     }
     let other = context.scene.solver.engine.other().name();
     let ghost = bar

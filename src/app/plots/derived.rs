@@ -1,16 +1,16 @@
 //! Curves derived from others: sum and difference of both fingers, and the change over time.
 
 use super::PlotCurve;
-use crate::app::derived::Derived;
+use crate::app::derived::Derivation;
 use std::rc::Rc;
 
 /// The derived curves; those of one finger that has no other are left out of sums and differences.
-pub(super) fn derive(derived: Derived, curves: Vec<PlotCurve>) -> Vec<PlotCurve> {
+pub(super) fn derive(derived: Derivation, curves: Vec<PlotCurve>) -> Vec<PlotCurve> {
     match derived {
-        Derived::Values => curves,
-        Derived::Sum => pairs(curves, "sum", |left, right| left + right),
-        Derived::Difference => pairs(curves, "difference", |left, right| left - right),
-        Derived::Derivative => curves.into_iter().map(change).collect(),
+        Derivation::Values => curves,
+        Derivation::Sum => pairs(curves, "sum", |left, right| left + right),
+        Derivation::Difference => pairs(curves, "difference", |left, right| left - right),
+        Derivation::Derivative => curves.into_iter().map(change).collect(),
     }
 }
 
@@ -31,6 +31,7 @@ fn pairs(curves: Vec<PlotCurve>, name: &str, join: fn(f64, f64) -> f64) -> Vec<P
             half_width: Box::new(|_, _| None),
             trace: curve.trace,
             dashed: false,
+            channel: None,
         });
     }
     joined
@@ -47,6 +48,7 @@ fn change(curve: PlotCurve) -> PlotCurve {
             (span > 0.0).then_some(rise / span)
         }),
         half_width: Box::new(|_, _| None),
+        channel: None,
         ..curve
     }
 }
@@ -64,6 +66,7 @@ mod tests {
             dashed,
             values: Box::new(move |trace, k| Some(f64::from(*trace.channels.get(column)?.get(k)?))),
             half_width: Box::new(|_, _| None),
+            channel: None,
         }
     }
 
@@ -75,15 +78,15 @@ mod tests {
             ..GraspTrace::default()
         };
         let curves = || vec![curve("left", 0, false), curve("right", 1, true)];
-        let values = |derived: Derived| -> Vec<Vec<f64>> {
+        let values = |derived: Derivation| -> Vec<Vec<f64>> {
             let all = |curve: &PlotCurve| (0..3).filter_map(|k| (curve.values)(&trace, k)).collect();
             derive(derived, curves()).iter().map(all).collect()
         };
-        assert_eq!(values(Derived::Sum), [[0.0, 1.5, 5.0]]);
-        assert_eq!(values(Derived::Difference), [[0.0, 0.5, 3.0]]);
-        assert_eq!(values(Derived::Derivative), [[2.0, 4.0, 6.0], [1.0, 1.0, 1.0]]);
-        assert_eq!(values(Derived::Values).len(), 2);
-        assert_eq!(derive(Derived::Sum, vec![curve("left", 0, false)]).len(), 0);
-        assert_eq!(Derived::Derivative.unit("kPa"), "kPa/s");
+        assert_eq!(values(Derivation::Sum), [[0.0, 1.5, 5.0]]);
+        assert_eq!(values(Derivation::Difference), [[0.0, 0.5, 3.0]]);
+        assert_eq!(values(Derivation::Derivative), [[2.0, 4.0, 6.0], [1.0, 1.0, 1.0]]);
+        assert_eq!(values(Derivation::Values).len(), 2);
+        assert_eq!(derive(Derivation::Sum, vec![curve("left", 0, false)]).len(), 0);
+        assert_eq!(Derivation::Derivative.unit("kPa"), "kPa/s");
     }
 }

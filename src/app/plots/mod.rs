@@ -6,7 +6,7 @@ mod labels;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::derived::Derived;
+use crate::app::derived::Derivation;
 use crate::app::features::inspect::{ComparedTrace, InspectAction};
 use crate::app::features::view::ViewAction;
 use crate::app::playback::Seek;
@@ -22,6 +22,7 @@ use labels::CurveLabel;
 use palpate_geometry::palette::{Rgb, Theme, Trace, series_colour};
 use palpate_geometry::units::three_digits;
 use palpate_lab::inspection::{PhaseSpan, TouchPhase};
+use palpate_sim::objects::object_title;
 use palpate_tactile::trial::TrialSource;
 
 /// Value of one row of a trace; `None` where it is undefined.
@@ -39,6 +40,8 @@ pub(super) struct PlotCurve {
     pub(super) values: TraceValue,
     /// Half the width of its error band, in the same unit; `None` without one.
     pub(super) half_width: TraceValue,
+    /// Name of its channel in files, and the factor from the channel's unit; `None` for curves that are no channel.
+    pub(super) channel: Option<(String, f64)>,
 }
 
 /// Plot of curves over time.
@@ -68,10 +71,12 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
     let theme = context.view.theme;
     let derived = context.view.derived.get(plot.id).copied().unwrap_or_default();
     if ui.available_height() > ROOM_FOR_HEADER && ui.available_width() > ROOM_FOR_LABELS {
-        header_ui(ui, context, actions, plot.id, derived);
+        let channels = plot.curves.iter().filter_map(|curve| Some(curve.channel.as_ref()?.0.as_str()));
+        let plotted: Vec<&str> = channels.collect();
+        header_ui(ui, context, actions, (plot.id, &plotted), derived);
     }
     let unit = derived.unit(plot.unit);
-    let least = if derived == Derived::Values { plot.least } else { [0.0, 0.0] };
+    let least = if derived == Derivation::Values { plot.least } else { [0.0, 0.0] };
     let plot = TimePlot { curves: derived::derive(derived, plot.curves), unit: &unit, least, ..plot };
     let [low, high] = value_range(context, &plot, [from, to]);
     let labelled = ui.available_width() > ROOM_FOR_LABELS;
@@ -106,6 +111,9 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
         add_gaps(plot_ui, &gaps, theme);
         for trace in context.traces.earlier() {
             add_curves(plot_ui, trace, &plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0);
+        }
+        if context.view.class_bands {
+            add_class_bands(plot_ui, context, &plot);
         }
         for compared in context.comparison.traces {
             let ink = series_colour(compared.colour, theme);
@@ -152,11 +160,17 @@ const ROOM_FOR_HEADER: f32 = 120.0;
 const ROOM_FOR_LABELS: f32 = 380.0;
 
 /// Choice of what is derived, and the times of cursor and marks.
-fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, id: &str, derived: Derived) {
+fn header_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    actions: &mut Actions,
+    (id, plotted): (&str, &[&str]),
+    derived: Derivation,
+) {
     ui.horizontal(|ui| {
         let combo = egui::ComboBox::from_id_salt((id, "derived")).width(96.0);
         let shown = combo.selected_text(egui::RichText::new(derived.name()).small()).show_ui(ui, |ui| {
-            for choice in Derived::ALL {
+            for choice in Derivation::ALL {
                 if ui.selectable_label(choice == derived, choice.name()).clicked() {
                     actions.push(ViewAction::Derive(id.to_owned(), choice));
                 }
@@ -167,6 +181,18 @@ fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, id:
             let mut raw = context.view.raw;
             if ui.checkbox(&mut raw, egui::RichText::new("raw counts").small()).changed() {
                 actions.push(ViewAction::ShowRaw(raw));
+            }
+        }
+        if let Some([first, second]) = plotted.first().and_then(|name| context.bands_for(name)) {
+            let mut shown = context.view.class_bands;
+            let text = egui::RichText::new("likeliest classes").small();
+            let hint = format!(
+                "Mean and spread of the two likeliest classes behind the curves: {} blue, {} orange",
+                object_title(&first.class),
+                object_title(&second.class)
+            );
+            if ui.checkbox(&mut shown, text).on_hover_text(hint).changed() {
+                actions.push(ViewAction::ShowClassBands(shown));
             }
         }
         let playback = context.playback;
@@ -367,6 +393,24 @@ fn add_spread(plot_ui: &mut egui_plot::PlotUi<'_>, compared: &ComparedTrace, plo
     }
 }
 
+/// Draws mean and spread of the two likeliest classes: the likeliest in the accent colour, the second in that of warnings.
+fn add_class_bands(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, plot: &TimePlot<'_>) {
+    let colours = context.view.theme.colours();
+    for (name, factor) in plot.curves.iter().filter_map(|curve| curve.channel.as_ref()) {
+        let Some(bands) = context.bands_for(name) else { continue };
+        for (band, ink) in bands.iter().zip([colours.accent, colours.warning]) {
+            let points: Vec<[f64; 3]> = (0..band.t_s.len())
+                .map(|k| [band.t_s[k], factor * band.low[k], factor * band.high[k]])
+                .filter(|point| point.iter().all(|value| value.is_finite()))
+                .collect();
+            fill(plot_ui, &points, veil(ink, 0.15));
+            let mean: Vec<[f64; 2]> = (0..band.t_s.len()).map(|k| [band.t_s[k], factor * band.mean[k]]).collect();
+            let line = Line::new("", PlotPoints::from(mean)).color(veil(ink, 0.7)).width(1.0);
+            plot_ui.line(line.style(LineStyle::dotted_dense()).allow_hover(false));
+        }
+    }
+}
+
 /// Fills between low and high: time, low, high.
 fn fill(plot_ui: &mut egui_plot::PlotUi<'_>, points: &[[f64; 3]], ink: Color32) {
     let [t, low, high] = [0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect::<Vec<f64>>());
@@ -511,6 +555,7 @@ mod tests {
             dashed: true,
             values: Box::new(|trace, k| Some(f64::from(trace.channels[0][k]))),
             half_width: Box::new(|_, _| None),
+            channel: None,
         };
         assert_eq!(runs(&trace, &curve), [vec![[1.0, 1.0], [2.0, 2.0]], vec![[5.0, 3.0]]]);
     }

@@ -5,10 +5,12 @@
 
 mod camera;
 mod figure;
+mod heat_map;
 mod overlay;
 
 pub use camera::{Camera, StandardView};
 pub use figure::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
+pub use heat_map::{CellAxis, ColourScale, HeatMap};
 pub use overlay::{Align, Overlay, Shape2};
 
 use crate::SurfaceMesh;

@@ -1,5 +1,6 @@
 //! Annotations of a picture: axis gizmo, scale bar, legend of the pressure map, and a badge.
 
+use super::contact_path::PathColour;
 use super::{PictureView, ink};
 use glam::{Vec2, Vec3};
 use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
@@ -10,6 +11,11 @@ use palpate_geometry::units::three_digits;
 const MARGIN: f32 = 18.0;
 /// Height of its text (points).
 const TEXT: f32 = 14.0;
+/// Least size of a picture with scale bar and legends (points).
+const LEAST_SIZE: Vec2 = Vec2::new(340.0, 200.0);
+/// Width of a legend, and its height with its texts (points).
+const LEGEND_WIDTH: f32 = 132.0;
+const LEGEND_HEIGHT: f32 = 50.0;
 /// Lengths that the scale bar may stand for (mm).
 pub const SCALE_STEPS: [f32; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
@@ -19,9 +25,13 @@ pub(super) fn add(overlay: &mut Overlay, view: &PictureView) {
     if size.x >= 160.0 && size.y >= 120.0 {
         add_gizmo(overlay, &view.camera, Vec2::new(MARGIN + 26.0, size.y - MARGIN - 26.0), view.theme);
     }
-    if size.x >= 340.0 && size.y >= 200.0 {
+    if size.x >= LEAST_SIZE.x && size.y >= LEAST_SIZE.y {
         add_scale_bar(overlay, view);
-        add_legend(overlay, view);
+        let full = f64::from(view.full_scale) * 1e-3;
+        add_legend(overlay, view, MARGIN, "pad pressure, kPa", [0.0, full]);
+        if let Some(PathColour::Time(span)) = view.path {
+            add_legend(overlay, view, MARGIN + LEGEND_HEIGHT, "first touch, s", span.map(f64::from));
+        }
     }
     if let Some(badge) = view.badge.as_ref().filter(|_| size.x >= 160.0) {
         add_badge(overlay, badge, view.theme);
@@ -74,14 +84,22 @@ fn add_scale_bar(overlay: &mut Overlay, view: &PictureView) {
     overlay.text((left + right) * 0.5 - Vec2::new(0.0, 12.0), Align::Centre, TEXT, colour, format!("{mm}\u{2009}mm"));
 }
 
-/// The pressure map with its unit, in the top right corner.
-fn add_legend(overlay: &mut Overlay, view: &PictureView) {
-    const WIDTH: f32 = 132.0;
+/// Room of the legends in the top right corner of a picture (points): width from the right edge, height from the top.
+pub fn legend_room(view: &PictureView) -> Vec2 {
+    let timed = matches!(view.path, Some(PathColour::Time(_)));
+    let count =
+        if view.size.x < LEAST_SIZE.x || view.size.y < LEAST_SIZE.y { 0.0 } else { 1.0 + f32::from(u8::from(timed)) };
+    Vec2::new(MARGIN + LEGEND_WIDTH, MARGIN + count * LEGEND_HEIGHT)
+}
+
+/// The colour map with its quantity and the values at its ends, in the top right corner.
+fn add_legend(overlay: &mut Overlay, view: &PictureView, from_top: f32, title: &str, [low, high]: [f64; 2]) {
+    const WIDTH: f32 = LEGEND_WIDTH;
     const HEIGHT: f32 = 9.0;
     let colour = ink(view.theme);
     let left = view.size.x - MARGIN - WIDTH;
-    let top = MARGIN + 16.0;
-    overlay.text(Vec2::new(left, MARGIN + 4.0), Align::Left, TEXT, colour, "pad pressure, kPa");
+    let top = from_top + 16.0;
+    overlay.text(Vec2::new(left, from_top + 4.0), Align::Left, TEXT, colour, title);
     let steps = PRESSURE_MAP.len() - 1;
     for k in 0..steps {
         let x = |k: usize| left + WIDTH * k as f32 / steps as f32;
@@ -102,7 +120,7 @@ fn add_legend(overlay: &mut Overlay, view: &PictureView) {
         } else {
             Align::Centre
         };
-        let value = three_digits(f64::from(view.full_scale * share) * 1e-3);
+        let value = three_digits(low + (high - low) * f64::from(share));
         let shown = value.trim_end_matches('0').trim_end_matches('.');
         let shown = if shown.is_empty() || !value.contains('.') { &value } else { shown };
         overlay.text(at + Vec2::new(0.0, 12.0), align, TEXT, colour, shown);
@@ -154,6 +172,10 @@ mod tests {
         for want in ["x", "y", "z", "pad pressure, kPa", "0", "20", "40", "SIMULATED"] {
             assert!(all.iter().any(|t| t == want), "{want} in {all:?}");
         }
+        let timed = PictureView { path: Some(PathColour::Time([0.0, 3.0])), ..view.clone() };
+        let all = texts(&timed);
+        assert!(["first touch, s", "1.5", "3"].iter().all(|want| all.iter().any(|t| t == want)), "{all:?}");
+        assert!(legend_room(&timed).y > legend_room(&view).y);
         let tiny = PictureView { size: Vec2::new(100.0, 80.0), ..view };
         assert!(texts(&tiny).is_empty());
     }

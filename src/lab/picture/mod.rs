@@ -2,13 +2,20 @@
 //! trial and a test all make their pictures here.
 
 mod annotations;
+mod contact_path;
 mod fingers;
 mod forces;
 mod ghost;
 mod gripper_model;
+mod heat_maps;
 mod reconstructed;
 
-pub use annotations::SCALE_STEPS;
+pub use annotations::{SCALE_STEPS, legend_room};
+pub use contact_path::{ContactPath, PathColour, TouchedPlace, contact_path};
+pub use heat_maps::{
+    BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, joints_over_time, pad_rows_over_time, pads_at,
+    whole_pads,
+};
 pub(crate) use reconstructed::evenly_bent;
 
 use glam::{Mat4, Vec2, Vec3};
@@ -38,6 +45,8 @@ pub struct PictureView {
     pub full_scale: f32,
     /// Badge in the top left corner: source of the data.
     pub badge: Option<String>,
+    /// Colours of the contact path; none where it is not drawn.
+    pub path: Option<PathColour>,
 }
 
 impl Default for PictureView {
@@ -48,8 +57,9 @@ impl Default for PictureView {
             size: Vec2::new(960.0, 600.0),
             forces: true,
             annotations: true,
-            full_scale: 40e3, // taxel pressures of an ordinary hold reach some 30 kPa
+            full_scale: PAD_FULL_SCALE,
             badge: None,
+            path: None,
         }
     }
 }
@@ -124,6 +134,25 @@ impl Stage {
             ghosts.push(solid(Arc::clone(mesh), matrix(pose)));
         }
         ghosts
+    }
+
+    /// Adds a frame to the contact path of its trial.
+    pub fn extend_path(&self, path: &mut ContactPath, frame: &Frame) {
+        path.push(&self.gripper, &self.world_from_gripper, frame);
+    }
+
+    /// Contact path on the object of a frame, for [`DrawList::solids`]; none for an empty hand.
+    pub fn path(&self, mesh: &Arc<SurfaceMesh>, frame: &Frame) -> Option<Solid> {
+        let pose = frame.world_from_object.as_ref()?;
+        Some(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose), gloss: 0.0 })
+    }
+
+    /// Draws the fingers of a picture translucent, so that what they cover is seen.
+    pub fn unveil(list: &mut DrawList, theme: Theme) {
+        let colour = theme.colours().accent;
+        let fingers = std::mem::take(&mut list.fingers);
+        let veils = fingers.iter().map(|finger| Arc::new(ghost::finger(finger, colour)));
+        list.ghosts.extend(veils.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY, gloss: 0.0 }));
     }
 
     /// The real fingers from the curvature of their flex strips (1/m), left and right, for

@@ -8,7 +8,7 @@ use crate::text::upload_texels;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger};
-use palpate_geometry::palette::{PRESSURE_MAP, Rgb};
+use palpate_geometry::palette::{PRESSURE_MAP, Rgb, SILICONE};
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPass, RenderPipeline};
 use wgpu::{Texture, VertexBufferLayout, VertexStepMode};
 
@@ -20,9 +20,8 @@ const TIP_RINGS: usize = 6;
 const TIP_ROUNDING: f32 = 0.0022;
 /// Bellows along the finger.
 const RIBS: f32 = 10.0;
-/// The silicone of the bellows and of the pad.
+/// The silicone of the bellows.
 const BELLOWS: Rgb = Rgb(214, 216, 214);
-const PAD: Rgb = Rgb(232, 222, 206);
 
 /// Mirrors `Ring` in the shader.
 #[repr(C)]
@@ -205,7 +204,7 @@ impl FingerOnDevice {
         let uniform = SkinUniform {
             rings,
             bellows: linear(BELLOWS),
-            pad: linear(PAD),
+            pad: linear(SILICONE),
             taxels: [self.size[1] as f32, self.size[0] as f32, finger.full_scale, length],
             map: PRESSURE_MAP.map(linear),
         };

@@ -1,0 +1,54 @@
+//! Signature of a grasp as two heat maps over time: bending of every joint, and load on every row of taxels, of both
+//! fingers. A click or drag moves the cursor.
+
+use super::pads::load_switch;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::view::ViewAction;
+use crate::app::heat_map::{OverTime, cells_width, height_beside, over_time_ui};
+use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
+use egui::{RichText, Ui, vec2};
+use palpate_lab::picture::BendUnit;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let Some(grasp) = ShownGrasp::of(context).filter(ShownGrasp::has_course) else {
+        ui.add(egui::Label::new(RichText::new(ShownGrasp::missing(context)).weak()).wrap());
+        return;
+    };
+    let (load_unit, bend_unit) = (context.view.load_unit, context.view.bend_unit);
+    ui.horizontal(|ui| {
+        load_switch(ui, load_unit, actions);
+        ui.separator();
+        for (choice, about) in
+            [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")]
+        {
+            if ui.selectable_label(bend_unit == choice, choice.symbol()).on_hover_text(about).clicked() {
+                actions.push(ViewAction::SetBendUnit(choice));
+            }
+        }
+    });
+    ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
+    let time = grasp.time_shown();
+    // As many columns as pixels at least, so that no peak falls between two of them.
+    let share = (time[1] - time[0]) / (grasp.span_s[1] - grasp.span_s[0]).max(1e-9);
+    let pixels = f64::from(cells_width(ui.available_width()) * ui.ctx().pixels_per_point());
+    let columns = ((pixels / share.max(1e-3)) as usize).clamp(1, MAP_COLUMNS);
+    let maps = [shown_joints(ui, &grasp, bend_unit, columns), shown_rows(ui, &grasp, load_unit, columns)];
+    let parts = [(true, false), (false, true)];
+    let beside: f32 = parts.iter().map(|(names, seconds)| height_beside(*names, *seconds)).sum();
+    let each = 0.5 * (ui.available_height() - beside);
+    for (shown, (names, seconds)) in maps.iter().zip(parts) {
+        let over_time = OverTime {
+            theme: context.view.theme,
+            shown,
+            time,
+            cursor_s: Some(grasp.cursor_s),
+            phases: &grasp.phases,
+            names,
+            seconds,
+        };
+        if let Some(t) = over_time_ui(ui, &over_time, height_beside(names, seconds) + each) {
+            actions.push(grasp.seek(t));
+        }
+    }
+}

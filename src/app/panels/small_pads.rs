@@ -1,0 +1,60 @@
+//! Small pads beside the 3-D view, below the legend that gives their colours: each pad unrolled, or one plain field where
+//! a pad reads one number.
+
+use crate::app::context::PanelContext;
+use crate::app::heat_map::pad_ui;
+use crate::app::shown_grasp::{ShownGrasp, shown_pads};
+use crate::app::theme::colour;
+use egui::{Align2, FontId, Rect, Ui, pos2, vec2};
+use palpate_lab::picture::{LoadUnit, PictureView, legend_room};
+
+/// Least and largest height of a pad, and its width as a share of its height (points).
+const HEIGHT: [f32; 2] = [44.0, 132.0];
+const WIDTH: f32 = 0.22;
+/// Width that each pad has with its number (points).
+const EACH: f32 = 54.0;
+/// Height of the texts above and below a pad, and of the scale bar at the foot of the picture (points).
+const TEXTS: f32 = 34.0;
+const SCALE_BAR: f32 = 46.0;
+/// A picture whose legends are lower has none (points).
+const LEGEND: f32 = 40.0;
+/// Width below which the view has no buttons in its upper left corner (points).
+const BUTTONS: f32 = 620.0;
+
+/// Draws both pads where nothing else is; leaves them out where the view is too small.
+pub(super) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: &PictureView) {
+    let Some(grasp) = ShownGrasp::of(context) else { return };
+    let legends = legend_room(view);
+    let below = rect.height() - legends.y - SCALE_BAR - TEXTS;
+    let beside = rect.height() - 18.0 - SCALE_BAR - TEXTS;
+    // Below the legends, or else to their left.
+    let (right, top, room) = if below >= HEIGHT[0] {
+        (rect.right() - 18.0, rect.top() + legends.y, below)
+    } else if rect.width() < BUTTONS && rect.width() > legends.x + 2.0 * EACH + 90.0 {
+        (rect.right() - legends.x - 12.0, rect.top() + 14.0, beside)
+    } else {
+        return;
+    };
+    if room < HEIGHT[0] || rect.width() < 2.0 * EACH + 90.0 {
+        return;
+    }
+    let theme = context.view.theme;
+    let height = (0.3 * rect.height()).clamp(HEIGHT[0], HEIGHT[1]).min(room);
+    let size = vec2((WIDTH * height).max(14.0), height);
+    let shown = shown_pads(ui, "small pads", &grasp, LoadUnit::Pressure);
+    let (ink, font) = (colour(theme.colours().text), FontId::proportional(12.0));
+    if legends.y < LEGEND {
+        let [_, full] = shown.maps[0].scale.limits();
+        let text = format!("0 to {full:.0}\u{2009}kPa");
+        ui.painter().text(pos2(right - EACH, top + height + 40.0), Align2::CENTER_CENTER, text, font.clone(), ink);
+    }
+    for (side, pad) in grasp.pads().iter().enumerate() {
+        let middle = right - EACH * (1.5 - side as f32);
+        let title = &shown.maps[side].title;
+        ui.painter().text(pos2(middle, top + 7.0), Align2::CENTER_CENTER, title, font.clone(), ink);
+        let place = Rect::from_min_size(pos2(middle - 0.5 * size.x, top + 16.0), size);
+        pad_ui(ui, theme, place, &shown, side, &pad.about(title));
+        let below = place.center_bottom() + vec2(0.0, 3.0);
+        ui.painter().text(below, Align2::CENTER_TOP, pad.force_text(), font.clone(), ink);
+    }
+}

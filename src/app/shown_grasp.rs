@@ -1,0 +1,217 @@
+//! Pads and fingers of the grasp that is shown, live or stored, as heat maps: at the time shown, and over all its time.
+
+use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
+use crate::app::heat_map::{MapsKey, ShownMaps, shown_maps};
+use crate::app::playback::Seek;
+use crate::app::traces::GraspTrace;
+use crate::app::view_source::ViewSource;
+use egui::Ui;
+use palpate_geometry::units::three_digits;
+use palpate_lab::inspection::PhaseSpan;
+use palpate_lab::picture::{
+    BendUnit, LoadUnit, SensorRows, channels_over_time, joints_over_time, pad_rows_over_time, pads_at, whole_pads,
+};
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{GripperModel, Side};
+use palpate_tactile::Quantity;
+use palpate_tactile::calibration::ACTIVE_AREA;
+
+/// Most columns of a heat map over time.
+pub(super) const MAP_COLUMNS: usize = 600;
+
+/// The grasp that is shown.
+pub(super) struct ShownGrasp<'a> {
+    gripper: &'a GripperModel,
+    /// Simulated frames, in order; none of a real gripper.
+    pub(super) frames: Vec<&'a Frame>,
+    /// Frame at the time shown; none of a real gripper.
+    frame: Option<&'a Frame>,
+    trace: Option<&'a GraspTrace>,
+    /// Columns of the trace with the curvature, force and pressure of each finger.
+    columns: Vec<(usize, Quantity, Side)>,
+    /// Time shown (s).
+    pub(super) cursor_s: f64,
+    /// First and last time (s).
+    pub(super) span_s: [f64; 2],
+    window_s: Option<[f64; 2]>,
+    /// Phases.
+    pub(super) phases: Vec<PhaseSpan>,
+}
+
+/// Load on one pad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PadLoad {
+    /// Normal force (N); NaN where it is unknown.
+    force: f64,
+    /// Largest pressure on a taxel (Pa); none without taxels.
+    peak: Option<f64>,
+}
+
+impl<'a> ShownGrasp<'a> {
+    /// The grasp that is shown; none before there is anything of it.
+    pub(super) fn of(context: &PanelContext<'a>) -> Option<Self> {
+        let shown = context.shown();
+        let trace = shown.traces.current();
+        let (gripper, frames, frame) = match shown.source {
+            ViewSource::Simulation => {
+                let snapshot = shown.snapshot?;
+                let own = trace.filter(|trace| trace.grasp == snapshot.grasp);
+                let frames = own.map(|trace| trace.frames.iter().flatten().map(|frame| &**frame).collect());
+                (&snapshot.scene.gripper, frames.unwrap_or_default(), shown.moment().map(|moment| moment.frame))
+            }
+            ViewSource::Trial => {
+                let trial = shown.inspected?.trial;
+                let frames = || trial.frames.iter().map(|frame| &**frame).collect();
+                let frames: Vec<&Frame> = if trial.simulated.is_some() { frames() } else { Vec::new() };
+                let frame = shown.moment().map(|moment| moment.frame).filter(|_| trial.simulated.is_some());
+                (&trial.header.scene.gripper, frames, frame)
+            }
+            ViewSource::Gripper => (&shown.scene.gripper, Vec::new(), None),
+        };
+        if frame.is_none() && trace.is_none_or(|trace| trace.t.is_empty()) {
+            return None;
+        }
+        let column = |(k, channel): (usize, Option<&palpate_tactile::Channel>)| {
+            channel.map(|channel| (k, channel.quantity, channel.side))
+        };
+        let span_s = shown.time_span();
+        Some(Self {
+            gripper,
+            frames,
+            frame,
+            trace,
+            columns: shown.channels().into_iter().enumerate().filter_map(column).collect(),
+            cursor_s: shown.time_s().or(frame.map(|frame| frame.t)).unwrap_or(span_s[0]),
+            span_s,
+            window_s: context.view.time_window,
+            phases: shown.phases(),
+        })
+    }
+
+    /// What to do where there is none.
+    pub(super) fn missing(context: &PanelContext<'_>) -> &'static str {
+        match context.source {
+            ViewSource::Trial if context.opening => "Opening the trial ..",
+            ViewSource::Trial => "Choose a trial in the library.",
+            ViewSource::Simulation => "Start a grasp: press Space.",
+            ViewSource::Gripper => "Connect the gripper (Ctrl+G), then record a grasp (R).",
+        }
+    }
+
+    /// True once it has something to show over time.
+    pub(super) fn has_course(&self) -> bool {
+        self.frames.len() > 1 || (self.frame.is_none() && self.trace.is_some_and(|trace| trace.t.len() > 1))
+    }
+
+    /// Load on both pads at the time shown.
+    pub(super) fn pads(&self) -> [PadLoad; 2] {
+        let grid = self.gripper.taxels();
+        Side::BOTH.map(|side| match self.frame {
+            Some(frame) => {
+                let peak = frame.loads(side, grid.count()).map(|(_, load)| f64::from(load.normal)).fold(0.0, f64::max);
+                PadLoad { force: frame.normal_force(side, grid.count()), peak: Some(peak / grid.area()) }
+            }
+            None => PadLoad { force: self.read_force(side), peak: None },
+        })
+    }
+
+    /// Force on a pad as sensors read it at the time shown (N); NaN where they do not.
+    fn read_force(&self, side: Side) -> f64 {
+        let read = |wanted: Quantity| {
+            let trace = self.trace?;
+            let (column, ..) = self.columns.iter().find(|(_, quantity, own)| *quantity == wanted && *own == side)?;
+            let value = f64::from(*trace.channels.get(*column)?.get(trace.sample_at(self.cursor_s)?)?);
+            Some(value).filter(|value| value.is_finite())
+        };
+        let from_pressure = || read(Quantity::Pressure).map(|pressure| pressure * ACTIVE_AREA);
+        read(Quantity::Force).or_else(from_pressure).unwrap_or(f64::NAN)
+    }
+
+    /// Time to show in heat maps over time (s).
+    pub(super) fn time_shown(&self) -> [f64; 2] {
+        let [first, last] = self.span_s;
+        let fits = |[from, to]: &[f64; 2]| *from >= first && to > from && *to <= last + 1e-9;
+        self.window_s.filter(fits).unwrap_or([first, last.max(first + 1e-3)])
+    }
+
+    /// Moves the cursor to a time (s).
+    pub(super) fn seek(&self, t: f64) -> InspectAction {
+        InspectAction::Seek(Seek::To(t))
+    }
+
+    /// Identity of frames or rows, from which maps are made.
+    fn key(&self, unit: &'static str, columns: usize) -> MapsKey {
+        let frame = |frame: Option<&&Frame>| frame.map_or(0, |frame| std::ptr::from_ref(*frame) as usize);
+        let (count, identity) = match (self.frames.as_slice(), self.trace) {
+            ([], Some(trace)) => {
+                let last = trace.t.last().copied().unwrap_or(0.0);
+                (trace.t.len(), [trace.grasp as usize, last.to_bits() as usize])
+            }
+            (frames, _) => (frames.len(), [frame(frames.first()), frame(frames.last())]),
+        };
+        MapsKey { frames: identity, count, unit, columns }
+    }
+
+    /// Columns of the trace with a quantity of a finger.
+    fn rows(&self, wanted: Quantity, side: Side) -> Vec<&'a [f32]> {
+        let Some(trace) = self.trace else { return Vec::new() };
+        let own = self.columns.iter().filter(|(_, quantity, own)| *quantity == wanted && *own == side);
+        own.filter_map(|(column, ..)| trace.channels.get(*column).map(Vec::as_slice)).collect()
+    }
+
+    fn sensed(&self, wanted: Quantity, rows: SensorRows, columns: usize) -> [palpate_geometry::drawing::HeatMap; 2] {
+        let times = self.trace.map_or(&[][..], |trace| &trace.t);
+        let sides = Side::BOTH.map(|side| self.rows(wanted, side));
+        channels_over_time(times, [&sides[0], &sides[1]], rows, columns)
+    }
+}
+
+impl PadLoad {
+    /// `1.23 N`.
+    pub(super) fn force_text(&self) -> String {
+        format!("{}\u{2009}N", three_digits(self.force))
+    }
+
+    /// `peak 31.0 kPa`.
+    pub(super) fn peak_text(&self) -> Option<String> {
+        self.peak.map(|peak| format!("peak {}\u{2009}kPa", three_digits(1e-3 * peak)))
+    }
+
+    /// `left pad: 1.23 N, peak 31.0 kPa`.
+    pub(super) fn about(&self, side: &str) -> String {
+        let peak = self.peak_text().map(|peak| format!(", {peak}")).unwrap_or_default();
+        format!("{side} pad: {}{peak}", self.force_text())
+    }
+}
+
+/// Both pads at the time shown: taxel by taxel, or of a real gripper the one value that each has.
+pub(super) fn shown_pads(ui: &Ui, name: &'static str, grasp: &ShownGrasp<'_>, unit: LoadUnit) -> ShownMaps {
+    let forces = Side::BOTH.map(|side| grasp.read_force(side));
+    let identity = match grasp.frame {
+        Some(frame) => [std::ptr::from_ref(frame) as usize, frame.t.to_bits() as usize],
+        None => forces.map(|force| force.to_bits() as usize),
+    };
+    let key = MapsKey { frames: identity, count: 1, unit: unit.symbol(), columns: MAP_COLUMNS };
+    shown_maps(ui, name, key, || match grasp.frame {
+        Some(frame) => pads_at(grasp.gripper, frame, unit),
+        None => whole_pads(grasp.gripper, forces, ACTIVE_AREA, unit),
+    })
+}
+
+/// Bending over time: of every joint, or of a real gripper as its strips read it.
+pub(super) fn shown_joints(ui: &Ui, grasp: &ShownGrasp<'_>, unit: BendUnit, columns: usize) -> ShownMaps {
+    shown_maps(ui, "joints", grasp.key(unit.symbol(), columns), || match grasp.frames.as_slice() {
+        [] => grasp.sensed(Quantity::Curvature, SensorRows::Curvature, columns),
+        frames => joints_over_time(grasp.gripper, frames, unit),
+    })
+}
+
+/// Load over time: of every row of taxels, or of a real gripper as its pads read it.
+pub(super) fn shown_rows(ui: &Ui, grasp: &ShownGrasp<'_>, unit: LoadUnit, columns: usize) -> ShownMaps {
+    shown_maps(ui, "rows", grasp.key(unit.symbol(), columns), || match (grasp.frames.as_slice(), unit) {
+        ([], LoadUnit::Pressure) => grasp.sensed(Quantity::Pressure, SensorRows::Pressure, columns),
+        ([], LoadUnit::Force) => grasp.sensed(Quantity::Force, SensorRows::Force(ACTIVE_AREA), columns),
+        (frames, _) => pad_rows_over_time(grasp.gripper, frames, unit),
+    })
+}

@@ -1,0 +1,376 @@
+//! Tactile signatures as heat maps: a pad unrolled at one instant; joints, and rows of taxels, over time.
+//!
+//! Colours of loads stand for pressure with the limit of the 3-D view, [`PAD_FULL_SCALE`], whichever unit the numbers
+//! have. A row's pressure is its force over the area of all its taxels.
+
+use palpate_geometry::drawing::{CellAxis, ColourScale, HeatMap};
+use palpate_geometry::units::mm;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{GripperModel, Side};
+use serde::{Deserialize, Serialize};
+use std::borrow::Borrow;
+
+/// Pressure that has the brightest colour (Pa): taxel pressures of an ordinary hold reach some 30 kPa.
+pub const PAD_FULL_SCALE: f32 = 40e3;
+/// Curvature that has the strongest colour (1/m): a radius of 50 mm.
+const STRONGEST_BEND: f64 = 20.0;
+
+/// Unit of the loads in heat maps of pads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LoadUnit {
+    /// Pressure in kPa.
+    #[default]
+    Pressure,
+    /// Force in N.
+    Force,
+}
+
+/// Unit of the bending of joints in heat maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BendUnit {
+    /// Joint angle in degrees, from the straight finger.
+    #[default]
+    Angle,
+    /// Curvature in 1/m: joint angle over the length of a segment.
+    Curvature,
+}
+
+impl LoadUnit {
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Pressure => "kPa",
+            Self::Force => "N",
+        }
+    }
+
+    fn quantity(self) -> &'static str {
+        match self {
+            Self::Pressure => "pressure",
+            Self::Force => "force",
+        }
+    }
+
+    /// Factor from a force (N) on an area (m²) to a value.
+    fn factor(self, area: f64) -> f64 {
+        match self {
+            Self::Pressure => 1e-3 / area,
+            Self::Force => 1.0,
+        }
+    }
+
+    fn scale(self, area: f64) -> ColourScale {
+        ColourScale::Load((f64::from(PAD_FULL_SCALE) * area * self.factor(area)) as f32)
+    }
+}
+
+impl BendUnit {
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Angle => "°",
+            Self::Curvature => "1/m",
+        }
+    }
+
+    fn quantity(self) -> &'static str {
+        match self {
+            Self::Angle => "joint angle",
+            Self::Curvature => "joint curvature",
+        }
+    }
+
+    /// Value of a joint angle (rad), for segments of a length (m).
+    fn value(self, q: f64, segment: f64) -> f64 {
+        match self {
+            Self::Angle => q.to_degrees(),
+            Self::Curvature => q / segment,
+        }
+    }
+}
+
+/// Both pads unrolled, left and right: rows from the palm to the tip, columns from negative to positive y of the gripper.
+pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit) -> [HeatMap; 2] {
+    let grid = gripper.taxels();
+    let half_width = 0.5 * mm(gripper.finger.width);
+    Side::BOTH.map(|side| {
+        let mut values = vec![0.0; grid.count()];
+        for (taxel, load) in frame.loads(side, grid.count()) {
+            values[taxel] = (f64::from(load.normal) * unit.factor(grid.area())) as f32;
+        }
+        HeatMap {
+            title: side.name().to_owned(),
+            quantity: format!("taxel {}", unit.quantity()),
+            unit: unit.symbol().to_owned(),
+            x: axis("across", "mm", grid.columns, [-half_width, half_width]),
+            y: rows(gripper),
+            values,
+            scale: unit.scale(grid.area()),
+        }
+    })
+}
+
+/// Both pads of a gripper that reads one force on each (N), NaN where it is unknown, over an area (m²): a single cell.
+pub fn whole_pads(gripper: &GripperModel, force: [f64; 2], area: f64, unit: LoadUnit) -> [HeatMap; 2] {
+    let half_width = 0.5 * mm(gripper.finger.width);
+    Side::BOTH.map(|side| HeatMap {
+        title: side.name().to_owned(),
+        quantity: format!("pad {}", unit.quantity()),
+        unit: unit.symbol().to_owned(),
+        x: axis("across", "mm", 1, [-half_width, half_width]),
+        y: axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)]),
+        values: vec![(force[side.index()] * unit.factor(area)) as f32],
+        scale: unit.scale(area),
+    })
+}
+
+/// Bending of every joint over time, left and right: rows from the palm to the tip, a column for each frame.
+pub fn joints_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F], unit: BendUnit) -> [HeatMap; 2] {
+    let (joints, segment) = (gripper.finger.joints, gripper.finger.segment_length());
+    let strongest = STRONGEST_BEND * segment;
+    Side::BOTH.map(|side| {
+        let values = over_time(frames, joints, |frame, row| {
+            frame.joints(side).get(row).map_or(f32::NAN, |q| unit.value(*q, segment) as f32)
+        });
+        HeatMap {
+            title: side.name().to_owned(),
+            quantity: unit.quantity().to_owned(),
+            unit: unit.symbol().to_owned(),
+            x: time_axis(frames),
+            y: axis("joint", "", joints, [0.5, joints as f64 + 0.5]),
+            values,
+            scale: ColourScale::Signed(unit.value(strongest, segment) as f32),
+        }
+    })
+}
+
+/// Load on every row of taxels over time, left and right: rows from the palm to the tip, a column for each frame.
+pub fn pad_rows_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F], unit: LoadUnit) -> [HeatMap; 2] {
+    let grid = gripper.taxels();
+    let area = grid.area() * grid.columns as f64;
+    Side::BOTH.map(|side| {
+        let mut values = vec![0.0; grid.rows * frames.len()];
+        for (column, frame) in frames.iter().enumerate() {
+            for (taxel, load) in frame.borrow().loads(side, grid.count()) {
+                let row = taxel / grid.columns;
+                values[row * frames.len() + column] += (f64::from(load.normal) * unit.factor(area)) as f32;
+            }
+        }
+        HeatMap {
+            title: side.name().to_owned(),
+            quantity: format!("row {}", unit.quantity()),
+            unit: unit.symbol().to_owned(),
+            x: time_axis(frames),
+            y: rows(gripper),
+            values,
+            scale: unit.scale(area),
+        }
+    })
+}
+
+/// Quantity of sensors that are shown over time, a row for each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SensorRows {
+    /// Curvature in 1/m.
+    Curvature,
+    /// Pressure in Pa, shown in kPa.
+    Pressure,
+    /// Force in N on a pad of that area (m²).
+    Force(f64),
+}
+
+/// Sensors over time, left and right, a row for each. Samples come at any times `t_s` (s); each holds until the next one,
+/// and NaN where nothing was read. At most `most` columns; each keeps the value farthest from zero.
+pub fn channels_over_time(t_s: &[f64], sides: [&[&[f32]]; 2], rows: SensorRows, most: usize) -> [HeatMap; 2] {
+    let (quantity, unit, factor, scale) = match rows {
+        SensorRows::Curvature => ("curvature", "1/m", 1.0, ColourScale::Signed(STRONGEST_BEND as f32)),
+        SensorRows::Pressure => ("pressure", "kPa", 1e-3, LoadUnit::Pressure.scale(1.0)),
+        SensorRows::Force(area) => ("force", "N", 1.0, LoadUnit::Force.scale(area)),
+    };
+    let range = [t_s.first(), t_s.last()].map(|t| t.copied().unwrap_or(0.0));
+    let columns = most.min(t_s.len());
+    let time = axis("time", "s", columns, range);
+    Side::BOTH.map(|side| {
+        let sensors = sides[side.index()];
+        let mut values = vec![f32::NAN; sensors.len() * columns];
+        for (row, sensor) in sensors.iter().enumerate() {
+            let row = &mut values[row * columns..(row + 1) * columns];
+            for (k, value) in sensor.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+                let Some(from) = t_s.get(k).and_then(|t| time.cell(*t)) else { continue };
+                let until = t_s.get(k + 1).and_then(|t| time.cell(*t)).unwrap_or(from);
+                for cell in &mut row[from..until.max(from + 1)] {
+                    if cell.is_nan() || value.abs() * factor > cell.abs() {
+                        *cell = value * factor;
+                    }
+                }
+            }
+        }
+        HeatMap {
+            title: side.name().to_owned(),
+            quantity: quantity.to_owned(),
+            unit: unit.to_owned(),
+            x: time.clone(),
+            y: axis("sensor", "", sensors.len(), [0.5, sensors.len() as f64 + 0.5]),
+            values,
+            scale,
+        }
+    })
+}
+
+fn axis(name: &str, unit: &str, count: usize, range: [f64; 2]) -> CellAxis {
+    CellAxis { name: name.to_owned(), unit: unit.to_owned(), count, range }
+}
+
+/// Rows of taxels by their distance from the palm along the finger.
+fn rows(gripper: &GripperModel) -> CellAxis {
+    axis("from palm", "mm", gripper.taxels().rows, [0.0, mm(gripper.finger.length)])
+}
+
+/// A column for each frame; frames come at even times.
+fn time_axis<F: Borrow<Frame>>(frames: &[F]) -> CellAxis {
+    let ends = frames.first().zip(frames.last()).map_or([0.0; 2], |(first, last)| [first.borrow().t, last.borrow().t]);
+    let half = 0.5 * (ends[1] - ends[0]) / (frames.len().max(2) - 1) as f64;
+    axis("time", "s", frames.len(), [ends[0] - half, ends[1] + half])
+}
+
+/// Values row by row, with a column for each frame.
+fn over_time<F: Borrow<Frame>>(frames: &[F], rows: usize, value: impl Fn(&Frame, usize) -> f32) -> Vec<f32> {
+    (0..rows)
+        .flat_map(|row| frames.iter().map(move |frame| (row, frame)))
+        .map(|(row, f)| value(f.borrow(), row))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grasping::grasp;
+    use palpate_sim::frame::TaxelLoad;
+    use palpate_sim::gripper::{Phase, Sway};
+    use palpate_sim::scene::Scene;
+    use palpate_tactile::trial::SimulatedTrial;
+
+    fn frame(sample: u32, q: Vec<f64>, loads: &[(u16, f32)]) -> Frame {
+        let load = |&(taxel, normal): &(u16, f32)| TaxelLoad { taxel, normal, along: 0.0, across: 0.0 };
+        Frame {
+            sample,
+            t: 0.02 * f64::from(sample),
+            line_bar: 0.0,
+            phase: Phase::Close,
+            q,
+            sways: [Sway::NONE; 2],
+            hand: glam::DVec3::ZERO,
+            world_from_object: None,
+            taxels: loads.iter().map(load).collect(),
+        }
+    }
+
+    #[test]
+    fn each_taxel_stands_in_its_row_and_column() {
+        let gripper = GripperModel::default();
+        // Second row, third column of the left pad; last taxel of the right one.
+        let frame = frame(0, vec![0.0; 20], &[(6, 0.25), (319, 0.1)]);
+        let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force);
+        assert_eq!((left.y.count, left.x.count, left.value(1, 2), right.value(39, 3)), (40, 4, 0.25, 0.1));
+        assert_eq!(left.values.iter().filter(|value| **value != 0.0).count(), 1);
+        assert_eq!(
+            (left.y.text(1), left.x.text(2)),
+            ("from palm 3.75\u{2009}mm".into(), "across 2.50\u{2009}mm".into())
+        );
+        // 0.25 N on 2.5 mm by 5 mm.
+        let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure)[0];
+        assert!((pressure.value(1, 2) - 20.0).abs() < 1e-5, "{}", pressure.value(1, 2));
+        // The colour does not depend on the unit.
+        assert_eq!((left.scale, pressure.scale), (ColourScale::Load(0.5), ColourScale::Load(40.0)));
+    }
+
+    #[test]
+    fn a_pad_that_reads_one_force_has_one_cell() {
+        let [left, right] = whole_pads(&GripperModel::default(), [2.0, f64::NAN], 1e-4, LoadUnit::Pressure);
+        assert_eq!((left.value(0, 0), left.x.count, left.y.count), (20.0, 1, 1));
+        assert!(right.value(0, 0).is_nan() && right.scale.colour(right.value(0, 0)).is_none());
+    }
+
+    #[test]
+    fn sensors_hold_their_value_until_the_next_sample() {
+        // Ten even columns over a second; nothing is read from 0.4 s to 0.8 s.
+        let t = [0.0, 0.1, 0.25, 0.4, 0.8, 0.95, 1.0];
+        let strip = [1.0, 2.0, 3.0, f32::NAN, 5.0, -6.0, 4.0];
+        let most = 5;
+        let [left, right] = channels_over_time(&t, [&[&strip], &[]], SensorRows::Curvature, most);
+        let shown: Vec<f32> = (0..most).map(|column| left.value(0, column)).collect();
+        assert!(shown[2].is_nan() && shown[3].is_nan(), "{shown:?}");
+        assert_eq!([shown[0], shown[1], shown[4]], [2.0, 3.0, -6.0]);
+        assert_eq!((left.y.text(0), right.y.count, right.values.len()), ("sensor 1".to_owned(), 0, 0));
+        let pressure = &channels_over_time(&[0.0, 1.0], [&[&[20e3, 10e3]], &[]], SensorRows::Pressure, most)[0];
+        assert_eq!((pressure.values.as_slice(), pressure.scale), (&[20.0, 10.0][..], ColourScale::Load(40.0)));
+        let nothing = channels_over_time(&[], [&[&[]], &[&[]]], SensorRows::Force(1e-4), most);
+        assert_eq!((nothing[0].x.count, nothing[0].values.len()), (0, 0));
+    }
+
+    #[test]
+    fn joints_and_rows_have_a_column_for_each_frame() {
+        let gripper = GripperModel::default();
+        let frames = [0, 1, 2].map(|k| {
+            let mut q = vec![0.0; 20];
+            q[3] = 0.1 * f64::from(k);
+            q[19] = -0.05;
+            frame(k, q, &[(4, 0.1), (7, 0.1 * k as f32)])
+        });
+        let [left, right] = joints_over_time(&gripper, &frames, BendUnit::Angle);
+        assert_eq!((left.y.count, left.x.count, left.x.range), (10, 3, [-0.01, 0.05]));
+        assert!((left.value(3, 2) - 0.2f32.to_degrees()).abs() < 1e-5 && left.value(3, 0) == 0.0);
+        assert!((right.value(9, 1) + 0.05f32.to_degrees()).abs() < 1e-5);
+        // 0.2 rad in 10 mm.
+        let curved = &joints_over_time(&gripper, &frames, BendUnit::Curvature)[0];
+        assert!((curved.value(3, 2) - 20.0).abs() < 1e-5);
+        let [left, right] = pad_rows_over_time(&gripper, &frames, LoadUnit::Force);
+        assert!((left.value(1, 2) - 0.3).abs() < 1e-6 && left.value(0, 2) == 0.0);
+        assert!(right.values.iter().all(|value| *value == 0.0) && right.values.len() == 120);
+        // Nothing yet: no column, and no panic.
+        let none = joints_over_time::<Frame>(&gripper, &[], BendUnit::Angle);
+        assert_eq!((none[0].x.count, none[0].values.len()), (0, 0));
+    }
+
+    fn held(object: &str) -> (SimulatedTrial, Scene) {
+        let mut scene = Scene::default();
+        object.clone_into(&mut scene.object.source);
+        let model = scene.load_object().expect("built in");
+        (grasp(&scene, model.as_ref(), 0), scene)
+    }
+
+    #[test]
+    fn taxels_and_rows_add_up_to_the_force_on_the_finger() {
+        let (trial, scene) = held("lemon");
+        let (gripper, grid, frames) = (&scene.gripper, scene.gripper.taxels(), trial.frames());
+        let rows = pad_rows_over_time(gripper, frames, LoadUnit::Force);
+        let mut largest = 0.0f64;
+        for (k, frame) in frames.iter().enumerate() {
+            let pads = pads_at(gripper, frame, LoadUnit::Force);
+            for side in Side::BOTH {
+                let force = frame.normal_force(side, grid.count());
+                let taxels: f64 = pads[side.index()].values.iter().map(|value| f64::from(*value)).sum();
+                let in_rows: f64 = (0..grid.rows).map(|row| f64::from(rows[side.index()].value(row, k))).sum();
+                assert!((taxels - force).abs() < 1e-6 && (in_rows - force).abs() < 1e-6, "{side:?} at {}", frame.t);
+                largest = largest.max(force);
+            }
+        }
+        assert!(largest > 0.5, "the lemon is held with {largest} N");
+    }
+
+    #[test]
+    fn both_fingers_feel_a_symmetric_object_alike() {
+        let (trial, scene) = held("ball");
+        let frames = trial.frames();
+        let [left, right] = pad_rows_over_time(&scene.gripper, frames, LoadUnit::Pressure);
+        let peak = left.values.iter().copied().fold(0.0, f32::max);
+        assert!(peak > 1.0, "{peak} kPa");
+        for (a, b) in left.values.iter().zip(&right.values) {
+            assert!((a - b).abs() < 0.02 * peak, "{a} and {b} of {peak} kPa");
+        }
+        let [left, right] = joints_over_time(&scene.gripper, frames, BendUnit::Angle);
+        assert!(left.values.iter().zip(&right.values).all(|(a, b)| (a - b).abs() < 0.05));
+    }
+}
