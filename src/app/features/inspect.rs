@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub(in crate::app) const MOST_PINNED: usize = 60;
 
 /// Action on what is inspected.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InspectAction {
     /// Open a stored trial in Inspect mode.
     Open(TrialId),

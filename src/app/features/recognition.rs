@@ -148,7 +148,7 @@ impl RecognitionFeature {
         match (outcome, gripper) {
             (Ok(trained), ViewSource::Gripper) => use_for_gripper(&trained, on, view, notices),
             (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {
-                use_for_simulation(&trained, on, view, notices)
+                use_for_simulation(&trained, on, view, notices);
             }
             (Err(cause), _) => notices.error(format!("Model not changed: {cause}")),
         }

@@ -24,8 +24,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
     let theme = context.view.theme;
     let channels = context.shown().channels();
     let find = |quantity: Quantity, side: Side| {
-        let wanted = |channel: &&Channel| channel.quantity == quantity && channel.side == side;
-        channels.iter().position(|channel| channel.filter(|own| wanted(&own)).is_some())
+        let wanted = |channel: &Channel| channel.quantity == quantity && channel.side == side;
+        channels.iter().position(|channel| channel.is_some_and(wanted))
     };
     let finger = |side: Side| {
         let load = find(Quantity::Pressure, side)?;

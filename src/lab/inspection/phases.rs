@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn contact_is_where_a_load_leaves_its_noise() {
         let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
-        let noise = |k: usize| if k % 2 == 0 { 0.5 } else { -0.5 };
+        let noise = |k: usize| if k.is_multiple_of(2) { 0.5 } else { -0.5 };
         let load = |k: usize| (20.0 + noise(k) + if t[k] >= 2.0 { 40.0 * (t[k] - 2.0) } else { 0.0 }) as f32;
         let loads: Vec<f32> = (0..400).map(load).collect();
         let found = onset(&t, &loads, 0.5, 0.0).unwrap();

@@ -174,10 +174,10 @@ impl Replay {
     }
 
     fn recognise(&mut self, row: &Row) {
-        if let Some(closing_s) = self.controller.closing_s().filter(|closing_s| row.t_s >= *closing_s) {
-            if let Some(identification) = &mut self.identification {
-                identification.push(row.t_s - closing_s, row);
-            }
+        if let Some(closing_s) = self.controller.closing_s().filter(|closing_s| row.t_s >= *closing_s)
+            && let Some(identification) = &mut self.identification
+        {
+            identification.push(row.t_s - closing_s, row);
         }
     }
 

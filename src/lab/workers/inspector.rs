@@ -5,7 +5,7 @@ use super::messages::Wake;
 use crate::inspection::{OpenOptions, OpenTrial, OpenTrialError};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialId;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, channel};
@@ -77,7 +77,7 @@ impl Inspector {
 
 fn open(
     reader: &mut Option<Store>,
-    path: &PathBuf,
+    path: &Path,
     id: TrialId,
     options: &OpenOptions,
 ) -> Result<OpenTrial, OpenTrialError> {
