@@ -24,7 +24,7 @@
 //! | parts | `widgets.rs` `plots/` `figure_plot.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `modes/` | curves of channels; layout and keys of each mode |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
-//! | tiles | `tiling.rs` | panels beside each other |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` | panels beside each other; command palette; file dialog inside the window |
 //! | workbench | `workbench.rs` | owner of all features |
 //! | window | `mod.rs` | the window |
 //!
@@ -46,7 +46,9 @@ mod icons;
 mod keys;
 mod modes;
 mod notices;
+mod palette;
 mod panels;
+mod path_dialog;
 mod playback;
 mod plots;
 mod shown;
@@ -135,6 +137,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
                 fit: Arc::new(fit_trials),
                 models: models_folder(),
             },
+            system_dialogs: true,
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

@@ -14,7 +14,9 @@ use crate::app::features::view::{ViewAction, ViewState};
 use crate::app::keys;
 use crate::app::modes;
 use crate::app::notices::Notices;
+use crate::app::palette;
 use crate::app::panels::PanelKind;
+use crate::app::path_dialog::{Closed, PathDialog};
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::tiling::{Tiling, panel_frame};
@@ -22,6 +24,7 @@ use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui_tiles::Tile;
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
@@ -56,6 +59,8 @@ pub struct WorkbenchSetup<'a> {
     pub playing: bool,
     /// Requests a redraw; called from other threads.
     pub wake: Wake,
+    /// File dialogs of the system are used where there are any; otherwise those inside the window.
+    pub system_dialogs: bool,
     /// Device of the 3-D view; the rest works without.
     pub render_state: Option<&'a egui_wgpu::RenderState>,
 }
@@ -74,6 +79,7 @@ pub struct Workbench {
     inspect: InspectFeature,
     tools: GripperTools,
     files: FileFeature,
+    path_dialog: Option<PathDialog>,
     thumbnails: BTreeMap<String, egui::TextureHandle>,
     driver: Option<String>,
 }
@@ -134,6 +140,9 @@ impl Workbench {
         // Layouts of other versions are forgotten.
         view.layouts.retain(|mode, layout| modes::is_complete(*mode, layout));
         theme::apply(ctx, view.theme);
+        // Keys for the scale are ours, so that it is remembered.
+        ctx.options_mut(|options| options.zoom_with_keyboard = false);
+        view.apply(ctx, ViewAction::SetScale(view.scale), None);
         let mut notices = Notices::default();
         let explainer = Explainer::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("explanations"))?;
         let recognition = RecognitionFeature::new(model.cloned(), explainer, &mut tools, &mut view, &mut notices);
@@ -146,7 +155,8 @@ impl Workbench {
             recognition,
             inspect,
             tools,
-            files: FileFeature::new(wake),
+            files: FileFeature::new(wake, setup.system_dialogs),
+            path_dialog: None,
             thumbnails: load_thumbnails(ctx),
             driver,
         };
@@ -206,14 +216,20 @@ impl Workbench {
         Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, &context, &mut actions));
         let ground = Frame::new().fill(colour(colours.border));
         CentralPanel::default().frame(ground).show(ui, |ui| {
-            layout.ui(&mut Tiling { context: &context, actions: &mut actions }, ui);
+            let mut tiling = Tiling { context: &context, actions: &mut actions, chosen: None };
+            layout.ui(&mut tiling, ui);
+            if let Some(chosen) = tiling.chosen {
+                layout.make_active(|id, _| id == chosen);
+            }
         });
         keys::sheet(&ctx, self.view.keys_shown, mode, &mut actions);
+        palette::ui(&ctx, &context, &mut actions);
         drop_hint(&ctx);
         self.view.layouts.insert(mode, layout);
         for action in actions {
             self.apply(&ctx, action);
         }
+        self.ask_inside(&ctx);
         self.notices.show(&ctx);
     }
 
@@ -287,6 +303,33 @@ impl Workbench {
         }
     }
 
+    /// Draws the file dialog inside the window, while there is one.
+    fn ask_inside(&mut self, ctx: &egui::Context) {
+        if let Some(question) = self.files.take_question() {
+            self.path_dialog = Some(PathDialog::new(question, &self.files.folder()));
+        }
+        let closed = self.path_dialog.as_mut().and_then(|dialog| dialog.ui(ctx));
+        if let Some(closed) = closed {
+            self.path_dialog = None;
+            if let Closed::Answered(answer) = closed {
+                self.files.answer(answer);
+            }
+            ctx.request_repaint();
+        }
+    }
+
+    /// Brings a panel to the front; opens a mode that has it where the present one has not.
+    fn show_panel(&mut self, name: &str) {
+        let others = modes::ALL.iter().map(|kind| kind.mode).filter(|mode| *mode != self.view.mode);
+        for mode in std::iter::once(self.view.mode).chain(others).collect::<Vec<_>>() {
+            let layout = self.view.layouts.entry(mode).or_insert_with(|| modes::default_layout(mode));
+            if layout.make_active(|_, tile| matches!(tile, Tile::Pane(pane) if pane == name)) {
+                self.view.mode = mode;
+                return;
+            }
+        }
+    }
+
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
         let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
@@ -307,6 +350,10 @@ impl Workbench {
     }
 
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
+        if let Action::View(ViewAction::ShowPanel(name)) = action {
+            self.show_panel(name);
+            return ctx.request_repaint();
+        }
         let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();
         let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
         match action {
@@ -336,7 +383,7 @@ impl Workbench {
             }
             Action::File(action) => files.apply(action, simulation),
             Action::Stop => {
-                view.keys_shown = false;
+                (view.keys_shown, view.palette_shown) = (false, false);
                 gripper.stop();
             }
             Action::Tell(message) => notices.tell(message),

@@ -7,7 +7,7 @@ use crate::app::modes::mode::Mode;
 use crate::app::notices::Notices;
 use palpate_lab::workers::{
     Command, GripperCommand, GripperView, LabelCommand, LabelView, Labeller, LabellingAction, LabellingEffect,
-    LabellingSession, SessionContext,
+    LabellingSession, SessionContext, TrialInSight,
 };
 use std::path::PathBuf;
 
@@ -58,7 +58,7 @@ impl LabellingFeature {
         let now = context(&self.labeller, seen.as_deref(), labels.as_deref(), view);
         let effects = self.session.observe(&now);
         let next = self.session.next_known_object(&now);
-        gripper.keep_trial_in_sight(self.session.keeps_trial_in_sight(&now));
+        gripper.keep_trial_in_sight(self.session.in_sight(&now) == TrialInSight::Last);
         self.carry_out(effects, gripper, view, notices);
         // The simulation shows the next object of the plan.
         if let Some(next) = next.filter(|name| *name != simulation.scene().object.source) {

@@ -9,10 +9,11 @@ use palpate_lab::workers::{
     Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot,
 };
 use palpate_sim::frame::Frame;
-use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_sim::objects::{EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::Scene;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Seed of the sequence of objects.
 const DECK_SEED: u64 = 1;
@@ -34,6 +35,10 @@ pub enum SimulationAction {
     MeasureAccuracy,
     /// Cancel that measurement.
     StopMeasuringAccuracy,
+    /// Back to the scene before the last change.
+    Undo,
+    /// Forward again.
+    Redo,
 }
 
 /// State of the simulated gripper in the window.
@@ -49,6 +54,7 @@ pub(in crate::app) struct SimulationFeature {
     /// Object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
     shuffled: ShuffledObjects,
+    changes: SceneChanges,
 }
 
 impl SimulationFeature {
@@ -68,6 +74,7 @@ impl SimulationFeature {
             unsent: false,
             seen: None,
             shuffled: ShuffledObjects::new(DECK_SEED),
+            changes: SceneChanges::default(),
         }
     }
 
@@ -122,6 +129,7 @@ impl SimulationFeature {
             self.send_scene();
         }
         if let Some(snapshot) = self.worker.snapshot() {
+            self.traces.forget_before(snapshot.scene_since);
             self.take_note_of_object(&snapshot, view);
         }
     }
@@ -141,6 +149,14 @@ impl SimulationFeature {
                 self.scene_accuracy.ask(Box::new(self.scene.clone()));
             }
             SimulationAction::StopMeasuringAccuracy => self.scene_accuracy.give_up(),
+            SimulationAction::Undo => match self.changes.undo(&self.scene) {
+                Some(scene) => self.take_back(scene, "Scene change undone", notices),
+                None => notices.info("No scene change to undo. Labels are undone in Label mode (Ctrl+3)."),
+            },
+            SimulationAction::Redo => match self.changes.redo(&self.scene) {
+                Some(scene) => self.take_back(scene, "Scene change redone", notices),
+                None => notices.info("No scene change to redo."),
+            },
         }
     }
 
@@ -181,9 +197,22 @@ impl SimulationFeature {
         if let Err(error) = scene.check() {
             return notices.error(error.to_string());
         }
+        if scene != self.scene {
+            self.changes.note(&self.scene);
+        }
+        self.use_scene(scene);
+    }
+
+    fn use_scene(&mut self, scene: Scene) {
         self.scene = scene;
         self.effects.give_up();
         self.send_scene();
+    }
+
+    fn take_back(&mut self, scene: Scene, done: &str, notices: &mut Notices) {
+        let object = object_title(&scene.object.source);
+        self.use_scene(scene);
+        notices.info(format!("{done}: {object}."));
     }
 
     fn send_scene(&mut self) {
@@ -211,6 +240,49 @@ impl SimulationFeature {
             view.remember_file(source);
         }
         self.seen = Some(source.clone());
+    }
+}
+
+/// Changes of the scene, to be undone.
+#[derive(Default)]
+struct SceneChanges {
+    before: Vec<Scene>,
+    after: Vec<Scene>,
+    last: Option<Instant>,
+}
+
+/// Changes that can be undone.
+const MOST_CHANGES: usize = 50;
+/// Changes that follow each other faster are one: a value that is dragged changes with every frame.
+const ONE_CHANGE: Duration = Duration::from_millis(600);
+
+impl SceneChanges {
+    /// Notes that the scene is about to change from this one.
+    fn note(&mut self, scene: &Scene) {
+        let now = Instant::now();
+        let continues = self.last.replace(now).is_some_and(|last| now - last < ONE_CHANGE);
+        self.after.clear();
+        if continues && !self.before.is_empty() {
+            return;
+        }
+        self.before.push(scene.clone());
+        if self.before.len() > MOST_CHANGES {
+            self.before.remove(0);
+        }
+    }
+
+    fn undo(&mut self, now: &Scene) -> Option<Scene> {
+        self.last = None;
+        let scene = self.before.pop()?;
+        self.after.push(now.clone());
+        Some(scene)
+    }
+
+    fn redo(&mut self, now: &Scene) -> Option<Scene> {
+        self.last = None;
+        let scene = self.after.pop()?;
+        self.before.push(now.clone());
+        Some(scene)
     }
 }
 

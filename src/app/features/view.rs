@@ -60,6 +60,11 @@ pub struct ViewState {
     pub derived: BTreeMap<String, Derived>,
     /// Plots of the real gripper show raw counts in place of physical units.
     pub raw: bool,
+    /// The command palette is open.
+    #[serde(skip)]
+    pub palette_shown: bool,
+    /// Size of texts and buttons, as a multiple of the system's.
+    pub scale: f32,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
 }
@@ -93,9 +98,20 @@ pub enum ViewAction {
     ShowPanel(&'static str),
     /// Show or hide the key sheet.
     ShowKeys(bool),
+    /// Show or hide the command palette.
+    ShowPalette(bool),
+    /// Set the size of texts and buttons.
+    SetScale(f32),
+    /// Bring a panel to the front, in a mode that has it.
+    ShowPanel(&'static str),
+    /// Change between window and full screen.
+    ToggleFullScreen,
     /// Restore the default layouts.
     ResetLayout,
 }
+
+/// Sizes of texts and buttons that can be set.
+pub(in crate::app) const SCALES: std::ops::RangeInclusive<f32> = 0.8..=2.0;
 
 /// Files that are remembered.
 const MOST_RECENT: usize = 6;
@@ -122,6 +138,8 @@ impl Default for ViewState {
             sensors: SensorView::default(),
             derived: BTreeMap::new(),
             raw: false,
+            palette_shown: false,
+            scale: 1.0,
             recent: Vec::new(),
         }
     }
@@ -156,6 +174,17 @@ impl ViewState {
                 }
             }
             ViewAction::ShowKeys(shown) => self.keys_shown = shown,
+            ViewAction::ShowPalette(shown) => self.palette_shown = shown,
+            ViewAction::SetScale(scale) => {
+                self.scale = scale.clamp(*SCALES.start(), *SCALES.end());
+                ctx.set_zoom_factor(self.scale);
+            }
+            // The workbench knows which mode has it.
+            ViewAction::ShowPanel(_) => {}
+            ViewAction::ToggleFullScreen => {
+                let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
+                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
+            }
             ViewAction::ResetLayout => self.layouts.clear(),
         }
     }

@@ -42,6 +42,7 @@ mod listener;
 #[cfg(test)]
 mod listener_tests;
 mod messages;
+mod object_search;
 mod pace;
 mod refined_run;
 mod scene_accuracy;
@@ -66,7 +67,7 @@ pub use inspector::{Inspector, OpenRequest, Opened};
 pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
-    parse_tags,
+    TrialInSight, parse_tags,
 };
 pub use latest::Latest;
 pub use listener::THRESHOLDS;

@@ -17,6 +17,12 @@ pub fn object_title(name: &str) -> String {
     built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
 
+/// Title of an object with the name of its class behind it, where the two differ: `Tennis ball (bigball)`.
+pub fn titled(name: &str) -> String {
+    let title = object_title(name);
+    if title.to_lowercase() == name.to_lowercase() { title } else { format!("{title} ({name})") }
+}
+
 /// A source that names the same object from any folder: files that exist get their whole path, names stay names.
 pub fn anchored(source: &str) -> String {
     let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);
