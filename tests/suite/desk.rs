@@ -89,7 +89,7 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::Enter);
     desk.until_labelled(&[(1, Some(&next), false)]);
     desk.until_shown(true, "1 of 800 trials");
-    desk.until_shown(true, "The model predicts lemon");
+    desk.until_shown(true, "The model predicts Lemon");
     // The next one is not the same again; it is recorded twice, because the first went wrong.
     assert_ne!(desk.next_object(), next);
     desk.record();
