@@ -3,8 +3,8 @@
 use crate::app::actions::{Action, Actions};
 use crate::app::context::PanelContext;
 use crate::app::features::gripper::GripperAction;
-use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::inspect::InspectAction;
+use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::features::view::{SCALES, ViewAction};
 use crate::app::keys;

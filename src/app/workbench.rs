@@ -335,7 +335,9 @@ impl Workbench {
         let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
-        labelling.gather(gripper, simulation, view, notices);
+        if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
+            inspect.apply(action, &[], view, notices);
+        }
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, view, notices);
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);

@@ -8,7 +8,7 @@ use crate::gripper::board;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{Mode, ViewAction};
+use palpate::app::{Mode, ViewAction, ViewSource};
 use palpate_lab::workers::{GripperCommand, LabellingAction};
 use palpate_store::Store;
 use palpate_tactile::trial::Control;
@@ -55,6 +55,19 @@ impl Bench {
     fn labels(&self) -> Vec<(i64, Option<String>, bool)> {
         let trials = self.store().labels().trials().unwrap();
         trials.into_iter().map(|trial| (trial.id, trial.object, trial.discarded)).collect()
+    }
+
+    /// Waits until this stored trial is shown, or the live stream.
+    fn until_inspected(&mut self, id: Option<i64>) {
+        for _ in 0..MOST_LOOKS {
+            let source = self.workbench().view().source;
+            let shown = self.workbench().inspected().filter(|_| source == ViewSource::Trial).map(|open| open.trial.id);
+            if shown == id {
+                return;
+            }
+            self.wait();
+        }
+        panic!("trial {id:?} is not shown");
     }
 
     /// Waits until the labels in the store are these.
@@ -110,6 +123,8 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::ArrowDown);
     desk.press(Key::ArrowDown);
     desk.until_shown(true, "Trial 1: labelled");
+    // What is shown is that trial, not the live stream.
+    desk.until_inspected(Some(1));
     desk.press(Key::Slash);
     desk.type_text("garlic");
     desk.press(Key::Enter);
@@ -122,6 +137,7 @@ fn an_afternoon_by_keys_alone() {
     // Thrown away while it goes on, and out of the list.
     desk.press(Key::R);
     desk.until_shown(true, "Time in the trial");
+    desk.until_inspected(None);
     desk.press(Key::D);
     desk.until_shown(false, "Time in the trial");
     desk.press(Key::ArrowDown);

@@ -177,10 +177,12 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
 
 pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let shown = context.shown();
+    let running = context.gripper.is_some_and(|gripper| gripper.trial.is_some());
     let records = match context.source {
         ViewSource::Gripper => true,
         ViewSource::Simulation => context.view.mode == Mode::Label,
-        ViewSource::Trial => false,
+        // A trial runs while the card asks about an older one.
+        ViewSource::Trial => context.view.mode == Mode::Label && running,
     };
     if records && !shown.looks_back() {
         return trial::ui(ui, context, actions);

@@ -11,7 +11,7 @@ use super::gripper::GripperView;
 use super::labeller::{LabelCommand, LabelOutcome, LabelView};
 use super::object_search::{ObjectSearch, search_objects};
 use crate::recording::TrialRequest;
-use palpate_sim::objects::{EMPTY, catalogue, object_title};
+use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
