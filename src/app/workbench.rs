@@ -3,7 +3,7 @@
 use crate::app::actions::{Action, Actions};
 use crate::app::bars;
 use crate::app::context::{Comparison, PanelContext};
-use crate::app::features::files::{FileFeature, drop_hint};
+use crate::app::features::files::{FileAction, FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
@@ -13,7 +13,7 @@ use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::{ViewAction, ViewState};
 use crate::app::keys;
 use crate::app::modes;
-use crate::app::notices::Notices;
+use crate::app::notices::{Notices, Remedy};
 use crate::app::palette;
 use crate::app::panels::PanelKind;
 use crate::app::path_dialog::{Closed, PathDialog};
@@ -28,7 +28,7 @@ use egui_tiles::Tile;
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
-    Inspector, LabelView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
+    Inspector, LabelCommand, LabelView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
     start_labeller,
 };
 use palpate_learn::{Model, ModelError};
@@ -203,6 +203,10 @@ impl Workbench {
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
+        let remedy = self.notices.line(ui, self.view.theme);
+        if let Some(action) = remedy.map(action_of) {
+            self.apply(&ctx, action);
+        }
         let published = self.published();
         let mut actions = Actions::default();
         // The layout changes while it is drawn, so it is taken out for that time.
@@ -230,7 +234,6 @@ impl Workbench {
             self.apply(&ctx, action);
         }
         self.ask_inside(&ctx);
-        self.notices.show(&ctx);
     }
 
     /// Draws one panel alone, as large as there is room.
@@ -391,6 +394,18 @@ impl Workbench {
             Action::Tell(message) => notices.tell(message),
         }
         ctx.request_repaint();
+    }
+}
+
+/// Action that carries out a remedy.
+fn action_of(remedy: Remedy) -> Action {
+    match remedy {
+        Remedy::UseHull => SimulationAction::UseHull.into(),
+        Remedy::TreatAsMillimetres => SimulationAction::SetScale(1e-3).into(),
+        Remedy::TreatAsMetres => SimulationAction::SetScale(1.0).into(),
+        Remedy::LocateFile => FileAction::Open.into(),
+        Remedy::Calibrate => ViewAction::ShowPanel("calibration").into(),
+        Remedy::UndoLabel => LabelCommand::Undo.into(),
     }
 }
 

@@ -356,7 +356,7 @@ fn commands_that_read_create_nothing() {
         &["recognise", "1"][..],
         &["replay", "1"][..],
         &["snapshot", "--trial", "1", "--out", "x.png"][..],
-        &["evaluate", "lda"][..],
+        &["evaluate"][..],
     ] {
         refused(at, arguments, &["there is no store"]);
     }

@@ -235,3 +235,29 @@ fn a_title_names_the_same_object_as_its_class() {
     press(&mut bench, Modifiers::NONE, Key::Enter);
     bench.until_shown(true, "Tennis ball: 0 of 50");
 }
+
+#[test]
+fn a_warning_carries_the_button_that_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    // A box without a lid: too wide a hole to close.
+    let path = folder.path().join("bin.obj");
+    let corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)];
+    let mut text = String::new();
+    for (x, y, z) in corners {
+        text += &format!("v {} {} {}\n", 0.04 * f64::from(x), 0.04 * f64::from(y), 0.04 * f64::from(z));
+    }
+    for [a, b, c, d] in [[1, 4, 3, 2], [1, 2, 6, 5], [2, 3, 7, 6], [3, 4, 8, 7], [4, 1, 5, 8]] {
+        text += &format!("f {a} {b} {c} {d}\n");
+    }
+    std::fs::write(&path, text).unwrap();
+    let mut bench = window([1280.0, 820.0]);
+    bench.tell(SimulationAction::OpenObject(path.to_str().unwrap().to_owned()));
+    bench.until_told("the mesh is open");
+    bench.harness.run_steps(2);
+    bench.harness.get_by_role_and_label(Role::Button, "Use its hull").click();
+    bench.harness.run_steps(2);
+    bench.until(|s| s.object.as_ref().is_some_and(|object| object.name == "bin"));
+    // What was refused leaves nothing to undo; the hull does.
+    press(&mut bench, Modifiers::COMMAND, Key::Z);
+    bench.until(|s| s.truth() == "lemon");
+}

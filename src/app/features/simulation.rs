@@ -9,7 +9,8 @@ use palpate_lab::workers::{
     Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot,
 };
 use palpate_sim::frame::Frame;
-use palpate_sim::objects::{EMPTY, anchored, catalogue, object_title};
+use palpate_sim::gripper::Auto;
+use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::Scene;
 use std::path::Path;
 use std::sync::Arc;
@@ -35,6 +36,10 @@ pub enum SimulationAction {
     MeasureAccuracy,
     /// Cancel that measurement.
     StopMeasuringAccuracy,
+    /// Grasp the scene refused last, or the present one, with the convex hull of its object.
+    UseHull,
+    /// Set the factor on all lengths of the object.
+    SetScale(f64),
     /// Back to the scene before the last change.
     Undo,
     /// Forward again.
@@ -55,6 +60,8 @@ pub(in crate::app) struct SimulationFeature {
     seen: Option<String>,
     shuffled: ShuffledObjects,
     changes: SceneChanges,
+    /// Scene that was refused last.
+    refused: Option<Scene>,
 }
 
 impl SimulationFeature {
@@ -75,6 +82,7 @@ impl SimulationFeature {
             seen: None,
             shuffled: ShuffledObjects::new(DECK_SEED),
             changes: SceneChanges::default(),
+            refused: None,
         }
     }
 
@@ -149,6 +157,16 @@ impl SimulationFeature {
                 self.scene_accuracy.ask(Box::new(self.scene.clone()));
             }
             SimulationAction::StopMeasuringAccuracy => self.scene_accuracy.give_up(),
+            SimulationAction::UseHull => {
+                let mut scene = self.refused.take().unwrap_or_else(|| self.scene.clone());
+                scene.object.collision = CollisionShape::Hull;
+                self.set_scene(scene, notices);
+            }
+            SimulationAction::SetScale(scale) => {
+                let mut scene = self.scene.clone();
+                scene.object.scale = Auto::Value(scale);
+                self.set_scene(scene, notices);
+            }
             SimulationAction::Undo => match self.changes.undo(&self.scene) {
                 Some(scene) => self.take_back(scene, "Scene change undone", notices),
                 None => notices.info("No scene change to undo. Labels are undone in Label mode (Ctrl+3)."),
@@ -182,6 +200,7 @@ impl SimulationFeature {
         scene.object.mass = fresh.mass;
         scene.object.friction = fresh.friction;
         scene.object.scale = fresh.scale;
+        scene.object.collision = fresh.collision;
         scene.object.rotation_deg = fresh.rotation_deg;
         self.set_scene(scene, notices);
     }
@@ -224,6 +243,8 @@ impl SimulationFeature {
         if self.scene == refusal.refused {
             self.scene = refusal.kept;
         }
+        self.changes.forget(&self.scene);
+        self.refused = Some(refusal.refused);
         notices.error(refusal.cause);
     }
 
@@ -269,6 +290,11 @@ impl SceneChanges {
         if self.before.len() > MOST_CHANGES {
             self.before.remove(0);
         }
+    }
+
+    /// Forgets the last change, where it led nowhere.
+    fn forget(&mut self, now: &Scene) {
+        self.before.pop_if(|before| before == now);
     }
 
     fn undo(&mut self, now: &Scene) -> Option<Scene> {

@@ -35,7 +35,7 @@ const GENERAL: &[Binding] = &[
     key(COMMAND_SHIFT, Key::Z, "redo", |c| {
         Some(if edits_scene(c) { SimulationAction::Redo.into() } else { LabelCommand::Redo.into() })
     }),
-    key(COMMAND, Key::Z, "undo: in Demo mode the last change of the scene, elsewhere the last label or discard", |c| {
+    key(COMMAND, Key::Z, "undo the last change of the scene (Demo mode), or the last label or discard", |c| {
         Some(if edits_scene(c) { SimulationAction::Undo.into() } else { LabelCommand::Undo.into() })
     }),
     key(COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(FileAction::Open.into())),

@@ -111,7 +111,8 @@ pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut 
     let room = ctx.content_rect().size() - egui::vec2(60.0, 90.0);
     let columns = if room.x > 2.0 * COLUMN + 30.0 { 2 } else { 1 };
     let window = egui::Window::new("Keys").open(&mut open).collapsible(false).resizable(false);
-    window.default_width(COLUMN * columns as f32).max_width(room.x).show(ctx, |ui| {
+    let window = window.default_width(COLUMN * columns as f32).max_width(room.x).default_height(room.y);
+    window.pivot(egui::Align2::CENTER_CENTER).default_pos(ctx.content_rect().center()).show(ctx, |ui| {
         let lines = sheet_lines(ctx, mode);
         egui::ScrollArea::vertical().max_height(room.y).show(ui, |ui| {
             ui.columns(columns, |columns| {
@@ -221,7 +222,7 @@ mod tests {
         assert_eq!(does(vec![key(Key::Num1, Modifiers::ALT, false)]), ["front view"]);
         assert_eq!(does(vec![key(Key::Slash, Modifiers::SHIFT, false)]), ["find an object"]);
         assert_eq!(does(vec![key(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, false)]), ["redo"]);
-        assert!(does(vec![key(Key::Z, Modifiers::COMMAND, false)])[0].starts_with("undo"));
+        assert!(does(vec![key(Key::Z, Modifiers::COMMAND, false)])[0].starts_with("undo the last change"));
         // Larger and faster share a key.
         assert_eq!(does(vec![key(Key::Minus, Modifiers::COMMAND, false)]), ["smaller texts and buttons"]);
         assert_eq!(does(vec![key(Key::Minus, Modifiers::NONE, false)]), ["slower"]);

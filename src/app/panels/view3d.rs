@@ -163,8 +163,8 @@ fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
     (context.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 
-/// Width of all buttons in a row (points).
-const BUTTONS: f32 = 430.0;
+/// Width of all buttons in a row, beside the legend (points).
+const BUTTONS: f32 = 600.0;
 
 /// Standard views and switches, in the upper left corner; in a menu where there is no room.
 fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {
