@@ -11,7 +11,8 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `notices.rs` `modes/mode.rs` | look, graphics, messages, time shown |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` | look, graphics, time shown |
+//! | messages | `notices.rs` | messages to the user |
 //! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
 //! | inspect | `features/inspect.rs` | stored trials that are open or compared |

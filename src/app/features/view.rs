@@ -4,7 +4,7 @@ use crate::app::derived::Derived;
 use crate::app::modes::mode::Mode;
 use crate::app::theme;
 use crate::app::view_source::ViewSource;
-use egui_tiles::{Tile, Tree};
+use egui_tiles::Tree;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
@@ -94,8 +94,6 @@ pub enum ViewAction {
     ShowRaw(bool),
     /// Show or hide the true object.
     ShowTruth(bool),
-    /// Bring the panel of this name to the front, where the mode has it.
-    ShowPanel(&'static str),
     /// Show or hide the key sheet.
     ShowKeys(bool),
     /// Show or hide the command palette.
@@ -168,11 +166,6 @@ impl ViewState {
             }
             ViewAction::ShowRaw(raw) => self.raw = raw,
             ViewAction::ShowTruth(shown) => self.truth_shown = shown,
-            ViewAction::ShowPanel(panel) => {
-                if let Some(layout) = self.layouts.get_mut(&self.mode) {
-                    layout.make_active(|_, tile| matches!(tile, Tile::Pane(name) if name == panel));
-                }
-            }
             ViewAction::ShowKeys(shown) => self.keys_shown = shown,
             ViewAction::ShowPalette(shown) => self.palette_shown = shown,
             ViewAction::SetScale(scale) => {

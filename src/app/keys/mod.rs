@@ -146,6 +146,7 @@ fn sheet_lines(ctx: &egui::Context, mode: Mode) -> Vec<(&'static str, Vec<(Strin
 fn group_ui(ui: &mut Ui, title: &str, lines: &[(String, &str)]) {
     ui.add_space(4.0);
     ui.label(RichText::new(title).strong());
+    ui.spacing_mut().interact_size.y = 18.0;
     egui::Grid::new(("keys", title)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
         for (how, does) in lines {
             ui.monospace(how);

@@ -1,7 +1,7 @@
 //! The built-in objects: every folder of `assets/objects`, embedded. Adding one is adding a folder.
 
 use super::files::inside;
-use super::{EMPTY, ObjectClass, ShapeClass, SizeClass};
+use super::{ObjectClass, ShapeClass, SizeClass};
 use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 use std::path::Path;
@@ -55,14 +55,6 @@ fn facts_of(folder: &Path) -> Option<BuiltIn> {
     }
 }
 
-/// Name of the class of the object with this name or title; the text itself where there is none.
-pub fn class_of(text: &str) -> &str {
-    let text = text.trim();
-    let is = |own: &str| own.to_lowercase() == text.to_lowercase();
-    let built_in = catalogue().iter().find(|b| is(&b.name)).or_else(|| catalogue().iter().find(|b| is(&b.title)));
-    built_in.map_or(if is("Empty hand") { EMPTY } else { text }, |b| b.name.as_str())
-}
-
 /// A small picture of a built-in object (PNG).
 pub fn thumbnail(name: &str) -> Option<&'static [u8]> {
     Some(FOLDERS.get_file(Path::new(name).join("thumbnail.png"))?.contents())
@@ -78,7 +70,6 @@ pub(super) fn read_embedded(path: &Path) -> std::io::Result<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{object_title, titled};
     use super::*;
 
     #[test]
@@ -86,23 +77,6 @@ mod tests {
         assert_eq!(catalogue().len(), FOLDERS.dirs().count());
         assert_eq!(catalogue().len(), 16);
         assert!(catalogue().windows(2).all(|pair| pair[0].name < pair[1].name));
-    }
-
-    #[test]
-    fn objects_have_one_title() {
-        assert_eq!(
-            ["bigball", "lemon", EMPTY, "garlic"].map(object_title),
-            ["Tennis ball", "Lemon", "Empty hand", "garlic"]
-        );
-        assert_eq!(["bigball", "lemon"].map(titled), ["Tennis ball (bigball)", "Lemon"]);
-        assert_eq!(
-            ["tennis Ball", "ball", " Die ", "garlic"].map(class_of),
-            ["bigball", "ball", "smallcube", "garlic"]
-        );
-        let mut titles: Vec<String> = catalogue().iter().map(|b| b.title.to_lowercase()).collect();
-        titles.sort();
-        titles.dedup();
-        assert_eq!(titles.len(), catalogue().len());
     }
 
     #[test]
