@@ -131,7 +131,7 @@ pub(super) fn existing_store(path: Option<&Path>) -> Result<Option<Store>, Failu
 pub(super) fn read_store(path: Option<&Path>) -> Result<Store, Failure> {
     existing_store(path)?.ok_or_else(|| {
         let path = path.map_or_else(Store::default_path, Path::to_owned);
-        format!("there is no store \"{}\" yet: `palpate grasp lemon` makes one", path.display()).into()
+        format!("no trials yet: there is no store \"{}\"; `palpate grasp lemon` makes one", path.display()).into()
     })
 }
 

@@ -11,7 +11,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let Some(gripper) = context.gripper.filter(|gripper| gripper.is_connected()) else { return };
     let colours = context.view.theme.colours();
     let watching = gripper.watching.is_some();
-    let trials = if watching { "trials: automatic" } else { "trials: key R" };
+    let narrow = ui.available_width() < 640.0;
+    let trials = match (watching, narrow) {
+        (true, true) => "auto",
+        (true, false) => "trials: automatic",
+        (false, true) => "key R",
+        (false, false) => "trials: key R",
+    };
     let ink = if watching { colours.warning } else { colours.quiet_text };
     let about = match watching {
         true => "Trials begin and end with the movement of the fingers. W in Label mode, or a click, ends that",
@@ -21,7 +27,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     if ui.selectable_label(watching, text).on_hover_text(about).clicked() {
         actions.push(GripperAction::ToggleWatch);
     }
-    let text = RichText::new(drive_text(context, gripper)).small().color(colour(colours.text));
+    let text = RichText::new(drive_text(context, gripper, narrow)).small().color(colour(colours.text));
     let about = "Who sets the pressure of the next trial: you by hand, or the board; untimed trials last until Q. \
                  M in Label mode, or a click, changes it";
     if ui.selectable_label(false, text).on_hover_text(about).clicked() {
@@ -30,9 +36,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 }
 
 /// Actuation, and line pressure where it is known.
-fn drive_text(context: &PanelContext<'_>, gripper: &GripperView) -> String {
+fn drive_text(context: &PanelContext<'_>, gripper: &GripperView, narrow: bool) -> String {
     let running = gripper.trial.as_ref().map(|trial| trial.request.control);
     let control = control_title(running.unwrap_or(context.view.control));
+    if narrow {
+        return control.to_owned();
+    }
     match gripper.latest.as_ref().and_then(|latest| latest.line_bar) {
         Some(bar) => format!("drive: {control}, {bar:.2} bar"),
         None => format!("drive: {control}"),

@@ -41,15 +41,16 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions
         }
         ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
             ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
-            if ui.available_width() > 520.0 {
+            if ui.available_width() > 780.0 {
                 ui.label(RichText::new("Palpate").heading().strong());
             }
             modes_ui(ui, context, actions);
+            // Before what may be cut off.
+            gripper::ui(ui, context, actions);
             sources_ui(ui, context, actions);
             if context.source == ViewSource::Simulation {
                 simulated_ui(ui, context);
             }
-            gripper::ui(ui, context, actions);
             let room = ui.available_width();
             if let Some(driver) = context.driver.filter(|_| room > 240.0) {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

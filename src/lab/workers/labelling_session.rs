@@ -17,9 +17,6 @@ use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 
-/// Objects that have a number key.
-pub const NUMBERED_OBJECTS: usize = 9;
-
 /// State that a session decides by.
 #[derive(Clone, Copy)]
 pub struct SessionContext<'a> {

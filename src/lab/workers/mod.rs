@@ -66,8 +66,8 @@ pub use gripper::{
 pub use inspector::{Inspector, OpenRequest, Opened};
 pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
-    LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
-    TrialInSight, parse_tags,
+    LabelDraft, LabellingAction, LabellingEffect, LabellingSession, SessionContext, TrialFilter, TrialInSight,
+    parse_tags,
 };
 pub use latest::Latest;
 pub use listener::THRESHOLDS;
@@ -75,6 +75,7 @@ pub use messages::{
     Checking, Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,
     Status, TraceRow, Wake,
 };
+pub use object_search::NUMBERED_OBJECTS;
 pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -1,8 +1,10 @@
 //! Search for an object by text. Titles, which the window shows, come before names; only an unambiguous match answers by
 //! itself.
 
-use super::labelling_session::NUMBERED_OBJECTS;
 use palpate_sim::objects::object_title;
+
+/// Objects that have a number key.
+pub const NUMBERED_OBJECTS: usize = 9;
 
 /// Objects that fit a text, best first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
