@@ -119,6 +119,9 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             None if *json => return say_json(&[(); 0]),
             None => return say(NONE_YET),
         },
+        TrialsCommand::Export { labelled: true, .. } => {
+            existing_store(store)?.ok_or("no trial has a label: there is no store yet")?
+        }
         _ => read_store(store)?,
     };
     match &arguments.command {
