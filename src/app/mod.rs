@@ -11,7 +11,8 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `notices.rs` `modes/mode.rs` | look, graphics, messages, time shown |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` | look, graphics, time shown |
+//! | messages | `notices.rs` | messages to the user |
 //! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
 //! | inspect | `features/inspect.rs` | stored trials that are open or compared |
@@ -24,7 +25,7 @@
 //! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
-//! | tiles | `tiling.rs` | panels beside each other |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` | panels beside each other; command palette; file dialog inside the window |
 //! | workbench | `workbench.rs` | owner of all features |
 //! | window | `mod.rs` | the window |
 //!
@@ -47,7 +48,9 @@ mod icons;
 mod keys;
 mod modes;
 mod notices;
+mod palette;
 mod panels;
+mod path_dialog;
 mod playback;
 mod plots;
 mod shown;
@@ -137,6 +140,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
                 fit: Arc::new(fit_trials),
                 models: models_folder(),
             },
+            system_dialogs: true,
             playing: true,
             wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),

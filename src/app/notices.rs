@@ -1,8 +1,11 @@
-//! Messages to the user, shown as notices over the window and kept for a while.
+//! Messages to the user: a line below the time bar, which covers nothing, with a button where something can be done; and the
+//! last messages, in a menu.
 
-use egui_notify::{Toast, Toasts};
+use crate::app::theme::colour;
+use egui::{Frame, Label, Margin, Panel, RichText, Ui};
+use palpate_geometry::palette::{Rgb, Theme};
 use std::collections::VecDeque;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Message to the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,35 +18,82 @@ pub enum UserMessage {
     Error(String),
 }
 
-/// Letters in a line of a notice.
-const LINE_LETTERS: usize = 64;
+/// What can be done about a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Remedy {
+    /// Take the convex hull of a mesh that cannot be repaired.
+    UseHull,
+    /// Read the lengths of the object's file as millimetres.
+    TreatAsMillimetres,
+    /// Read them as metres.
+    TreatAsMetres,
+    /// Choose another file.
+    LocateFile,
+    /// Open the calibration panel.
+    Calibrate,
+    /// Undo the last change of labels.
+    UndoLabel,
+}
+
+/// Remedies by a phrase of the messages that they help with, and their buttons.
+const REMEDIES: [(&str, &str, Remedy); 8] = [
+    ("object.collision = \"hull\"", "Use its hull", Remedy::UseHull),
+    ("set object.scale to decide", "Treat as mm", Remedy::TreatAsMillimetres),
+    ("set object.scale to decide", "Treat as m", Remedy::TreatAsMetres),
+    ("cannot read \"", "Choose a file ..", Remedy::LocateFile),
+    ("cannot read the mesh", "Choose a file ..", Remedy::LocateFile),
+    ("not calibrated", "Calibrate ..", Remedy::Calibrate),
+    ("no calibration", "Calibrate ..", Remedy::Calibrate),
+    ("Ctrl+Z brings it back", "Undo", Remedy::UndoLabel),
+];
+
 /// Messages that are kept.
 const MOST_MESSAGES: usize = 50;
+/// Least height of the line (points).
+const LINE: f32 = 18.0;
+/// Time that a message with a button stays.
+const WITH_BUTTON: Duration = Duration::from_secs(30);
 
-/// Notices on the screen and the last messages.
+/// Level of a message, least urgent first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Level {
+    Info,
+    Warning,
+    Error,
+}
+
+/// Message in the line.
+struct Shown {
+    level: Level,
+    text: String,
+    until: Instant,
+}
+
+/// Messages of the window.
+#[derive(Default)]
 pub(super) struct Notices {
-    toasts: Toasts,
+    shown: Vec<Shown>,
     messages: VecDeque<String>,
 }
 
-impl Default for Notices {
-    fn default() -> Self {
-        // At the lower left, where they do not cover the recognition.
-        let toasts = Toasts::default().with_anchor(egui_notify::Anchor::BottomLeft);
-        Self { toasts: toasts.with_margin(egui::vec2(12.0, 56.0)), messages: VecDeque::new() }
-    }
+/// Remedies for a message.
+fn remedies(text: &str) -> impl Iterator<Item = (&'static str, Remedy)> + '_ {
+    REMEDIES.iter().filter(|(phrase, ..)| text.contains(phrase)).map(|(_, button, remedy)| (*button, *remedy))
 }
 
 impl Notices {
     /// Shows a message. Long sentences stay until they can have been read, errors twice as long.
     pub(super) fn tell(&mut self, message: UserMessage) {
-        let (text, toast, patience): (String, fn(String) -> Toast, u32) = match message {
-            UserMessage::Info(text) => (text, |text| Toast::info(text), 1),
-            UserMessage::Warning(text) => (text, |text| Toast::warning(text), 1),
-            UserMessage::Error(text) => (text, |text| Toast::error(text), 2),
+        let (level, text) = match message {
+            UserMessage::Info(text) => (Level::Info, text),
+            UserMessage::Warning(text) => (Level::Warning, text),
+            UserMessage::Error(text) => (Level::Error, text),
         };
-        let time = patience * Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
-        self.toasts.add(toast(folded(&text, LINE_LETTERS))).duration(Some(time)).show_progress_bar(false);
+        let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
+        let time = if level == Level::Error { 2 * reading } else { reading };
+        let time = if remedies(&text).next().is_some() { time.max(WITH_BUTTON) } else { time };
+        self.shown.retain(|shown| shown.text != text);
+        self.shown.push(Shown { level, text: text.clone(), until: Instant::now() + time });
         self.messages.push_back(text);
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
@@ -67,27 +117,80 @@ impl Notices {
         &self.messages
     }
 
-    /// Draws the notices.
-    pub(super) fn show(&mut self, ctx: &egui::Context) {
-        self.toasts.show(ctx);
+    /// Draws the line; returns the remedy that was chosen.
+    pub(super) fn line(&mut self, ui: &mut Ui, theme: Theme) -> Option<Remedy> {
+        let now = Instant::now();
+        self.shown.retain(|shown| shown.until > now);
+        if let Some(next) = self.shown.iter().map(|shown| shown.until).min() {
+            ui.request_repaint_after(next - now);
+        }
+        let colours = theme.colours();
+        let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 2));
+        let mut chosen = None;
+        Panel::bottom("messages").frame(bar).show_separator_line(false).show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.set_min_height(LINE);
+                // The most urgent, and among those the newest.
+                let first = (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level, *k));
+                let Some(first) = first else {
+                    return quiet_line(ui, colours.quiet_text, self.messages.back());
+                };
+                let Shown { level, text, .. } = &self.shown[first];
+                let ink = match level {
+                    Level::Info => colours.text,
+                    Level::Warning => colours.warning,
+                    Level::Error => colours.error,
+                };
+                let others = self.shown.len() - 1;
+                let mut closed = false;
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    closed = ui.small_button("×").on_hover_text("Dismiss").clicked();
+                    if others > 0 {
+                        ui.menu_button(RichText::new(format!("{others} more")).small(), |ui| {
+                            for shown in self.shown.iter().rev() {
+                                ui.label(&shown.text);
+                            }
+                        });
+                    }
+                    for (button, remedy) in remedies(text) {
+                        if ui.button(RichText::new(button).small()).clicked() {
+                            chosen = Some(remedy);
+                        }
+                    }
+                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                        ui.add(Label::new(RichText::new(text).small().color(colour(ink))).wrap());
+                    });
+                });
+                if closed || chosen.is_some() {
+                    self.shown.remove(first);
+                }
+            });
+        });
+        chosen
     }
 }
 
-/// Breaks a text between words into lines of at most `width` letters; notices do not wrap.
-fn folded(text: &str, width: usize) -> String {
-    let mut folded = String::new();
-    let mut column = 0;
-    for word in text.split(' ') {
-        let letters = word.chars().count();
-        if column > 0 && column + 1 + letters > width {
-            folded.push('\n');
-            column = 0;
-        } else if column > 0 {
-            folded.push(' ');
-            column += 1;
-        }
-        folded.push_str(word);
-        column += letters;
+/// Line without news: the last message, or the two keys that lead on.
+fn quiet_line(ui: &mut Ui, ink: Rgb, last: Option<&String>) {
+    let text = last.map_or("Ctrl+K finds any action, F1 shows all keys", String::as_str);
+    ui.add(Label::new(RichText::new(text).small().color(colour(ink))).truncate());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_geometry::MeshError;
+
+    #[test]
+    fn warnings_carry_the_buttons_that_help() {
+        let of = |text: &str| remedies(text).map(|(_, remedy)| remedy).collect::<Vec<_>>();
+        let open = MeshError::Open { holes: 1, widest_mm: 20.0 };
+        assert_eq!(of(&open.to_string()), [Remedy::UseHull]);
+        assert_eq!(of(&MeshError::NotOrientable.to_string()), [Remedy::UseHull]);
+        assert_eq!(of("Trial 3 stored."), []);
+        assert_eq!(of("cannot read \"part.obj\": no such file"), [Remedy::LocateFile]);
+        let scale = "as given, \"x\" is 40 m across: millimetres taken for metres? It is used at 40 mm; set object.scale to decide";
+        assert_eq!(of(scale), [Remedy::TreatAsMillimetres, Remedy::TreatAsMetres]);
+        assert_eq!(of("trial 7 discarded; Ctrl+Z brings it back"), [Remedy::UndoLabel]);
     }
-    folded
 }

@@ -18,6 +18,8 @@ pub(super) fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {
 pub(super) struct Tiling<'a, 'b> {
     pub(super) context: &'a PanelContext<'b>,
     pub(super) actions: &'a mut Actions,
+    /// Tab chosen in a menu.
+    pub(super) chosen: Option<TileId>,
 }
 
 impl Tiling<'_, '_> {
@@ -38,6 +40,39 @@ impl Behavior<String> for Tiling<'_, '_> {
             (panel.ui)(ui, self.context, self.actions);
         });
         UiResponse::None
+    }
+
+    /// Menu of all tabs, where they do not fit.
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<String>,
+        ui: &mut Ui,
+        _tile: TileId,
+        tabs: &egui_tiles::Tabs,
+        _scroll: &mut f32,
+    ) {
+        let font = egui::TextStyle::Button.resolve(ui.style());
+        let titles: Vec<(TileId, String)> =
+            tabs.children.iter().map(|id| (*id, self.tab_title_for_tile(tiles, *id).text().to_owned())).collect();
+        let width = |title: &str| {
+            let ink = egui::Color32::PLACEHOLDER;
+            ui.painter().layout_no_wrap(title.to_owned(), font.clone(), ink).size().x
+        };
+        let spacing = 2.0 * self.tab_title_spacing(ui.visuals());
+        let needed: f32 = titles.iter().map(|(_, title)| width(title) + spacing).sum();
+        if needed <= ui.available_width() {
+            return;
+        }
+        let response = ui.menu_button("⏷", |ui| {
+            for (id, title) in &titles {
+                if ui.selectable_label(tabs.is_active(*id), title).clicked() {
+                    self.chosen = Some(*id);
+                    ui.close();
+                }
+            }
+        });
+        response.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "All tabs"));
+        response.response.on_hover_text("All tabs");
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

@@ -137,6 +137,11 @@ impl TraceHistory {
         self.grasps.push_back(trace);
     }
 
+    /// Forgets the grasps before this one: they had another scene.
+    pub fn forget_before(&mut self, grasp: u64) {
+        self.grasps.retain(|trace| trace.grasp >= grasp);
+    }
+
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.grasps.clear();
@@ -190,6 +195,8 @@ mod tests {
         assert_eq!(traces.current().map(|t| (t.grasp, t.t.len())), Some((6, 3)));
         let earlier: Vec<u64> = traces.earlier().map(|t| t.grasp).collect();
         assert_eq!(earlier, [3, 4, 5]);
+        traces.forget_before(5);
+        assert_eq!(traces.earlier().map(|t| t.grasp).collect::<Vec<u64>>(), [5]);
         // Computed again.
         for t in [0.0, 0.1] {
             let values = Box::new([7.0, 7.0]);

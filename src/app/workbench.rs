@@ -3,7 +3,7 @@
 use crate::app::actions::{Action, Actions};
 use crate::app::bars;
 use crate::app::context::{ComparedTrials, PanelContext};
-use crate::app::features::files::{FileFeature, drop_hint};
+use crate::app::features::files::{FileAction, FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
@@ -13,8 +13,10 @@ use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::{ViewAction, ViewState};
 use crate::app::keys;
 use crate::app::modes;
-use crate::app::notices::Notices;
+use crate::app::notices::{Notices, Remedy};
+use crate::app::palette;
 use crate::app::panels::PanelKind;
+use crate::app::path_dialog::{Closed, PathDialog};
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::tiling::{Tiling, panel_frame};
@@ -22,10 +24,11 @@ use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui_tiles::Tile;
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
-    Inspector, LabelView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
+    Inspector, LabelCommand, LabelView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
     start_labeller,
 };
 use palpate_learn::{Model, ModelError};
@@ -56,6 +59,8 @@ pub struct WorkbenchSetup<'a> {
     pub playing: bool,
     /// Requests a redraw; called from other threads.
     pub wake: Wake,
+    /// File dialogs of the system are used where there are any; otherwise those inside the window.
+    pub system_dialogs: bool,
     /// Device of the 3-D view; the rest works without.
     pub render_state: Option<&'a egui_wgpu::RenderState>,
 }
@@ -74,6 +79,7 @@ pub struct Workbench {
     inspect: InspectFeature,
     tools: GripperTools,
     files: FileFeature,
+    path_dialog: Option<PathDialog>,
     thumbnails: BTreeMap<String, egui::TextureHandle>,
     driver: Option<String>,
 }
@@ -134,6 +140,9 @@ impl Workbench {
         // Layouts of other versions are forgotten.
         view.layouts.retain(|mode, layout| modes::is_complete(*mode, layout));
         theme::apply(ctx, view.theme);
+        // Keys for the scale are ours, so that it is remembered.
+        ctx.options_mut(|options| options.zoom_with_keyboard = false);
+        view.apply(ctx, ViewAction::SetScale(view.scale), None);
         let mut notices = Notices::default();
         let explainer = Explainer::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("explanations"))?;
         let recognition = RecognitionFeature::new(model.cloned(), explainer, &mut tools, &mut view, &mut notices);
@@ -146,7 +155,8 @@ impl Workbench {
             recognition,
             inspect,
             tools,
-            files: FileFeature::new(wake),
+            files: FileFeature::new(wake, setup.system_dialogs),
+            path_dialog: None,
             thumbnails: load_thumbnails(ctx),
             driver,
         };
@@ -193,6 +203,10 @@ impl Workbench {
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
+        let remedy = self.notices.line(ui, self.view.theme);
+        if let Some(action) = remedy.map(action_of) {
+            self.apply(&ctx, action);
+        }
         let published = self.published();
         let mut actions = Actions::default();
         // The layout changes while it is drawn, so it is taken out for that time.
@@ -206,15 +220,20 @@ impl Workbench {
         Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, &context, &mut actions));
         let ground = Frame::new().fill(colour(colours.border));
         CentralPanel::default().frame(ground).show(ui, |ui| {
-            layout.ui(&mut Tiling { context: &context, actions: &mut actions }, ui);
+            let mut tiling = Tiling { context: &context, actions: &mut actions, chosen: None };
+            layout.ui(&mut tiling, ui);
+            if let Some(chosen) = tiling.chosen {
+                layout.make_active(|id, _| id == chosen);
+            }
         });
         keys::sheet(&ctx, self.view.keys_shown, mode, &mut actions);
+        palette::ui(&ctx, &context, &mut actions);
         drop_hint(&ctx);
         self.view.layouts.insert(mode, layout);
         for action in actions {
             self.apply(&ctx, action);
         }
-        self.notices.show(&ctx);
+        self.ask_inside(&ctx);
     }
 
     /// Draws one panel alone, as large as there is room.
@@ -287,12 +306,41 @@ impl Workbench {
         }
     }
 
+    /// Draws the file dialog inside the window, while there is one.
+    fn ask_inside(&mut self, ctx: &egui::Context) {
+        if let Some(question) = self.files.take_question() {
+            self.path_dialog = Some(PathDialog::new(question, &self.files.folder()));
+        }
+        let closed = self.path_dialog.as_mut().and_then(|dialog| dialog.ui(ctx));
+        if let Some(closed) = closed {
+            self.path_dialog = None;
+            if let Closed::Answered(answer) = closed {
+                self.files.answer(answer);
+            }
+            ctx.request_repaint();
+        }
+    }
+
+    /// Brings a panel to the front; opens a mode that has it where the present one has not.
+    fn show_panel(&mut self, name: &str) {
+        let others = modes::ALL.iter().map(|kind| kind.mode).filter(|mode| *mode != self.view.mode);
+        for mode in std::iter::once(self.view.mode).chain(others).collect::<Vec<_>>() {
+            let layout = self.view.layouts.entry(mode).or_insert_with(|| modes::default_layout(mode));
+            if layout.make_active(|_, tile| matches!(tile, Tile::Pane(pane) if pane == name)) {
+                self.view.mode = mode;
+                return;
+            }
+        }
+    }
+
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
         let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
-        labelling.gather(gripper, simulation, view, notices);
+        if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
+            inspect.apply(action, &[], view, notices);
+        }
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, view, notices);
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
@@ -307,6 +355,10 @@ impl Workbench {
     }
 
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
+        if let Action::View(ViewAction::ShowPanel(name)) = action {
+            self.show_panel(name);
+            return ctx.request_repaint();
+        }
         let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();
         let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
         match action {
@@ -336,12 +388,24 @@ impl Workbench {
             }
             Action::File(action) => files.apply(action, simulation),
             Action::Stop => {
-                view.keys_shown = false;
+                (view.keys_shown, view.palette_shown) = (false, false);
                 gripper.stop();
             }
             Action::Tell(message) => notices.tell(message),
         }
         ctx.request_repaint();
+    }
+}
+
+/// Action that carries out a remedy.
+fn action_of(remedy: Remedy) -> Action {
+    match remedy {
+        Remedy::UseHull => SimulationAction::UseHull.into(),
+        Remedy::TreatAsMillimetres => SimulationAction::SetScale(1e-3).into(),
+        Remedy::TreatAsMetres => SimulationAction::SetScale(1.0).into(),
+        Remedy::LocateFile => FileAction::Open.into(),
+        Remedy::Calibrate => ViewAction::ShowPanel("calibration").into(),
+        Remedy::UndoLabel => LabelCommand::Undo.into(),
     }
 }
 

@@ -5,7 +5,7 @@ mod manage;
 mod zero;
 
 use super::Failure;
-use super::setup::open_store;
+use super::setup::{existing_store, open_store};
 use super::terminal::{say, say_json, table, warn};
 use palpate_store::{CalibrationId, Store, StoredCalibration, read_points_csv};
 use palpate_tactile::board::{Board, Sensor};
@@ -67,10 +67,16 @@ fn parse_sensor(text: &str) -> Result<Sensor, String> {
 }
 
 pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let mut store = open_store(store)?;
     if let Some(command) = &arguments.command {
-        return manage::run(command, &mut store);
+        return match command.reads() {
+            true => match existing_store(store)? {
+                Some(mut store) => manage::run(command, &mut store),
+                None => say("no calibrations yet: `palpate help gripper` says how to calibrate"),
+            },
+            false => manage::run(command, &mut open_store(store)?),
+        };
     }
+    let mut store = open_store(store)?;
     let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
     let part = part_name(arguments, sensor, &store)?;
     if arguments.points.is_some() && arguments.live.empty_close.is_none() {

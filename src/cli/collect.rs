@@ -1,12 +1,16 @@
 //! `palpate collect`: collects a simulated data set in parallel, resumable, in parts.
 
 use super::Failure;
+use super::interrupt::stop_flag;
 use super::setup::{RecomputeArguments, SceneArguments, open_store};
 use super::terminal::{say, say_json};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_lab::grasping::{CollectionPlan, CollectionReport, Shard, all_objects, collect};
+use palpate_sim::objects::titled;
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 /// Arguments of `palpate collect`.
 #[derive(Debug, clap::Args)]
@@ -74,16 +78,31 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
     let mut store = open_store(store)?;
+    let stop = stop_flag()?;
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?);
     let start = cpu_time::ProcessTime::now();
+    let mut of = 0;
     let outcome = collect(&plan, &mut store, threads, &mut |progress| {
         bar.set_length(u64::from(progress.of));
-        bar.set_message(progress.object);
+        bar.set_message(titled(&progress.object));
         bar.set_position(u64::from(progress.done));
+        of = progress.of;
+        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     bar.finish_and_clear();
     let report = Report { collection: outcome?, cpu_s: start.elapsed().as_secs_f64(), threads };
-    if arguments.json { say_json(&report) } else { print(&report, store.path()) }
+    if arguments.json {
+        say_json(&report)?;
+    } else {
+        print(&report, store.path())?;
+    }
+    let CollectionReport { interrupted, known, stored, .. } = report.collection;
+    if interrupted {
+        let (kept, path) = (known + stored, store.path().display());
+        let text = format!("stopped: {kept} of {of} trials are kept in {path}; the same command resumes with the rest");
+        return Err(text.into());
+    }
+    Ok(())
 }
 
 fn print(report: &Report, store: &Path) -> Result<(), Failure> {

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
-use super::setup::open_store;
+use super::setup::read_store;
 use super::terminal::{say, say_json, table, warn};
 use palpate_lab::study::{Comparison, ComparisonRow, Controls, in_table_order};
 use palpate_learn::evaluation::StageOneScores;
@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     let (methods, paths) = chosen(&arguments.models)?;
     let models = paths.iter().map(|path| Ok((path.as_str(), Model::load(Path::new(path))?)));
     let models: Vec<(&str, Model)> = models.collect::<Result<_, Failure>>()?;
-    let store = open_store(store)?;
+    let store = read_store(store)?;
     // A saved model is tested on all trials: only the user knows which of them it was trained on.
     let train_trials = if methods.is_empty() { 0 } else { arguments.train_trials };
     let most = arguments.test_trials.map(|test| train_trials + test);

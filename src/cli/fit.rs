@@ -1,7 +1,7 @@
 //! `palpate fit`: estimates stiffness, damping, torque curve and lag of a real finger from recorded grasps.
 
 use super::Failure;
-use super::setup::{SceneArguments, open_store};
+use super::setup::{SceneArguments, read_store};
 use super::terminal::{say, say_json, table, warn};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{FingerFit, Known, RecordedGrasps, fit_finger};
@@ -47,7 +47,7 @@ struct Report {
 }
 
 pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let store = open_store(store)?;
+    let store = read_store(store)?;
     // Only the gripper of the scene is used.
     let scene = arguments.scene.any_given().then(|| arguments.scene.scene(None)).transpose()?;
     let gripper = scene.as_ref().map(|scene| &scene.gripper);

@@ -6,6 +6,7 @@ use super::terminal::{say, say_json, warn};
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp_soundly};
 use palpate_sim::frame::TrustLevel;
+use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_store::{contacts_path, write_contacts_csv, write_trial_csv};
@@ -130,7 +131,7 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
     }
     let duration = scene.timing.duration_s;
     let held = if scene.holds_object() { "fixed" } else { "free" };
-    say(format!("object        {}, {held}", summary.object))?;
+    say(format!("object        {}, {held}", titled(&summary.object)))?;
     match summary.contact_onset_s {
         Some(onset) => say(format!("first contact {onset:.3} s"))?,
         None => say("first contact none")?,

@@ -40,7 +40,7 @@ fn command_help(program: &clap::Command, names: &[String]) -> Result<(), Failure
             None => {
                 let topics = TOPICS.iter().map(|topic| topic.name).filter(|_| depth == 0);
                 let commands = command.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);
-                refuse(name, topics.chain(commands));
+                refuse("palpate help", "TOPIC|COMMAND", name, topics.chain(commands));
             }
         }
     }
@@ -49,11 +49,16 @@ fn command_help(program: &clap::Command, names: &[String]) -> Result<(), Failure
 }
 
 /// Ends the program as wrong use; clap adds the nearest of the known names.
-fn refuse<'a>(name: &str, known: impl Iterator<Item = &'a str>) {
+pub(super) fn refuse<'a>(
+    program: &'static str,
+    argument: &'static str,
+    name: &str,
+    known: impl Iterator<Item = &'a str>,
+) {
     // Leaked, because clap wants names that live as long as the program, which ends here.
     let known = PossibleValuesParser::new(known.map(|known| &*known.to_owned().leak()));
-    let argument = clap::Arg::new("TOPIC|COMMAND").value_parser(known);
-    if let Err(error) = clap::Command::new("palpate help").arg(argument).try_get_matches_from(["palpate help", name]) {
+    let argument = clap::Arg::new(argument).value_parser(known);
+    if let Err(error) = clap::Command::new(program).arg(argument).try_get_matches_from([program, name]) {
         error.exit();
     }
 }

@@ -27,11 +27,11 @@ mod trials;
 
 use crate::app::{WindowOptions, open_window};
 use crate::manual::TOPICS;
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate_learn::Model;
 use palpate_sim::objects::{EMPTY, anchored, catalogue};
 use palpate_sim::scene::Scene;
-use palpate_store::Store;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -130,24 +130,48 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
     }
     // The path is remembered; the working folder may differ next time.
     let model = model.as_ref().map(std::path::absolute).transpose()?;
-    let store = store.clone().unwrap_or_else(Store::default_path);
+    let store = setup::store_path(store.as_deref())?;
     Ok(open_window(WindowOptions { scene, store, port: port.clone(), model })?)
 }
 
-/// Refuses a misspelt command, which would otherwise be taken for an object.
+/// Refuses a misspelt command or object, with the nearest of those there are.
 fn refuse_unknown_word(object: &str) {
     let known = object == EMPTY || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
     if !known && Path::new(object).extension().is_none() {
-        let commands = Arguments::command();
-        let names: Vec<&str> = commands.get_subcommands().filter(|c| !c.is_hide_set()).map(|c| c.get_name()).collect();
-        let text = format!("'{object}' is neither a command ({}) nor an object; see `palpate help`", names.join(", "));
-        Arguments::command().error(clap::error::ErrorKind::InvalidSubcommand, text).exit();
+        let program = Arguments::command();
+        let commands = program.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);
+        let objects = catalogue().iter().map(|built_in| built_in.name.as_str()).chain([EMPTY]);
+        help::refuse("palpate", "OBJECT|COMMAND", object, commands.chain(objects));
     }
+}
+
+/// First argument of the command line that is neither an option nor the value of one.
+fn first_word() -> Option<String> {
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--store" | "--port" | "--model" => drop(words.next()),
+            option if option.starts_with('-') => {}
+            _ => return Some(word),
+        }
+    }
+    None
 }
 
 /// Runs the program with the arguments of the command line.
 pub fn run() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        // A misspelt command is taken for an object, and what follows it for the mistake.
+        if matches!(error.kind(), ErrorKind::InvalidSubcommand | ErrorKind::UnknownArgument)
+            && let Some(word) = first_word()
+        {
+            let is_command = |command: &clap::Command| command.get_name() == word;
+            if !Arguments::command().get_subcommands().any(is_command) {
+                refuse_unknown_word(&word);
+            }
+        }
+        error.exit()
+    });
     if (arguments.port.is_some() || arguments.model.is_some()) && arguments.command.is_some() {
         let text = "--port and --model before a command apply to the window only; put them after the command";
         Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();

@@ -1,10 +1,10 @@
 //! `palpate plan`: trials wanted and done per object, and the next one to record.
 
 use super::Failure;
-use super::setup::open_store;
+use super::setup::{existing_store, open_store};
 use super::terminal::{say, say_json, table};
-use palpate_store::Store;
-use palpate_store::labels::{NextTrial, ObjectProgress, Progress};
+use palpate_sim::objects::{class_of, titled};
+use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, ObjectProgress, Progress};
 use serde::Serialize;
 use std::path::Path;
 
@@ -52,20 +52,26 @@ struct Report {
 }
 
 pub(super) fn run(arguments: &PlanArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let command = arguments.command.as_ref().unwrap_or(&PlanCommand::Show);
+    if matches!(command, PlanCommand::Show) {
+        return match existing_store(store)? {
+            Some(store) => show(&store.labels().plan()?, &store.labels().trials()?, arguments.json),
+            None => show(&LabelPlan::default(), &[], arguments.json),
+        };
+    }
     let store = open_store(store)?;
     let mut plan = store.labels().plan()?;
-    match arguments.command.as_ref().unwrap_or(&PlanCommand::Show) {
+    match command {
         PlanCommand::Show => {}
-        PlanCommand::Set { name, wanted } => plan.set(name, *wanted)?,
-        PlanCommand::Remove { name } => plan.remove(name)?,
+        PlanCommand::Set { name, wanted } => plan.set(class_of(name), *wanted)?,
+        PlanCommand::Remove { name } => plan.remove(class_of(name))?,
     }
     store.labels().set_plan(&plan)?;
-    show(&store, arguments.json)
+    show(&plan, &store.labels().trials()?, arguments.json)
 }
 
-fn show(store: &Store, json: bool) -> Result<(), Failure> {
-    let rows = store.labels().trials()?;
-    let progress = store.labels().plan()?.progress(&rows);
+fn show(plan: &LabelPlan, rows: &[LabelledTrial], json: bool) -> Result<(), Failure> {
+    let progress = plan.progress(rows);
     let last = rows.iter().rev().find(|row| row.counts()).and_then(|row| row.object.as_deref());
     let next = progress.next(last);
     let unlabelled = rows.iter().filter(|row| row.complete && !row.discarded && row.object.is_none()).count();
@@ -83,7 +89,9 @@ fn show(store: &Store, json: bool) -> Result<(), Failure> {
             let [opening, across] = next.cue.shift_mm;
             say(format!(
                 "next: {} (trial {}), turned by {:.0} degrees, shifted by {opening:.0} mm to the right and {across:.0} mm across",
-                next.object, next.number, next.cue.turn_deg
+                titled(&next.object),
+                next.number,
+                next.cue.turn_deg
             ))
         }
         None => say("the plan is complete"),
@@ -94,7 +102,7 @@ fn cells(progress: &Progress) -> Vec<Vec<String>> {
     let row = |object: &ObjectProgress| {
         let ObjectProgress { name, wanted, done, flagged } = object;
         let wanted = if *wanted == 0 { "not planned".to_owned() } else { wanted.to_string() };
-        vec![name.clone(), done.to_string(), wanted, flagged.to_string()]
+        vec![titled(name), done.to_string(), wanted, flagged.to_string()]
     };
     progress.objects.iter().map(row).collect()
 }

@@ -3,11 +3,11 @@
 mod why;
 
 use super::Failure;
-use super::setup::open_store;
+use super::setup::read_store;
 use super::terminal::{say, say_json, table};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Verdict, shipped_model};
-use palpate_store::labels::shown_name;
+use palpate_store::labels::shown_title;
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -106,7 +106,7 @@ pub(super) fn named(model: &Model, pmf: &Pmf) -> BTreeMap<String, f64> {
 
 pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Result<(), Failure> {
     let model = load_model(arguments.model.as_deref())?;
-    let store = open_store(store)?;
+    let store = read_store(store)?;
     let labels = &model.card.labels;
     let mut belief = Belief::default();
     let mut trials = Vec::new();
@@ -155,16 +155,16 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             let properties = trial.stage_one.as_ref().map_or_else(String::new, |s| format!("{}, {}", s.size, s.shape));
             vec![
                 trial.trial.to_string(),
-                shown_name(trial.truth.as_deref().unwrap_or_default()).to_owned(),
+                shown_title(trial.truth.as_deref().unwrap_or_default()),
                 properties,
-                trial.decided.clone(),
+                shown_title(&trial.decided),
                 format!("{:.0} %", 100.0 * trial.probability),
             ]
         })
         .collect();
     table(&["trial", "label", "stage one", "recognised as", "probability"], &cells)?;
     if let Some(all) = together {
-        say(format!("together: {} ({:.0} %)", all.decided, 100.0 * all.probability))?;
+        say(format!("together: {} ({:.0} %)", shown_title(&all.decided), 100.0 * all.probability))?;
     }
     let explained = || trials.iter().filter_map(|trial| Some((trial.trial, trial.why.as_ref()?)));
     for (id, why) in explained() {

@@ -9,8 +9,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::serial::{Baud, LinkOptions, LinkState, LinkStatus, list_ports};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{RecordProgress, RecordedTrial, TrialRequest, record};
+use palpate_sim::objects::class_of;
 use palpate_sim::scene::Scene;
-use palpate_store::labels::{FlagRemark, class_name, flaws, shown_name};
+use palpate_store::labels::{FlagRemark, class_name, flaws, shown_title};
 use palpate_tactile::trial::Control;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -105,7 +106,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         Some(path) => Scene::from_file(path)?,
         None => Scene::default(),
     };
-    let object = arguments.object.as_deref().map(class_name).transpose()?;
+    let object = arguments.object.as_deref().map(|name| class_name(class_of(name))).transpose()?;
     // Opened once here: a store that cannot be used is reported before the board is.
     let store = open_store(store)?.path().to_owned();
     let stop = stop_flag()?;
@@ -178,7 +179,7 @@ fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, j
     for warning in &report.warnings {
         warn(warning);
     }
-    let object = shown_name(report.object.as_deref().unwrap_or_default());
+    let object = shown_title(report.object.as_deref().unwrap_or_default());
     say(format!("trial {}      {object} from {}", report.trial_id, report.port))?;
     for found in &report.flags {
         say(format!("flagged       {}: {}", found.flag.label(), found.remark))?;

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::recognise::{StageOne, load_model, named};
-use super::setup::open_store;
+use super::setup::{existing_store, read_store};
 use super::terminal::{note, say, say_json};
 use palpate_device::serial::{LinkOptions, SerialLink};
 use palpate_lab::grasping::{Identification, Row};
@@ -62,9 +62,8 @@ struct Report {
 
 pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(), Failure> {
     let model = Arc::new(load_model(arguments.model.as_deref())?);
-    let store = open_store(store)?;
     let mut replay = match arguments.source.to_str().and_then(|text| text.parse().ok()) {
-        Some(id) => Replay::of_trial(&store, id, Some(model))?,
+        Some(id) => Replay::of_trial(&read_store(store)?, id, Some(model))?,
         None => {
             let replay_speed = f64::INFINITY;
             let options = LinkOptions { path: Some(arguments.source.clone()), replay_speed, ..LinkOptions::default() };
@@ -72,7 +71,8 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
                 let name = arguments.source.display();
                 return Err(format!("\"{name}\" is neither the number of a trial nor a file of captured bytes").into());
             }
-            Replay::of_capture(SerialGripper::new(Box::new(SerialLink::open(&options)?)), &store, Some(model))?
+            let gripper = SerialGripper::new(Box::new(SerialLink::open(&options)?));
+            Replay::of_capture(gripper, existing_store(store)?.as_ref(), Some(model))?
         }
     };
     let (mut rows, mut header, mut pace) = (Vec::new(), Vec::new(), None);

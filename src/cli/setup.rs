@@ -102,12 +102,41 @@ impl SceneArguments {
     }
 }
 
-/// Opens the named store, or the default one.
+/// Path of the named store, or of the default one. Folders are not created for a named one.
+pub(super) fn store_path(path: Option<&Path>) -> Result<PathBuf, Failure> {
+    let Some(path) = path else { return Ok(Store::default_path()) };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => {
+            let (store, folder) = (path.display(), folder.display());
+            Err(format!("no store \"{store}\": there is no folder \"{folder}\". Create it, or name another --store")
+                .into())
+        }
+        None => Ok(path.to_owned()),
+    }
+}
+
+/// Opens the named store, or the default one; creates the file where there is none.
 pub(super) fn open_store(path: Option<&Path>) -> Result<Store, Failure> {
-    let store = match path {
-        Some(path) => Store::open(path)?,
-        None => Store::open(&Store::default_path())?,
-    };
+    opened(&store_path(path)?)
+}
+
+/// Opens the named store, or the default one, for a command that reads; `None` where there is none, which is not created.
+pub(super) fn existing_store(path: Option<&Path>) -> Result<Option<Store>, Failure> {
+    let path = store_path(path)?;
+    if path.exists() { opened(&path).map(Some) } else { Ok(None) }
+}
+
+/// The same for a command that cannot do without.
+pub(super) fn read_store(path: Option<&Path>) -> Result<Store, Failure> {
+    existing_store(path)?.ok_or_else(|| {
+        let path = path.map_or_else(Store::default_path, Path::to_owned);
+        format!("no trials yet: there is no store \"{}\"; `palpate grasp lemon` makes one", path.display()).into()
+    })
+}
+
+fn opened(path: &Path) -> Result<Store, Failure> {
+    let store = Store::open(path)?;
     for warning in store.warnings() {
         super::terminal::warn(warning);
     }

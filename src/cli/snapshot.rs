@@ -1,7 +1,7 @@
 //! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
 use super::Failure;
-use super::setup::{SceneArguments, open_store};
+use super::setup::{SceneArguments, read_store};
 use super::terminal::say;
 use glam::Vec2;
 use palpate_geometry::drawing::{Camera, DrawList, StandardView};
@@ -133,7 +133,7 @@ fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Fr
 }
 
 fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> Result<(Stage, Frame, String), Failure> {
-    let store = open_store(store)?;
+    let store = read_store(store)?;
     let Some(trial) = store.load(id)?.into_simulated() else {
         let text = format!(
             "trial {id} was not simulated, so there are no poses to draw. Use `palpate trials show {id}`, `palpate trials \

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
-use super::setup::open_store;
+use super::setup::read_store;
 use super::terminal::{say, say_json, table};
 use palpate_lab::datasets::models_folder;
 use palpate_lab::study::{SearchRow, search};
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
             None => say("this method has no hyperparameters to set"),
         };
     }
-    let store = open_store(store)?;
+    let store = read_store(store)?;
     let data = arguments.data.read(&store, false, arguments.trials)?;
     let mut settings = parse_settings(&arguments.settings)?;
     let search = if arguments.search { Some(searched(method, &data, arguments, &mut settings)?) } else { None };

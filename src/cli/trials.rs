@@ -4,10 +4,11 @@ mod labels;
 mod show;
 
 use super::Failure;
-use super::setup::open_store;
+use super::setup::{existing_store, open_store, read_store};
 use super::terminal::{say, say_json, table, warn};
 use labels::LabelCommand;
-use palpate_store::labels::shown_name;
+use palpate_sim::objects::class_of;
+use palpate_store::labels::{shown_name, shown_title};
 use palpate_store::{
     Store, TrialRow, contacts_path, export_board_trial, file_name_of, read_trials_csv, write_contacts_csv,
     write_signals_csv, write_trial_csv,
@@ -110,7 +111,19 @@ enum TrialsCommand {
 }
 
 pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let mut store = open_store(store)?;
+    let creates = matches!(arguments.command, TrialsCommand::Import { .. } | TrialsCommand::Merge { .. });
+    let mut store = match &arguments.command {
+        _ if creates => open_store(store)?,
+        TrialsCommand::List { json, .. } => match existing_store(store)? {
+            Some(store) => store,
+            None if *json => return say_json(&[(); 0]),
+            None => return say(NONE_YET),
+        },
+        TrialsCommand::Export { labelled: true, .. } => {
+            existing_store(store)?.ok_or("no trial has a label: there is no store yet")?
+        }
+        _ => read_store(store)?,
+    };
     match &arguments.command {
         TrialsCommand::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
@@ -147,6 +160,8 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
     }
 }
 
+const NONE_YET: &str = "no trials yet: `palpate grasp lemon` records one";
+
 fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
     let import = read_trials_csv(file)?;
     for warning in &import.warnings {
@@ -160,19 +175,19 @@ fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
 
 fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Result<(), Failure> {
     let mut rows = store.list(deleted)?;
-    rows.retain(|row| object.is_none_or(|object| row.object == object));
+    rows.retain(|row| object.is_none_or(|object| row.object == object || row.object == class_of(object)));
     if json {
         return say_json(&rows);
     }
     if rows.is_empty() {
-        return say("no trials yet: `palpate grasp lemon` records one");
+        return say(NONE_YET);
     }
     let cells: Vec<Vec<String>> = rows
         .iter()
         .map(|row| {
             vec![
                 row.id.to_string(),
-                shown_name(&row.object).to_owned(),
+                shown_title(&row.object),
                 row.created.chars().take(19).collect::<String>().replace('T', " "),
                 row.source.to_string(),
                 row.samples.to_string(),

@@ -6,7 +6,7 @@
 
 use super::store::{Store, json};
 use super::store_error::StoreError;
-use crate::labels::{Guess, LabelPlan, shown_name};
+use crate::labels::{Guess, LabelPlan, shown_title};
 use palpate_tactile::trial::TrialId;
 use rusqlite::{Row, Transaction, params};
 use serde::{Deserialize, Serialize};
@@ -84,7 +84,7 @@ impl Change {
 
     /// The change in words.
     pub fn sentence(&self) -> String {
-        let name = |label: &Option<String>| shown_name(label.as_deref().unwrap_or_default()).to_owned();
+        let name = |label: &Option<String>| shown_title(label.as_deref().unwrap_or_default());
         match self {
             Self::Label { from, to } => format!("label {} -> {}", name(from), name(to)),
             Self::Discarded => "discarded".to_owned(),
@@ -95,7 +95,7 @@ impl Change {
             Self::Unsure { to: true, .. } => "label marked as unsure".to_owned(),
             Self::Unsure { to: false, .. } => "label no longer unsure".to_owned(),
             Self::Guess { guess } => match guess.top() {
-                Some((class, p)) => format!("{} predicted {class} ({:.0} %)", guess.model, 100.0 * p),
+                Some((class, p)) => format!("{} predicted {} ({:.0} %)", guess.model, shown_title(class), 100.0 * p),
                 None => format!("{} predicted nothing", guess.model),
             },
             Self::Reviewed => "label reviewed and kept".to_owned(),

@@ -9,6 +9,7 @@ use palpate_learn::evaluation::prefix_calibration;
 use palpate_learn::{Dataset, Fitting, Model, Signatures, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -29,7 +30,7 @@ fn collected(set: usize, store: &mut Store) -> Result<Dataset, Failure> {
     let scene = Scene { pose: preset.poses(), ..Scene::default() };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let plan = CollectionPlan::of_all_objects(scene, TRIALS[set], SEEDS[set]);
-    let report = collect(&plan, store, threads, &mut |_| ())?;
+    let report = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?;
     let source = DatasetQuery { collection: Some(report.collection), ..DatasetQuery::default() };
     Ok(source.read(store, &SensorView::default(), &mut |_, _| ())?)
 }

@@ -22,7 +22,6 @@ const HOMES: &[(&str, &[&str])] = &[
     ("directories", &["src/store/store.rs"]),
     ("eframe", &["src/app"]),
     ("egui", &["src/app"]),
-    ("egui_notify", &["src/app/notices.rs"]),
     ("egui_plot", &["src/app"]),
     ("egui_tiles", &["src/app"]),
     ("egui_wgpu", &["src/app"]),

@@ -322,3 +322,67 @@ fn the_readme_is_short_and_begins_with_two_commands() {
         assert!(readme.contains(topic.name), "the README does not name {}", topic.name);
     }
 }
+
+#[test]
+fn misspelt_words_are_answered_with_the_nearest() {
+    let folder = folder();
+    for (arguments, wanted) in [
+        (&["lemn"][..], "'lemon'"),
+        (&["grsp", "lemon"][..], "'grasp'"),
+        (&["colect", "--trials", "3"][..], "'collect'"),
+        (&["trails", "list"][..], "'trials'"),
+    ] {
+        let ran = run(folder.path(), arguments);
+        assert!(ran.code == Some(2) && ran.err.contains("similar value") && ran.err.contains(wanted), "{ran:?}");
+    }
+    // The store before it is no word.
+    let ran = run(folder.path(), &["lemn", "--model", "grasp"]);
+    assert!(ran.code == Some(2) && ran.err.contains("'lemon'"), "{ran:?}");
+}
+
+#[test]
+fn commands_that_read_create_nothing() {
+    let folder = folder();
+    let at = folder.path();
+    let list = run(at, &["trials", "list"]);
+    assert!(list.code == Some(0) && list.out.contains("no trials yet"), "{list:?}");
+    assert_eq!(json(at, &["trials", "list", "--json"]), Value::Array(vec![]));
+    let plan = run(at, &["plan"]);
+    assert!(plan.code == Some(0) && plan.out.contains("0 of 800 trials"), "{plan:?}");
+    assert_eq!(run(at, &["calibrate", "list"]).code, Some(0));
+    for arguments in [
+        &["trials", "show", "1"][..],
+        &["trials", "export", "1", "--out", "x.csv"][..],
+        &["recognise", "1"][..],
+        &["replay", "1"][..],
+        &["snapshot", "--trial", "1", "--out", "x.png"][..],
+        &["evaluate"][..],
+    ] {
+        refused(at, arguments, &["there is no store"]);
+    }
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 0, "something was created");
+    // A folder that was not asked for is not created either.
+    for arguments in [&["trials", "list"][..], &["grasp", "lemon"][..]] {
+        let ran = ran(&palpate(&at.join("not/there.sqlite")).args(arguments).output().unwrap());
+        assert!(ran.code == Some(1) && ran.err.contains("there is no folder"), "{ran:?}");
+    }
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 0, "something was created");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_collection_says_what_is_kept() {
+    let folder = folder();
+    let store = folder.path().join("set.sqlite");
+    let arguments = ["collect", "--objects", "ball", "--trials", "100000", "--accuracy", "draft", "--threads", "1"];
+    let mut command = palpate(&store);
+    let child = command.args(arguments).stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    while !Store::open(&store).is_ok_and(|store| store.list(false).is_ok_and(|rows| rows.len() > 2)) {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let id = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    let ran = ran(&child.wait_with_output().unwrap());
+    assert!(ran.code == Some(1) && ran.err.contains("of 100000 trials are kept in"), "{ran:?}");
+    assert!(ran.err.contains("the same command resumes"), "{ran:?}");
+}

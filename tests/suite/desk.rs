@@ -8,7 +8,7 @@ use crate::gripper::board;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{Mode, ViewAction};
+use palpate::app::{Mode, ViewAction, ViewSource};
 use palpate_lab::workers::{GripperCommand, LabellingAction};
 use palpate_store::Store;
 use palpate_tactile::trial::Control;
@@ -57,6 +57,19 @@ impl Bench {
         trials.into_iter().map(|trial| (trial.id, trial.object, trial.discarded)).collect()
     }
 
+    /// Waits until this stored trial is shown, or the live stream.
+    fn until_inspected(&mut self, id: Option<i64>) {
+        for _ in 0..MOST_LOOKS {
+            let source = self.workbench().view().source;
+            let shown = self.workbench().inspected().filter(|_| source == ViewSource::Trial).map(|open| open.trial.id);
+            if shown == id {
+                return;
+            }
+            self.wait();
+        }
+        panic!("trial {id:?} is not shown");
+    }
+
     /// Waits until the labels in the store are these.
     fn until_labelled(&mut self, wanted: &[(i64, Option<&str>, bool)]) {
         let wanted: Vec<(i64, Option<String>, bool)> =
@@ -89,7 +102,7 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::Enter);
     desk.until_labelled(&[(1, Some(&next), false)]);
     desk.until_shown(true, "1 of 800 trials");
-    desk.until_shown(true, "The model predicts lemon");
+    desk.until_shown(true, "The model predicts Lemon");
     // The next one is not the same again; it is recorded twice, because the first went wrong.
     assert_ne!(desk.next_object(), next);
     desk.record();
@@ -110,6 +123,8 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::ArrowDown);
     desk.press(Key::ArrowDown);
     desk.until_shown(true, "Trial 1: labelled");
+    // What is shown is that trial, not the live stream.
+    desk.until_inspected(Some(1));
     desk.press(Key::Slash);
     desk.type_text("garlic");
     desk.press(Key::Enter);
@@ -122,6 +137,7 @@ fn an_afternoon_by_keys_alone() {
     // Thrown away while it goes on, and out of the list.
     desk.press(Key::R);
     desk.until_shown(true, "Time in the trial");
+    desk.until_inspected(None);
     desk.press(Key::D);
     desk.until_shown(false, "Time in the trial");
     desk.press(Key::ArrowDown);

@@ -406,8 +406,12 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
         assert!(view.beliefs.len() == 1 && view.verdict.is_some(), "{:?}", ended.recognition_off);
         assert!(store.labels().guess(number).unwrap().is_some_and(|guess| guess.pmf.len() == 17));
     }
+    // Switched off in the middle of a trial: it ends, and is kept.
+    let running = desk.until(|view| view.trial.as_ref().is_some_and(|trial| trial.id == Some(3) && trial.samples > 20));
+    assert!(running.trial.as_ref().is_some_and(|trial| trial.automatic));
     desk.command(GripperCommand::Watch(None));
-    desk.until(|view| view.watching.is_none());
+    let ended = desk.until(|view| view.watching.is_none() && view.ended.as_ref().is_some_and(|ended| ended.id == 3));
+    assert!(ended.trial.is_none() && ended.ended.as_ref().is_some_and(|ended| !ended.discarded));
 }
 
 #[test]

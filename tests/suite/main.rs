@@ -22,6 +22,7 @@
 //! - `studies`: stored results of studies, and what is made from them.
 //! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
+//! - `window`: command palette, undo, keys without effect, files without a system dialog, sizes.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `signatures`: pads and heat maps over time in the window, clicked and switched.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
@@ -65,3 +66,4 @@ mod studies;
 mod training;
 mod trust;
 mod why;
+mod window;

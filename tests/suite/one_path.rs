@@ -239,7 +239,7 @@ fn captured_bytes_replay_as_the_trial_that_is_recorded_from_them() {
     let model = Arc::new(shipped_model().unwrap());
     let options = LinkOptions { path: Some(bytes), replay_speed: f64::INFINITY, ..LinkOptions::default() };
     let gripper = SerialGripper::new(Box::new(SerialLink::open(&options).unwrap()));
-    let from_bytes = played(Replay::of_capture(gripper, &store, Some(Arc::clone(&model))).unwrap());
+    let from_bytes = played(Replay::of_capture(gripper, Some(&store), Some(Arc::clone(&model))).unwrap());
     let from_trial = played(Replay::of_trial(&store, 1, Some(Arc::clone(&model))).unwrap());
     assert!(from_trial.0.len() > 500 && from_trial.1.is_some(), "{}", from_trial.0.len());
     assert_eq!(from_bytes, from_trial);

@@ -1,5 +1,6 @@
 //! Bar above the panels (modes and data source) and below (time, or the running trial).
 
+mod gripper;
 mod timeline;
 mod trial;
 
@@ -29,37 +30,71 @@ fn speed_text(speed: f64) -> String {
 }
 
 pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let colours = context.view.theme.colours();
-    ui.horizontal_centered(|ui| {
-        ui.label(RichText::new("Palpate").heading().strong());
-        modes_ui(ui, context, actions);
-        sources_ui(ui, context, actions);
-        if context.source == ViewSource::Simulation {
-            simulated_ui(ui, context);
+    // From the right, so that buttons stay in sight where there is no room for everything.
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        if ui.button("?").on_hover_text("Keys (F1)").clicked() {
+            actions.push(ViewAction::ShowKeys(!context.view.keys_shown));
         }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui.button("?").on_hover_text("Keys (F1)").clicked() {
-                actions.push(ViewAction::ShowKeys(!context.view.keys_shown));
+        menu_ui(ui, context, actions);
+        if context.gripper.is_some_and(GripperView::is_connected) {
+            stop_button(ui, context.view.theme, actions);
+        }
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
+            if ui.available_width() > 780.0 {
+                ui.label(RichText::new("Palpate").heading().strong());
             }
-            let (icon, other) = match context.view.theme {
-                Theme::Dark => (Icon::Sun, Theme::Light),
-                Theme::Light => (Icon::Moon, Theme::Dark),
-            };
-            if icons::button(ui, icon, "Theme", &format!("Change to {} theme", other.name())).clicked() {
-                actions.push(ViewAction::SetTheme(other));
+            modes_ui(ui, context, actions);
+            // Before what may be cut off.
+            gripper::ui(ui, context, actions);
+            sources_ui(ui, context, actions);
+            if context.source == ViewSource::Simulation {
+                simulated_ui(ui, context);
             }
-            if ui.button("Reset layout").on_hover_text("Restore the default layout of all modes").clicked() {
-                actions.push(ViewAction::ResetLayout);
-            }
-            if context.gripper.is_some_and(GripperView::is_connected) {
-                stop_button(ui, context.view.theme, actions);
-            }
-            if let Some(driver) = context.driver.filter(|_| ui.available_width() > 240.0) {
-                let quiet = RichText::new(driver).small().color(colour(colours.quiet_text));
-                ui.add(egui::Label::new(quiet).truncate());
+            let room = ui.available_width();
+            if let Some(driver) = context.driver.filter(|_| room > 240.0) {
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    let quiet = RichText::new(driver).small().color(colour(context.view.theme.colours().quiet_text));
+                    ui.add(egui::Label::new(quiet).truncate());
+                });
             }
         });
     });
+}
+
+/// Settings of the window.
+fn menu_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let (icon, other) = match context.view.theme {
+        Theme::Dark => (Icon::Sun, Theme::Light),
+        Theme::Light => (Icon::Moon, Theme::Dark),
+    };
+    if icons::button(ui, icon, "Theme", &format!("Change to {} theme", other.name())).clicked() {
+        actions.push(ViewAction::SetTheme(other));
+    }
+    let menu = ui.menu_button("Menu", |ui| {
+        if ui.button("Find an action ..  Ctrl+K").clicked() {
+            actions.push(ViewAction::ShowPalette(true));
+        }
+        ui.separator();
+        ui.label("UI scale");
+        ui.horizontal(|ui| {
+            let scale = context.view.scale;
+            for step in [0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0] {
+                let text = format!("{:.0} %", 100.0 * step);
+                if ui.selectable_label((scale - step).abs() < 0.01, text).clicked() {
+                    actions.push(ViewAction::SetScale(step));
+                }
+            }
+        });
+        ui.separator();
+        if ui.button("Reset layout").on_hover_text("Restore the default layout of all modes").clicked() {
+            actions.push(ViewAction::ResetLayout);
+        }
+        if ui.button("Full screen  F11").clicked() {
+            actions.push(ViewAction::ToggleFullScreen);
+        }
+    });
+    menu.response.on_hover_text("Actions, UI scale, layout");
 }
 
 /// Tabs of the modes.
@@ -125,9 +160,9 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
 fn simulated_ui(ui: &mut Ui, context: &PanelContext<'_>) {
     let object = context.snapshot.and_then(|s| s.object.as_deref());
     if let Some(object) = object.filter(|_| context.view.truth_shown) {
-        ui.label(&object.title);
+        ui.add(egui::Label::new(&object.title).truncate());
     }
-    if let Some(snapshot) = context.snapshot {
+    if let Some(snapshot) = context.snapshot.filter(|_| ui.available_width() > 120.0) {
         let status = &snapshot.status;
         // With a model, grasping ends as soon as the object is recognised.
         let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
@@ -143,10 +178,12 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
 
 pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let shown = context.shown();
+    let running = context.gripper.is_some_and(|gripper| gripper.trial.is_some());
     let records = match context.source {
         ViewSource::Gripper => true,
         ViewSource::Simulation => context.view.mode == Mode::Label,
-        ViewSource::Trial => false,
+        // A trial runs while the card asks about an older one.
+        ViewSource::Trial => context.view.mode == Mode::Label && running,
     };
     if records && !shown.looks_back() {
         return trial::ui(ui, context, actions);

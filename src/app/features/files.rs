@@ -33,37 +33,71 @@ pub enum FileAction {
 pub(in crate::app) struct FileFeature {
     answers: (Sender<Answer>, Receiver<Answer>),
     wake: Wake,
+    /// File dialogs of the system are tried first.
+    system_dialogs: bool,
+    /// File to ask for inside the window.
+    inside: Option<Question>,
+    /// Folder of the file chosen last.
+    folder: Option<PathBuf>,
 }
 
 impl FileFeature {
-    pub(in crate::app) fn new(wake: Wake) -> Self {
-        Self { answers: channel(), wake }
+    pub(in crate::app) fn new(wake: Wake, system_dialogs: bool) -> Self {
+        Self { answers: channel(), wake, system_dialogs, inside: None, folder: None }
     }
 
-    pub(in crate::app) fn apply(&self, action: FileAction, simulation: &SimulationFeature) {
+    /// File that is to be asked for inside the window now.
+    pub(in crate::app) fn take_question(&mut self) -> Option<Question> {
+        self.inside.take()
+    }
+
+    /// Folder that a dialog begins in: that of the file chosen last, or the working folder.
+    pub(in crate::app) fn folder(&self) -> PathBuf {
+        let home = || std::env::current_dir().ok().or_else(std::env::home_dir);
+        self.folder.clone().filter(|folder| folder.is_dir()).or_else(home).unwrap_or_default()
+    }
+
+    /// Takes in the answer of a dialog inside the window.
+    pub(in crate::app) fn answer(&self, answer: Answer) {
+        // The channel is our own.
+        let _sent = self.answers.0.send(answer);
+    }
+
+    pub(in crate::app) fn apply(&mut self, action: FileAction, simulation: &SimulationFeature) {
         let question = match action {
             FileAction::Open => Question::Object,
             FileAction::SaveScene => Question::SaveScene(Box::new(simulation.scene().clone())),
             FileAction::SaveSceneAs(scene) => Question::SaveScene(scene),
             FileAction::SavePicture => Question::SavePicture,
         };
+        if !self.system_dialogs {
+            self.inside = Some(question);
+            return;
+        }
         let wake = Arc::clone(&self.wake);
         ask(question, &self.answers.0, move || wake());
     }
 
     /// Takes in answers of dialogs and dropped files since the last frame.
     pub(in crate::app) fn gather(
-        &self,
+        &mut self,
         ctx: &egui::Context,
         simulation: &mut SimulationFeature,
         view: &ViewState,
         notices: &mut Notices,
     ) {
-        for answer in self.answers.1.try_iter() {
+        for answer in self.answers.1.try_iter().collect::<Vec<_>>() {
+            if let Answer::Open(path) | Answer::SaveScene(path, _) | Answer::SavePicture(path) = &answer {
+                self.folder = path.parent().map(Path::to_owned);
+            }
             match answer {
                 Answer::Open(path) => simulation.open(&path.to_string_lossy(), notices),
                 Answer::SaveScene(path, scene) => save_scene(&path, &scene, notices),
                 Answer::SavePicture(path) => self.save_picture(path, simulation, view, notices),
+                Answer::AskInside(question) => {
+                    self.system_dialogs = false;
+                    self.inside = Some(question);
+                }
                 Answer::Tell(message) => notices.tell(message),
             }
             ctx.request_repaint();

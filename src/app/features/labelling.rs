@@ -1,26 +1,30 @@
 //! Labelling in the window: hands actions to the [`LabellingSession`] and carries out its effects.
 
 use crate::app::features::gripper::GripperFeature;
+use crate::app::features::inspect::InspectAction;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::features::view::ViewState;
 use crate::app::modes::mode::Mode;
 use crate::app::notices::Notices;
 use palpate_lab::workers::{
     Command, GripperCommand, GripperView, LabelCommand, LabelView, Labeller, LabellingAction, LabellingEffect,
-    LabellingSession, SessionContext,
+    LabellingSession, SessionContext, TrialInSight,
 };
+use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
 
 /// State of labelling in the window.
 pub(in crate::app) struct LabellingFeature {
     labeller: Labeller,
     session: LabellingSession,
+    /// Stored trial that is shown because the card asks about it.
+    shown: Option<TrialId>,
 }
 
 impl LabellingFeature {
     pub(in crate::app) fn new(labeller: Labeller, store: PathBuf) -> Self {
         labeller.ask(LabelCommand::Refresh);
-        Self { labeller, session: LabellingSession::new(store) }
+        Self { labeller, session: LabellingSession::new(store), shown: None }
     }
 
     pub(in crate::app) fn labeller(&self) -> &Labeller {
@@ -46,25 +50,36 @@ impl LabellingFeature {
         self.session.hides_prediction(&context(&self.labeller, gripper, labels, view))
     }
 
-    /// Updates the session with gripper and labels.
+    /// Updates the session with gripper and labels. Returns how the stored trial that the card asks about comes into sight.
     pub(in crate::app) fn gather(
         &mut self,
         gripper: &mut GripperFeature,
         simulation: &mut SimulationFeature,
         view: &mut ViewState,
         notices: &mut Notices,
-    ) {
+    ) -> Option<InspectAction> {
         let (seen, labels) = (gripper.worker().view(), self.labeller.view());
         let now = context(&self.labeller, seen.as_deref(), labels.as_deref(), view);
         let effects = self.session.observe(&now);
         let next = self.session.next_known_object(&now);
-        gripper.keep_trial_in_sight(self.session.keeps_trial_in_sight(&now));
+        let in_sight = self.session.in_sight(&now);
+        gripper.keep_trial_in_sight(in_sight == TrialInSight::Last);
         self.carry_out(effects, gripper, view, notices);
         // The simulation shows the next object of the plan.
         if let Some(next) = next.filter(|name| *name != simulation.scene().object.source) {
             simulation.open(&next, notices);
             simulation.send(Command::Pause, notices);
         }
+        let stored = match in_sight {
+            TrialInSight::Stored(id) => Some(id),
+            TrialInSight::Live | TrialInSight::Last => None,
+        };
+        if std::mem::replace(&mut self.shown, stored) == stored {
+            return None;
+        }
+        // Inspect mode goes on with the trial that is open.
+        let closes = || (view.mode != Mode::Inspect).then_some(InspectAction::Close);
+        stored.map(InspectAction::Show).or_else(closes)
     }
 
     pub(in crate::app) fn apply(

@@ -9,10 +9,12 @@ use palpate_lab::workers::{
     Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot,
 };
 use palpate_sim::frame::Frame;
-use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_sim::gripper::Auto;
+use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::Scene;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Seed of the sequence of objects.
 const DECK_SEED: u64 = 1;
@@ -34,6 +36,14 @@ pub enum SimulationAction {
     MeasureAccuracy,
     /// Cancel that measurement.
     StopMeasuringAccuracy,
+    /// Grasp the scene refused last, or the present one, with the convex hull of its object.
+    UseHull,
+    /// Set the factor on all lengths of the object.
+    SetScale(f64),
+    /// Back to the scene before the last change.
+    Undo,
+    /// Forward again.
+    Redo,
 }
 
 /// State of the simulated gripper in the window.
@@ -49,6 +59,9 @@ pub(in crate::app) struct SimulationFeature {
     /// Object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
     shuffled: ShuffledObjects,
+    changes: SceneChanges,
+    /// Scene that was refused last.
+    refused: Option<Scene>,
 }
 
 impl SimulationFeature {
@@ -68,6 +81,8 @@ impl SimulationFeature {
             unsent: false,
             seen: None,
             shuffled: ShuffledObjects::new(DECK_SEED),
+            changes: SceneChanges::default(),
+            refused: None,
         }
     }
 
@@ -122,6 +137,7 @@ impl SimulationFeature {
             self.send_scene();
         }
         if let Some(snapshot) = self.worker.snapshot() {
+            self.traces.forget_before(snapshot.scene_since);
             self.take_note_of_object(&snapshot, view);
         }
     }
@@ -141,6 +157,24 @@ impl SimulationFeature {
                 self.scene_accuracy.ask(Box::new(self.scene.clone()));
             }
             SimulationAction::StopMeasuringAccuracy => self.scene_accuracy.give_up(),
+            SimulationAction::UseHull => {
+                let mut scene = self.refused.take().unwrap_or_else(|| self.scene.clone());
+                scene.object.collision = CollisionShape::Hull;
+                self.set_scene(scene, notices);
+            }
+            SimulationAction::SetScale(scale) => {
+                let mut scene = self.scene.clone();
+                scene.object.scale = Auto::Value(scale);
+                self.set_scene(scene, notices);
+            }
+            SimulationAction::Undo => match self.changes.undo(&self.scene) {
+                Some(scene) => self.take_back(scene, "Scene change undone", notices),
+                None => notices.info("No scene change to undo. Labels are undone in Label mode (Ctrl+3)."),
+            },
+            SimulationAction::Redo => match self.changes.redo(&self.scene) {
+                Some(scene) => self.take_back(scene, "Scene change redone", notices),
+                None => notices.info("No scene change to redo."),
+            },
         }
     }
 
@@ -166,6 +200,7 @@ impl SimulationFeature {
         scene.object.mass = fresh.mass;
         scene.object.friction = fresh.friction;
         scene.object.scale = fresh.scale;
+        scene.object.collision = fresh.collision;
         scene.object.rotation_deg = fresh.rotation_deg;
         self.set_scene(scene, notices);
     }
@@ -181,9 +216,22 @@ impl SimulationFeature {
         if let Err(error) = scene.check() {
             return notices.error(error.to_string());
         }
+        if scene != self.scene {
+            self.changes.note(&self.scene);
+        }
+        self.use_scene(scene);
+    }
+
+    fn use_scene(&mut self, scene: Scene) {
         self.scene = scene;
         self.effects.give_up();
         self.send_scene();
+    }
+
+    fn take_back(&mut self, scene: Scene, done: &str, notices: &mut Notices) {
+        let object = object_title(&scene.object.source);
+        self.use_scene(scene);
+        notices.info(format!("{done}: {object}."));
     }
 
     fn send_scene(&mut self) {
@@ -195,6 +243,8 @@ impl SimulationFeature {
         if self.scene == refusal.refused {
             self.scene = refusal.kept;
         }
+        self.changes.forget(&self.scene);
+        self.refused = Some(refusal.refused);
         notices.error(refusal.cause);
     }
 
@@ -211,6 +261,54 @@ impl SimulationFeature {
             view.remember_file(source);
         }
         self.seen = Some(source.clone());
+    }
+}
+
+/// Changes of the scene, to be undone.
+#[derive(Default)]
+struct SceneChanges {
+    before: Vec<Scene>,
+    after: Vec<Scene>,
+    last: Option<Instant>,
+}
+
+/// Changes that can be undone.
+const MOST_CHANGES: usize = 50;
+/// Changes that follow each other faster are one: a value that is dragged changes with every frame.
+const ONE_CHANGE: Duration = Duration::from_millis(600);
+
+impl SceneChanges {
+    /// Notes that the scene is about to change from this one.
+    fn note(&mut self, scene: &Scene) {
+        let now = Instant::now();
+        let continues = self.last.replace(now).is_some_and(|last| now - last < ONE_CHANGE);
+        self.after.clear();
+        if continues && !self.before.is_empty() {
+            return;
+        }
+        self.before.push(scene.clone());
+        if self.before.len() > MOST_CHANGES {
+            self.before.remove(0);
+        }
+    }
+
+    /// Forgets the last change, where it led nowhere.
+    fn forget(&mut self, now: &Scene) {
+        self.before.pop_if(|before| before == now);
+    }
+
+    fn undo(&mut self, now: &Scene) -> Option<Scene> {
+        self.last = None;
+        let scene = self.before.pop()?;
+        self.after.push(now.clone());
+        Some(scene)
+    }
+
+    fn redo(&mut self, now: &Scene) -> Option<Scene> {
+        self.last = None;
+        let scene = self.after.pop()?;
+        self.before.push(now.clone());
+        Some(scene)
     }
 }
 

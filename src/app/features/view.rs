@@ -4,7 +4,7 @@ use crate::app::derived::Derivation;
 use crate::app::modes::mode::Mode;
 use crate::app::theme;
 use crate::app::view_source::ViewSource;
-use egui_tiles::{Tile, Tree};
+use egui_tiles::Tree;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
@@ -69,6 +69,11 @@ pub struct ViewState {
     pub class_bands: bool,
     /// Plots of the real gripper show raw counts in place of physical units.
     pub raw: bool,
+    /// The command palette is open.
+    #[serde(skip)]
+    pub palette_shown: bool,
+    /// Size of texts and buttons, as a multiple of the system's.
+    pub scale: f32,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
 }
@@ -139,13 +144,22 @@ pub enum ViewAction {
     ShowRaw(bool),
     /// Show or hide the true object.
     ShowTruth(bool),
-    /// Bring the panel of this name to the front, where the mode has it.
-    ShowPanel(&'static str),
     /// Show or hide the key sheet.
     ShowKeys(bool),
+    /// Show or hide the command palette.
+    ShowPalette(bool),
+    /// Set the size of texts and buttons.
+    SetScale(f32),
+    /// Bring a panel to the front, in a mode that has it.
+    ShowPanel(&'static str),
+    /// Change between window and full screen.
+    ToggleFullScreen,
     /// Restore the default layouts.
     ResetLayout,
 }
+
+/// Sizes of texts and buttons that can be set.
+pub(in crate::app) const SCALES: std::ops::RangeInclusive<f32> = 0.8..=2.0;
 
 /// Files that are remembered.
 const MOST_RECENT: usize = 6;
@@ -176,6 +190,8 @@ impl Default for ViewState {
             derived: BTreeMap::new(),
             class_bands: false,
             raw: false,
+            palette_shown: false,
+            scale: 1.0,
             recent: Vec::new(),
         }
     }
@@ -208,12 +224,18 @@ impl ViewState {
             ViewAction::ShowClassBands(shown) => self.class_bands = shown,
             ViewAction::ShowRaw(raw) => self.raw = raw,
             ViewAction::ShowTruth(shown) => self.truth_shown = shown,
-            ViewAction::ShowPanel(panel) => {
-                if let Some(layout) = self.layouts.get_mut(&self.mode) {
-                    layout.make_active(|_, tile| matches!(tile, Tile::Pane(name) if name == panel));
-                }
-            }
             ViewAction::ShowKeys(shown) => self.keys_shown = shown,
+            ViewAction::ShowPalette(shown) => self.palette_shown = shown,
+            ViewAction::SetScale(scale) => {
+                self.scale = scale.clamp(*SCALES.start(), *SCALES.end());
+                ctx.set_zoom_factor(self.scale);
+            }
+            // The workbench knows which mode has it.
+            ViewAction::ShowPanel(_) => {}
+            ViewAction::ToggleFullScreen => {
+                let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
+                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
+            }
             ViewAction::ResetLayout => self.layouts.clear(),
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::app::actions::Action;
 use crate::app::context::PanelContext;
+use crate::app::notices::UserMessage;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 /// Key, its line in the sheet, and its action.
@@ -10,6 +11,8 @@ pub(in crate::app) struct Binding {
     /// Text in the sheet; empty where another line covers it.
     pub(in crate::app) does: &'static str,
     pub(in crate::app) act: fn(&PanelContext<'_>) -> Option<Action>,
+    /// Message where it has no effect.
+    pub(in crate::app) otherwise: &'static str,
 }
 
 /// A binding.
@@ -19,10 +22,20 @@ pub(in crate::app) const fn key(
     does: &'static str,
     act: fn(&PanelContext<'_>) -> Option<Action>,
 ) -> Binding {
-    Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, act }
+    Binding { shortcut: KeyboardShortcut::new(modifiers, key), does, act, otherwise: "Nothing to do here now." }
 }
 
 impl Binding {
+    /// The binding with a message for when it has no effect.
+    pub(in crate::app) const fn otherwise(self, message: &'static str) -> Self {
+        Self { otherwise: message, ..self }
+    }
+
+    /// Its action, or the message why it has no effect.
+    pub(in crate::app) fn action(&self, context: &PanelContext<'_>) -> Action {
+        (self.act)(context).unwrap_or_else(|| UserMessage::Info(self.otherwise.to_owned()).into())
+    }
+
     /// True if the key triggers the binding. An additional Shift is ignored: some keyboards need it for the key.
     pub(in crate::app) fn is(&self, key: Key, modifiers: Modifiers) -> bool {
         let KeyboardShortcut { modifiers: wanted, logical_key } = self.shortcut;

@@ -2,88 +2,17 @@
 //! has focus.
 
 pub(super) mod binding;
+mod common;
 
 use crate::app::actions::{Action, Actions};
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::gripper::GripperAction;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::simulation::SimulationAction;
 use crate::app::features::view::ViewAction;
 use crate::app::modes;
 use crate::app::modes::mode::Mode;
-use crate::app::playback::{Seek, next_speed};
-use crate::app::view_source::ViewSource;
-use binding::{Binding, key};
-use egui::{Key, Modifiers};
-use palpate_geometry::drawing::{Camera, StandardView};
-use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingAction};
-
-/// Ctrl and Shift.
-const COMMAND_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };
-
-/// Keys of all modes. Those with more modifiers come first, so that they win.
-static COMMON: [Binding; 31] = [
-    key(Modifiers::NONE, Key::R, "record a grasp of the real gripper, or restart it", |_| {
-        Some(LabellingAction::Record.into())
-    }),
-    key(Modifiers::NONE, Key::Q, "end the trial and keep it", |c| {
-        c.gripper?.trial.as_ref()?;
-        Some(GripperCommand::End.into())
-    }),
-    key(Modifiers::NONE, Key::D, "discard the trial", |_| Some(LabellingAction::Discard.into())),
-    key(Modifiers::NONE, Key::T, "tare the sensors of the real gripper", |_| Some(GripperCommand::Tare.into())),
-    key(Modifiers::COMMAND, Key::G, "connect or disconnect the real gripper", |_| {
-        Some(GripperAction::ToggleConnection.into())
-    }),
-    key(COMMAND_SHIFT, Key::Z, "redo", |_| Some(LabelCommand::Redo.into())),
-    key(Modifiers::COMMAND, Key::Z, "undo the last label or discard", |_| Some(LabelCommand::Undo.into())),
-    key(Modifiers::NONE, Key::Space, "play or pause", |c| {
-        if replays(c) {
-            return Some(InspectAction::TogglePlaying.into());
-        }
-        let playing = c.snapshot?.status.playing;
-        Some(if playing { Command::Pause } else { Command::Play }.into())
-    }),
-    key(Modifiers::COMMAND, Key::ArrowRight, "one sample forward", |c| {
-        Some(if replays(c) { InspectAction::Seek(Seek::Samples(1)).into() } else { Command::Step.into() })
-    }),
-    key(Modifiers::COMMAND, Key::ArrowLeft, "one sample back", |_| Some(InspectAction::Seek(Seek::Samples(-1)).into())),
-    key(Modifiers::NONE, Key::ArrowRight, "0.1 s forward", |_| Some(InspectAction::Seek(Seek::By(0.1)).into())),
-    key(Modifiers::NONE, Key::ArrowLeft, "0.1 s back", |_| Some(InspectAction::Seek(Seek::By(-0.1)).into())),
-    key(Modifiers::NONE, Key::End, "last sample; of a live gripper, back to live", |_| {
-        Some(InspectAction::Seek(Seek::End).into())
-    }),
-    key(Modifiers::NONE, Key::Backspace, "back to the start", |c| {
-        Some(if replays(c) { InspectAction::Seek(Seek::Start).into() } else { Command::Reset.into() })
-    }),
-    key(Modifiers::NONE, Key::Minus, "slower", |c| faster(c, -1)),
-    key(Modifiers::NONE, Key::Equals, "faster", |c| faster(c, 1)),
-    key(Modifiers::COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(FileAction::Open.into())),
-    key(Modifiers::COMMAND, Key::S, "save the scene", |_| Some(FileAction::SaveScene.into())),
-    key(Modifiers::COMMAND, Key::P, "save a picture of the 3-D view", |_| Some(FileAction::SavePicture.into())),
-    key(Modifiers::SHIFT, Key::Z, "show everything", |_| Some(ViewAction::FrameAll.into())),
-    key(Modifiers::NONE, Key::Z, "show the object", |c| Some(ViewAction::SetCamera(object_framed(c)?).into())),
-    key(Modifiers::NONE, Key::F, "force arrows", |c| Some(ViewAction::SetForces(!c.view.forces).into())),
-    key(Modifiers::NONE, Key::C, "contact path on the object: by time, by pressure, off", |c| {
-        Some(ViewAction::SetPath(c.view.path.next()).into())
-    }),
-    key(Modifiers::NONE, Key::G, "ghost: result of the other engine", |c| {
-        Some(SimulationAction::SetGhost(!c.view.ghost).into())
-    }),
-    key(Modifiers::ALT, Key::Num1, "front view", |c| turned(c, StandardView::Front)),
-    key(Modifiers::ALT, Key::Num3, "right view", |c| turned(c, StandardView::Right)),
-    key(Modifiers::ALT, Key::Num7, "top view", |c| turned(c, StandardView::Top)),
-    key(Modifiers::ALT, Key::Num5, "parallel projection", |c| {
-        let camera = Camera { parallel: !c.view.camera.parallel, ..c.view.camera };
-        Some(ViewAction::SetCamera(camera).into())
-    }),
-    key(Modifiers::NONE, Key::F1, "show or hide the keys", |c| Some(ViewAction::ShowKeys(!c.view.keys_shown).into())),
-    key(Modifiers::NONE, Key::Escape, "STOP: vent the real gripper and end the trial; close the keys", |_| {
-        Some(Action::Stop)
-    }),
-    key(Modifiers::NONE, Key::F11, "full screen", |_| None),
-];
+use crate::app::notices::UserMessage;
+use binding::Binding;
+use common::GROUPS;
+use egui::{Key, RichText, Ui};
 
 /// Mouse actions in the sheet.
 const MOUSE: [(&str, &str); 6] = [
@@ -95,64 +24,70 @@ const MOUSE: [(&str, &str); 6] = [
     ("Ctrl+drag", "pull at the object"),
 ];
 
-/// Bindings of a mode: its own, those that open modes, and those of all modes.
+/// Bindings of a mode in groups with titles: its own, those that open modes, and those of all modes.
+pub(super) fn groups(mode: Mode) -> Vec<(&'static str, Vec<&'static Binding>)> {
+    let own = modes::kind(mode);
+    let open = modes::ALL.iter().map(|kind| &kind.open).collect();
+    let common = GROUPS.iter().map(|(title, bindings)| (*title, bindings.iter().collect()));
+    [(own.title, own.keys.iter().collect()), ("Modes", open)].into_iter().chain(common).collect()
+}
+
+/// Bindings of a mode, in the order in which they are looked through.
 fn bindings(mode: Mode) -> impl Iterator<Item = &'static Binding> {
-    let open = modes::ALL.iter().map(|kind| &kind.open);
-    modes::kind(mode).keys.iter().chain(open).chain(&COMMON)
-}
-
-/// True where a stored trial or the past of a live gripper is shown.
-fn replays(context: &PanelContext<'_>) -> bool {
-    context.source == ViewSource::Trial || context.shown().looks_back()
-}
-
-fn faster(context: &PanelContext<'_>, by: isize) -> Option<Action> {
-    if replays(context) {
-        return Some(InspectAction::ChangeSpeed(by).into());
-    }
-    let now = context.snapshot?.status.target_speed;
-    Some(Command::SetSpeed(next_speed(now, by)).into())
-}
-
-fn turned(context: &PanelContext<'_>, view: StandardView) -> Option<Action> {
-    Some(ViewAction::SetCamera(context.view.camera.turned_to(view)).into())
-}
-
-fn object_framed(context: &PanelContext<'_>) -> Option<Camera> {
-    let snapshot = context.snapshot?;
-    let place = snapshot.frame.world_from_object?.position.as_vec3();
-    let radius = snapshot.object.as_ref()?.size.length() as f32;
-    Some(context.view.camera.framing(place, 0.6 * radius.max(0.02)))
+    groups(mode).into_iter().flat_map(|(_, bindings)| bindings)
 }
 
 /// Pushes the actions of the keys pressed in this frame.
 pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>, actions: &mut Actions) {
-    if ctx.text_edit_focused() {
+    let dialog = ctx.memory(|memory| memory.top_modal_layer().is_some());
+    if ctx.text_edit_focused() || context.view.palette_shown || dialog {
         return stop(ctx, actions);
-    }
-    if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F11)) {
-        let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
-        ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
     }
     let mode = context.view.mode;
     if let Some(action) = (modes::kind(mode).typed)(ctx, context) {
         actions.push(action);
         return stop(ctx, actions);
     }
-    for action in bound(ctx, mode).into_iter().filter_map(|binding| (binding.act)(context)) {
-        actions.push(action);
+    for pressed in bound(ctx, mode) {
+        actions.push(match pressed {
+            Pressed::Key(binding) => binding.action(context),
+            Pressed::Elsewhere(binding, mode) => elsewhere(ctx, binding, mode).into(),
+        });
     }
 }
 
+/// Key pressed in this frame.
+enum Pressed {
+    Key(&'static Binding),
+    /// Key of another mode.
+    Elsewhere(&'static Binding, Mode),
+}
+
+/// Message about a key that acts in another mode.
+fn elsewhere(ctx: &egui::Context, binding: &Binding, mode: Mode) -> UserMessage {
+    let kind = modes::kind(mode);
+    let [key, open] = [&binding.shortcut, &kind.open.shortcut].map(|shortcut| ctx.format_shortcut(shortcut));
+    UserMessage::Info(format!("{key} acts in {} mode ({open}): {}.", kind.title, binding.does))
+}
+
 /// Bindings of the keys pressed in this frame, in their order. The keys are consumed.
-fn bound(ctx: &egui::Context, mode: Mode) -> Vec<&'static Binding> {
+fn bound(ctx: &egui::Context, mode: Mode) -> Vec<Pressed> {
     let mut pressed = Vec::new();
     ctx.input_mut(|input| {
         input.events.retain(|event| {
             let egui::Event::Key { key, modifiers, pressed: true, repeat, .. } = event else { return true };
-            let Some(binding) = bindings(mode).find(|binding| binding.is(*key, *modifiers)) else { return true };
+            let Some(binding) = bindings(mode).find(|binding| binding.is(*key, *modifiers)) else {
+                let others = modes::ALL.iter().filter(|kind| kind.mode != mode && !repeat);
+                pressed.extend(others.flat_map(|kind| kind.keys.iter().map(|binding| (binding, kind.mode))).find_map(
+                    |(binding, mode)| {
+                        let told = binding.is(*key, *modifiers) && !binding.does.is_empty();
+                        told.then_some(Pressed::Elsewhere(binding, mode))
+                    },
+                ));
+                return true;
+            };
             if !repeat || binding.repeats() {
-                pressed.push(binding);
+                pressed.push(Pressed::Key(binding));
             }
             false
         });
@@ -167,21 +102,28 @@ fn stop(ctx: &egui::Context, actions: &mut Actions) {
     }
 }
 
+/// Width of a column of the sheet (points).
+const COLUMN: f32 = 380.0;
+
 /// Sheet of keys and mouse actions.
 pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut Actions) {
     let mut open = shown;
-    let room = ctx.content_rect().height() - 90.0;
-    let window = egui::Window::new("Keys").open(&mut open).collapsible(false).resizable(false).default_width(330.0);
-    window.show(ctx, |ui| {
-        egui::ScrollArea::vertical().max_height(room).show(ui, |ui| {
-            egui::Grid::new("keys").num_columns(2).spacing([22.0, 4.0]).show(ui, |ui| {
-                let keys = bindings(mode).filter(|binding| !binding.does.is_empty());
-                let keys = keys.map(|binding| (ctx.format_shortcut(&binding.shortcut), binding.does));
-                let mouse = MOUSE.iter().map(|(how, does)| ((*how).to_owned(), *does));
-                for (how, does) in keys.chain(mouse) {
-                    ui.monospace(how);
-                    ui.label(does);
-                    ui.end_row();
+    let room = ctx.content_rect().size() - egui::vec2(60.0, 90.0);
+    let columns = if room.x > 2.0 * COLUMN + 30.0 { 2 } else { 1 };
+    let window = egui::Window::new("Keys").open(&mut open).collapsible(false).resizable(false);
+    let window = window.default_width(COLUMN * columns as f32).max_width(room.x).default_height(room.y);
+    window.pivot(egui::Align2::CENTER_CENTER).default_pos(ctx.content_rect().center()).show(ctx, |ui| {
+        let lines = sheet_lines(ctx, mode);
+        egui::ScrollArea::vertical().max_height(room.y).show(ui, |ui| {
+            ui.columns(columns, |columns| {
+                let many = columns.len();
+                let all: usize = lines.iter().map(|(_, lines)| lines.len() + 2).sum();
+                let mut above = 0;
+                for (title, lines) in &lines {
+                    // A group stands in the column of its middle.
+                    let middle = above + lines.len() / 2;
+                    above += lines.len() + 2;
+                    group_ui(&mut columns[(middle * many / all).min(many - 1)], title, lines);
                 }
             });
         });
@@ -191,10 +133,35 @@ pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut 
     }
 }
 
+/// Lines of the sheet by group: how, and what it does.
+fn sheet_lines(ctx: &egui::Context, mode: Mode) -> Vec<(&'static str, Vec<(String, &'static str)>)> {
+    let keys = |bindings: Vec<&'static Binding>| -> Vec<(String, &'static str)> {
+        let named = bindings.into_iter().filter(|binding| !binding.does.is_empty());
+        named.map(|binding| (ctx.format_shortcut(&binding.shortcut), binding.does)).collect()
+    };
+    let mouse = MOUSE.iter().map(|(how, does)| ((*how).to_owned(), *does)).collect();
+    groups(mode).into_iter().map(|(title, bindings)| (title, keys(bindings))).chain([("Mouse", mouse)]).collect()
+}
+
+fn group_ui(ui: &mut Ui, title: &str, lines: &[(String, &str)]) {
+    ui.add_space(4.0);
+    ui.label(RichText::new(title).strong());
+    ui.spacing_mut().interact_size.y = 18.0;
+    egui::Grid::new(("keys", title)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
+        for (how, does) in lines {
+            ui.monospace(how);
+            ui.add(egui::Label::new(*does).wrap());
+            ui.end_row();
+        }
+    });
+    ui.add_space(6.0);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::manual::TOPICS;
+    use egui::Modifiers;
 
     #[test]
     fn no_key_does_two_things() {
@@ -210,18 +177,20 @@ mod tests {
     fn the_manual_lists_the_same_keys() {
         let row = |how: &str, does: &str| if does.is_empty() { String::new() } else { format!("| {how} | {does} |\n") };
         let name = |binding: &Binding| binding.shortcut.format(&egui::ModifierNames::NAMES, false);
-        let table = |keys: &mut dyn Iterator<Item = &'static Binding>| -> String {
-            let rows: String = keys.map(|binding| row(&name(binding), binding.does)).collect();
+        let table = |keys: &[&'static Binding]| -> String {
+            let rows: String = keys.iter().map(|binding| row(&name(binding), binding.does)).collect();
             format!("| key | action |\n|---|---|\n{rows}\n")
         };
-        let mouse: String = MOUSE.iter().map(|(how, does)| row(how, does)).collect();
-        for (topic, expected) in [
-            ("keys", table(&mut bindings(Mode::Demo)) + "| mouse | action |\n|---|---|\n" + &mouse),
-            ("labelling", table(&mut modes::kind(Mode::Label).keys.iter())),
-        ] {
+        let holds = |topic: &str, expected: &str| {
             let text = TOPICS.iter().find(|own| own.name == topic).expect("a topic").text;
-            assert!(text.contains(&expected), "assets/help/{topic}.md should hold:\n{expected}");
+            assert!(text.contains(expected), "assets/help/{topic}.md should hold:\n{expected}");
+        };
+        for (title, keys) in groups(Mode::Demo) {
+            holds("keys", &format!("## {title}\n\n{}", table(&keys)));
         }
+        let mouse: String = MOUSE.iter().map(|(how, does)| row(how, does)).collect();
+        holds("keys", &format!("| mouse | action |\n|---|---|\n{mouse}"));
+        holds("labelling", &table(&modes::kind(Mode::Label).keys.iter().collect::<Vec<_>>()));
     }
 
     fn key(key: Key, modifiers: Modifiers, repeat: bool) -> egui::Event {
@@ -233,7 +202,12 @@ mod tests {
         let ctx = egui::Context::default();
         let mut does = Vec::new();
         let mut drawn = ctx.run_ui(egui::RawInput { events, ..egui::RawInput::default() }, |ui| {
-            does = bound(ui.ctx(), Mode::Label).iter().map(|binding| binding.does).collect();
+            does = bound(ui.ctx(), Mode::Label)
+                .iter()
+                .map(|pressed| match pressed {
+                    Pressed::Key(binding) | Pressed::Elsewhere(binding, _) => binding.does,
+                })
+                .collect();
         });
         drawn.textures_delta.clear();
         does
@@ -248,7 +222,10 @@ mod tests {
         assert_eq!(does(vec![plain(Key::ArrowUp), key(Key::ArrowUp, Modifiers::NONE, true)]).len(), 2);
         assert_eq!(does(vec![key(Key::Num1, Modifiers::ALT, false)]), ["front view"]);
         assert_eq!(does(vec![key(Key::Slash, Modifiers::SHIFT, false)]), ["find an object"]);
-        assert_eq!(does(vec![key(Key::Z, COMMAND_SHIFT, false)]), ["redo"]);
-        assert_eq!(does(vec![key(Key::Z, Modifiers::COMMAND, false)]), ["undo the last label or discard"]);
+        assert_eq!(does(vec![key(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, false)]), ["redo"]);
+        assert!(does(vec![key(Key::Z, Modifiers::COMMAND, false)])[0].starts_with("undo the last change"));
+        // Larger and faster share a key.
+        assert_eq!(does(vec![key(Key::Minus, Modifiers::COMMAND, false)]), ["smaller texts and buttons"]);
+        assert_eq!(does(vec![key(Key::Minus, Modifiers::NONE, false)]), ["slower"]);
     }
 }

@@ -24,7 +24,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let running = context.gripper.and_then(|gripper| gripper.trial.as_ref());
+        let open = context.draft.trial(view).filter(|trial| trial.object.is_none());
         match (running, context.draft.trial(view)) {
+            (Some(trial), _) if trial.automatic && context.draft.selected.is_some() && open.is_some() => {
+                let text = format!("{} is being recorded automatically: {}", trial.title(), instruction(trial));
+                wrapped(ui, RichText::new(text).small().color(colour(context.view.theme.colours().accent)));
+                open.into_iter().for_each(|asked| question_ui(ui, context, view, asked, actions));
+            }
             (Some(trial), _) => {
                 running_ui(ui, context, view, trial);
                 answer_ahead_ui(ui, context, actions);
@@ -126,19 +132,19 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial: 
 fn last_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView) {
     let last = view.trials.iter().find(|trial| !trial.discarded && trial.object.is_some());
     let Some((trial, label)) = last.and_then(|trial| Some((trial, trial.object.as_ref()?))) else { return };
-    let colours = context.view.theme.colours();
+    let (colours, title) = (context.view.theme.colours(), object_title(label));
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
-            (format!("trial {}: {label}. The model agrees ({:.0} %)", trial.id, 100.0 * guess.p), colours.accent)
+            (format!("trial {}: {title}. The model agrees ({:.0} %)", trial.id, 100.0 * guess.p), colours.accent)
         }
         Some(guess) => {
-            let (class, p) = (&guess.class, 100.0 * guess.p);
+            let (class, p) = (object_title(&guess.class), 100.0 * guess.p);
             (
-                format!("trial {}: {label}. The model predicts {class} ({p:.0} %): please review", trial.id),
+                format!("trial {}: {title}. The model predicts {class} ({p:.0} %): please review", trial.id),
                 colours.warning,
             )
         }
-        None => (format!("trial {}: {label}", trial.id), colours.quiet_text),
+        None => (format!("trial {}: {title}", trial.id), colours.quiet_text),
     };
     let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
     frame.show(ui, |ui| {
@@ -189,10 +195,13 @@ fn question_ui(
             actions.push(LabelCommand::Unsure(trial.id, unsure));
         }
     });
-    let (names, chosen) = (draft.objects(view), draft.chosen.unwrap_or(0));
+    let (names, chosen) = (draft.objects(view), draft.place(view));
+    if chosen.is_none() {
+        ui.weak("Which one? Choose with the arrow keys or the mouse.");
+    }
     for (place, name) in names.iter().take(NUMBERED_OBJECTS).enumerate() {
         let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
-        if object_row(ui, context, place, name, place == chosen, !known).clicked() {
+        if object_row(ui, context, place, name, Some(place) == chosen, !known).clicked() {
             actions.push(LabellingAction::ChooseObject(place));
             actions.push(LabellingAction::GiveLabel);
         }
@@ -237,7 +246,9 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     // Arrows choose among the matches while the cursor stays in the field.
     let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));
     if response.has_focus() && step != 0 {
-        let place = draft.chosen.unwrap_or(0).saturating_add_signed(step as isize).min(NUMBERED_OBJECTS - 1);
+        let chosen = draft.chosen.or_else(|| context.labels.and_then(|view| draft.place(view)));
+        let next = |chosen: usize| chosen.saturating_add_signed(step as isize).min(NUMBERED_OBJECTS - 1);
+        let place = chosen.map_or(0, next);
         actions.push(LabellingAction::ChooseObject(place));
     }
     if search != draft.search {

@@ -98,5 +98,6 @@ fn row(
         let quiet = RichText::new(below).small().color(colour(colours.quiet_text));
         ui.add(egui::Label::new(quiet).truncate().selectable(false));
     });
-    response
+    // Narrow panels cut it off.
+    response.on_hover_text(format!("{title}\n{below}"))
 }

@@ -6,7 +6,7 @@ use crate::app::theme::{colour, veil};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::LabelCommand;
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::{class_of, object_title};
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
 
 /// Trials wanted of an added object (paper, section IV-B: 40 to 55).
@@ -43,7 +43,7 @@ fn add_ui(ui: &mut Ui, actions: &mut Actions) {
     let response = ui.add(field);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
-        actions.push(LabelCommand::Want(name.trim().to_owned(), WANTED));
+        actions.push(LabelCommand::Want(class_of(&name).to_owned(), WANTED));
         name.clear();
     }
     ui.data_mut(|data| data.insert_temp(id, name));
@@ -92,7 +92,7 @@ fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, action
         }
         let remove = ui.add_enabled(*wanted > 0, egui::Button::new("–").small());
         remove.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Remove {name} from the plan"))
+            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Remove {} from the plan", object_title(name)))
         });
         if remove.on_hover_text("Remove it from the plan; its trials stay").clicked() {
             actions.push(LabelCommand::Unplan(name.clone()));

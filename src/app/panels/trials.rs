@@ -97,7 +97,9 @@ fn row_ui(
     let blind = context.blind && trial.object.is_none();
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
-        (_, _, Some(found)) => (format!("model: {} {:.0} %", found.guess, 100.0 * found.p), colours.warning),
+        (_, _, Some(found)) => {
+            (format!("model: {} {:.0} %", object_title(&found.guess), 100.0 * found.p), colours.warning)
+        }
         (_, Some(_), None) => {
             let labels: Vec<&str> = trial.flags.iter().map(|flag| flag.flag.label()).collect();
             (labels.join(", "), colours.warning)

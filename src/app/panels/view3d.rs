@@ -17,6 +17,7 @@ use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_lab::workers::Command;
+use palpate_sim::objects::object_title;
 
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
@@ -40,14 +41,14 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     small_pads(ui, rect, context, &picture);
     buttons(ui, rect, context, actions);
     if let Some(loading) = context.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
-        let text = format!("Loading {loading} ..");
-        ui.painter().text(
-            rect.center_top() + egui::vec2(0.0, 30.0),
-            egui::Align2::CENTER_CENTER,
-            text,
-            egui::FontId::proportional(14.0),
-            colour(context.view.theme.colours().text),
-        );
+        // Below the buttons.
+        let text = format!("Loading {} ..", object_title(loading));
+        let (font, ink) = (egui::FontId::proportional(14.0), colour(context.view.theme.colours().text));
+        let galley = ui.painter().layout(text, font, ink, (rect.width() - 24.0).max(60.0));
+        let place = rect.center_top() + egui::vec2(-0.5 * galley.size().x, 48.0);
+        let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
+        ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
+        ui.painter().galley(place, galley, ink);
     }
 }
 
@@ -176,15 +177,24 @@ fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
     (context.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 
-/// Standard views and switches, in the upper left corner.
+/// Width of all buttons in a row, beside the legend (points).
+const BUTTONS: f32 = 600.0;
+
+/// Standard views and switches, in the upper left corner; in a menu where there is no room.
 fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {
-    if rect.width() < 620.0 || rect.height() < 160.0 {
-        return;
-    }
-    let place = Rect::from_min_size(rect.min + egui::vec2(12.0, 12.0), egui::vec2(460.0, 26.0));
+    let place = Rect::from_min_size(rect.min + egui::vec2(10.0, 10.0), egui::vec2(rect.width() - 20.0, 26.0));
     let layout = egui::Layout::left_to_right(egui::Align::Center);
     let mut bar = ui.new_child(egui::UiBuilder::new().max_rect(place).layout(layout));
     bar.spacing_mut().item_spacing.x = 4.0;
+    if place.width() < BUTTONS {
+        let menu = bar.menu_button("View", |ui| switches(ui, context, actions));
+        menu.response.on_hover_text("Standard views, parallel projection, forces, ghost");
+    } else {
+        switches(&mut bar, context, actions);
+    }
+}
+
+fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let camera = context.view.camera;
     for (view, name, key) in [
         (StandardView::Home, "Home", "double click, Shift+Z"),
@@ -192,18 +202,18 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ac
         (StandardView::Right, "Right", "Alt+3"),
         (StandardView::Top, "Top", "Alt+7"),
     ] {
-        if bar.small_button(name).on_hover_text(format!("{name} view ({key})")).clicked() {
+        if ui.small_button(name).on_hover_text(format!("{name} view ({key})")).clicked() {
             actions.push(ViewAction::SetCamera(camera.turned_to(view)));
             if view == StandardView::Home {
                 actions.push(ViewAction::FrameAll);
             }
         }
     }
-    let parallel = bar.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
+    let parallel = ui.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
     if parallel.clicked() {
         actions.push(ViewAction::SetCamera(Camera { parallel: !camera.parallel, ..camera }));
     }
-    let forces = bar.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
+    let forces = ui.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
     if forces.clicked() {
         actions.push(ViewAction::SetForces(!context.view.forces));
     }
@@ -214,7 +224,7 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ac
         actions.push(ViewAction::SetPath(context.view.path.next()));
     }
     let other = context.scene.solver.engine.other().name();
-    let ghost = bar
+    let ghost = ui
         .selectable_label(context.view.ghost, format!("Ghost: {other}"))
         .on_hover_text("Result of the other engine, translucent (G)");
     if ghost.clicked() {

@@ -66,6 +66,13 @@ pub(super) enum CalibrateCommand {
     },
 }
 
+impl CalibrateCommand {
+    /// True for a command that only lists what is there.
+    pub(super) fn reads(&self) -> bool {
+        matches!(self, Self::List { json: false, .. } | Self::Drift(_))
+    }
+}
+
 pub(super) fn run(command: &CalibrateCommand, store: &mut Store) -> Result<(), Failure> {
     match command {
         CalibrateCommand::List { part, json } => list(store, part.as_deref(), *json),

@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
-use palpate_sim::objects::EMPTY;
+use palpate_sim::objects::{EMPTY, class_of, titled};
 use palpate_store::labels::class_name;
 use palpate_store::{JournalEntry, Store, export_labelled};
 use palpate_tactile::trial::TrialId;
@@ -79,7 +79,7 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
 }
 
 fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(), Failure> {
-    let name = class_name(name)?;
+    let name = class_name(class_of(name))?;
     let planned = store.labels().plan()?.objects.iter().any(|object| object.name == name);
     let known = planned || store.labels().trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
     store.labels().set_label(id, &name)?;
@@ -87,7 +87,7 @@ fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(),
     if !known && name != EMPTY {
         warn(&format!("\"{name}\" is a new class: not in the plan, and no other trial has it (`palpate trials undo`)"));
     }
-    say(format!("trial {id}: {name}{}", if unsure { ", unsure" } else { "" }))
+    say(format!("trial {id}: {}{}", titled(&name), if unsure { ", unsure" } else { "" }))
 }
 
 fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {

@@ -4,7 +4,7 @@ use super::super::Failure;
 use super::super::terminal::{say, say_json, warn};
 use palpate_lab::grasping::GraspSummary;
 use palpate_sim::frame::Plan;
-use palpate_store::labels::{LabelledTrial, cadence_line, shown_name};
+use palpate_store::labels::{LabelledTrial, cadence_line, shown_title};
 use palpate_store::{BoardInfo, Store};
 use palpate_tactile::Signals;
 use palpate_tactile::board::Gap;
@@ -51,7 +51,7 @@ fn show_import(id: TrialId, header: TrialHeader, signals: Signals, json: bool) -
         return say_json(&report);
     }
     let from = report.collection.as_deref().unwrap_or("none");
-    say(format!("trial {id}: {} (imported, collection {from})", report.object))?;
+    say(format!("trial {id}: {} (imported, collection {from})", shown_title(&report.object)))?;
     say(format!("{} samples over {:.2} s", report.samples, report.duration_s))?;
     say(format!("channels {}", report.channels.join(", ")))
 }
@@ -92,7 +92,7 @@ fn show_board(store: &Store, id: TrialId, header: TrialHeader, log: BoardLog, js
     for warning in &report.warnings {
         warn(warning);
     }
-    say(format!("trial {id}: {} (real gripper on {})", shown_name(&report.object), report.about.port))?;
+    say(format!("trial {id}: {} (real gripper on {})", shown_title(&report.object), report.about.port))?;
     print_labels(&report.labels)?;
     say(format!("{} samples over {:.2} s, recorded by Palpate {}", report.samples, report.duration_s, report.version))?;
     say(format!("channels {}", report.about.course.board.channels.join(", ")))?;
@@ -124,7 +124,7 @@ fn print_labels(labels: &LabelledTrial) -> Result<(), Failure> {
         say(format!("tags {}", labels.tags.join(", ")))?;
     }
     match &labels.guess {
-        Some(guess) => say(format!("{} guessed {} ({:.0} %)", guess.model, guess.class, 100.0 * guess.p)),
+        Some(guess) => say(format!("{} guessed {} ({:.0} %)", guess.model, shown_title(&guess.class), 100.0 * guess.p)),
         None => Ok(()),
     }
 }
@@ -156,7 +156,7 @@ fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), 
     for warning in &report.summary.warnings {
         warn(warning);
     }
-    say(format!("trial {id}: {} ({}, seed {})", report.summary.object, report.rig, report.seed))?;
+    say(format!("trial {id}: {} ({}, seed {})", shown_title(&report.summary.object), report.rig, report.seed))?;
     say(format!("{} samples, recorded by Palpate {}", report.samples, report.version))?;
     match report.summary.contact_onset_s {
         Some(onset) => say(format!("first contact at {onset:.3} s"))?,

@@ -13,6 +13,7 @@ use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::SimulatedTrial;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, OnceLock};
@@ -65,6 +66,8 @@ pub struct CollectionReport {
     pub redrawn: u32,
     /// Trials computed again at a finer accuracy than the scene asks for.
     pub recomputed: u32,
+    /// Ended before the plan was done; a new run of the same plan resumes.
+    pub interrupted: bool,
     /// Trials with non-finite values, without convergence, or that do not come to rest at any accuracy: stored and
     /// marked, but excluded from data sets.
     pub unsound: u32,
@@ -161,12 +164,12 @@ fn mixed(x: u64) -> u64 {
 }
 
 /// Simulates and stores the trials of the plan that the store lacks, on `threads` threads. `progress` receives
-/// the progress.
+/// the progress, and ends the collection by [`ControlFlow::Break`].
 pub fn collect(
     plan: &CollectionPlan,
     store: &mut Store,
     threads: usize,
-    progress: &mut dyn FnMut(CollectionProgress),
+    progress: &mut dyn FnMut(CollectionProgress) -> ControlFlow<()>,
 ) -> Result<CollectionReport, CollectionError> {
     let collection = plan.name();
     let known = store.collected(&collection)?;
@@ -186,7 +189,7 @@ pub fn collect(
         }
         drop(sender);
         let outcome = store_in_order(&line, &made, store, &mut report, &mut |done, object| {
-            progress(CollectionProgress { done, of: all.len() as u32, object });
+            progress(CollectionProgress { done, of: all.len() as u32, object })
         });
         // Threads that wait for room in the channel find it closed.
         line.stop.store(true, Ordering::Relaxed);
@@ -237,7 +240,7 @@ fn store_in_order(
     made: &Receiver<(usize, Made)>,
     store: &mut Store,
     report: &mut CollectionReport,
-    progress: &mut dyn FnMut(u32, String),
+    progress: &mut dyn FnMut(u32, String) -> ControlFlow<()>,
 ) -> Result<(), CollectionError> {
     let mut waiting: BTreeMap<usize, Made> = BTreeMap::new();
     let mut due = 0;
@@ -267,9 +270,13 @@ fn store_in_order(
         let recomputed = |(trial, _): &&(SimulatedTrial, u32)| trial.data.quality.recomputed.is_some();
         report.recomputed += ready.iter().filter(recomputed).count() as u32;
         line.stored.store(due, Ordering::Relaxed);
-        progress(report.known + due as u32, object);
+        let go_on = progress(report.known + due as u32, object);
         if let Some(failure) = failure {
             return Err(failure);
+        }
+        if go_on.is_break() && due < line.tasks.len() {
+            report.interrupted = true;
+            return Ok(());
         }
     }
     Ok(())
@@ -361,7 +368,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = |name: &str, plan: &CollectionPlan, threads: usize| {
             let mut store = store(&folder, name);
-            let report = collect(plan, &mut store, threads, &mut |_| ()).expect("collects");
+            let report = collect(plan, &mut store, threads, &mut |_| ControlFlow::Continue(())).expect("collects");
             (store, report)
         };
         let (one, report) = run("one", &plan(), 1);
@@ -398,11 +405,15 @@ mod tests {
         let mut plan = CollectionPlan { trials: 7, objects: vec!["smallcube".to_owned()], ..plan() };
         plan.scene.timing.duration_s = 4.0;
         plan.scene.pose.between = Between::AsReleased;
-        let run = |name: &str, trials: u32, threads: usize| {
-            let mut store = store(&folder, name);
-            collect(&CollectionPlan { trials, ..plan.clone() }, &mut store, threads, &mut |_| ()).expect("collects");
-            store
-        };
+        let run =
+            |name: &str, trials: u32, threads: usize| {
+                let mut store = store(&folder, name);
+                collect(&CollectionPlan { trials, ..plan.clone() }, &mut store, threads, &mut |_| {
+                    ControlFlow::Continue(())
+                })
+                .expect("collects");
+                store
+            };
         let whole = contents(&run("one", 7, 1));
         assert!(contents(&run("two", 7, 2)) == whole);
         run("resumed", 3, 2);
@@ -433,11 +444,26 @@ mod tests {
     }
 
     #[test]
+    fn a_collection_that_is_stopped_keeps_its_trials_and_resumes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut store = Store::open(&folder.path().join("stopped.sqlite")).expect("opens");
+        let stopped = collect(&plan(), &mut store, 2, &mut |progress| match progress.done {
+            0..3 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        });
+        let stopped = stopped.expect("collects");
+        let all = plan().tasks().len() as u32;
+        assert!(stopped.interrupted && (3..all).contains(&stopped.stored), "{stopped:?} of {all}");
+        let rest = collect(&plan(), &mut store, 2, &mut |_| ControlFlow::Continue(())).expect("collects");
+        assert_eq!((rest.interrupted, rest.known, rest.stored), (false, stopped.stored, all - stopped.stored));
+    }
+
+    #[test]
     fn an_object_that_cannot_be_loaded_stops_the_work_and_keeps_what_is_done() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut store = store(&folder, "store");
         let objects = ["ball", "/nowhere/at/all.urdf"].map(str::to_owned).to_vec();
-        let outcome = collect(&CollectionPlan { objects, ..plan() }, &mut store, 2, &mut |_| ());
+        let outcome = collect(&CollectionPlan { objects, ..plan() }, &mut store, 2, &mut |_| ControlFlow::Continue(()));
         assert!(
             matches!(&outcome, Err(CollectionError::Object(cause)) if cause.to_string().contains("/nowhere/at/all.urdf")),
             "{outcome:?}"

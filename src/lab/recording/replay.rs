@@ -97,8 +97,12 @@ impl Replay {
     }
 
     /// Replays captured bytes, read by the calibrations of the mounted parts.
-    pub fn of_capture(gripper: SerialGripper, store: &Store, model: Option<Arc<Model>>) -> Result<Self, ReplayError> {
-        let serving = store.calibrations().serving(None, &[])?;
+    pub fn of_capture(
+        gripper: SerialGripper,
+        store: Option<&Store>,
+        model: Option<Arc<Model>>,
+    ) -> Result<Self, ReplayError> {
+        let serving = store.map(|store| store.calibrations().serving(None, &[])).transpose()?.unwrap_or_default();
         Ok(Self::of_board(Box::new(gripper), serving, VecDeque::new(), model))
     }
 

@@ -12,6 +12,7 @@ use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::model::SensorModel;
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// The stored result.
@@ -222,7 +223,7 @@ fn data_set(kind: &Kind, store: &mut Store, threads: usize) -> Result<Dataset, S
     let mut scene = Scene { pose: preset.poses(), ..Scene::default() };
     scene.object.fixed = kind.fixed;
     let plan = CollectionPlan::of_all_objects(scene, (TRAIN + TEST) as u32, POSES);
-    let collection = collect(&plan, store, threads, &mut |_| ())?.collection;
+    let collection = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?.collection;
     let query = DatasetQuery { collection: Some(collection), without_empty: true, ..DatasetQuery::default() };
     let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors, ..SensorView::default() };
     Ok(query.read(store, &view, &mut |_, _| ())?)

@@ -207,6 +207,7 @@ mod tests {
     use super::*;
     use palpate_sim::scene::Scene;
     use palpate_store::BoardInfo;
+    use palpate_store::labels::shown_title;
     use palpate_tactile::trial::TrialHeader;
 
     fn recorded(store: &mut Store) -> TrialId {
@@ -242,7 +243,9 @@ mod tests {
             let is = |outcome: &LabelOutcome| matches!(outcome, LabelOutcome::Done(text) if text.starts_with(begin) && text.ends_with(end));
             view.outcomes.iter().any(|(_, outcome)| is(outcome))
         };
-        until(&labeller, &woken, |view| is_done(view, "redone: ", &format!("label unlabelled -> {next}")));
+        until(&labeller, &woken, |view| {
+            is_done(view, "redone: ", &format!("label unlabelled -> {}", shown_title(&next)))
+        });
         labeller.ask(LabelCommand::Undo);
         let back = until(&labeller, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
         assert!(is_done(&back, "undone: ", ""));

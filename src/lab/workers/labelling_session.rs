@@ -9,15 +9,13 @@
 
 use super::gripper::GripperView;
 use super::labeller::{LabelCommand, LabelOutcome, LabelView};
+use super::object_search::{ObjectSearch, search_objects};
 use crate::recording::TrialRequest;
-use palpate_sim::objects::{EMPTY, catalogue, object_title};
+use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
-
-/// Objects that have a number key.
-pub const NUMBERED_OBJECTS: usize = 9;
 
 /// State that a session decides by.
 #[derive(Clone, Copy)]
@@ -92,6 +90,17 @@ pub enum LabellingEffect {
     Fail(String),
 }
 
+/// Trial that the plots show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrialInSight {
+    /// The running trial, or the live stream.
+    Live,
+    /// The trial that ended last.
+    Last,
+    /// A trial in the store.
+    Stored(TrialId),
+}
+
 /// Filter of the list of trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TrialFilter {
@@ -144,7 +153,7 @@ pub struct LabelDraft {
     pub selected: Option<TrialId>,
     /// Text in the search field.
     pub search: String,
-    /// Chosen place in the list of objects; the first otherwise.
+    /// Place chosen in the list of objects; otherwise the one that the search means.
     pub chosen: Option<usize>,
     /// The search field should get the cursor.
     pub focus_search: bool,
@@ -165,33 +174,34 @@ impl LabelDraft {
         }
     }
 
-    /// Objects that match the search, in the order of their number keys: the trial's label, the next of the plan, the
-    /// plan, the empty hand. A name that matches no object exactly is offered as a new one, last of those with a number.
+    /// Objects that match the search, in the order of their number keys: best matches first, among equals the trial's label,
+    /// the next of the plan, the plan, the empty hand. A name that matches no object exactly is offered as a new one, last of
+    /// those with a number.
     pub fn objects(&self, view: &LabelView) -> Vec<String> {
-        let wanted = self.search.trim().to_lowercase();
+        self.found(view).names
+    }
+
+    fn found(&self, view: &LabelView) -> ObjectSearch {
         let next = view.next.iter().map(|next| next.object.clone());
         let label = self.trial(view).and_then(|trial| trial.object.clone());
         let planned = view.progress.objects.iter().map(|object| object.name.clone());
         let mut names: Vec<String> = Vec::new();
         for name in label.into_iter().chain(next).chain(planned).chain([EMPTY.to_owned()]) {
-            let fits = name.to_lowercase().contains(&wanted) || object_title(&name).to_lowercase().contains(&wanted);
-            if fits && !names.contains(&name) {
+            if !names.contains(&name) {
                 names.push(name);
             }
         }
-        // An exact match comes first.
-        let exact = |name: &str| name.to_lowercase() == wanted || object_title(name).to_lowercase() == wanted;
-        names.sort_by_key(|name| wanted.is_empty() || !exact(name));
-        if !wanted.is_empty() && !names.first().is_some_and(|name| exact(name)) {
-            names.insert(names.len().min(NUMBERED_OBJECTS - 1), self.search.trim().to_owned());
-        }
-        names
+        search_objects(names, &self.search)
+    }
+
+    /// Place in the list of objects that a label is given from; none while the search may mean several.
+    pub fn place(&self, view: &LabelView) -> Option<usize> {
+        self.chosen.or_else(|| self.found(view).sure)
     }
 
     /// Label that is chosen now.
     pub fn label(&self, view: &LabelView) -> Option<String> {
-        let names = self.objects(view);
-        names.get(self.chosen.unwrap_or(0)).cloned()
+        self.objects(view).get(self.place(view)?).cloned()
     }
 
     /// Selects the trial this many places further in the list.
@@ -232,6 +242,8 @@ pub struct LabellingSession {
     draft: LabelDraft,
     /// A trial was running at the last look.
     recording: bool,
+    /// That trial, or the last one, was detected automatically.
+    automatic: bool,
     /// Trial that ended last.
     ended: Option<TrialId>,
     /// Command by which the last trial was requested, by its number.
@@ -263,16 +275,25 @@ impl LabellingSession {
             let ended = gripper.ended.as_ref().map(|ended| ended.id);
             if self.ended != ended {
                 self.ended = ended;
-                // Text typed while it was running answers its question.
-                self.draft.selected = None;
+                // Text typed while it was running answers its question, unless an older one is still open.
+                if self.open_question(now).is_none() {
+                    self.draft.selected = None;
+                }
                 effects.push(LabellingEffect::Edit(LabelCommand::Refresh));
             }
             let recording = gripper.trial.is_some();
             if recording && !self.recording {
-                // A trial may begin automatically: unsaved text is kept.
-                let unsaved = now.labels.map(|labels| self.draft.unsaved(labels)).unwrap_or_default();
-                effects.extend(unsaved.into_iter().map(LabellingEffect::Edit));
-                self.draft.reset();
+                // A trial may begin automatically: its predecessor's question stays open, or unsaved text is kept.
+                self.automatic = gripper.trial.as_ref().is_some_and(|trial| trial.automatic);
+                let asked = now.labels.and_then(|labels| self.draft.trial(labels));
+                match asked.filter(|trial| self.automatic && now.labelling && trial.object.is_none()) {
+                    Some(asked) => self.draft.selected = Some(asked.id),
+                    None => {
+                        let unsaved = now.labels.map(|labels| self.draft.unsaved(labels)).unwrap_or_default();
+                        effects.extend(unsaved.into_iter().map(LabellingEffect::Edit));
+                        self.draft.reset();
+                    }
+                }
             }
             self.recording = recording;
         }
@@ -307,6 +328,8 @@ impl LabellingSession {
                     self.draft.focus_search = true;
                     self.draft.search.push_str(&typed);
                     self.draft.chosen = None;
+                } else {
+                    effects.push(self.no_question(now));
                 }
             }
             LabellingAction::SearchFocused => self.draft.focus_search = false,
@@ -314,17 +337,18 @@ impl LabellingSession {
                 self.draft.reset();
                 self.draft.selected = id;
             }
-            LabellingAction::Step(by) => {
-                if let Some(labels) = now.labels {
-                    self.draft.step(labels, by);
-                }
-            }
+            LabellingAction::Step(by) => match now.labels {
+                Some(labels) if !self.draft.filter.of(labels).is_empty() => self.draft.step(labels, by),
+                _ => effects.push(LabellingEffect::Inform("No trials in the list.".to_owned())),
+            },
             LabellingAction::Filter(filter) => self.draft.filter = filter,
             LabellingAction::WriteNote(id, text) => self.draft.note = Some((id, text)),
             LabellingAction::WriteTags(id, text) => self.draft.tags = Some((id, text)),
             LabellingAction::ToggleUnsure => {
-                let trial = self.in_question(now);
-                effects.extend(trial.map(|trial| LabellingEffect::Edit(LabelCommand::Unsure(trial.id, !trial.unsure))));
+                effects.push(match self.in_question(now) {
+                    Some(trial) => LabellingEffect::Edit(LabelCommand::Unsure(trial.id, !trial.unsure)),
+                    None => self.no_question(now),
+                });
             }
             LabellingAction::ToggleBlind => {
                 let state = if now.blind { "shown" } else { "hidden until the label is given" };
@@ -346,10 +370,16 @@ impl LabellingSession {
         now.labelling && now.blind && (running || open)
     }
 
-    /// True while the plots keep the last trial: it stays in sight until it has a label.
-    pub fn keeps_trial_in_sight(&self, now: &SessionContext<'_>) -> bool {
-        let running = now.gripper.is_some_and(|gripper| gripper.trial.is_some());
-        now.labelling && !running && self.draft.selected.is_none() && self.in_question(now).is_some()
+    /// Trial that the plots show: the one that the card asks about, or the live stream.
+    pub fn in_sight(&self, now: &SessionContext<'_>) -> TrialInSight {
+        let open = self.open_question(now);
+        let blocked = self.recording || self.awaits_question(now);
+        let asked = if blocked { open } else { now.labels.and_then(|labels| self.draft.trial(labels)) };
+        match asked.filter(|_| now.labelling).map(|trial| trial.id) {
+            None => TrialInSight::Live,
+            Some(id) if Some(id) == self.ended && !self.recording => TrialInSight::Last,
+            Some(id) => TrialInSight::Stored(id),
+        }
     }
 
     /// Next object of the plan, where it is a built-in one that a simulation can grasp meanwhile.
@@ -370,10 +400,33 @@ impl LabellingSession {
     /// is not shown.
     fn in_question<'a>(&self, now: &SessionContext<'a>) -> Option<&'a LabelledTrial> {
         let shown = now.settled && !self.is_beginning(now);
-        if self.recording || self.awaits_question(now) || !shown {
+        if !shown {
             return None;
         }
+        if self.recording || self.awaits_question(now) {
+            return self.open_question(now);
+        }
         self.draft.trial(now.labels?)
+    }
+
+    /// Trial whose question stays open while further ones are detected.
+    fn open_question<'a>(&self, now: &SessionContext<'a>) -> Option<&'a LabelledTrial> {
+        let selected = self.draft.selected.filter(|_| self.automatic)?;
+        now.labels?.trial(selected).filter(|trial| trial.object.is_none() && !trial.discarded)
+    }
+
+    /// Why no key is about a trial.
+    fn no_question(&self, now: &SessionContext<'_>) -> LabellingEffect {
+        let text = if !now.settled {
+            "One moment: the last change is being saved."
+        } else if self.has_trial(now) {
+            "The trial is still running. Q ends it; an object can be typed ahead ( / )."
+        } else if self.awaits_question(now) {
+            "One moment: the trial is being stored."
+        } else {
+            "No trial waits for a label. R records one; the arrow keys select one."
+        };
+        LabellingEffect::Inform(text.to_owned())
     }
 
     /// A trial has been requested and is not running yet.
@@ -405,17 +458,26 @@ impl LabellingSession {
         if self.has_trial(now) {
             return vec![LabellingEffect::DiscardRunning];
         }
-        let Some(id) = self.in_question(now).map(|trial| trial.id) else { return Vec::new() };
+        let Some(id) = self.in_question(now).map(|trial| trial.id).filter(|_| now.labelling) else {
+            let stored =
+                if now.labelling { "or selected" } else { "; stored ones are discarded in Label mode (Ctrl+3)" };
+            return vec![LabellingEffect::Inform(format!("No trial to discard: none is running {stored}."))];
+        };
         self.draft.reset();
         vec![LabellingEffect::Edit(LabelCommand::Discard(id))]
     }
 
     fn give_label(&mut self, now: &SessionContext<'_>) -> Vec<LabellingEffect> {
-        if !now.settled {
-            return vec![LabellingEffect::Inform("One moment: the last change is being saved.".to_owned())];
-        }
-        let (Some(labels), Some(trial)) = (now.labels, self.in_question(now)) else { return Vec::new() };
-        let Some(label) = self.draft.label(labels) else { return Vec::new() };
+        let (Some(labels), Some(trial)) = (now.labels, self.in_question(now)) else {
+            return vec![self.no_question(now)];
+        };
+        let Some(label) = self.draft.label(labels) else {
+            // The text in the field stays, to be completed or chosen from.
+            self.draft.focus_search = true;
+            let (text, many) = (self.draft.search.trim(), self.draft.objects(labels).len());
+            let text = format!("\"{text}\" may be {many} objects: choose one with the arrow keys or the mouse.");
+            return vec![LabellingEffect::Inform(text)];
+        };
         let mut effects = vec![LabellingEffect::Edit(LabelCommand::Label(trial.id, label))];
         if labels.disagreements.iter().any(|found| found.id == trial.id) {
             effects.push(LabellingEffect::Edit(LabelCommand::Reviewed(trial.id)));
@@ -439,210 +501,4 @@ fn new_export_folder(store: &Path) -> PathBuf {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::grasping::GraspStage;
-    use crate::labelling::Disagreement;
-    use crate::workers::{EndedTrial, LabelError, TrialView};
-    use palpate_store::ExportError;
-    use palpate_store::labels::LabelPlan;
-    use std::sync::Arc;
-
-    fn trial(id: TrialId, object: Option<&str>) -> LabelledTrial {
-        LabelledTrial { id, object: object.map(str::to_owned), complete: true, ..LabelledTrial::default() }
-    }
-
-    fn view() -> LabelView {
-        let trials = vec![trial(4, None), trial(3, Some("ball")), trial(2, None), trial(1, Some("lemon"))];
-        let progress = LabelPlan::default().progress(&trials);
-        let next = progress.next(Some("ball"));
-        LabelView { trials, progress, next, ..LabelView::default() }
-    }
-
-    fn request() -> TrialRequest {
-        TrialRequest { object: None, length_s: None, control: Control::Driven, adds: false }
-    }
-
-    fn running(id: TrialId) -> GripperView {
-        let trial = TrialView {
-            id: Some(id),
-            request: request(),
-            stage: GraspStage::Lead,
-            left_s: None,
-            t_s: 0.0,
-            length_s: None,
-            samples: 0,
-        };
-        GripperView { trial: Some(trial), ..GripperView::default() }
-    }
-
-    fn ended(id: TrialId) -> GripperView {
-        let request = request();
-        let ended = EndedTrial { id, request, discarded: false, warnings: Vec::new(), cadence: String::new() };
-        GripperView { ended: Some(Arc::new(ended)), ..GripperView::default() }
-    }
-
-    fn now<'a>(gripper: &'a GripperView, labels: &'a LabelView) -> SessionContext<'a> {
-        SessionContext {
-            gripper: Some(gripper),
-            labels: Some(labels),
-            settled: true,
-            labelling: true,
-            blind: true,
-            control: Control::Driven,
-        }
-    }
-
-    fn edit(command: LabelCommand) -> LabellingEffect {
-        LabellingEffect::Edit(command)
-    }
-
-    #[test]
-    fn the_plan_is_proposed_and_typing_narrows_it_down() {
-        let (view, mut draft) = (view(), LabelDraft::default());
-        assert_eq!(draft.trial(&view).map(|trial| trial.id), Some(4));
-        assert_eq!(draft.label(&view), view.next.as_ref().map(|next| next.object.clone()));
-        draft.search = "BALL".to_owned();
-        assert_eq!(draft.objects(&view), ["ball", "bigball"]);
-        // By its title, too.
-        draft.search = "stop".to_owned();
-        assert_eq!(draft.objects(&view), ["button", "stop"]);
-        // A new name that is a part of another one, and a number without an object.
-        draft.search = "ring".to_owned();
-        assert_eq!(draft.objects(&view), ["syringe", "ring"]);
-        draft.chosen = Some(1);
-        assert_eq!(draft.label(&view).as_deref(), Some("ring"));
-        draft.chosen = Some(7);
-        assert_eq!(draft.label(&view), None);
-        draft.chosen = None;
-        draft.search = "ball".to_owned();
-        draft.chosen = Some(1);
-        assert_eq!(draft.label(&view).as_deref(), Some("bigball"));
-        (draft.search, draft.chosen) = (" garlic ".to_owned(), None);
-        assert_eq!(draft.label(&view).as_deref(), Some("garlic"));
-        draft.note = Some((4, "slipped".to_owned()));
-        draft.tags = Some((3, " ,".to_owned()));
-        assert_eq!(draft.unsaved(&view), [LabelCommand::Note(4, "slipped".to_owned())]);
-        draft.reset();
-        assert_eq!(draft, LabelDraft::default());
-    }
-
-    #[test]
-    fn trials_are_picked_with_the_arrows() {
-        let (view, mut draft) = (view(), LabelDraft::default());
-        for expected in [3, 2, 1, 1] {
-            draft.step(&view, 1);
-            assert_eq!(draft.selected, Some(expected));
-        }
-        // Its present label comes first: keeping it takes one key.
-        assert_eq!(draft.label(&view).as_deref(), Some("lemon"));
-        draft.filter = TrialFilter::Unlabelled;
-        draft.step(&view, -1);
-        assert_eq!(draft.selected, Some(4));
-    }
-
-    #[test]
-    fn a_label_goes_to_the_trial_in_question_and_settles_a_disagreement() {
-        let (labels, gripper) = (view(), GripperView::default());
-        let mut session = LabellingSession::default();
-        let next = labels.next.as_ref().map(|next| next.object.clone()).expect("a plan");
-        let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-        assert_eq!(given, [edit(LabelCommand::Label(4, next))]);
-        // Not while the outcome of the last key is unknown.
-        let busy = SessionContext { settled: false, ..now(&gripper, &labels) };
-        assert!(matches!(session.apply(LabellingAction::GiveLabel, &busy)[..], [LabellingEffect::Inform(_)]));
-        let (label, guess) = ("ball".to_owned(), "cube".to_owned());
-        let found = Disagreement { id: 3, label, guess, p: 0.9, label_p: 0.1 };
-        let labels = LabelView { disagreements: vec![found], ..labels };
-        session.apply(LabellingAction::Select(Some(3)), &now(&gripper, &labels));
-        let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-        assert_eq!(given, [edit(LabelCommand::Label(3, "ball".to_owned())), edit(LabelCommand::Reviewed(3))]);
-    }
-
-    #[test]
-    fn recording_again_discards_what_has_no_label() {
-        let labels = view();
-        let mut session = LabellingSession::default();
-        let begin = LabellingEffect::BeginTrial(request());
-        // Without a connection nothing is thrown away.
-        let gripper = GripperView::default();
-        assert_eq!(session.apply(LabellingAction::Record, &now(&gripper, &labels)), std::slice::from_ref(&begin));
-        let gripper = running(5);
-        assert_eq!(
-            session.apply(LabellingAction::Record, &now(&gripper, &labels)),
-            [LabellingEffect::DiscardRunning, begin]
-        );
-        // A trial that is requested counts as running.
-        session.trial_requested(7);
-        let gripper = GripperView { handled: 6, ..GripperView::default() };
-        assert_eq!(session.apply(LabellingAction::Discard, &now(&gripper, &labels)), [LabellingEffect::DiscardRunning]);
-        let gripper = GripperView { handled: 7, ..GripperView::default() };
-        let discarded = session.apply(LabellingAction::Discard, &now(&gripper, &labels));
-        assert_eq!(discarded, [edit(LabelCommand::Discard(4))]);
-        // Elsewhere a grasp adds to the ones before.
-        let elsewhere = SessionContext { labelling: false, ..now(&gripper, &labels) };
-        let begun = session.apply(LabellingAction::Record, &elsewhere);
-        assert_eq!(begun, [LabellingEffect::BeginTrial(TrialRequest { adds: true, ..request() })]);
-    }
-
-    #[test]
-    fn an_answer_typed_ahead_waits_for_its_question() {
-        let labels = view();
-        let mut session = LabellingSession::default();
-        // Nothing to answer: everything has a label.
-        let done = LabelView { trials: vec![trial(1, Some("lemon"))], ..LabelView::default() };
-        let (idle, during) = (GripperView::default(), running(5));
-        session.apply(LabellingAction::FocusSearch("c".to_owned()), &now(&idle, &done));
-        assert_eq!(session.draft(), &LabelDraft::default());
-        // Unsaved text is kept when a trial begins automatically.
-        session.apply(LabellingAction::WriteNote(3, "slipped".to_owned()), &now(&idle, &labels));
-        let kept = session.observe(&now(&during, &labels));
-        assert_eq!(kept, [edit(LabelCommand::Note(3, "slipped".to_owned()))]);
-        session.apply(LabellingAction::FocusSearch("cu".to_owned()), &now(&during, &labels));
-        session.apply(LabellingAction::SearchFocused, &now(&during, &labels));
-        // It ends; the list does not have it yet, so no key is about an older trial.
-        let after = ended(5);
-        assert_eq!(session.observe(&now(&after, &labels)), [edit(LabelCommand::Refresh)]);
-        assert!(session.apply(LabellingAction::GiveLabel, &now(&after, &labels)).is_empty());
-        let mut labels = labels;
-        labels.trials.insert(0, trial(5, None));
-        session.observe(&now(&after, &labels));
-        session.apply(LabellingAction::Search("cube".to_owned()), &now(&after, &labels));
-        assert!(session.keeps_trial_in_sight(&now(&after, &labels)));
-        let given = session.apply(LabellingAction::GiveLabel, &now(&after, &labels));
-        assert_eq!(given, [edit(LabelCommand::Label(5, "cube".to_owned()))]);
-    }
-
-    #[test]
-    fn a_prediction_is_hidden_until_the_label_is_given() {
-        let session = LabellingSession::default();
-        let (idle, during) = (GripperView::default(), running(5));
-        let labelled = LabelView { trials: vec![trial(1, Some("lemon"))], ..LabelView::default() };
-        assert!(session.hides_prediction(&now(&idle, &view())));
-        assert!(session.hides_prediction(&now(&during, &labelled)));
-        assert!(!session.hides_prediction(&now(&idle, &labelled)));
-        assert!(!session.hides_prediction(&SessionContext { blind: false, ..now(&during, &labelled) }));
-        assert!(!session.hides_prediction(&SessionContext { labelling: false, ..now(&during, &labelled) }));
-    }
-
-    #[test]
-    fn outcomes_are_reported_once() {
-        let mut session = LabellingSession::default();
-        let failure = Arc::new(LabelError::from(ExportError::Nothing));
-        let text = |text: &str| text.to_owned();
-        let outcomes = vec![
-            (1, LabelOutcome::Warning(text("updated"))),
-            (2, LabelOutcome::Done(text("done"))),
-            (3, LabelOutcome::Failed(Arc::clone(&failure))),
-        ];
-        let (gripper, labels) = (GripperView::default(), LabelView { outcomes, ..LabelView::default() });
-        let effects = session.observe(&now(&gripper, &labels));
-        let expected = [
-            LabellingEffect::Warn(text("updated")),
-            LabellingEffect::Inform(text("done")),
-            LabellingEffect::Fail(failure.to_string()),
-        ];
-        assert_eq!(effects, expected);
-        assert!(session.observe(&now(&gripper, &labels)).is_empty());
-    }
-}
+mod tests;

@@ -212,6 +212,8 @@ pub struct Snapshot {
     pub revision: u64,
     /// The number of the grasp, as in [`TraceRow::grasp`].
     pub grasp: u64,
+    /// Number of the first grasp of the scene: earlier ones had another object or other settings.
+    pub scene_since: u64,
     /// The scene as it was set up, with this grasp's pose.
     pub scene: Arc<Scene>,
     /// Effects of this grasp, with the reason for each.

@@ -42,6 +42,7 @@ mod listener;
 #[cfg(test)]
 mod listener_tests;
 mod messages;
+mod object_search;
 mod pace;
 mod refined_run;
 mod scene_accuracy;
@@ -65,7 +66,7 @@ pub use gripper::{
 pub use inspector::{Inspector, OpenRequest, Opened};
 pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
-    LabelDraft, LabellingAction, LabellingEffect, LabellingSession, NUMBERED_OBJECTS, SessionContext, TrialFilter,
+    LabelDraft, LabellingAction, LabellingEffect, LabellingSession, SessionContext, TrialFilter, TrialInSight,
     parse_tags,
 };
 pub use latest::Latest;
@@ -74,6 +75,7 @@ pub use messages::{
     Checking, Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,
     Status, TraceRow, Wake,
 };
+pub use object_search::NUMBERED_OBJECTS;
 pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -17,6 +17,20 @@ pub fn object_title(name: &str) -> String {
     built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
 
+/// Name of the class of the object with this name or title; the text itself where there is none.
+pub fn class_of(text: &str) -> &str {
+    let text = text.trim();
+    let is = |own: &str| own.to_lowercase() == text.to_lowercase();
+    let built_in = catalogue().iter().find(|b| is(&b.name)).or_else(|| catalogue().iter().find(|b| is(&b.title)));
+    built_in.map_or(if is("Empty hand") { EMPTY } else { text }, |b| b.name.as_str())
+}
+
+/// Title of an object with the name of its class behind it, where the two differ: `Tennis ball (bigball)`.
+pub fn titled(name: &str) -> String {
+    let title = object_title(name);
+    if title.to_lowercase() == name.to_lowercase() { title } else { format!("{title} ({name})") }
+}
+
 /// A source that names the same object from any folder: files that exist get their whole path, names stay names.
 pub fn anchored(source: &str) -> String {
     let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);
@@ -113,4 +127,26 @@ fn load_mesh(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectEr
 
 fn unreadable(path: &Path, cause: &std::io::Error) -> ObjectError {
     ObjectError::Unreadable { path: path.to_owned(), cause: cause.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_have_one_title() {
+        assert_eq!(
+            ["bigball", "lemon", EMPTY, "garlic"].map(object_title),
+            ["Tennis ball", "Lemon", "Empty hand", "garlic"]
+        );
+        assert_eq!(["bigball", "lemon"].map(titled), ["Tennis ball (bigball)", "Lemon"]);
+        assert_eq!(
+            ["tennis Ball", "ball", " Die ", "garlic"].map(class_of),
+            ["bigball", "ball", "smallcube", "garlic"]
+        );
+        let mut titles: Vec<String> = catalogue().iter().map(|b| b.title.to_lowercase()).collect();
+        titles.sort();
+        titles.dedup();
+        assert_eq!(titles.len(), catalogue().len());
+    }
 }

@@ -1,5 +1,7 @@
 //! Names of classes, which are the labels in files, tables and on the axes of a confusion matrix.
 
+use palpate_sim::objects::titled;
+
 /// Most characters of a name.
 pub const LONGEST_NAME: usize = 80;
 
@@ -45,6 +47,11 @@ pub fn shown_name(object: &str) -> &str {
     if object.is_empty() { "unlabelled" } else { object }
 }
 
+/// Title of a trial's object for display, with the name of its class where it differs; `unlabelled` without one.
+pub fn shown_title(object: &str) -> String {
+    if object.is_empty() { "unlabelled".to_owned() } else { titled(object) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,5 +64,9 @@ mod tests {
         assert!(matches!(class_name(&"x".repeat(81)), Err(ClassNameError::TooLong { length: 81, .. })));
         assert!(matches!(class_name("a\tb"), Err(ClassNameError::Control { .. })));
         assert_eq!((shown_name(""), shown_name("lemon")), ("unlabelled", "lemon"));
+        assert_eq!(
+            (shown_title(""), shown_title("bigball")),
+            ("unlabelled".to_owned(), "Tennis ball (bigball)".to_owned())
+        );
     }
 }

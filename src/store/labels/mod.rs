@@ -6,7 +6,7 @@ mod labelled_trial;
 mod plan;
 mod sparkline;
 
-pub use class_name::{ClassNameError, LONGEST_NAME, class_name, shown_name};
+pub use class_name::{ClassNameError, LONGEST_NAME, class_name, shown_name, shown_title};
 pub use flag::{Flag, FlagRemark, cadence_line, flaws};
 pub use labelled_trial::{Guess, GuessTop, LabelledTrial};
 pub use plan::{LabelPlan, MOST_WANTED, NextTrial, ObjectProgress, PlanError, PlannedObject, PoseCue, Progress};

@@ -126,16 +126,17 @@ fn pose_ui(ui: &mut Ui, scene: &mut Scene) {
 fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
     let max = scene.gripper.actuation.max_bar;
     let step = scene.gripper.actuation.step_bar;
+    let per_s = f64::from(scene.timing.actuation_hz.max(1));
     let programme = &mut scene.programme;
     Number { name: "peak", unit: "bar", factor: 1.0, range: [0.0, max], speed: 0.01 }.ui(ui, &mut programme.peak_bar);
-    Number { name: "close per tick", unit: "bar", factor: 1.0, range: [step, max], speed: 0.005 }
+    let rates = [step * per_s, max * per_s];
+    Number { name: "closing", unit: "bar/s", factor: per_s, range: rates, speed: 0.05 }
         .ui(ui, &mut programme.close_bar_per_tick);
-    let label = ui.label("hold");
-    let ticks =
-        DragValue::new(&mut programme.hold_ticks).range(0..=600).clamp_existing_to_range(false).suffix(" ticks");
-    ui.add(ticks).labelled_by(label.id);
-    ui.end_row();
-    Number { name: "release per tick", unit: "bar", factor: 1.0, range: [step, max], speed: 0.005 }
+    // Stored in whole actuation ticks.
+    let mut hold = f64::from(programme.hold_ticks);
+    Number { name: "hold", unit: "s", factor: 1.0 / per_s, range: [0.0, 600.0 / per_s], speed: 0.05 }.ui(ui, &mut hold);
+    programme.hold_ticks = hold.round() as u32;
+    Number { name: "releasing", unit: "bar/s", factor: per_s, range: rates, speed: 0.05 }
         .ui(ui, &mut programme.release_bar_per_tick);
     Number { name: "trial", unit: "s", factor: 1.0, range: [0.1, 60.0], speed: 0.02 }
         .ui(ui, &mut scene.timing.duration_s);

@@ -102,6 +102,8 @@ pub struct TrialView {
     pub length_s: Option<f64>,
     /// Readings so far.
     pub samples: u64,
+    /// Detected from the movement of the fingers.
+    pub automatic: bool,
 }
 
 impl TrialView {

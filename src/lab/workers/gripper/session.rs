@@ -230,7 +230,7 @@ impl GripperSession {
             }
             GripperCommand::AnotherObject => self.start_over(),
             GripperCommand::Begin(request) => self.begin(request, None),
-            GripperCommand::Watch(request) => self.watching = request,
+            GripperCommand::Watch(request) => self.set_watching(request),
             GripperCommand::End => self.end(false, None),
             GripperCommand::Discard => self.end(true, None),
             GripperCommand::Observe(request) if self.connection.is_some() => {

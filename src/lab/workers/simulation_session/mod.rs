@@ -87,6 +87,8 @@ pub(super) struct Session {
     last: Option<Arc<FinishedGrasp>>,
     revision: u64,
     grasp: u64,
+    /// Number of the first grasp of the scene.
+    scene_since: u64,
     /// The scene's own pose has been grasped; random poses follow.
     own_pose_done: bool,
     /// Random poses drawn for this scene so far; the next one's seed is one more.
@@ -147,6 +149,7 @@ impl Session {
             last: None,
             revision: 0,
             grasp: 0,
+            scene_since: 1,
             own_pose_done: false,
             poses_drawn: 0,
             sampler: None,
@@ -310,6 +313,10 @@ impl Session {
             return self.refuse(scene, &cause);
         }
         self.nominal = scene;
+        // Results of another scene say nothing about this one.
+        self.last = None;
+        self.begin_check(None);
+        self.scene_since = self.grasp + 1;
         if let Some(listener) = &mut self.listener {
             listener.another_scene();
         }
@@ -584,6 +591,7 @@ impl Session {
         self.outlets.snapshots.publish(Arc::new(Snapshot {
             revision: self.revision,
             grasp: self.grasp,
+            scene_since: self.scene_since,
             scene: Arc::clone(&current.scene),
             plan: Arc::clone(&current.plan),
             stage: Arc::clone(&current.stage),

@@ -37,6 +37,14 @@ impl GripperSession {
         }
     }
 
+    /// Detects trials from now on, or no longer; an automatic trial that is running ends then.
+    pub(super) fn set_watching(&mut self, request: Option<TrialRequest>) {
+        self.watching = request;
+        if self.watching.is_none() && self.recording.as_ref().is_some_and(BoardTrialRecording::is_automatic) {
+            self.end(false, None);
+        }
+    }
+
     pub(super) fn vent(&mut self) {
         let Some(connection) = &mut self.connection else {
             return self.outlets.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
@@ -209,6 +217,7 @@ impl GripperSession {
             t_s: now_s - closing_s,
             length_s: controller.end_s().map(|end_s| end_s - closing_s),
             samples: recording.samples(),
+            automatic: recording.is_automatic(),
         }
     }
 }

@@ -1,0 +1,263 @@
+//! Actions of the whole window: command palette, undo, keys without effect, files without a system dialog, sizes.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::cpu_renderer::CpuRenderer;
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
+use palpate::app::{FileAction, Mode, SimulationAction, ViewAction};
+use palpate_lab::workers::{Command, LabelCommand};
+use palpate_sim::objects::catalogue;
+use palpate_sim::scene::Scene;
+use palpate_store::{BoardInfo, Store};
+use palpate_tactile::trial::TrialHeader;
+
+fn window(size: [f32; 2]) -> Bench {
+    Bench::new(BenchSetup { size, ..BenchSetup::default() }, CpuRenderer::default())
+}
+
+fn press(bench: &mut Bench, modifiers: Modifiers, key: Key) {
+    bench.harness.key_press_modifiers(modifiers, key);
+    bench.harness.run_steps(2);
+}
+
+fn type_text(bench: &mut Bench, text: &str) {
+    bench.harness.event(egui::Event::Text(text.to_owned()));
+    bench.harness.run_steps(2);
+}
+
+/// Opens the palette and runs the first action that fits a text.
+fn run(bench: &mut Bench, text: &str) {
+    press(bench, Modifiers::COMMAND, Key::K);
+    type_text(bench, text);
+    press(bench, Modifiers::NONE, Key::Enter);
+    assert!(bench.harness.query_by_role_and_label(Role::SearchInput, "Find an action").is_none());
+}
+
+#[test]
+fn the_palette_finds_and_runs_every_kind_of_action() {
+    let mut bench = window([1280.0, 820.0]);
+    run(&mut bench, "tennis");
+    bench.until(|s| s.object.as_ref().is_some_and(|object| object.name == "bigball"));
+    run(&mut bench, "light theme");
+    assert_eq!(bench.workbench().view().theme.name(), "light");
+    run(&mut bench, "force arrows");
+    assert!(!bench.workbench().view().forces);
+    // A panel of another mode opens that mode.
+    run(&mut bench, "calibration");
+    assert_eq!(bench.workbench().view().mode, Mode::Label);
+    // Arrows choose, Escape closes and runs nothing.
+    press(&mut bench, Modifiers::COMMAND, Key::K);
+    type_text(&mut bench, "demo mode");
+    press(&mut bench, Modifiers::NONE, Key::Escape);
+    assert!(bench.harness.query_by_role_and_label(Role::SearchInput, "Find an action").is_none());
+    assert_eq!(bench.workbench().view().mode, Mode::Label);
+    // Letters in its field are no keys.
+    let forces = bench.workbench().view().forces;
+    press(&mut bench, Modifiers::COMMAND, Key::K);
+    bench.harness.key_press(Key::F);
+    type_text(&mut bench, "f");
+    assert_eq!(bench.workbench().view().forces, forces);
+}
+
+#[test]
+fn the_palette_lists_objects_panels_and_keys() {
+    let mut bench = window([1280.0, 820.0]);
+    press(&mut bench, Modifiers::COMMAND, Key::K);
+    for built_in in catalogue() {
+        let label = format!("Grasp: {}", built_in.title);
+        assert!(bench.harness.query_by_label(&label).is_some(), "{label}");
+    }
+    for panel in &palpate::app::ALL_PANELS {
+        assert!(bench.harness.query_by_label(&format!("Panel: {}", panel.title)).is_some(), "{}", panel.title);
+    }
+    assert!(bench.harness.query_by_label("General: Save the scene").is_some());
+}
+
+/// A labelled trial of the real gripper.
+fn labelled(store: &mut Store) {
+    let header = TrialHeader::new("", Scene::default());
+    let id = store.begin_board(&header, &BoardInfo::default()).unwrap();
+    store.finish_board(id, &BoardInfo::default(), &[]).unwrap();
+    store.labels().set_label(id, "lemon").unwrap();
+}
+
+#[test]
+fn undo_acts_on_what_the_mode_shows() {
+    let setup = BenchSetup { fill: labelled, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    let label = |bench: &Bench| bench.store().labels().trials().unwrap()[0].object.clone();
+    bench.tell(SimulationAction::OpenObject("tomato".to_owned()));
+    bench.until(|s| s.truth() == "tomato");
+    press(&mut bench, Modifiers::COMMAND, Key::Z);
+    bench.until(|s| s.truth() == "lemon");
+    press(&mut bench, Modifiers::COMMAND, Key::Z);
+    bench.until_told("No scene change to undo");
+    assert_eq!(label(&bench).as_deref(), Some("lemon"));
+    press(&mut bench, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    bench.until(|s| s.truth() == "tomato");
+    // In Label mode the label goes.
+    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.harness.step();
+    press(&mut bench, Modifiers::COMMAND, Key::Z);
+    bench.until_told("undone: trial 1: label");
+    assert_eq!(label(&bench), None);
+}
+
+#[test]
+fn keys_without_effect_say_why() {
+    let mut bench = window([1280.0, 820.0]);
+    for (key, told) in [
+        (Key::Q, "No trial of the real gripper is running"),
+        (Key::D, "No trial to discard"),
+        (Key::W, "W acts in Label mode"),
+    ] {
+        press(&mut bench, Modifiers::NONE, key);
+        bench.until_told(told);
+    }
+    bench.tell(SimulationAction::OpenObject("empty".to_owned()));
+    bench.until(|s| s.object.is_none());
+    press(&mut bench, Modifiers::NONE, Key::Z);
+    bench.until_told("There is no object in the hand");
+    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.until_shown(true, "0 of 800 trials");
+    press(&mut bench, Modifiers::NONE, Key::N);
+    bench.until_told("No trial waits for a label");
+}
+
+#[test]
+fn files_are_saved_and_opened_where_the_system_has_no_dialog() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = window([1280.0, 820.0]);
+    let write = |bench: &mut Bench, path: &str| {
+        press(bench, Modifiers::COMMAND, Key::A);
+        type_text(bench, path);
+        press(bench, Modifiers::NONE, Key::Enter);
+    };
+    press(&mut bench, Modifiers::COMMAND, Key::S);
+    let field = |bench: &Bench| bench.harness.get_by_role_and_label(Role::TextInput, "Path").value();
+    assert!(field(&bench).is_some_and(|path| path.ends_with("lemon_scene.toml")));
+    write(&mut bench, folder.path().join("nowhere/mine.toml").to_str().unwrap());
+    assert!(bench.harness.query_by_label_contains("There is no folder").is_some());
+    let mine = folder.path().join("mine.toml");
+    write(&mut bench, mine.to_str().unwrap());
+    bench.until_told("Scene saved as");
+    assert!(mine.is_file() && bench.harness.query_by_role_and_label(Role::TextInput, "Path").is_none());
+    // The next one begins there; an existing file is replaced only when asked for again.
+    press(&mut bench, Modifiers::COMMAND, Key::S);
+    assert_eq!(field(&bench), Some(folder.path().join("lemon_scene.toml").to_str().unwrap().to_owned()));
+    write(&mut bench, mine.to_str().unwrap());
+    assert!(bench.harness.query_by_label_contains("Replace it?").is_some());
+    bench.harness.get_by_label("Replace").click();
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_role_and_label(Role::TextInput, "Path").is_none());
+    // A file is opened from the list.
+    bench.tell(SimulationAction::OpenObject("tomato".to_owned()));
+    bench.until(|s| s.truth() == "tomato");
+    bench.tell(FileAction::Open);
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("mine.toml").click();
+    bench.harness.run_steps(3);
+    bench.harness.get_by_role_and_label(Role::Button, "Open").click();
+    bench.harness.run_steps(3);
+    bench.until(|s| s.truth() == "lemon");
+}
+
+#[test]
+fn the_scale_is_set_by_keys_and_remembered() {
+    let mut bench = window([1280.0, 820.0]);
+    press(&mut bench, Modifiers::COMMAND, Key::Plus);
+    press(&mut bench, Modifiers::COMMAND, Key::Plus);
+    bench.harness.run_steps(2);
+    assert!((bench.workbench().view().scale - 1.2).abs() < 1e-6);
+    assert!((bench.harness.ctx.zoom_factor() - 1.2).abs() < 1e-6);
+    press(&mut bench, Modifiers::COMMAND, Key::Minus);
+    assert!((bench.workbench().view().scale - 1.1).abs() < 1e-6);
+    press(&mut bench, Modifiers::COMMAND, Key::Num0);
+    assert!((bench.workbench().view().scale - 1.0).abs() < 1e-6);
+    for _ in 0..20 {
+        press(&mut bench, Modifiers::COMMAND, Key::Plus);
+    }
+    assert!((bench.workbench().view().scale - 2.0).abs() < 1e-6);
+}
+
+#[test]
+fn results_of_an_earlier_object_vanish() {
+    let mut bench = window([1400.0, 1000.0]);
+    bench.tell(Command::SetGrasps(1));
+    bench.tell(Command::SetSpeed(64.0));
+    bench.tell(Command::Play);
+    bench.until(|s| s.status.finished && s.last.is_some());
+    bench.harness.get_by_label("This grasp").click();
+    bench.harness.run_steps(2);
+    assert!(bench.harness.query_by_label_contains("result of grasp").is_some());
+    bench.tell(Command::Pause);
+    bench.tell(SimulationAction::OpenObject("tomato".to_owned()));
+    let changed = bench.until(|s| s.truth() == "tomato");
+    assert!(changed.last.is_none() && changed.scene_since == changed.grasp);
+    assert!(bench.harness.query_by_label_contains("result of grasp").is_none());
+}
+
+#[test]
+fn every_tab_is_reachable_in_a_small_window() {
+    let mut bench = window([960.0, 600.0]);
+    bench.harness.run_steps(2);
+    let menus = bench.harness.query_all_by_label("All tabs").count();
+    assert!(menus > 0, "the tabs on the right do not fit");
+    bench.harness.query_all_by_label("All tabs").last().unwrap().click();
+    bench.harness.run_steps(3);
+    // The tab, and below it its line in the menu.
+    let both: Vec<_> = bench.harness.query_all_by_label("Gripper").collect();
+    both.iter().max_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).unwrap().click();
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_all_by_label_contains("Connect").next().is_some());
+    // Also with large letters.
+    bench.tell(ViewAction::SetScale(1.5));
+    bench.harness.run_steps(4);
+    let room = bench.harness.ctx.content_rect();
+    for label in ["Menu", "?", "Theme"] {
+        let button = bench.harness.get_by_role_and_label(Role::Button, label).rect();
+        assert!(room.contains_rect(button), "{label} at {button:?} in {room:?}");
+    }
+}
+
+#[test]
+fn a_title_names_the_same_object_as_its_class() {
+    let mut bench = window([1280.0, 820.0]);
+    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.until_shown(true, "0 of 800 trials");
+    bench.tell(LabelCommand::Want("bigball".to_owned(), 3));
+    bench.until_shown(true, "Tennis ball: 0 of 3");
+    let field = bench.harness.get_by_role_and_label(Role::TextInput, "Add an object to the plan");
+    field.focus();
+    bench.harness.run_steps(2);
+    type_text(&mut bench, "tennis ball");
+    press(&mut bench, Modifiers::NONE, Key::Enter);
+    bench.until_shown(true, "Tennis ball: 0 of 50");
+}
+
+#[test]
+fn a_warning_carries_the_button_that_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    // A box without a lid: too wide a hole to close.
+    let path = folder.path().join("bin.obj");
+    let corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)];
+    let mut text = String::new();
+    for (x, y, z) in corners {
+        text += &format!("v {} {} {}\n", 0.04 * f64::from(x), 0.04 * f64::from(y), 0.04 * f64::from(z));
+    }
+    for [a, b, c, d] in [[1, 4, 3, 2], [1, 2, 6, 5], [2, 3, 7, 6], [3, 4, 8, 7], [4, 1, 5, 8]] {
+        text += &format!("f {a} {b} {c} {d}\n");
+    }
+    std::fs::write(&path, text).unwrap();
+    let mut bench = window([1280.0, 820.0]);
+    bench.tell(SimulationAction::OpenObject(path.to_str().unwrap().to_owned()));
+    bench.until_told("the mesh is open");
+    bench.harness.run_steps(2);
+    bench.harness.get_by_role_and_label(Role::Button, "Use its hull").click();
+    bench.harness.run_steps(2);
+    bench.until(|s| s.object.as_ref().is_some_and(|object| object.name == "bin"));
+    // What was refused leaves nothing to undo; the hull does.
+    press(&mut bench, Modifiers::COMMAND, Key::Z);
+    bench.until(|s| s.truth() == "lemon");
+}
