@@ -162,10 +162,10 @@ fn changes_of_many_trials_are_one_step_of_undo() -> Outcome {
         Ok(store.list(true)?.into_iter().map(|row| row.tags).collect())
     };
     store.labels().set_tags(1, &["wet".to_owned(), "late".to_owned()])?;
-    let wet = TrialEdit::Tag(" wet ".to_owned());
+    let wet = TrialEdit::Tag(vec![" wet ".to_owned()]);
     assert_eq!(store.labels().edit(&[1, 2, simulated], &wet)?, Edited { changed: 2, known: 0 });
     assert_eq!(tags(&store)?, [vec!["wet", "late"], vec!["wet"], vec![], vec!["wet"]]);
-    store.labels().edit(&[1, 2, 3], &TrialEdit::Untag("wet".to_owned()))?;
+    store.labels().edit(&[1, 2, 3], &TrialEdit::Untag(vec!["wet".to_owned()]))?;
     assert_eq!(tags(&store)?, [vec!["late"], vec![], vec![], vec!["wet"]]);
     assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), "trials 1, 2: tags changed");
     assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), format!("trials 2, {simulated}: tags [] -> [wet]"));

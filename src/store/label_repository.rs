@@ -4,7 +4,7 @@
 use super::journal::{Change, Links, append, change, new_batch};
 use super::store::{Store, json, source_named};
 use super::store_error::StoreError;
-use crate::labels::{Edited, Guess, LabelPlan, TrialEdit, class_name};
+use crate::labels::{ClassNameError, Edited, Guess, LabelPlan, TrialEdit, class_name};
 use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
@@ -25,6 +25,17 @@ impl Store {
     pub fn labels(&self) -> LabelRepository<'_> {
         LabelRepository { store: self }
     }
+}
+
+/// State of the labels: two that are equal show the same lists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelRevision {
+    /// Last entry of the journal.
+    entry: i64,
+    /// Number of trials of the real gripper.
+    trials: i64,
+    /// The newest of them and how far it is.
+    newest: Option<(TrialId, String)>,
 }
 
 /// Labels of one trial.
@@ -61,16 +72,16 @@ impl LabelRepository<'_> {
                 self.change_trials(ids, |_, state| Ok(Some(Change::Note { from: state.note, to: to.clone() })))
             }
             TrialEdit::Tags(tags) => {
-                let tags = tags.iter().map(|tag| class_name(tag)).collect::<Result<Vec<_>, _>>()?;
-                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, &[], &tags, true))))
+                let tags = checked(tags)?;
+                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, |_| false, &tags))))
             }
-            TrialEdit::Tag(tag) => {
-                let tag = class_name(tag)?;
-                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, &[], &[tag.clone()], false))))
+            TrialEdit::Tag(tags) => {
+                let tags = checked(tags)?;
+                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, |_| true, &tags))))
             }
-            TrialEdit::Untag(tag) => {
-                let tag = tag.trim().to_owned();
-                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, &[tag.clone()], &[], false))))
+            TrialEdit::Untag(tags) => {
+                let tags = checked(tags)?;
+                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, |tag| !tags.contains(tag), &[]))))
             }
             TrialEdit::Unsure(unsure) => {
                 self.change_trials(ids, |_, state| Ok(Some(Change::Unsure { from: state.unsure, to: *unsure })))
@@ -122,6 +133,20 @@ impl LabelRepository<'_> {
     /// Marks a trial as reviewed: its label was checked and kept.
     pub fn mark_reviewed(&self, id: TrialId) -> Result<(), StoreError> {
         self.change_trials(&[id], |_, state| Ok((!state.reviewed).then_some(Change::Reviewed))).map(drop)
+    }
+
+    /// The present state of labels, plan and recorded trials, which is cheaper to read than the lists.
+    pub fn revision(&self) -> Result<LabelRevision, StoreError> {
+        let number = |sql: &str| self.store.connection.query_row(sql, [], |row| row.get(0));
+        let newest = "SELECT id, state FROM trials JOIN board_trials ON trial = id ORDER BY trial DESC LIMIT 1";
+        let read = || -> rusqlite::Result<LabelRevision> {
+            Ok(LabelRevision {
+                entry: number("SELECT coalesce(max(number), 0) FROM journal")?,
+                trials: number("SELECT count(*) FROM board_trials")?,
+                newest: self.store.connection.query_row(newest, [], |row| Ok((row.get(0)?, row.get(1)?))).optional()?,
+            })
+        };
+        read().map_err(|e| self.store.fault(&e))
     }
 
     /// How many trials of each object are wanted.
@@ -191,12 +216,16 @@ fn label_change(id: TrialId, state: LabelState, to: String) -> Result<Option<Cha
     Ok(Some(Change::Label { from, to: Some(to) }))
 }
 
-/// Change of tags: some leave, others come, each once; all present ones leave too where the new ones replace them.
-fn tag_change(state: LabelState, leave: &[String], come: &[String], replace: bool) -> Change {
+/// Tags as they are stored.
+fn checked(tags: &[String]) -> Result<Vec<String>, ClassNameError> {
+    tags.iter().map(|tag| class_name(tag)).collect()
+}
+
+/// Change of tags: those that are kept, then new ones, each once.
+fn tag_change(state: LabelState, keeps: impl Fn(&String) -> bool, new: &[String]) -> Change {
     let from = state.tags;
-    let kept = from.iter().filter(|tag| !replace && !leave.contains(tag));
     let mut to: Vec<String> = Vec::new();
-    for tag in kept.chain(come) {
+    for tag in from.iter().filter(|tag| keeps(tag)).chain(new) {
         if !to.contains(tag) {
             to.push(tag.clone());
         }

@@ -25,6 +25,7 @@
 //! | 5 | `label_repository`, `tares` | labels, notes and plan; zeros of parts |
 //! | 5 | `board_export`, `board_signals` | counts of a board trial as CSV; its signals by the calibrations |
 //! | 6 | `labelled_trials`, `labelled_export` | lists of trials with labels; export for training |
+//! | 7 | `trial_export` | export of any trial |
 //!
 //! # Example
 //!
@@ -74,6 +75,7 @@ mod store_tests;
 mod tares;
 #[cfg(test)]
 mod test_trials;
+mod trial_export;
 mod trial_rows;
 
 pub use board_export::write_board_csv;
@@ -85,7 +87,7 @@ pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trial
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
 pub use journal::{Change, JournalEntry, JournalRepository};
-pub use label_repository::LabelRepository;
+pub use label_repository::{LabelRepository, LabelRevision};
 pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};
 pub use library::{
     Counted, Day, Library, LibraryCounts, LibraryTrial, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery,
@@ -95,4 +97,5 @@ pub use points_csv::{PointsError, read_points_csv};
 pub use store::Store;
 pub use store_error::StoreError;
 pub use tares::{PartTare, StoredTare};
+pub use trial_export::{TrialFormat, export_trial};
 pub use trial_rows::TrialRow;

@@ -50,7 +50,7 @@ fn filled(folder: &tempfile::TempDir) -> Result<Store, StoreError> {
     record(&mut store, "lemon")?;
     record(&mut store, "")?;
     import(&mut store, "mug")?;
-    store.labels().edit(&[2, 4], &TrialEdit::Tag("wet".to_owned()))?;
+    store.labels().edit(&[2, 4], &TrialEdit::Tag(vec!["wet".to_owned()]))?;
     store.labels().set_note(3, "slipped at the end")?;
     Ok(store)
 }
@@ -201,8 +201,8 @@ fn apply(store: &mut Store, event: Event, begun: &mut Vec<TrialId>) -> Result<()
         Event::Edit(ids, what) => {
             let edit = [
                 TrialEdit::Label("mug".to_owned()),
-                TrialEdit::Tag("wet".to_owned()),
-                TrialEdit::Untag("wet".to_owned()),
+                TrialEdit::Tag(vec!["wet".to_owned()]),
+                TrialEdit::Untag(vec!["wet".to_owned()]),
                 TrialEdit::Note("n".to_owned()),
                 TrialEdit::Discard,
                 TrialEdit::Restore,

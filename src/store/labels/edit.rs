@@ -9,10 +9,10 @@ pub enum TrialEdit {
     Note(String),
     /// Replace all tags.
     Tags(Vec<String>),
-    /// Add a tag.
-    Tag(String),
-    /// Remove a tag.
-    Untag(String),
+    /// Add tags.
+    Tag(Vec<String>),
+    /// Remove tags.
+    Untag(Vec<String>),
     /// Mark the label as unsure, or remove the mark.
     Unsure(bool),
     /// Mark as deleted; can be restored.
@@ -39,8 +39,8 @@ impl Edited {
             TrialEdit::Note(note) if note.trim().is_empty() => "without note now".to_owned(),
             TrialEdit::Note(_) => "given a note".to_owned(),
             TrialEdit::Tags(tags) => format!("tagged [{}]", tags.join(", ")),
-            TrialEdit::Tag(tag) => format!("tagged {}", tag.trim()),
-            TrialEdit::Untag(tag) => format!("no longer tagged {}", tag.trim()),
+            TrialEdit::Tag(tags) => format!("tagged {}", tags.join(", ")),
+            TrialEdit::Untag(tags) => format!("no longer tagged {}", tags.join(", ")),
             TrialEdit::Unsure(true) => "marked as unsure".to_owned(),
             TrialEdit::Unsure(false) => "no longer unsure".to_owned(),
             TrialEdit::Discard => "discarded".to_owned(),
