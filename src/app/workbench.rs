@@ -7,6 +7,7 @@ use crate::app::features::files::{FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
+use crate::app::features::library::LibraryFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
@@ -25,7 +26,8 @@ use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, GhostGrasp, GripperSetup, GripperView, GripperWorker, Inspector, LabelView,
-    MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
+    LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake, start_labeller,
+    start_librarian,
 };
 use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
@@ -69,6 +71,7 @@ pub struct Workbench {
     simulation: SimulationFeature,
     gripper: GripperFeature,
     labelling: LabellingFeature,
+    library: LibraryFeature,
     recognition: RecognitionFeature,
     inspect: InspectFeature,
     tools: GripperTools,
@@ -84,6 +87,7 @@ struct Published {
     ghost: Option<Arc<GhostGrasp>>,
     gripper: Option<Arc<GripperView>>,
     labels: Option<Arc<LabelView>>,
+    library: Option<Arc<LibraryView>>,
 }
 
 impl Workbench {
@@ -95,6 +99,8 @@ impl Workbench {
         let labeller =
             start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
         let labelling = LabellingFeature::new(labeller, store.clone());
+        let librarian =
+            start_librarian(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the trial library"))?;
         let worker = SimWorker::start(SimWorkerSetup {
             scene: scene.clone(),
             sensors: view.sensors.clone(),
@@ -140,6 +146,7 @@ impl Workbench {
             simulation,
             gripper: GripperFeature::new(gripper, scene),
             labelling,
+            library: LibraryFeature::new(librarian),
             recognition,
             inspect,
             tools,
@@ -236,11 +243,12 @@ impl Workbench {
             ghost: self.simulation.ghost(&self.view),
             gripper: self.gripper.worker().view(),
             labels: self.labelling.labeller().view(),
+            library: self.library.view(),
         }
     }
 
     fn context<'a>(&'a self, published: &'a Published) -> PanelContext<'a> {
-        let Published { snapshot, accuracy, ghost, gripper, labels } = published;
+        let Published { snapshot, accuracy, ghost, gripper, labels, library } = published;
         let (snapshot, gripper, labels) = (snapshot.as_deref(), gripper.as_deref(), labels.as_deref());
         let source = self.view.source;
         PanelContext {
@@ -255,6 +263,8 @@ impl Workbench {
             tools: &self.tools,
             labels,
             draft: self.labelling.session().draft(),
+            library: library.as_deref(),
+            picked: self.library.selection(),
             blind: self.labelling.hides_prediction(gripper, labels, &self.view),
             source,
             traces: self.traces(),
@@ -284,10 +294,12 @@ impl Workbench {
 
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
-        let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
+        let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
+            self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
         labelling.gather(gripper, simulation, view, notices);
+        library.gather(notices);
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, view, notices);
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
@@ -303,11 +315,17 @@ impl Workbench {
 
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
         let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();
-        let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
+        let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
+            self;
         match action {
             Action::Simulation(action) => simulation.apply(action, view, notices),
             Action::Gripper(action) => gripper.apply(action, view, notices),
             Action::Labelling(action) => labelling.apply(action, gripper, view, notices),
+            Action::Library(action) => {
+                for action in library.apply(action) {
+                    inspect.apply(action, &times, view, notices);
+                }
+            }
             Action::Recognition(action) => {
                 recognition.apply(action, &mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
             }

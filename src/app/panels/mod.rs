@@ -16,6 +16,7 @@ mod gripper;
 mod hysteresis;
 mod journal;
 mod label;
+mod library;
 mod line_pressure;
 mod objects;
 mod plan;
@@ -43,7 +44,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 26] = [
+pub const ALL: [PanelKind; 27] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -58,6 +59,7 @@ pub const ALL: [PanelKind; 26] = [
     PanelKind { name: "label", title: "Label", ui: label::ui },
     PanelKind { name: "plan", title: "Plan", ui: plan::ui },
     PanelKind { name: "trials", title: "Trials", ui: trials::ui },
+    PanelKind { name: "library", title: "Library", ui: library::ui },
     PanelKind { name: "journal", title: "Journal", ui: journal::ui },
     PanelKind { name: "gripper", title: "Gripper", ui: gripper::ui },
     PanelKind { name: "counts", title: "Counts", ui: counts::ui },
