@@ -2,6 +2,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
 use crate::app::theme::colour;
 use crate::app::widgets::sparkline;
 use egui::{Align2, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
@@ -114,7 +115,13 @@ fn row_ui(
             trial.tags.iter().map(|tag| format!(" #{tag}")).collect::<String>()
         )
     };
+    if response.double_clicked() {
+        actions.push(InspectAction::Open(trial.id));
+    }
     response.on_hover_text(about()).context_menu(|ui| {
+        if !trial.discarded && ui.button("Inspect").clicked() {
+            actions.push(InspectAction::Open(trial.id));
+        }
         if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
             actions.push(LabelCommand::Reviewed(trial.id));
         }
