@@ -5,7 +5,7 @@ use crate::app::context::PanelContext;
 use crate::app::features::library::LibraryAction;
 use crate::app::widgets::wrapped;
 use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{Button, Key, PopupCloseBehavior, RichText, TextEdit, Ui};
+use egui::{Button, Key, PopupCloseBehavior, RichText, ScrollArea, TextEdit, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
 use palpate_store::labels::TrialEdit;
@@ -13,8 +13,8 @@ use palpate_store::{LibraryTrial, TrialFormat};
 use palpate_tactile::trial::TrialSource;
 use std::sync::Arc;
 
-/// Objects and tags that a menu offers beside its field.
-const OFFERED: usize = 12;
+/// Height of what a menu offers below its field (points).
+const OFFERS: f32 = 150.0;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
     let trials = context.picked.trials.as_slice();
@@ -61,6 +61,11 @@ fn menu(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
+/// What a menu offers below its field.
+fn offers(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    ScrollArea::vertical().max_height(OFFERS).show(ui, contents);
+}
+
 /// Field for a word; the word once it is entered.
 fn word_ui(ui: &mut Ui, name: &str, hint: &str, done: &str) -> Option<String> {
     let id = ui.scope_id().with(name);
@@ -99,27 +104,30 @@ fn label_ui(ui: &mut Ui, context: &PanelContext<'_>, trials: &[Arc<LibraryTrial>
     }
     let done = format!("Label {recorded}");
     let mut given = word_ui(ui, "Label of the selection", "name of the object", &done);
-    let planned = context.labels.iter().flat_map(|labels| &labels.progress.objects);
-    for object in planned.take(OFFERED) {
-        if ui.button(object_title(&object.name)).clicked() {
-            given = Some(object.name.clone());
-            ui.close();
+    offers(ui, |ui| {
+        for object in context.labels.iter().flat_map(|labels| &labels.progress.objects) {
+            if ui.button(object_title(&object.name)).clicked() {
+                given = Some(object.name.clone());
+                ui.close();
+            }
         }
-    }
+    });
     actions_of(given.map(TrialEdit::Label), actions);
 }
 
 /// Tags that all have are removed by a click, others are added.
 fn tag_ui(ui: &mut Ui, view: &LibraryView, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
     let mut edit = word_ui(ui, "Tag of the selection", "new tag", "Add").map(|tag| TrialEdit::Tag(vec![tag]));
-    for (tag, _) in view.counts.tags.iter().take(OFFERED) {
-        let all = trials.iter().all(|trial| trial.row.tags.contains(tag));
-        if ui.selectable_label(all, tag).clicked() {
-            let tags = vec![tag.clone()];
-            edit = Some(if all { TrialEdit::Untag(tags) } else { TrialEdit::Tag(tags) });
-            ui.close();
+    offers(ui, |ui| {
+        for (tag, _) in &view.counts.tags {
+            let all = trials.iter().all(|trial| trial.row.tags.contains(tag));
+            if ui.selectable_label(all, tag).clicked() {
+                let tags = vec![tag.clone()];
+                edit = Some(if all { TrialEdit::Untag(tags) } else { TrialEdit::Tag(tags) });
+                ui.close();
+            }
         }
-    }
+    });
     actions_of(edit, actions);
 }
 

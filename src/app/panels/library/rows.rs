@@ -103,9 +103,9 @@ fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, columns: &[(Shows, f32)], 
     }
 }
 
-/// Mark of the direction: the tip shows where the last one stands.
+/// Mark of the direction: up for rising values, down for falling ones.
 fn triangle(ui: &Ui, at: egui::Pos2, descending: bool, ink: Color32) {
-    let tip = if descending { -3.0 } else { 3.0 };
+    let tip = if descending { 3.0 } else { -3.0 };
     let corners = vec![at + vec2(-3.5, -tip), at + vec2(3.5, -tip), at + vec2(0.0, tip)];
     ui.painter().add(egui::Shape::convex_polygon(corners, ink, egui::Stroke::NONE));
 }
