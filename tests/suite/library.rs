@@ -188,6 +188,10 @@ fn the_panel_finds_sorts_and_selects() {
         assert_eq!(tagged(&bench), [2, 3, 4, 6]);
         bench.store().journal().undo().unwrap();
         assert_eq!(tagged(&bench), [0i64; 0]);
+        if size[0] < 500.0 {
+            bench.harness.get_by_label("Edit").click();
+            bench.harness.run_steps(3);
+        }
         bench.harness.get_by_label("Discard").click();
         bench.until_told("4 trials discarded");
         until_left(&mut bench);
@@ -196,7 +200,6 @@ fn the_panel_finds_sorts_and_selects() {
 
 /// The trials that were not discarded, in either direction.
 fn until_left(bench: &mut Bench) {
-    bench.until_shown(true, "2 trials");
     bench.until_shown(true, "discarded 4");
     let mut left = rows(bench);
     left.sort();

@@ -52,7 +52,7 @@ const KEYS: &[Binding] = &[
 fn layout(tiles: &mut Tiles<String>) -> TileId {
     let library = tabs(tiles, &["library"]);
     let compared = tabs(tiles, &["compared", "sensors"]);
-    let left = split(tiles, LinearDir::Vertical, [(library, 0.66), (compared, 0.34)]);
+    let left = split(tiles, LinearDir::Vertical, [(library, 0.72), (compared, 0.28)]);
     let [view, curvature] = ["view", "curvature"].map(|name| tabs(tiles, &[name]));
     let loads = tabs(tiles, &["pressure", "force", "line", "counts", "hysteresis"]);
     let right = tabs(tiles, &["recognition", "trial"]);

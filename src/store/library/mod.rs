@@ -142,8 +142,9 @@ impl Library {
     /// Trials that match a query, in its order.
     pub fn find(&self, store: &Store, query: &TrialQuery) -> Result<Vec<Arc<LibraryTrial>>, StoreError> {
         let matcher = query.matcher(store)?;
-        let found = self.trials.values().filter(|trial| matcher.matches(trial)).cloned().collect();
-        Ok(query.order.sorted(found))
+        let found: Vec<Arc<LibraryTrial>> =
+            self.trials.values().filter(|trial| matcher.matches(trial)).cloned().collect();
+        Ok(query.order.sorted(&found))
     }
 
     /// A trial by its number.

@@ -127,7 +127,7 @@ impl<'a> SortKey<'a> {
 
 impl TrialOrder {
     /// Trials in this order.
-    pub(super) fn sorted(self, trials: Vec<Arc<LibraryTrial>>) -> Vec<Arc<LibraryTrial>> {
+    pub(super) fn sorted(self, trials: &[Arc<LibraryTrial>]) -> Vec<Arc<LibraryTrial>> {
         let mut keys: Vec<(SortKey<'_>, usize)> =
             trials.iter().enumerate().map(|(at, trial)| (SortKey::of(trial, self.column), at)).collect();
         // Almost in order for numbers and dates: the stable sort finds that.

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::library::LibraryAction;
 use crate::app::widgets::wrapped;
-use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
 use egui::{Button, Key, PopupCloseBehavior, RichText, ScrollArea, TextEdit, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
@@ -13,6 +13,10 @@ use palpate_store::{LibraryTrial, TrialFormat};
 use palpate_tactile::trial::TrialSource;
 use std::sync::Arc;
 
+/// Room that the buttons of all edits need; with less they are in a menu (points).
+const WHOLE: f32 = 280.0;
+/// Width of a menu (points).
+const MENU: f32 = 200.0;
 /// Height of what a menu offers below its field (points).
 const OFFERS: f32 = 150.0;
 
@@ -34,31 +38,47 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, ac
         if ui.button("Compare").on_hover_text("Pin for comparison (P)").clicked() {
             actions.push(LibraryAction::Pin);
         }
-        menu(ui, "Label", |ui| label_ui(ui, context, trials, actions));
-        menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
-        menu(ui, "Note", |ui| note_ui(ui, trials, actions));
-        if ui.button("Discard").on_hover_text("Discard (Del); Ctrl+Z brings them back").clicked() {
-            actions.push(LibraryAction::Edit(TrialEdit::Discard));
+        if ui.available_width() < WHOLE {
+            menu(ui, "Edit", |ui| edits_ui(ui, context, view, actions));
+        } else {
+            edits_ui(ui, context, view, actions);
         }
-        menu(ui, "Export", |ui| {
-            for format in TrialFormat::ALL {
-                let text = format!("{} into a folder beside the store", format.name().to_uppercase());
-                if ui.button(text).clicked() {
-                    actions.push(LibraryAction::Export(format));
-                    ui.close();
-                }
-            }
-        });
     });
 }
 
-/// Menu that stays open while text is written.
+/// Everything that changes or exports the selection.
+fn edits_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    let trials = context.picked.trials.as_slice();
+    menu(ui, "Label", |ui| label_ui(ui, context, trials, actions));
+    menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
+    menu(ui, "Note", |ui| note_ui(ui, trials, actions));
+    menu(ui, "Export", |ui| {
+        for format in TrialFormat::ALL {
+            let text = format!("{} into a folder beside the store", format.name().to_uppercase());
+            if ui.button(text).clicked() {
+                actions.push(LibraryAction::Export(format));
+                ui.close();
+            }
+        }
+    });
+    if ui.button("Discard").on_hover_text("Discard (Del); Ctrl+Z brings them back").clicked() {
+        actions.push(LibraryAction::Edit(TrialEdit::Discard));
+        ui.close();
+    }
+}
+
+/// Menu that stays open while text is written; in another menu a part of that.
 fn menu(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
-    MenuButton::new(title).config(config).ui(ui, |ui| {
-        ui.set_width(220.0);
+    let contents = |ui: &mut Ui| {
+        ui.set_width(MENU);
         contents(ui);
-    });
+    };
+    if is_in_menu(ui) {
+        SubMenuButton::new(title).config(config).ui(ui, contents);
+    } else {
+        MenuButton::new(title).config(config).ui(ui, contents);
+    }
 }
 
 /// What a menu offers below its field.

@@ -26,7 +26,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     }
     search_ui(ui, context, view, actions);
     filters::ui(ui, context, view, actions);
-    count_ui(ui, context, view, actions);
+    if context.picked.query.is_filtered() || !view.complete {
+        count_ui(ui, context, view, actions);
+    }
     if view.found.is_empty() {
         return empty_ui(ui, context, view);
     }
@@ -53,15 +55,10 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, action
     }
 }
 
-/// How many trials were found.
+/// How many trials were found; without filters the search field says how many there are.
 fn count_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
     ui.horizontal(|ui| {
-        let found = grouped(view.found.len());
-        let text = match (view.query.is_filtered(), view.found.len()) {
-            (false, 1) => "1 trial".to_owned(),
-            (false, _) => format!("{found} trials"),
-            (true, _) => format!("{found} of {} trials", grouped(view.counts.kept)),
-        };
+        let text = format!("{} of {} trials", grouped(view.found.len()), grouped(view.counts.kept));
         ui.label(RichText::new(text).small().weak());
         if !view.complete {
             ui.label(RichText::new("reading older ones ..").small().weak());
