@@ -152,7 +152,8 @@ fn measure(path: &Path, trials: u32, runs: usize) -> Result<(Vec<Waited>, Option
     rows.push(row("search", of(&|run| bench.find(search(run)))?));
     let sorted = |run: usize| {
         let columns = TrialColumn::ALL;
-        let order = TrialOrder { column: columns[run % columns.len()], descending: run / columns.len() % 2 == 0 };
+        let order =
+            TrialOrder { column: columns[run % columns.len()], descending: (run / columns.len()).is_multiple_of(2) };
         TrialQuery { order, ..everything.clone() }
     };
     rows.push(row("sort", of(&|run| bench.find(sorted(run)))?));
