@@ -274,6 +274,7 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
          ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
+         ALTER TABLE trials DROP COLUMN earlier;
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
          PRAGMA user_version = 6;",
     )?;

@@ -333,10 +333,10 @@ mod tests {
         let drawn = |id: TrialId| view.sparklines[&id].iter().all(|finger| finger.iter().any(Option::is_some));
         assert_eq!((1..=99).filter(|id| drawn(*id)).collect::<Vec<_>>(), [1, 2, 4, 5]);
         librarian.ask(LibraryCommand::Export(vec![1, 2, 4], TrialFormat::Csv));
-        let view = until(&librarian, &woken, |view| !view.outcomes.is_empty());
-        assert!(
-            matches!(&view.outcomes[..], [(1, LabelOutcome::Done(text))] if text.starts_with("3 of 3 trials exported"))
-        );
+        let view = until(&librarian, &woken, |view| view.outcomes.len() == 2);
+        assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Warning(text)) if text.contains("before-v12")));
+        let done = |text: &str| text.starts_with("3 of 3 trials exported");
+        assert!(matches!(&view.outcomes[1], (2, LabelOutcome::Done(text)) if done(text)), "{:?}", view.outcomes);
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
             assert!(folder.path().join("export").join(name).is_file(), "{name}");
         }
