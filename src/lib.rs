@@ -71,6 +71,9 @@
 //! | a check of the doctor | a function in `src/device/doctor/checks.rs` |
 //! | a gripper | a file in `src/lab/gripper/` that implements [`palpate_lab::gripper::Gripper`] |
 //! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
+//! | a filter or column of the trial library | `src/store/library/`, its option in `src/cli/trials/selection.rs` |
+//! | an edit of many trials | `src/store/labels/edit.rs` and `src/store/label_repository.rs` |
+//! | a format of exported trials | `src/store/trial_export.rs` |
 //! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |

@@ -3,6 +3,7 @@
 use crate::app::features::files::FileAction;
 use crate::app::features::gripper::GripperAction;
 use crate::app::features::inspect::InspectAction;
+use crate::app::features::library::LibraryAction;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::features::tools::ToolAction;
@@ -19,6 +20,8 @@ pub enum Action {
     Gripper(GripperAction),
     /// Trials, labels and plan.
     Labelling(LabellingAction),
+    /// All trials: search, selection, edits.
+    Library(LibraryAction),
     /// Recognition by both grippers.
     Recognition(RecognitionAction),
     /// Diagnostics, fit and training.
@@ -70,6 +73,7 @@ actions_from! {
     SimulationAction => |action| Self::Simulation(action);
     GripperAction => |action| Self::Gripper(action);
     LabellingAction => |action| Self::Labelling(action);
+    LibraryAction => |action| Self::Library(action);
     RecognitionAction => |action| Self::Recognition(action);
     ToolAction => |action| Self::Tool(action);
     InspectAction => |action| Self::Inspect(action);

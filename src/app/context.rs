@@ -1,6 +1,7 @@
 //! Read-only context of panels, bars and keys.
 
 use crate::app::features::inspect::{ComparedTrace, Inspected, Pinned};
+use crate::app::features::library::LibrarySelection;
 use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
 use crate::app::playback::Playback;
@@ -11,7 +12,7 @@ use palpate_lab::inspection::Alignment;
 use palpate_lab::study::accuracy::AccuracyStudy;
 use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{
-    EffectsWorker, ExplainRequest, ExplainedGrasp, GripperView, LabelDraft, LabelView, MeasuredAccuracy,
+    EffectsWorker, ExplainRequest, ExplainedGrasp, GripperView, LabelDraft, LabelView, LibraryView, MeasuredAccuracy,
     SceneAccuracyJob, Snapshot,
 };
 use palpate_sim::frame::Frame;
@@ -48,6 +49,10 @@ pub struct PanelContext<'a> {
     pub labels: Option<&'a LabelView>,
     /// Label being chosen.
     pub draft: &'a LabelDraft,
+    /// Trials of the library that were found; absent until they were asked for.
+    pub library: Option<&'a LibraryView>,
+    /// Query and selection in the library.
+    pub picked: &'a LibrarySelection,
     /// The model's prediction is hidden until the label is given.
     pub blind: bool,
     /// Source of the data that are shown.

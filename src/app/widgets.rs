@@ -2,9 +2,10 @@
 
 use crate::app::actions::Actions;
 use crate::app::theme::colour;
-use egui::{Button, Label, RichText, TextEdit, Ui};
-use palpate_geometry::palette::Theme;
+use egui::{Button, Color32, Label, Rect, RichText, Stroke, TextEdit, Ui, pos2};
+use palpate_geometry::palette::{Theme, Trace};
 use palpate_lab::workers::GripperCommand;
+use palpate_store::labels::Sparkline;
 use std::path::PathBuf;
 
 /// Text that wraps.
@@ -61,5 +62,29 @@ pub(super) fn stop_button(ui: &mut Ui, theme: Theme, actions: &mut Actions) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Stop and vent"));
     if response.clicked() {
         actions.push(GripperCommand::Vent);
+    }
+}
+
+/// Least range of a sparkline: a newton, or a count.
+const LEAST_RANGE: f32 = 1.0;
+
+/// Sparkline of both pads, over the range of its values.
+pub(super) fn sparkline(ui: &Ui, theme: Theme, values: &Sparkline, place: Rect) {
+    let painter = ui.painter_at(place);
+    painter.rect_filled(place, 2.0, colour(theme.colours().raised));
+    let inks: [Color32; 2] = [Trace::Pressure, Trace::PressureDistal].map(|trace| colour(trace.colour(theme)));
+    let all = || values.iter().flatten().flatten().copied();
+    let (low, high) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
+    let range = (high - low).max(LEAST_RANGE);
+    for (finger, ink) in values.iter().zip(inks) {
+        let last = finger.len().saturating_sub(1).max(1) as f32;
+        let at = |(k, value): (usize, &Option<f32>)| {
+            let x = place.left() + place.width() * k as f32 / last;
+            value.map(|value| pos2(x, place.bottom() - 2.0 - (place.height() - 4.0) * (value - low) / range))
+        };
+        let points: Vec<Option<egui::Pos2>> = finger.iter().enumerate().map(at).collect();
+        for piece in points.split(Option::is_none) {
+            painter.line(piece.iter().copied().flatten().collect(), Stroke::new(1.2, ink));
+        }
     }
 }

@@ -7,6 +7,7 @@ use crate::app::features::files::{FileAction, FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
+use crate::app::features::library::LibraryFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
@@ -28,8 +29,8 @@ use egui_tiles::Tile;
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
-    Inspector, LabelCommand, LabelView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
-    start_labeller,
+    Inspector, LabelCommand, LabelView, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
+    Snapshot, Wake, start_labeller, start_librarian,
 };
 use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
@@ -75,6 +76,7 @@ pub struct Workbench {
     simulation: SimulationFeature,
     gripper: GripperFeature,
     labelling: LabellingFeature,
+    library: LibraryFeature,
     recognition: RecognitionFeature,
     inspect: InspectFeature,
     tools: GripperTools,
@@ -92,6 +94,7 @@ struct Published {
     gripper: Option<Arc<GripperView>>,
     labels: Option<Arc<LabelView>>,
     explained: Option<Arc<ExplainedGrasp>>,
+    library: Option<Arc<LibraryView>>,
 }
 
 impl Workbench {
@@ -103,6 +106,8 @@ impl Workbench {
         let labeller =
             start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
         let labelling = LabellingFeature::new(labeller, store.clone());
+        let librarian =
+            start_librarian(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the trial library"))?;
         let worker = SimWorker::start(SimWorkerSetup {
             scene: scene.clone(),
             sensors: view.sensors.clone(),
@@ -152,6 +157,7 @@ impl Workbench {
             simulation,
             gripper: GripperFeature::new(gripper, scene),
             labelling,
+            library: LibraryFeature::new(librarian),
             recognition,
             inspect,
             tools,
@@ -259,11 +265,12 @@ impl Workbench {
             gripper: self.gripper.worker().view(),
             labels: self.labelling.labeller().view(),
             explained: self.recognition.explained(),
+            library: self.library.view(),
         }
     }
 
     fn context<'a>(&'a self, published: &'a Published) -> PanelContext<'a> {
-        let Published { snapshot, accuracy, ghost, gripper, labels, explained } = published;
+        let Published { snapshot, accuracy, ghost, gripper, labels, explained, library } = published;
         let (snapshot, gripper, labels) = (snapshot.as_deref(), gripper.as_deref(), labels.as_deref());
         let source = self.view.source;
         PanelContext {
@@ -279,6 +286,8 @@ impl Workbench {
             explained: explained.as_deref(),
             labels,
             draft: self.labelling.session().draft(),
+            library: library.as_deref(),
+            picked: self.library.selection(),
             blind: self.labelling.hides_prediction(gripper, labels, &self.view),
             source,
             traces: self.traces(),
@@ -335,12 +344,14 @@ impl Workbench {
 
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
-        let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
+        let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
+            self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
         if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
             inspect.apply(action, &[], view, notices);
         }
+        library.gather(notices);
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, view, notices);
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
@@ -360,11 +371,17 @@ impl Workbench {
             return ctx.request_repaint();
         }
         let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();
-        let Self { view, notices, simulation, gripper, labelling, recognition, inspect, tools, files, .. } = self;
+        let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
+            self;
         match action {
             Action::Simulation(action) => simulation.apply(action, view, notices),
             Action::Gripper(action) => gripper.apply(action, view, notices),
             Action::Labelling(action) => labelling.apply(action, gripper, view, notices),
+            Action::Library(action) => {
+                for action in library.apply(action) {
+                    inspect.apply(action, &times, view, notices);
+                }
+            }
             Action::Recognition(action) => {
                 recognition.apply(action, &mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
             }

@@ -1,5 +1,7 @@
 //! `palpate bench`: CPU time on this machine.
 
+mod library;
+
 use super::Failure;
 use super::terminal::{say, say_json, table};
 use palpate_geometry::units::three_digits;
@@ -14,7 +16,8 @@ use palpate_sim::scene::Accuracy;
 #[command(after_help = "Examples:
   palpate bench physics
   palpate bench physics --reference --json
-  palpate bench live --runs 1000")]
+  palpate bench live --runs 1000
+  palpate bench library --trials 10000")]
 pub(super) struct BenchArguments {
     #[command(subcommand)]
     benchmark: Benchmark,
@@ -44,6 +47,18 @@ enum Benchmark {
         #[arg(long)]
         json: bool,
     },
+    /// Measure the trial library on a temporary store: opening, scrolling, search, filters, order, bulk edits.
+    Library {
+        /// Trials in the store.
+        #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1000..=1_000_000))]
+        trials: u32,
+        /// Runs per row; median and 95th percentile are printed.
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=1000))]
+        runs: u16,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
     /// Measure a live step of the macro-layer: a sample in, probabilities out.
     Live {
         /// Sequences per row; the median is printed.
@@ -63,6 +78,7 @@ const FEW_AND_MANY: [usize; 2] = [4, 22];
 
 pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     match &arguments.benchmark {
+        Benchmark::Library { trials, runs, json } => library::run(*trials, *runs, *json),
         Benchmark::Physics { runs, reference, json } => physics(*runs, *reference, *json),
         Benchmark::Training { runs, json } => {
             let mut rows = Vec::new();

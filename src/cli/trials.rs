@@ -1,31 +1,32 @@
 //! `palpate trials`: manages the store of trials.
 
 mod labels;
+mod selection;
 mod show;
 
 use super::Failure;
 use super::setup::{existing_store, open_store, read_store};
-use super::terminal::{say, say_json, table, warn};
+use super::terminal::{note, say, say_json, table, warn};
 use labels::LabelCommand;
-use palpate_sim::objects::class_of;
-use palpate_store::labels::{shown_name, shown_title};
+use palpate_store::labels::shown_title;
 use palpate_store::{
-    Store, TrialRow, contacts_path, export_board_trial, file_name_of, read_trials_csv, write_contacts_csv,
-    write_signals_csv, write_trial_csv,
+    Library, Shown, Store, TrialColumn, TrialFormat, TrialOrder, TrialQuery, TrialRow, export_trial, read_trials_csv,
 };
-use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
-use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::{PressureArea, SensorLayout};
+use selection::{Filters, Numbers, chosen};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate trials`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  palpate trials list --object lemon
+  palpate trials list --object lemon --since yesterday --quality sound
   palpate trials show 1
   palpate trials export 1 2 3 --out csv/
   palpate trials label 7 lemon
-  palpate trials discard 7
+  palpate trials tag matching wet --add --search slipped
+  palpate trials discard 7-9
   palpate trials undo
   palpate trials merge part1.sqlite part2.sqlite --store set.sqlite
 
@@ -37,14 +38,25 @@ pub(super) struct TrialsArguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum TrialsCommand {
-    /// List trials, oldest first.
+    /// List trials, oldest first, by the filters of the library.
     List {
-        /// Only trials of this object.
-        #[arg(long)]
-        object: Option<String>,
+        #[command(flatten)]
+        filters: Filters,
         /// Include deleted trials.
         #[arg(long)]
         deleted: bool,
+        /// Only deleted trials.
+        #[arg(long, conflicts_with = "deleted")]
+        discarded: bool,
+        /// Column to sort by: id, object, date, source, preset, sensors, quality, tags, note or samples.
+        #[arg(long, value_name = "COLUMN", default_value = "id")]
+        sort: TrialColumn,
+        /// Last first.
+        #[arg(long)]
+        reverse: bool,
+        /// Print this many at most.
+        #[arg(long, value_name = "N")]
+        limit: Option<usize>,
         /// Print JSON instead of a table.
         #[arg(long)]
         json: bool,
@@ -61,9 +73,11 @@ enum TrialsCommand {
     Labels(LabelCommand),
     /// Export trials as CSV files; with --labelled, all labelled trials of the real gripper as a data set.
     Export {
-        /// Trial numbers.
-        #[arg(required_unless_present = "labelled")]
-        ids: Vec<TrialId>,
+        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
+        #[arg(required_unless_present = "labelled", value_name = "TRIALS")]
+        ids: Vec<Numbers>,
+        #[command(flatten)]
+        filters: Filters,
         /// Export all labelled trials of the real gripper to a new folder: trials.csv (list), signals.csv (for `palpate trials
         /// import`) and raw/ (counts and bytes).
         #[arg(long, conflicts_with_all = ["ids", "layout", "hull", "unsound"])]
@@ -96,15 +110,19 @@ enum TrialsCommand {
     /// Mark trials as deleted: lists and data sets exclude them; `restore` or `undo` brings them back.
     #[command(visible_alias = "discard")]
     Delete {
-        /// Trial numbers.
-        #[arg(required = true)]
-        ids: Vec<TrialId>,
+        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
+        #[arg(required = true, value_name = "TRIALS")]
+        ids: Vec<Numbers>,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Restore deleted trials.
     Restore {
-        /// Trial numbers.
-        #[arg(required = true)]
-        ids: Vec<TrialId>,
+        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
+        #[arg(required = true, value_name = "TRIALS")]
+        ids: Vec<Numbers>,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Remove all deleted trials permanently.
     Purge,
@@ -125,11 +143,20 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         _ => read_store(store)?,
     };
     match &arguments.command {
-        TrialsCommand::List { object, deleted, json } => list(&store, object.as_deref(), *deleted, *json),
+        TrialsCommand::List { filters, deleted, discarded, sort, reverse, limit, json } => {
+            let shown = match (deleted, discarded) {
+                (true, _) => Shown::All,
+                (_, true) => Shown::Discarded,
+                _ => Shown::Kept,
+            };
+            let order = TrialOrder { column: *sort, descending: *reverse };
+            list(&store, &TrialQuery { order, ..filters.query(shown) }, limit.unwrap_or(usize::MAX), *json)
+        }
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
         TrialsCommand::Export { labelled: true, out, .. } => labels::export(&store, out),
-        TrialsCommand::Export { ids, out, layout, hull, unsound, .. } => {
+        TrialsCommand::Export { ids, filters, out, layout, hull, unsound, .. } => {
+            let ids = &chosen(&store, ids, filters, Shown::Kept)?;
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
             export(&store, &ids, out, &SensorLayout::named(layout)?, area)
@@ -148,12 +175,14 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             }
             Ok(())
         }
-        TrialsCommand::Delete { ids } => {
-            store.delete(ids)?;
+        TrialsCommand::Delete { ids, filters } => {
+            let ids = chosen(&store, ids, filters, Shown::Kept)?;
+            store.delete(&ids)?;
             say(format!("deleted {} trial(s); `palpate trials restore` brings them back", ids.len()))
         }
-        TrialsCommand::Restore { ids } => {
-            store.restore(ids)?;
+        TrialsCommand::Restore { ids, filters } => {
+            let ids = chosen(&store, ids, filters, Shown::Discarded)?;
+            store.restore(&ids)?;
             say(format!("restored {} trial(s)", ids.len()))
         }
         TrialsCommand::Purge => say(format!("removed {} trial(s) permanently", store.purge()?)),
@@ -173,14 +202,21 @@ fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
     say(format!("{}: {added} trial(s) added as collection {collection}, {known} already there", file.display()))
 }
 
-fn list(store: &Store, object: Option<&str>, deleted: bool, json: bool) -> Result<(), Failure> {
-    let mut rows = store.list(deleted)?;
-    rows.retain(|row| object.is_none_or(|object| row.object == object || row.object == class_of(object)));
+fn list(store: &Store, query: &TrialQuery, limit: usize, json: bool) -> Result<(), Failure> {
+    let library = Library::read(store)?;
+    let found = library.find(store, query)?;
+    let rows: Vec<&TrialRow> = found.iter().take(limit).map(|trial| &trial.row).collect();
     if json {
         return say_json(&rows);
     }
+    if rows.is_empty() && query.is_filtered() && library.counts().kept > 0 {
+        return say("no trial matches");
+    }
     if rows.is_empty() {
         return say(NONE_YET);
+    }
+    if rows.len() < found.len() {
+        note(&format!("{} of {} trials", rows.len(), found.len()));
     }
     let cells: Vec<Vec<String>> = rows
         .iter()
@@ -257,25 +293,7 @@ fn export(
         return Err("several trials need a folder: --out FOLDER".into());
     }
     for id in ids {
-        let trial = store.load(*id)?;
-        let path = if as_file {
-            out.to_owned()
-        } else {
-            out.join(format!("trial_{id}_{}.csv", file_name_of(shown_name(&trial.header.object))))
-        };
-        let Trial { header, data } = trial;
-        match data {
-            TrialData::Recorded(_) => drop(export_board_trial(store, *id, &path)?),
-            TrialData::Imported(signals) => write_signals_csv(&path, &signals)?,
-            TrialData::Simulated(data) => {
-                let trial = SimulatedTrial { header, data };
-                let scene = &trial.header.scene;
-                let sensors = Sensors::new(layout, &scene.gripper, area)?;
-                write_trial_csv(&path, &trial, scene, &sensors)?;
-                write_contacts_csv(&contacts_path(&path), &trial, scene)?;
-            }
-        }
-        say(path.display())?;
+        say(export_trial(store, *id, out, TrialFormat::Csv, (layout, area))?.display())?;
     }
     Ok(())
 }

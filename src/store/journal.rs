@@ -2,7 +2,8 @@
 //! of their change; undoing adds one as well. SQLite triggers refuse to alter or remove them.
 //!
 //! Undo and redo are read from the journal, so that they work after a restart. Programs that share a store share its
-//! history: undo takes back the last change, whichever program made it.
+//! history: undo takes back the last change, whichever program made it. Changes of many trials made together form a
+//! batch: one step of undo and redo.
 
 use super::store::{Store, json};
 use super::store_error::StoreError;
@@ -78,7 +79,7 @@ impl Change {
     }
 
     /// True where nothing changes.
-    fn is_idle(&self) -> bool {
+    pub(super) fn is_idle(&self) -> bool {
         self.inverse().is_some_and(|inverse| inverse == *self)
     }
 
@@ -125,25 +126,67 @@ pub struct JournalEntry {
     pub undoes: Option<i64>,
     /// Made in another store, which was merged into this one.
     pub merged: bool,
+    /// The same kind of change of other trials, made together with this one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Self>,
 }
+
+/// Trials that a sentence names; more are counted.
+const NAMED: usize = 4;
 
 impl JournalEntry {
     /// The entry in words.
     pub fn sentence(&self) -> String {
-        let trial = match (self.trial, &self.trial_uid) {
-            (Some(id), _) => format!("trial {id}: "),
-            (None, Some(uid)) => format!("trial {} (purged): ", uid.chars().take(8).collect::<String>()),
-            (None, None) => String::new(),
-        };
         let undoes = self.undoes.map_or_else(String::new, |number| format!(" (undoes {number})"));
-        format!("{trial}{}{undoes}", self.change.sentence())
+        format!("{}{}{undoes}", self.trials(), self.words())
     }
 
     /// The change that this entry undid, in words.
     pub fn restored(&self) -> String {
-        let again =
-            Self { change: self.change.inverse().unwrap_or_else(|| self.change.clone()), undoes: None, ..self.clone() };
-        again.sentence()
+        let inverted = |entry: &Self| {
+            let change = entry.change.inverse().unwrap_or_else(|| entry.change.clone());
+            Self { change, undoes: None, others: Vec::new(), ..entry.clone() }
+        };
+        Self { others: self.others.iter().map(inverted).collect(), ..inverted(self) }.sentence()
+    }
+
+    /// The trials of the entry, before its words.
+    fn trials(&self) -> String {
+        let all = 1 + self.others.len();
+        if all > NAMED {
+            return format!("{all} trials: ");
+        }
+        let name = |entry: &Self| match (entry.trial, &entry.trial_uid) {
+            (Some(id), _) => Some(id.to_string()),
+            (None, Some(uid)) => Some(format!("{} (purged)", uid.chars().take(8).collect::<String>())),
+            (None, None) => None,
+        };
+        let names: Vec<String> = std::iter::once(self).chain(&self.others).filter_map(name).collect();
+        match names.len() {
+            0 => String::new(),
+            1 => format!("trial {}: ", names[0]),
+            _ => format!("trials {}: ", names.join(", ")),
+        }
+    }
+
+    /// The change; of several that differ, what they share.
+    fn words(&self) -> String {
+        let own = self.change.sentence();
+        if self.others.iter().all(|other| other.change.sentence() == own) {
+            return own;
+        }
+        let label = |entry: &Self| match &entry.change {
+            Change::Label { to, .. } => Some(to.clone()),
+            _ => None,
+        };
+        match (label(self), &self.change) {
+            (Some(to), _) if self.others.iter().all(|other| label(other) == Some(to.clone())) => {
+                format!("label -> {}", shown_title(to.as_deref().unwrap_or_default()))
+            }
+            (Some(_), _) => "labels changed".to_owned(),
+            (None, Change::Tags { .. }) => "tags changed".to_owned(),
+            (None, _) => "notes changed".to_owned(),
+        }
     }
 }
 
@@ -169,14 +212,17 @@ impl Store {
         self.change_each(ids, &Change::Restored)
     }
 
-    fn change_each(&self, ids: &[TrialId], what: &Change) -> Result<(), StoreError> {
+    pub(super) fn change_each(&self, ids: &[TrialId], what: &Change) -> Result<(), StoreError> {
+        let fault = |e: rusqlite::Error| self.fault(&e);
         let transaction = self.write()?;
+        let batch = new_batch(&transaction, ids.len()).map_err(fault)?;
         for id in ids {
-            if !change(&transaction, *id, what, None).map_err(|e| self.fault(&e))? {
+            let links = Links { batch: batch.as_deref(), undoes: None };
+            if !change(&transaction, *id, what, links).map_err(fault)? {
                 return Err(self.no_trial(*id));
             }
         }
-        transaction.commit().map_err(|e| self.fault(&e))
+        transaction.commit().map_err(fault)
     }
 }
 
@@ -188,17 +234,18 @@ enum Direction {
 }
 
 const ENTRIES: &str = "SELECT journal.number, journal.at, journal.trial, trials.id, journal.entry, journal.merged,
-    undone.number, journal.uid, journal.undoes
+    undone.number, journal.uid, journal.undoes, journal.batch
     FROM journal LEFT JOIN trials ON trials.uid = journal.trial LEFT JOIN journal AS undone ON undone.uid = journal.undoes";
 
 /// An entry with what links entries to each other.
-struct Step {
+struct Record {
     entry: JournalEntry,
     uid: String,
     undoes: Option<String>,
+    batch: Option<String>,
 }
 
-fn step_of(row: &Row<'_>) -> rusqlite::Result<Step> {
+fn record_of(row: &Row<'_>) -> rusqlite::Result<Record> {
     let change = serde_json::from_str(&row.get::<_, String>(4)?);
     let damaged = |e| rusqlite::Error::FromSqlConversionFailure(4, rusqlite::types::Type::Text, Box::new(e));
     let entry = JournalEntry {
@@ -209,22 +256,52 @@ fn step_of(row: &Row<'_>) -> rusqlite::Result<Step> {
         change: change.map_err(damaged)?,
         merged: row.get(5)?,
         undoes: row.get(6)?,
+        others: Vec::new(),
     };
-    Ok(Step { entry, uid: row.get(7)?, undoes: row.get(8)? })
+    Ok(Record { entry, uid: row.get(7)?, undoes: row.get(8)?, batch: row.get(9)? })
+}
+
+/// A change, or all changes of a batch.
+type Step = Vec<Record>;
+
+/// Adds a record to the last step where both belong to one batch, else as a step of its own.
+fn gather(steps: &mut Vec<Step>, record: Record) {
+    let is_same = |step: &&mut Step| record.batch.is_some() && step.first().is_some_and(|r| r.batch == record.batch);
+    match steps.last_mut().filter(is_same) {
+        Some(step) => step.push(record),
+        None => steps.push(vec![record]),
+    }
+}
+
+/// One entry for all records of a step, in their order.
+fn joined(step: Step) -> Option<JournalEntry> {
+    let mut entries = step.into_iter().map(|record| record.entry);
+    let first = entries.next()?;
+    Some(JournalEntry { others: entries.collect(), ..first })
 }
 
 impl JournalRepository<'_> {
-    /// The newest entries, newest first.
+    /// The newest entries, newest first; a batch is one entry.
     pub fn entries(&self, limit: usize) -> Result<Vec<JournalEntry>, StoreError> {
-        let sql = format!("{ENTRIES} ORDER BY journal.number DESC LIMIT ?1");
-        let limit = i64::try_from(limit).unwrap_or(i64::MAX);
-        let rows = self.store.connection.prepare(&sql).and_then(|mut statement| {
-            statement.query_map([limit], |row| step_of(row).map(|step| step.entry))?.collect()
+        let sql = format!("{ENTRIES} ORDER BY journal.number DESC");
+        let steps = self.store.connection.prepare(&sql).and_then(|mut statement| {
+            let mut steps = Vec::new();
+            let mut records = statement.query_map([], record_of)?;
+            while let Some(record) = records.next().transpose()? {
+                gather(&mut steps, record);
+                if steps.len() > limit {
+                    steps.pop();
+                    break;
+                }
+            }
+            Ok(steps)
         });
-        rows.map_err(|e| self.store.fault(&e))
+        let oldest_first = |step: Step| joined(step.into_iter().rev().collect());
+        Ok(steps.map_err(|e| self.store.fault(&e))?.into_iter().filter_map(oldest_first).collect())
     }
 
-    /// Undoes the last change of a label, note, tag, doubt or deletion; the entry that was undone, or none at the end.
+    /// Undoes the last change of a label, note, tag, doubt or deletion, of a batch all changes; the entry that was undone,
+    /// or none at the end.
     pub fn undo(&self) -> Result<Option<JournalEntry>, StoreError> {
         self.step(Direction::Undo)
     }
@@ -237,14 +314,17 @@ impl JournalRepository<'_> {
     fn step(&self, direction: Direction) -> Result<Option<JournalEntry>, StoreError> {
         let fault = |e: rusqlite::Error| self.store.fault(&e);
         let transaction = self.store.write()?;
-        let last = next_step(history(&transaction).map_err(fault)?, direction);
-        let Some(Step { entry, uid, .. }) = last else { return Ok(None) };
-        let (Some(id), Some(inverse)) = (entry.trial, entry.change.inverse()) else { return Ok(None) };
-        if !change(&transaction, id, &inverse, Some(&uid)).map_err(fault)? {
-            return Err(StoreError::ChangedMeanwhile { id, change: entry.change.sentence() });
+        let Some(step) = next_step(history(&transaction).map_err(fault)?, direction) else { return Ok(None) };
+        let batch = new_batch(&transaction, step.len()).map_err(fault)?;
+        for Record { entry, uid, .. } in &step {
+            let (Some(id), Some(inverse)) = (entry.trial, entry.change.inverse()) else { continue };
+            let links = Links { undoes: Some(uid), batch: batch.as_deref() };
+            if !change(&transaction, id, &inverse, links).map_err(fault)? {
+                return Err(StoreError::ChangedMeanwhile { id, change: entry.change.sentence() });
+            }
         }
         transaction.commit().map_err(fault)?;
-        Ok(Some(entry))
+        Ok(joined(step))
     }
 }
 
@@ -253,14 +333,23 @@ fn history(transaction: &Transaction<'_>) -> rusqlite::Result<Vec<Step>> {
     let sql = format!(
         "{ENTRIES} WHERE journal.undoable AND NOT journal.merged AND trials.id IS NOT NULL ORDER BY journal.number"
     );
-    transaction.prepare(&sql)?.query_map([], step_of)?.collect()
+    let mut steps = Vec::new();
+    for record in transaction.prepare(&sql)?.query_map([], record_of)? {
+        gather(&mut steps, record?);
+    }
+    Ok(steps)
 }
 
-/// The entry to be inverted next. Undoing a change allows to redo it, and the other way round; any other change ends redo.
+/// The step to be inverted next. Undoing a change allows to redo it, and the other way round; any other change ends redo.
 fn next_step(history: Vec<Step>, direction: Direction) -> Option<Step> {
     let (mut undo, mut redo): (Vec<Step>, Vec<Step>) = (Vec::new(), Vec::new());
     for step in history {
-        let place = |stack: &[Step]| stack.iter().rposition(|other| Some(&other.uid) == step.undoes.as_ref());
+        // Every entry of a batch undoes another entry of one batch.
+        let undone = step.iter().find_map(|record| record.undoes.clone());
+        let place = |stack: &[Step]| {
+            let undone = undone.as_ref()?;
+            stack.iter().rposition(|other| other.iter().any(|record| record.uid == *undone))
+        };
         if let Some(at) = place(&undo) {
             undo.remove(at);
             redo.push(step);
@@ -275,16 +364,32 @@ fn next_step(history: Vec<Step>, direction: Direction) -> Option<Step> {
     if direction == Direction::Undo { undo.pop() } else { redo.pop() }
 }
 
+/// Links of an entry to others, by their uids.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Links<'a> {
+    /// Entry that this one undoes.
+    pub(super) undoes: Option<&'a str>,
+    /// Batch that it belongs to.
+    pub(super) batch: Option<&'a str>,
+}
+
+/// Name of a new batch; none for a single change.
+pub(super) fn new_batch(transaction: &Transaction<'_>, changes: usize) -> rusqlite::Result<Option<String>> {
+    let name = || transaction.query_row("SELECT lower(hex(randomblob(16)))", [], |row| row.get(0));
+    (changes > 1).then(name).transpose()
+}
+
 /// Adds an entry.
 pub(super) fn append(
     transaction: &Transaction<'_>,
     trial: Option<TrialId>,
     change: &Change,
-    undoes: Option<&str>,
+    Links { undoes, batch }: Links<'_>,
 ) -> rusqlite::Result<()> {
-    let sql = "INSERT INTO journal (trial, undoes, undoable, entry)
-               VALUES ((SELECT uid FROM trials WHERE id = ?1), ?2, ?3, ?4)";
-    transaction.execute(sql, params![trial, undoes, change.inverse().is_some(), json(change)])?;
+    let sql = "INSERT INTO journal (trial, undoes, undoable, entry, batch)
+               VALUES ((SELECT uid FROM trials WHERE id = ?1), ?2, ?3, ?4, ?5)";
+    let columns = params![trial, undoes, change.inverse().is_some(), json(change), batch];
+    transaction.prepare_cached(sql)?.execute(columns)?;
     Ok(())
 }
 
@@ -293,14 +398,14 @@ pub(super) fn change(
     transaction: &Transaction<'_>,
     trial: TrialId,
     change: &Change,
-    undoes: Option<&str>,
+    links: Links<'_>,
 ) -> rusqlite::Result<bool> {
     if change.is_idle() {
         return Ok(true);
     }
     let changed = apply(transaction, trial, change)? == 1;
     if changed {
-        append(transaction, Some(trial), change, undoes)?;
+        append(transaction, Some(trial), change, links)?;
     }
     Ok(changed)
 }
@@ -308,7 +413,7 @@ pub(super) fn change(
 fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusqlite::Result<usize> {
     let set = |column: &str, from: &dyn rusqlite::ToSql, to: &dyn rusqlite::ToSql| {
         let sql = format!("UPDATE trials SET {column} = ?3 WHERE id = ?1 AND {column} = ?2 AND deleted IS NULL");
-        transaction.execute(&sql, params![trial, from, to])
+        transaction.prepare_cached(&sql)?.execute(params![trial, from, to])
     };
     match change {
         Change::Label { from, to } => {
@@ -322,10 +427,11 @@ fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusq
         Change::Discarded => {
             let sql = "UPDATE trials SET deleted = strftime('%Y-%m-%dT%H:%M:%fZ', 'now')
                        WHERE id = ?1 AND deleted IS NULL";
-            transaction.execute(sql, [trial])
+            transaction.prepare_cached(sql)?.execute([trial])
         }
         Change::Restored => {
-            transaction.execute("UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL", [trial])
+            let sql = "UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL";
+            transaction.prepare_cached(sql)?.execute([trial])
         }
         Change::Guess { guess } => {
             let sql = "INSERT INTO guesses (trial, model, pmf) SELECT id, ?2, ?3 FROM trials

@@ -1,7 +1,7 @@
 //! Labels, notes and deletions in the store: every change is in the journal and can be undone.
 
 use super::*;
-use crate::labels::{LabelPlan, LabelledTrial};
+use crate::labels::{Edited, LabelPlan, LabelledTrial, TrialEdit};
 use crate::test_trials::{header, without_frames};
 use palpate_tactile::trial::TrialId;
 use proptest::prelude::*;
@@ -134,6 +134,57 @@ fn programs_share_one_history() -> Outcome {
 }
 
 #[test]
+fn changes_of_many_trials_are_one_step_of_undo() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon", "cube", ""])?;
+    let simulated = store.begin(&without_frames("cube"))?;
+    store.labels().set_note(2, "before")?;
+    // A label leaves the simulated one alone, and says so.
+    let label = TrialEdit::Label("mug".to_owned());
+    let edited = store.labels().edit(&[1, 2, 3, simulated], &label)?;
+    assert_eq!(edited, Edited { changed: 3, known: 1 });
+    assert_eq!(edited.sentence(&label), "3 trials labelled mug; 1 is simulated or imported and keeps its object");
+    let mug = || vec![Some("mug".to_owned()); 3];
+    let before = [Some("lemon"), Some("cube"), None].map(|label| label.map(str::to_owned));
+    assert_eq!(labels(&store)?, mug());
+    let entries = store.journal().entries(99)?;
+    assert_eq!((entries.len(), entries[0].others.len()), (2, 2));
+    assert_eq!(entries[0].sentence(), "trials 1, 2, 3: label -> mug");
+    for _ in 0..2 {
+        let undone = store.journal().undo()?.ok_or("all three")?;
+        assert!(undone.sentence().starts_with("trials 1, 2, 3: label -> mug"), "{}", undone.sentence());
+        assert_eq!(labels(&store)?, before);
+        let redone = store.journal().redo()?.ok_or("all three again")?;
+        assert_eq!((redone.restored().as_str(), labels(&store)?), ("trials 1, 2, 3: label -> mug", mug()));
+    }
+    // Tags are added and removed one by one; a trial that has one already is no change.
+    let tags = |store: &Store| -> Result<Vec<Vec<String>>, StoreError> {
+        Ok(store.list(true)?.into_iter().map(|row| row.tags).collect())
+    };
+    store.labels().set_tags(1, &["wet".to_owned(), "late".to_owned()])?;
+    let wet = TrialEdit::Tag(vec![" wet ".to_owned()]);
+    assert_eq!(store.labels().edit(&[1, 2, simulated], &wet)?, Edited { changed: 2, known: 0 });
+    assert_eq!(tags(&store)?, [vec!["wet", "late"], vec!["wet"], vec![], vec!["wet"]]);
+    store.labels().edit(&[1, 2, 3], &TrialEdit::Untag(vec!["wet".to_owned()]))?;
+    assert_eq!(tags(&store)?, [vec!["late"], vec![], vec![], vec!["wet"]]);
+    assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), "trials 1, 2: tags changed");
+    assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), format!("trials 2, {simulated}: tags [] -> [wet]"));
+    assert_eq!(tags(&store)?, [vec!["wet", "late"], vec![], vec![], vec![]]);
+    // Deleting is one step, and one that cannot be undone whole changes nothing.
+    store.delete(&[1, 2, 3])?;
+    assert_eq!(store.journal().entries(1)?[0].sentence(), "trials 1, 2, 3: discarded");
+    store.connection.execute("UPDATE trials SET deleted = NULL WHERE id = 2", [])?;
+    assert!(matches!(store.journal().undo(), Err(StoreError::ChangedMeanwhile { id: 2, .. })));
+    assert_eq!(store.list(false)?.len(), 2, "none came back");
+    // All or none: a trial that does not exist stops the rest.
+    assert!(store.labels().edit(&[2, 99], &TrialEdit::Note("x".to_owned())).is_err());
+    assert_eq!(store.list(false)?[0].note, "before");
+    // Only simulated ones are left to label: that is an error.
+    assert!(matches!(store.labels().edit(&[simulated], &label), Err(StoreError::NotOfBoard { .. })));
+    Ok(())
+}
+
+#[test]
 fn nonsense_is_refused_and_changes_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
@@ -223,6 +274,7 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
          ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
+         ALTER TABLE trials DROP COLUMN earlier;
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
          PRAGMA user_version = 6;",
     )?;

@@ -1,10 +1,10 @@
 //! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an
 //! entry to the journal in the same transaction.
 
-use super::journal::{Change, append, change};
+use super::journal::{Change, Links, append, change, new_batch};
 use super::store::{Store, json, source_named};
 use super::store_error::StoreError;
-use crate::labels::{Guess, LabelPlan, class_name};
+use crate::labels::{ClassNameError, Edited, Guess, LabelPlan, TrialEdit, class_name};
 use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
@@ -27,6 +27,17 @@ impl Store {
     }
 }
 
+/// State of the labels: two that are equal show the same lists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelRevision {
+    /// Last entry of the journal.
+    entry: i64,
+    /// Number of trials of the real gripper.
+    trials: i64,
+    /// The newest of them and how far it is.
+    newest: Option<(TrialId, String)>,
+}
+
 /// Labels of one trial.
 struct LabelState {
     rig: String,
@@ -44,45 +55,60 @@ fn state_of(row: &Row<'_>) -> rusqlite::Result<LabelState> {
 }
 
 impl LabelRepository<'_> {
+    /// Changes trials, all or none of them; one undo takes all changes back. Of several trials, a label leaves out those
+    /// whose object is known.
+    pub fn edit(&self, ids: &[TrialId], edit: &TrialEdit) -> Result<Edited, StoreError> {
+        match edit {
+            TrialEdit::Label(object) => {
+                let to = class_name(object)?;
+                self.change_trials(ids, |id, state| label_change(id, state, to.clone()))
+            }
+            TrialEdit::Note(note) => {
+                let to = note.trim().to_owned();
+                let length = to.chars().count();
+                if length > LONGEST_NOTE {
+                    return Err(StoreError::LongNote { length, most: LONGEST_NOTE });
+                }
+                self.change_trials(ids, |_, state| Ok(Some(Change::Note { from: state.note, to: to.clone() })))
+            }
+            TrialEdit::Tags(tags) => {
+                let tags = checked(tags)?;
+                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, |_| false, &tags))))
+            }
+            TrialEdit::Tag(tags) => {
+                let tags = checked(tags)?;
+                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, |_| true, &tags))))
+            }
+            TrialEdit::Untag(tags) => {
+                let tags = checked(tags)?;
+                self.change_trials(ids, |_, state| Ok(Some(tag_change(state, |tag| !tags.contains(tag), &[]))))
+            }
+            TrialEdit::Unsure(unsure) => {
+                self.change_trials(ids, |_, state| Ok(Some(Change::Unsure { from: state.unsure, to: *unsure })))
+            }
+            TrialEdit::Discard => self.change_deletion(ids, &Change::Discarded),
+            TrialEdit::Restore => self.change_deletion(ids, &Change::Restored),
+        }
+    }
+
     /// Labels a trial of the real gripper.
     pub fn set_label(&self, id: TrialId, object: &str) -> Result<(), StoreError> {
-        let label = class_name(object)?;
-        self.change_trial(id, |LabelState { rig, object, .. }| {
-            // The object of simulated and imported trials is known.
-            let origin = source_named(id, &rig)?;
-            if origin != TrialSource::Recorded {
-                return Err(StoreError::NotOfBoard { id, object, origin });
-            }
-            let from = Some(object).filter(|name| !name.is_empty());
-            Ok(Some(Change::Label { from, to: Some(label) }))
-        })
+        self.edit(&[id], &TrialEdit::Label(object.to_owned())).map(drop)
     }
 
     /// Sets the note on a trial; an empty text removes it.
     pub fn set_note(&self, id: TrialId, note: &str) -> Result<(), StoreError> {
-        let to = note.trim().to_owned();
-        let length = to.chars().count();
-        if length > LONGEST_NOTE {
-            return Err(StoreError::LongNote { length, most: LONGEST_NOTE });
-        }
-        self.change_trial(id, |state| Ok(Some(Change::Note { from: state.note, to })))
+        self.edit(&[id], &TrialEdit::Note(note.to_owned())).map(drop)
     }
 
     /// Sets the tags of a trial. Each must be a valid label; repeated ones count once.
     pub fn set_tags(&self, id: TrialId, tags: &[String]) -> Result<(), StoreError> {
-        let mut to: Vec<String> = Vec::new();
-        for tag in tags {
-            let tag = class_name(tag)?;
-            if !to.contains(&tag) {
-                to.push(tag);
-            }
-        }
-        self.change_trial(id, |state| Ok(Some(Change::Tags { from: state.tags, to })))
+        self.edit(&[id], &TrialEdit::Tags(tags.to_vec())).map(drop)
     }
 
     /// Marks a label as unsure, or removes the mark.
     pub fn set_unsure(&self, id: TrialId, unsure: bool) -> Result<(), StoreError> {
-        self.change_trial(id, |state| Ok(Some(Change::Unsure { from: state.unsure, to: unsure })))
+        self.edit(&[id], &TrialEdit::Unsure(unsure)).map(drop)
     }
 
     /// Stores the prediction of a model for a trial: classes and their probabilities, which sum to one.
@@ -92,7 +118,7 @@ impl LabelRepository<'_> {
             return Err(StoreError::BadGuess { model: model.to_owned(), sum });
         }
         let guess = Guess { model: model.to_owned(), pmf: pmf.to_vec() };
-        self.change_trial(id, |_state| Ok(Some(Change::Guess { guess })))
+        self.change_trials(&[id], |_, _state| Ok(Some(Change::Guess { guess: guess.clone() }))).map(drop)
     }
 
     /// The prediction stored for a trial.
@@ -106,7 +132,21 @@ impl LabelRepository<'_> {
 
     /// Marks a trial as reviewed: its label was checked and kept.
     pub fn mark_reviewed(&self, id: TrialId) -> Result<(), StoreError> {
-        self.change_trial(id, |state| Ok((!state.reviewed).then_some(Change::Reviewed)))
+        self.change_trials(&[id], |_, state| Ok((!state.reviewed).then_some(Change::Reviewed))).map(drop)
+    }
+
+    /// The present state of labels, plan and recorded trials, which is cheaper to read than the lists.
+    pub fn revision(&self) -> Result<LabelRevision, StoreError> {
+        let number = |sql: &str| self.store.connection.query_row(sql, [], |row| row.get(0));
+        let newest = "SELECT id, state FROM trials JOIN board_trials ON trial = id ORDER BY trial DESC LIMIT 1";
+        let read = || -> rusqlite::Result<LabelRevision> {
+            Ok(LabelRevision {
+                entry: number("SELECT coalesce(max(number), 0) FROM journal")?,
+                trials: number("SELECT count(*) FROM board_trials")?,
+                newest: self.store.connection.query_row(newest, [], |row| Ok((row.get(0)?, row.get(1)?))).optional()?,
+            })
+        };
+        read().map_err(|e| self.store.fault(&e))
     }
 
     /// How many trials of each object are wanted.
@@ -125,25 +165,72 @@ impl LabelRepository<'_> {
         }
         let sql = "INSERT INTO label_plan (only, plan) VALUES (1, ?1) ON CONFLICT (only) DO UPDATE SET plan = ?1";
         transaction.execute(sql, params![json(&to)]).map_err(fault)?;
-        append(&transaction, None, &Change::Plan { from, to }, None).map_err(fault)?;
+        append(&transaction, None, &Change::Plan { from, to }, Links::default()).map_err(fault)?;
         transaction.commit().map_err(fault)
     }
 
-    /// Makes the change that follows from a trial's present state, if any.
-    fn change_trial(
+    /// Makes the changes that follow from the present states of trials, all or none. A known object is an error only where
+    /// it leaves nothing to change.
+    fn change_trials(
         &self,
-        id: TrialId,
-        follows: impl FnOnce(LabelState) -> Result<Option<Change>, StoreError>,
-    ) -> Result<(), StoreError> {
+        ids: &[TrialId],
+        follows: impl Fn(TrialId, LabelState) -> Result<Option<Change>, StoreError>,
+    ) -> Result<Edited, StoreError> {
         let fault = |e: rusqlite::Error| self.store.fault(&e);
         let transaction = self.store.write()?;
+        let batch = new_batch(&transaction, ids.len()).map_err(fault)?;
+        let links = Links { undoes: None, batch: batch.as_deref() };
+        let mut edited = Edited::default();
         let sql = "SELECT rig, object, note, tags, unsure, reviewed FROM trials WHERE id = ?1 AND deleted IS NULL";
-        let state = transaction.query_row(sql, [id], state_of).optional().map_err(fault)?;
-        if let Some(wanted) = follows(state.ok_or_else(|| self.store.no_trial(id))?)? {
-            change(&transaction, id, &wanted, None).map_err(fault)?;
+        for id in ids {
+            let state =
+                transaction.prepare_cached(sql).and_then(|mut found| found.query_row([id], state_of).optional());
+            let wanted = match follows(*id, state.map_err(fault)?.ok_or_else(|| self.store.no_trial(*id))?) {
+                Err(StoreError::NotOfBoard { .. }) if edited.known + 1 < ids.len() => {
+                    edited.known += 1;
+                    continue;
+                }
+                wanted => wanted?,
+            };
+            let Some(wanted) = wanted.filter(|change| !change.is_idle()) else { continue };
+            edited.changed += usize::from(change(&transaction, *id, &wanted, links).map_err(fault)?);
         }
-        transaction.commit().map_err(fault)
+        transaction.commit().map_err(fault)?;
+        Ok(edited)
     }
+
+    fn change_deletion(&self, ids: &[TrialId], what: &Change) -> Result<Edited, StoreError> {
+        self.store.change_each(ids, what)?;
+        Ok(Edited { changed: ids.len(), known: 0 })
+    }
+}
+
+/// Change of a label. The object of simulated and imported trials is known.
+fn label_change(id: TrialId, state: LabelState, to: String) -> Result<Option<Change>, StoreError> {
+    let LabelState { rig, object, .. } = state;
+    let origin = source_named(id, &rig)?;
+    if origin != TrialSource::Recorded {
+        return Err(StoreError::NotOfBoard { id, object, origin });
+    }
+    let from = Some(object).filter(|name| !name.is_empty());
+    Ok(Some(Change::Label { from, to: Some(to) }))
+}
+
+/// Tags as they are stored.
+fn checked(tags: &[String]) -> Result<Vec<String>, ClassNameError> {
+    tags.iter().map(|tag| class_name(tag)).collect()
+}
+
+/// Change of tags: those that are kept, then new ones, each once.
+fn tag_change(state: LabelState, keeps: impl Fn(&String) -> bool, new: &[String]) -> Change {
+    let from = state.tags;
+    let mut to: Vec<String> = Vec::new();
+    for tag in from.iter().filter(|tag| keeps(tag)).chain(new) {
+        if !to.contains(tag) {
+            to.push(tag.clone());
+        }
+    }
+    Change::Tags { from, to }
 }
 
 /// The plan of a store; the default where it has none, or one that cannot be read.

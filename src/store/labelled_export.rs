@@ -18,7 +18,7 @@ use crate::labels::LabelledTrial;
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::catalogue;
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{Channel, SensorLayout, Signals};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, Signals};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufWriter;
@@ -46,6 +46,9 @@ pub enum ExportError {
     /// Error of a file or folder.
     #[error(transparent)]
     File(#[from] CsvError),
+    /// The layout does not fit the gripper of a trial.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// The folder is not empty.
     #[error("\"{folder}\" is not empty; choose an empty or new folder", folder = folder.display())]
     NotEmpty {

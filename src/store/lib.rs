@@ -17,12 +17,15 @@
 //! | 0 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
-//! | 3 | `store` | open, begin, append, finish, list and load trials ([`Store`]) |
+//! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
 //! | 4 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
+//! | 4 | `trial_rows` | the list of trials |
 //! | 4 | `calibrations`, `journal`, `merge` | calibrations, undoable changes, merging of stores |
+//! | 5 | `library` | search, filters and order of all trials ([`Library`]) |
 //! | 5 | `label_repository`, `tares` | labels, notes and plan; zeros of parts |
 //! | 5 | `board_export`, `board_signals` | counts of a board trial as CSV; its signals by the calibrations |
 //! | 6 | `labelled_trials`, `labelled_export` | lists of trials with labels; export for training |
+//! | 7 | `trial_export` | export of any trial |
 //!
 //! # Example
 //!
@@ -56,6 +59,9 @@ mod label_repository;
 mod labelled_export;
 mod labelled_trials;
 pub mod labels;
+mod library;
+#[cfg(test)]
+mod library_tests;
 mod merge;
 #[cfg(test)]
 mod old_store_tests;
@@ -69,6 +75,8 @@ mod store_tests;
 mod tares;
 #[cfg(test)]
 mod test_trials;
+mod trial_export;
+mod trial_rows;
 
 pub use board_export::write_board_csv;
 pub use board_signals::BoardSignals;
@@ -79,10 +87,15 @@ pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trial
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
 pub use journal::{Change, JournalEntry, JournalRepository};
-pub use label_repository::LabelRepository;
+pub use label_repository::{LabelRepository, LabelRevision};
 pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};
+pub use library::{
+    Counted, Day, Library, LibraryCounts, LibraryTrial, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery,
+};
 pub use merge::Merged;
 pub use points_csv::{PointsError, read_points_csv};
-pub use store::{Store, TrialRow};
+pub use store::Store;
 pub use store_error::StoreError;
 pub use tares::{PartTare, StoredTare};
+pub use trial_export::{TrialFormat, export_trial};
+pub use trial_rows::TrialRow;

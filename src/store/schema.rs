@@ -28,7 +28,7 @@ pub(super) const APPLICATION_ID: i32 = 0x5061_6c70;
 pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
 
 /// Each makes the next version out of the one before; the first makes the tables.
-pub(super) const MIGRATIONS: [&str; 11] = [
+pub(super) const MIGRATIONS: [&str; 12] = [
     "CREATE TABLE trials (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
@@ -148,6 +148,8 @@ pub(super) const MIGRATIONS: [&str; 11] = [
      ALTER TABLE journal DROP COLUMN writer;",
     // JSON of the grasps before it, as the recogniser judged them.
     "ALTER TABLE trials ADD COLUMN earlier TEXT;",
+    // Names the changes that were made, and are undone, together.
+    "ALTER TABLE journal ADD COLUMN batch TEXT;",
 ];
 
 /// Tables whose rows belong to a trial by their column `trial`; merging copies them with it.
@@ -176,7 +178,7 @@ pub(super) fn migrate(transaction: &Transaction<'_>, store: &Path) -> Result<Opt
     Ok(copy)
 }
 
-/// `trials.before-v11.sqlite` beside the store, or with a number where such a file exists.
+/// `trials.before-v12.sqlite` beside the store, or with a number where such a file exists.
 fn free_name(store: &Path) -> PathBuf {
     let name = |suffix: String| store.with_extension(format!("before-v{SCHEMA_VERSION}{suffix}.sqlite"));
     let numbered = (2..).map(|number| name(format!("-{number}")));

@@ -10,7 +10,6 @@ use super::checksum::{checksum, is_intact};
 use super::frame_blob::{decode_frames, encode_frames};
 use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
 use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain};
-use crate::labels::{FlagRemark, flaws};
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::scene::Scene;
@@ -25,44 +24,6 @@ use std::time::{Duration, Instant};
 
 /// Samples per chunk when a whole trial is stored at once: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
-
-/// One row of the list of trials.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TrialRow {
-    /// Number in this store.
-    pub id: TrialId,
-    /// Time of its beginning, UTC.
-    pub created: String,
-    /// `recording`, or `complete`.
-    pub state: String,
-    /// Origin.
-    #[serde(rename = "rig")]
-    pub source: TrialSource,
-    /// Name of the object; empty while unlabelled.
-    pub object: String,
-    /// Seed of the pose.
-    pub seed: u64,
-    /// Data set that it belongs to.
-    pub collection: Option<String>,
-    /// Size and shape of the object, for imported trials that state them.
-    pub properties: Option<(String, String)>,
-    /// Samples stored.
-    pub samples: i64,
-    /// Whether it stayed finite and converged.
-    pub sound: bool,
-    /// Number of warnings.
-    pub warnings: usize,
-    /// Note.
-    pub note: String,
-    /// Tags.
-    pub tags: Vec<String>,
-    /// The label is marked as unsure.
-    pub unsure: bool,
-    /// Flags, for a trial of the real gripper.
-    pub flags: Vec<FlagRemark>,
-    /// Time of deletion, UTC.
-    pub deleted: Option<String>,
-}
 
 /// An open store.
 #[derive(Debug)]
@@ -190,10 +151,23 @@ impl Store {
         Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate).map_err(|e| self.fault(&e))
     }
 
-    /// Current time, UTC, in the format of [`TrialRow::created`]: `2026-11-21T15:36:00.123Z`.
+    /// Current time, UTC, in the format of [`TrialRow::created`](crate::TrialRow::created): `2026-11-21T15:36:00.123Z`.
     pub fn now(&self) -> Result<String, StoreError> {
         let sql = "SELECT strftime('%Y-%m-%dT%H:%M:%fZ', 'now')";
         self.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| fault(&self.path, &e))
+    }
+
+    /// The local day this many days ago: `2026-11-21`.
+    pub fn local_day(&self, days_ago: u32) -> Result<String, StoreError> {
+        let sql = "SELECT date('now', 'localtime', ?1)";
+        let day = self.connection.query_row(sql, [format!("-{days_ago} days")], |row| row.get(0));
+        day.map_err(|e| self.fault(&e))
+    }
+
+    /// A number that changes whenever another connection, of this or another program, has changed the store.
+    pub fn data_version(&self) -> Result<i64, StoreError> {
+        let version = self.connection.pragma_query_value(None, "data_version", |row| row.get(0));
+        version.map_err(|e| self.fault(&e))
     }
 
     /// Begins a simulated trial, without its frames: they follow with [`Store::append`].
@@ -258,48 +232,6 @@ impl Store {
             statement.query_map([collection], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?.cast_unsigned())))?.collect()
         });
         rows.map_err(|e| self.fault(&e))
-    }
-
-    /// All trials, oldest first; with or without deleted ones.
-    pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
-        let sql = "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, \
-                   collection, size, shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END
-                   FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id
-                   WHERE ?1 OR deleted IS NULL ORDER BY id";
-        let rows: rusqlite::Result<Vec<Result<TrialRow, StoreError>>> =
-            self.connection.prepare(sql).and_then(|mut statement| {
-                statement
-                    .query_map([with_deleted], |row| {
-                        let source = match source_named(row.get(0)?, &row.get::<_, String>(3)?) {
-                            Ok(source) => source,
-                            Err(error) => return Ok(Err(error)),
-                        };
-                        let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
-                        let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
-                        let object: String = row.get(4)?;
-                        let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
-                        Ok(Ok(TrialRow {
-                            note: row.get(13)?,
-                            tags: json_or_default(&row.get::<_, String>(14)?),
-                            unsure: row.get(15)?,
-                            flags: flaws(flags, Some(&object)),
-                            id: row.get(0)?,
-                            created: row.get(1)?,
-                            state: row.get(2)?,
-                            source,
-                            object,
-                            seed: row.get::<_, i64>(5)?.cast_unsigned(),
-                            collection: row.get(10)?,
-                            properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
-                            samples: row.get(6)?,
-                            sound: quality.is_some_and(|quality| quality.is_sound()),
-                            warnings: warnings.len(),
-                            deleted: row.get(9)?,
-                        }))
-                    })?
-                    .collect()
-            });
-        rows.map_err(|e| self.fault(&e))?.into_iter().collect()
     }
 
     /// Time of a trial's beginning, UTC.
@@ -490,10 +422,6 @@ pub(super) fn set_complete(
         params![id, json(quality), json(warnings)],
     )?;
     Ok(())
-}
-
-fn json_or_default<T: Default + serde::de::DeserializeOwned>(text: &str) -> T {
-    serde_json::from_str(text).unwrap_or_default()
 }
 
 /// True for a file on a network file system, as far as the system reports it (Linux).

@@ -12,6 +12,7 @@
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
+//! - `library`: all trials found and changed, in the window and on the command line.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the emulated gripper calibrated and fitted.
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
@@ -50,6 +51,7 @@ mod imports;
 mod inspect;
 mod labelling;
 mod learning;
+mod library;
 mod one_path;
 mod panels;
 mod peers;

@@ -8,13 +8,14 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, Mode, SimulationAction};
+use palpate::app::{ALL_PANELS, LibraryAction, Mode, SimulationAction};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Accuracy, Effect, PosePreset, Scene, Setting};
+use palpate_store::TrialQuery;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -38,6 +39,11 @@ fn every_panel_in_both_themes() {
                 "plan" => bench.until_shown(true, "0 of 800 trials"),
                 "trials" => bench.until_shown(true, "No trials of the real gripper yet"),
                 "label" => bench.until_shown(true, "Connect the gripper:"),
+                "library" => {
+                    let search = "in no trial".to_owned();
+                    bench.tell(LibraryAction::Find(TrialQuery { search, ..TrialQuery::default() }));
+                    bench.until_shown(true, "0 of 1 trials");
+                }
                 _ => {}
             }
             bench.harness.render().unwrap()

@@ -5,6 +5,7 @@ pub(super) mod files;
 pub(super) mod gripper;
 pub(super) mod inspect;
 pub(super) mod labelling;
+pub(super) mod library;
 pub(super) mod recognition;
 pub(super) mod simulation;
 pub(super) mod tools;

@@ -3,11 +3,13 @@
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
 use crate::app::features::inspect::InspectAction;
+use crate::app::features::library::LibraryAction;
 use crate::app::features::view::ViewAction;
 use crate::app::keys::binding::{Binding, key};
 use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
+use palpate_store::labels::TrialEdit;
 
 pub(super) const KIND: ModeKind = ModeKind {
     mode: Mode::Inspect,
@@ -20,6 +22,18 @@ pub(super) const KIND: ModeKind = ModeKind {
 };
 
 const KEYS: &[Binding] = &[
+    key(Modifiers::NONE, Key::Slash, "search the library", |_| Some(LibraryAction::FocusSearch.into())),
+    // Those with more modifiers come first, so that they win.
+    key(Modifiers::SHIFT, Key::ArrowUp, "select the trial above too", |_| Some(LibraryAction::Step(-1, true).into())),
+    key(Modifiers::SHIFT, Key::ArrowDown, "select the trial below too", |_| Some(LibraryAction::Step(1, true).into())),
+    key(Modifiers::NONE, Key::ArrowUp, "trial above", |_| Some(LibraryAction::Step(-1, false).into())),
+    key(Modifiers::NONE, Key::ArrowDown, "trial below", |_| Some(LibraryAction::Step(1, false).into())),
+    key(Modifiers::COMMAND, Key::A, "select all trials found", |_| Some(LibraryAction::SelectAll.into())),
+    key(Modifiers::NONE, Key::Enter, "open the trial", |_| Some(LibraryAction::Open.into())),
+    key(Modifiers::NONE, Key::P, "compare the selected trials, or no longer", |_| Some(LibraryAction::Pin.into())),
+    key(Modifiers::NONE, Key::Delete, "discard the selected trials", |_| {
+        Some(LibraryAction::Edit(TrialEdit::Discard).into())
+    }),
     key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
     key(Modifiers::SHIFT, Key::A, "mark A at the cursor", |_| Some(InspectAction::PutMark(0).into())),
     key(Modifiers::SHIFT, Key::B, "mark B at the cursor", |_| Some(InspectAction::PutMark(1).into())),
@@ -36,10 +50,12 @@ const KEYS: &[Binding] = &[
 
 /// Trials left, the view over plots in the middle, answers and facts right.
 fn layout(tiles: &mut Tiles<String>) -> TileId {
+    let library = tabs(tiles, &["library"]);
     let compared = tabs(tiles, &["compared", "sensors"]);
+    let left = split(tiles, LinearDir::Vertical, [(library, 0.72), (compared, 0.28)]);
     let [view, curvature] = [&["view"][..], &["curvature", "signature"]].map(|names| tabs(tiles, names));
     let loads = tabs(tiles, &["pressure", "force", "line", "counts", "hysteresis", "pads"]);
     let right = tabs(tiles, &["recognition", "why", "trial"]);
     let middle = split(tiles, LinearDir::Vertical, [(view, 0.42), (curvature, 0.29), (loads, 0.29)]);
-    split(tiles, LinearDir::Horizontal, [(compared, 0.22), (middle, 0.52), (right, 0.26)])
+    split(tiles, LinearDir::Horizontal, [(left, 0.22), (middle, 0.52), (right, 0.26)])
 }

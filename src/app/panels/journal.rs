@@ -2,8 +2,9 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
 use crate::app::widgets::wrapped;
-use egui::{RichText, ScrollArea, Ui};
+use egui::{Label, RichText, ScrollArea, Sense, Ui};
 use palpate_lab::workers::LabelCommand;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -24,7 +25,20 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         for entry in journal {
             // Hours and minutes; `palpate trials journal` lists the day too.
             let time: String = entry.at.chars().skip(11).take(5).collect();
-            wrapped(ui, RichText::new(format!("{time}  {}", entry.sentence())).small());
+            let text = RichText::new(format!("{time}  {}", entry.sentence())).small();
+            let Some(id) = entry.trial.filter(|_| entry.others.is_empty()) else {
+                wrapped(ui, text);
+                continue;
+            };
+            let line = ui.add(Label::new(text).wrap().sense(Sense::click()));
+            if line.double_clicked() {
+                actions.push(InspectAction::Open(id));
+            }
+            line.context_menu(|ui| {
+                if ui.button("Inspect").clicked() {
+                    actions.push(InspectAction::Open(id));
+                }
+            });
         }
     });
 }

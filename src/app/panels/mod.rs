@@ -17,6 +17,7 @@ mod gripper;
 mod hysteresis;
 mod journal;
 mod label;
+mod library;
 mod line_pressure;
 mod objects;
 mod pads;
@@ -48,7 +49,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 29] = [
+pub const ALL: [PanelKind; 30] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -64,6 +65,7 @@ pub const ALL: [PanelKind; 29] = [
     PanelKind { name: "label", title: "Label", ui: label::ui },
     PanelKind { name: "plan", title: "Plan", ui: plan::ui },
     PanelKind { name: "trials", title: "Trials", ui: trials::ui },
+    PanelKind { name: "library", title: "Library", ui: library::ui },
     PanelKind { name: "journal", title: "Journal", ui: journal::ui },
     PanelKind { name: "gripper", title: "Gripper", ui: gripper::ui },
     PanelKind { name: "counts", title: "Counts", ui: counts::ui },

@@ -2,9 +2,10 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::inspect::InspectAction;
 use crate::app::theme::colour;
-use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Stroke, Ui, pos2, vec2};
-use palpate_geometry::palette::Trace;
+use crate::app::widgets::sparkline;
+use egui::{Align2, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::LabelledTrial;
@@ -86,7 +87,7 @@ fn row_ui(
         ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
     }
     let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
-    sparkline(ui, context, trial, picture);
+    sparkline(ui, context.view.theme, &trial.sparkline, picture);
     let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);
     let words = Rect::from_min_max(pos2(picture.right() + 8.0, rect.top() + 3.0), rect.max - vec2(4.0, 3.0));
     let painter = ui.painter_at(words);
@@ -116,7 +117,13 @@ fn row_ui(
             trial.tags.iter().map(|tag| format!(" #{tag}")).collect::<String>()
         )
     };
+    if response.double_clicked() {
+        actions.push(InspectAction::Open(trial.id));
+    }
     response.on_hover_text(about()).context_menu(|ui| {
+        if !trial.discarded && ui.button("Inspect").clicked() {
+            actions.push(InspectAction::Open(trial.id));
+        }
         if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
             actions.push(LabelCommand::Reviewed(trial.id));
         }
@@ -126,28 +133,5 @@ fn row_ui(
     });
     if clicked {
         actions.push(LabellingAction::Select(Some(trial.id)));
-    }
-}
-
-/// Sparkline of the counts of both pads.
-fn sparkline(ui: &Ui, context: &PanelContext<'_>, trial: &LabelledTrial, place: Rect) {
-    let theme = context.view.theme;
-    let painter = ui.painter_at(place);
-    painter.rect_filled(place, 2.0, colour(theme.colours().raised));
-    let inks: [Color32; 2] = [Trace::Pressure, Trace::PressureDistal].map(|trace| colour(trace.colour(theme)));
-    let values = &trial.sparkline;
-    let all = || values.iter().flatten().flatten().copied();
-    let (low, high) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
-    let range = (high - low).max(1.0);
-    for (finger, ink) in values.iter().zip(inks) {
-        let last = finger.len().saturating_sub(1).max(1) as f32;
-        let at = |(k, value): (usize, &Option<f32>)| {
-            let x = place.left() + place.width() * k as f32 / last;
-            value.map(|value| pos2(x, place.bottom() - 2.0 - (place.height() - 4.0) * (value - low) / range))
-        };
-        let points: Vec<Option<egui::Pos2>> = finger.iter().enumerate().map(at).collect();
-        for piece in points.split(Option::is_none) {
-            painter.line(piece.iter().copied().flatten().collect(), Stroke::new(1.2, ink));
-        }
     }
 }

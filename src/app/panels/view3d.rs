@@ -160,8 +160,8 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) ->
     if !caption.is_empty() {
         let ink = colour(context.view.theme.colours().text);
         let galley =
-            ui.painter().layout(caption, egui::FontId::proportional(12.0), ink, (rect.width() - 24.0).max(80.0));
-        let place = rect.left_bottom() + egui::vec2(12.0, -60.0 - galley.size().y);
+            ui.painter().layout(caption, egui::FontId::proportional(12.0), ink, (0.5 * rect.width()).max(80.0));
+        let place = rect.left_top() + egui::vec2(14.0, 44.0);
         let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
         ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
         ui.painter().galley(place, galley, ink);
@@ -178,7 +178,7 @@ fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
 }
 
 /// Width of all buttons in a row, beside the legend (points).
-const BUTTONS: f32 = 600.0;
+const BUTTONS: f32 = 660.0;
 
 /// Standard views and switches, in the upper left corner; in a menu where there is no room.
 fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -217,7 +217,7 @@ fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if forces.clicked() {
         actions.push(ViewAction::SetForces(!context.view.forces));
     }
-    let path = bar
+    let path = ui
         .selectable_label(context.view.path != PathLayer::Off, context.view.path.title())
         .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
     if path.clicked() {

@@ -2,9 +2,10 @@
 
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table, warn};
+use super::selection::{Filters, Numbers, chosen};
 use palpate_sim::objects::{EMPTY, class_of, titled};
-use palpate_store::labels::class_name;
-use palpate_store::{JournalEntry, Store, export_labelled};
+use palpate_store::labels::{TrialEdit, class_name};
+use palpate_store::{JournalEntry, Shown, Store, export_labelled};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,31 +13,46 @@ use std::path::Path;
 /// Subcommands that change or show labels.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum LabelCommand {
-    /// Label a trial of the real gripper with its object.
+    /// Label trials of the real gripper with their object.
     Label {
-        /// Trial number.
-        id: TrialId,
+        /// Trial number; also 3,7-9, or `matching` with filters.
+        #[arg(value_name = "TRIALS")]
+        ids: Numbers,
         /// Label; `empty` for the empty hand.
         name: String,
         /// Mark the label as unsure.
         #[arg(long)]
         unsure: bool,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Set the note of a trial; an empty text removes it.
     Note {
-        /// Trial number.
-        id: TrialId,
+        /// Trial number; also 3,7-9, or `matching` with filters.
+        #[arg(value_name = "TRIALS")]
+        ids: Numbers,
         /// Note.
         text: String,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Set the tags of a trial; no tags removes them.
     Tag {
-        /// Trial number.
-        id: TrialId,
+        /// Trial number; also 3,7-9, or `matching` with filters.
+        #[arg(value_name = "TRIALS")]
+        ids: Numbers,
         /// Tags, which replace the present ones.
         tags: Vec<String>,
+        /// Add the tags to the present ones.
+        #[arg(long)]
+        add: bool,
+        /// Remove these tags and keep the others.
+        #[arg(long, conflicts_with = "add")]
+        remove: bool,
+        #[command(flatten)]
+        filters: Filters,
     },
-    /// Undo the last change of a label, note or tag, or the last deletion, one trial at a time.
+    /// Undo the last change of a label, note or tag, or the last deletion; what was changed together is undone together.
     Undo,
     /// Redo the last undone change.
     Redo,
@@ -53,18 +69,27 @@ pub(super) enum LabelCommand {
 
 pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failure> {
     match command {
-        LabelCommand::Label { id, name, unsure } => label(store, *id, name, *unsure),
-        LabelCommand::Note { id, text } => {
-            store.labels().set_note(*id, text)?;
-            say(if text.trim().is_empty() {
-                format!("trial {id}: note removed")
-            } else {
-                format!("trial {id}: note set")
-            })
+        LabelCommand::Label { ids, name, unsure, filters } => label(store, &of(store, ids, filters)?, name, *unsure),
+        LabelCommand::Note { ids, text, filters } => {
+            let removed = text.trim().is_empty();
+            let done = if removed { "note removed" } else { "note set" };
+            edit(store, &of(store, ids, filters)?, &TrialEdit::Note(text.clone()), done)
         }
-        LabelCommand::Tag { id, tags } => {
-            store.labels().set_tags(*id, tags)?;
-            say(format!("trial {id}: tags [{}]", tags.join(", ")))
+        LabelCommand::Tag { ids, tags, add, remove, filters } => {
+            let list = tags.clone();
+            let change = match (add, remove) {
+                (true, _) => TrialEdit::Tag(list),
+                (_, true) => TrialEdit::Untag(list),
+                _ => TrialEdit::Tags(list),
+            };
+            let what = if *add {
+                "added tags"
+            } else if *remove {
+                "removed tags"
+            } else {
+                "tags"
+            };
+            edit(store, &of(store, ids, filters)?, &change, &format!("{what} [{}]", tags.join(", ")))
         }
         LabelCommand::Undo => match store.journal().undo()? {
             Some(entry) => say(format!("undone: {}", entry.sentence())),
@@ -78,16 +103,37 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
     }
 }
 
-fn label(store: &mut Store, id: TrialId, name: &str, unsure: bool) -> Result<(), Failure> {
+/// Trials that are meant.
+fn of(store: &Store, numbers: &Numbers, filters: &Filters) -> Result<Vec<TrialId>, Failure> {
+    chosen(store, std::slice::from_ref(numbers), filters, Shown::Kept)
+}
+
+/// Changes trials and says so: of one trial in the words `done`.
+fn edit(store: &Store, ids: &[TrialId], change: &TrialEdit, done: &str) -> Result<(), Failure> {
+    let edited = store.labels().edit(ids, change)?;
+    match ids {
+        [id] => say(format!("trial {id}: {done}")),
+        _ => say(edited.sentence(change)),
+    }
+}
+
+fn label(store: &Store, ids: &[TrialId], name: &str, unsure: bool) -> Result<(), Failure> {
     let name = class_name(class_of(name))?;
+    let recorded = store.labels().trials()?;
     let planned = store.labels().plan()?.objects.iter().any(|object| object.name == name);
-    let known = planned || store.labels().trials()?.iter().any(|row| row.object.as_deref() == Some(&name));
-    store.labels().set_label(id, &name)?;
-    store.labels().set_unsure(id, unsure)?;
+    let known = planned || recorded.iter().any(|row| row.object.as_deref() == Some(&name));
+    edit(
+        store,
+        ids,
+        &TrialEdit::Label(name.clone()),
+        &format!("{}{}", titled(&name), if unsure { ", unsure" } else { "" }),
+    )?;
+    let labelled: Vec<TrialId> = recorded.iter().map(|row| row.id).filter(|id| ids.contains(id)).collect();
+    store.labels().edit(&labelled, &TrialEdit::Unsure(unsure))?;
     if !known && name != EMPTY {
         warn(&format!("\"{name}\" is a new class: not in the plan, and no other trial has it (`palpate trials undo`)"));
     }
-    say(format!("trial {id}: {}{}", titled(&name), if unsure { ", unsure" } else { "" }))
+    Ok(())
 }
 
 fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {

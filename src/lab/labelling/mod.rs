@@ -21,4 +21,4 @@ mod sparkline;
 pub use disagreement::{Disagreement, disagreements};
 pub use flags::{Observed, flags_of};
 pub use segmentation::{PRE_ROLL_S, SegmentEvent, Segmenter};
-pub use sparkline::{decimated, sparkline};
+pub use sparkline::{decimated, sparkline, stored_sparkline};

@@ -2,7 +2,10 @@
 
 use palpate_sim::gripper::Side;
 use palpate_store::labels::{SPARKLINE_BINS, Sparkline};
+use palpate_store::{Store, StoreError};
+use palpate_tactile::Signals;
 use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::trial::{Trial, TrialData, TrialId};
 
 /// Readings that flags and pictures are made from, at most.
 const MOST: usize = 8192;
@@ -31,20 +34,55 @@ pub fn sparkline(board: &Board, readings: &[Reading]) -> Sparkline {
 }
 
 fn bins(readings: &[Reading], column: usize) -> Vec<Option<f32>> {
-    let (Some(first), Some(last)) = (readings.first(), readings.last()) else { return Vec::new() };
-    let span = last.t_s - first.t_s;
+    let samples = readings.iter().map(|reading| (reading.t_s, reading.counts.get(column).copied().flatten()));
+    // Tenths of a count are more than a picture of a few pixels shows.
+    means(samples).into_iter().map(|mean| mean.map(|mean| (10.0 * mean).round() / 10.0)).collect()
+}
+
+/// Mean value in each bin of the time from the first to the last sample.
+fn means(samples: impl DoubleEndedIterator<Item = (f64, Option<f32>)> + Clone) -> Vec<Option<f32>> {
+    let (Some((first_s, _)), Some((last_s, _))) = (samples.clone().next(), samples.clone().next_back()) else {
+        return Vec::new();
+    };
+    let span = last_s - first_s;
     let mut sums = [(0.0f64, 0u32); SPARKLINE_BINS];
-    for reading in readings {
-        let share = if span > 0.0 { (reading.t_s - first.t_s) / span } else { 0.0 };
+    for (t_s, value) in samples {
+        let share = if span > 0.0 { (t_s - first_s) / span } else { 0.0 };
         let bin = ((share * SPARKLINE_BINS as f64) as usize).min(SPARKLINE_BINS - 1);
-        if let Some(count) = reading.counts.get(column).copied().flatten() {
-            sums[bin].0 += f64::from(count);
+        if let Some(value) = value {
+            sums[bin].0 += f64::from(value);
             sums[bin].1 += 1;
         }
     }
-    // Tenths of a count are more than a picture of a few pixels shows.
-    let mean = |(sum, n): (f64, u32)| (n > 0).then(|| ((10.0 * sum / f64::from(n)).round() / 10.0) as f32);
-    sums.into_iter().map(mean).collect()
+    sums.into_iter().map(|(sum, n)| (n > 0).then(|| (sum / f64::from(n)) as f32)).collect()
+}
+
+/// Sparkline of a stored trial: forces on the pads (N) of a simulated one, counts of a recorded one, of an imported one its
+/// channels of the left and right pad, else its first two.
+pub fn stored_sparkline(store: &Store, id: TrialId) -> Result<Sparkline, StoreError> {
+    if let Some(info) = store.board_info(id)?.filter(|info| !info.sparkline.iter().all(Vec::is_empty)) {
+        return Ok(info.sparkline);
+    }
+    let Trial { header, data } = store.load(id)?;
+    Ok(match data {
+        TrialData::Simulated(data) => {
+            let taxels = header.scene.gripper.taxels().count();
+            Side::BOTH.map(|side| {
+                means(data.frames.iter().map(|frame| (frame.t, Some(frame.normal_force(side, taxels) as f32))))
+            })
+        }
+        TrialData::Recorded(log) => sparkline(&log.course.board, &decimated(&log.readings)),
+        TrialData::Imported(signals) => [0, 1].map(|place| imported_channel(&signals, place)),
+    })
+}
+
+fn imported_channel(signals: &Signals, place: usize) -> Vec<Option<f32>> {
+    let named = |side: &str| signals.channels.iter().position(|name| name.contains("pressure") && name.contains(side));
+    let column = named(["left", "right"][place]).unwrap_or(place);
+    if column >= signals.channels.len() {
+        return Vec::new();
+    }
+    means((0..signals.len()).map(|sample| (signals.t_s[sample], signals.row(sample).get(column).copied())))
 }
 
 #[cfg(test)]
@@ -81,5 +119,33 @@ mod tests {
         let strips = Board { channels: vec!["flexL".to_owned()], ..Board::default() };
         assert_eq!(sparkline(&strips, &readings)[0][0], Some(1400.0));
         assert_eq!(sparkline(&strips, &[]), [Vec::new(), Vec::new()]);
+    }
+    #[test]
+    fn stored_trials_of_every_source_have_a_sparkline() -> Result<(), Box<dyn std::error::Error>> {
+        use palpate_sim::{run::SimRun, scene::Scene};
+        use palpate_store::ImportedTrial;
+        use palpate_tactile::trial::{SimulatedData, TrialHeader};
+        let folder = tempfile::tempdir()?;
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+        let mut scene = Scene::default();
+        scene.object.source = "lemon".to_owned();
+        let (mut run, placement) = SimRun::new(&scene, scene.load_object()?.as_ref());
+        let frames = run.run_programme(&scene.programme)?;
+        let (plan, quality) = (run.plan().clone(), run.quality());
+        let data = SimulatedData { world_from_gripper: placement.world_from_gripper, plan, quality, frames };
+        let simulated = store.insert(&Trial { header: TrialHeader::new("lemon", scene), data })?;
+        for finger in stored_sparkline(&store, simulated)? {
+            let force: Vec<f32> = finger.into_iter().flatten().collect();
+            assert_eq!((force.len(), force[0]), (SPARKLINE_BINS, 0.0), "no force before the contact");
+            assert!(force.iter().copied().fold(0.0, f32::max) > 0.3, "{force:?}");
+        }
+        let channels = ["grip", "pressure_right", "pressure_left"].map(str::to_owned).to_vec();
+        let signals = Signals { channels, t_s: vec![0.0, 1.0], values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
+        let (name, label) = (String::new(), "mug".to_owned());
+        store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+        let [left, right] = stored_sparkline(&store, simulated + 1)?;
+        assert_eq!((left[0], left[47], right[0], right[47]), (Some(3.0), Some(6.0), Some(2.0), Some(5.0)));
+        assert!(stored_sparkline(&store, 99).is_err());
+        Ok(())
     }
 }

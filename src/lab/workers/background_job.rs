@@ -4,8 +4,9 @@ use super::latest::Latest;
 use super::messages::Wake;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Handle of the thread: commands `W` in, the newest view `V` out. Dropping it cancels running work and ends the thread.
 #[derive(Debug)]
@@ -42,19 +43,48 @@ impl<W: Send + 'static, V: Send + Sync + 'static> BackgroundJob<W, V> {
         wake: Wake,
         mut work: impl FnMut(W, &AtomicBool, &Outlet<V>) + Send + 'static,
     ) -> std::io::Result<Self> {
+        Self::spawn_idling(name, wake, move |command, stop, outlet| {
+            command.into_iter().for_each(|command| work(command, stop, outlet));
+            None
+        })
+    }
+
+    /// Starts a thread that also works by itself: `work` returns how long it waits for the next command at most, and is
+    /// called without one when that time is over.
+    pub(super) fn spawn_idling(
+        name: &str,
+        wake: Wake,
+        mut work: impl FnMut(Option<W>, &AtomicBool, &Outlet<V>) -> Option<Duration> + Send + 'static,
+    ) -> std::io::Result<Self> {
         let (commands, inbox) = channel::<(W, Arc<AtomicBool>)>();
         let view = Arc::new(Latest::default());
         let outlet = Outlet { view: Arc::clone(&view), wake };
         let (asked, done) = (AtomicU64::new(0), Arc::new(AtomicU64::new(0)));
         let handled = Arc::clone(&done);
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            while let Ok((command, stop)) = inbox.recv() {
-                work(command, &stop, &outlet);
+            let mut patience = None;
+            while let Ok(next) = next_command(&inbox, patience) {
+                let Some((command, stop)) = next else {
+                    patience = work(None, &AtomicBool::new(false), &outlet);
+                    continue;
+                };
+                patience = work(Some(command), &stop, &outlet);
                 handled.fetch_add(1, Ordering::Release);
                 (outlet.wake)();
             }
         })?;
         Ok(Self { commands: Some(commands), stop: Arc::default(), view, asked, done, thread: Some(thread) })
+    }
+}
+
+/// The next command, or none after so much time; an error once no more can come.
+fn next_command<T>(inbox: &Receiver<T>, patience: Option<Duration>) -> Result<Option<T>, RecvTimeoutError> {
+    match patience {
+        None => inbox.recv().map(Some).map_err(|_closed| RecvTimeoutError::Disconnected),
+        Some(patience) => match inbox.recv_timeout(patience) {
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            outcome => outcome.map(Some),
+        },
     }
 }
 

@@ -5,11 +5,12 @@ use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::labelling::{Disagreement, disagreements};
 use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, PlanError, Progress};
-use palpate_store::{ExportError, Exported, JournalEntry, Store, StoreError, export_labelled};
+use palpate_store::{ExportError, Exported, JournalEntry, LabelRevision, Store, StoreError, export_labelled};
 use palpate_tactile::trial::TrialId;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Command to the label service.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +92,8 @@ impl LabelView {
     }
 }
 
+/// Time between two glances at changes by other programs.
+pub(super) const GLANCE: Duration = Duration::from_millis(250);
 /// Number of journal entries shown.
 const ENTRIES: usize = 60;
 /// Outcomes kept for a slow window.
@@ -101,17 +104,20 @@ pub type Labeller = BackgroundJob<LabelCommand, LabelView>;
 
 /// Starts the thread on a store, which is opened when it is first needed.
 pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
-    let mut service = LabelService { path, store: None, outcomes: VecDeque::new(), number: 0 };
-    BackgroundJob::spawn("label", wake, move |command: LabelCommand, _stop, outlet: &Outlet<LabelView>| {
-        match service.handle(&command) {
-            Ok(text) => text.into_iter().for_each(|text| service.report(LabelOutcome::Done(text))),
-            Err(cause) => service.report(LabelOutcome::Failed(Arc::new(cause))),
+    let mut service = LabelService { path, store: None, seen: None, outcomes: VecDeque::new(), number: 0 };
+    BackgroundJob::spawn_idling("label", wake, move |command, _stop, outlet: &Outlet<LabelView>| {
+        match command.map(|command| service.handle(&command)) {
+            None if !service.has_changed() => return Some(GLANCE),
+            None => {}
+            Some(Ok(text)) => text.into_iter().for_each(|text| service.report(LabelOutcome::Done(text))),
+            Some(Err(cause)) => service.report(LabelOutcome::Failed(Arc::new(cause))),
         }
         let view = service.view().unwrap_or_else(|cause| {
             service.report(LabelOutcome::Failed(Arc::new(cause.into())));
             LabelView { outcomes: service.outcomes.iter().cloned().collect(), ..LabelView::default() }
         });
         outlet.publish(view);
+        Some(GLANCE)
     })
 }
 
@@ -119,6 +125,8 @@ pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
 struct LabelService {
     path: PathBuf,
     store: Option<Store>,
+    /// What the view shows, as [`palpate_store::LabelRepository::revision`] counts.
+    seen: Option<LabelRevision>,
     outcomes: VecDeque<(u64, LabelOutcome)>,
     number: u64,
 }
@@ -142,6 +150,13 @@ impl LabelService {
         if self.outcomes.len() > OUTCOMES {
             self.outcomes.pop_front();
         }
+    }
+
+    /// True when another program or thread has changed what the view shows.
+    fn has_changed(&mut self) -> bool {
+        let revision = self.store.as_ref().map(|store| store.labels().revision());
+        // A store that cannot be read just now can be read at the next glance.
+        revision.and_then(Result::ok).is_some_and(|revision| self.seen.as_ref() != Some(&revision))
     }
 
     /// Handles a command; returns its outcome where it is worth a notice.
@@ -173,12 +188,14 @@ impl LabelService {
     fn view(&mut self) -> Result<LabelView, StoreError> {
         let outcomes = self.outcomes.iter().cloned().collect();
         let store = self.store()?;
+        let seen = store.labels().revision()?;
         let mut trials = store.labels().trials()?;
         let progress = store.labels().plan()?.progress(&trials);
         trials.sort_by_key(|trial| std::cmp::Reverse(trial.id));
         let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
         let next = progress.next(last);
         let journal = store.journal().entries(ENTRIES)?;
+        self.seen = Some(seen);
         Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, outcomes })
     }
 }
@@ -262,6 +279,26 @@ mod tests {
     }
 
     #[test]
+    fn changes_by_others_are_shown_without_a_command() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("s.sqlite");
+        let mut theirs = Store::open(&path).expect("opens");
+        let (wake, woken) = waker();
+        let labeller = start_labeller(path, wake).expect("starts");
+        labeller.ask(LabelCommand::Refresh);
+        until(&labeller, &woken, |view| view.trials.is_empty());
+        let id = recorded(&mut theirs);
+        until(&labeller, &woken, |view| view.unlabelled().is_some_and(|trial| trial.id == id));
+        theirs.labels().set_label(id, "mug").expect("labels");
+        let labelled = until(&labeller, &woken, |view| view.unlabelled().is_none());
+        assert_eq!(labelled.journal[0].sentence(), format!("trial {id}: label unlabelled -> mug"));
+        theirs.delete(&[id]).expect("discards");
+        until(&labeller, &woken, |view| view.trials.iter().all(|trial| trial.discarded));
+        theirs.purge().expect("purges");
+        until(&labeller, &woken, |view| view.trials.is_empty());
+    }
+
+    #[test]
     fn an_update_of_the_store_is_reported_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("s.sqlite");
@@ -273,7 +310,7 @@ mod tests {
         labeller.ask(LabelCommand::Refresh);
         let view = until(&labeller, &woken, |_| labeller.is_settled());
         assert!(
-            matches!(&view.outcomes[..], [(1, LabelOutcome::Warning(text))] if text.contains("s.before-v10.sqlite")),
+            matches!(&view.outcomes[..], [(1, LabelOutcome::Warning(text))] if text.contains("s.before-v12.sqlite")),
             "{:?}",
             view.outcomes
         );

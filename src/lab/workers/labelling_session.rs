@@ -493,7 +493,7 @@ pub fn parse_tags(text: &str) -> Vec<String> {
 }
 
 /// A folder beside the store that does not exist yet: export, export-2, export-3 ..
-fn new_export_folder(store: &Path) -> PathBuf {
+pub(super) fn new_export_folder(store: &Path) -> PathBuf {
     let beside = store.parent().unwrap_or(Path::new(""));
     let name = |k: u32| if k == 1 { "export".to_owned() } else { format!("export-{k}") };
     let free = (1..=u32::MAX).map(|k| beside.join(name(k))).find(|folder| !folder.exists());

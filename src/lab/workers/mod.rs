@@ -16,6 +16,8 @@
 //! setting of accuracy costs there. The thread "ghost" computes each
 //! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
 //!
+//! The thread "label" handles labels, "library" search and edits of all trials. Both show changes by other programs.
+//!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
 //! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it.
 //! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
@@ -38,6 +40,7 @@ mod inspector;
 mod labeller;
 mod labelling_session;
 mod latest;
+mod librarian;
 mod listener;
 #[cfg(test)]
 mod listener_tests;
@@ -70,6 +73,7 @@ pub use labelling_session::{
     parse_tags,
 };
 pub use latest::Latest;
+pub use librarian::{Librarian, LibraryCommand, LibraryView, start_librarian};
 pub use listener::THRESHOLDS;
 pub use messages::{
     Checking, Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,

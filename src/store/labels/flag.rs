@@ -1,8 +1,10 @@
 //! Flags: faults of recorded trials.
 
+use super::unknown_word::UnknownWord;
 use palpate_sim::objects::EMPTY;
 use palpate_tactile::cadence::Cadence;
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Fault of a recorded trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -30,6 +32,14 @@ impl Flag {
             Self::Interrupted => "interrupted",
             Self::Cadence => "cadence",
         }
+    }
+}
+
+impl FromStr for Flag {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        UnknownWord::choose(&text.replace('-', " "), "flag", Self::ALL.map(|flag| (flag.label(), flag)))
     }
 }
 

@@ -1,13 +1,17 @@
-//! Labels: class names, predictions, flags and the plan of a labelling session.
+//! Labels: class names, edits, predictions, flags and the plan of a labelling session.
 
 mod class_name;
+mod edit;
 mod flag;
 mod labelled_trial;
 mod plan;
 mod sparkline;
+mod unknown_word;
 
 pub use class_name::{ClassNameError, LONGEST_NAME, class_name, shown_name, shown_title};
+pub use edit::{Edited, TrialEdit};
 pub use flag::{Flag, FlagRemark, cadence_line, flaws};
 pub use labelled_trial::{Guess, GuessTop, LabelledTrial};
 pub use plan::{LabelPlan, MOST_WANTED, NextTrial, ObjectProgress, PlanError, PlannedObject, PoseCue, Progress};
 pub use sparkline::{SPARKLINE_BINS, Sparkline};
+pub use unknown_word::UnknownWord;

@@ -1,0 +1,165 @@
+//! Bar below the library: what can be done with the selected trials.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::library::LibraryAction;
+use crate::app::widgets::wrapped;
+use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
+use egui::{Button, Key, PopupCloseBehavior, RichText, ScrollArea, TextEdit, Ui};
+use palpate_lab::workers::LibraryView;
+use palpate_sim::objects::object_title;
+use palpate_store::labels::TrialEdit;
+use palpate_store::{LibraryTrial, TrialFormat};
+use palpate_tactile::trial::TrialSource;
+use std::sync::Arc;
+
+/// Room that the buttons of all edits need; with less they are in a menu (points).
+const WHOLE: f32 = 280.0;
+/// Width of a menu (points).
+const MENU: f32 = 200.0;
+/// Height of what a menu offers below its field (points).
+const OFFERS: f32 = 150.0;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    let trials = context.picked.trials.as_slice();
+    let gone = trials.iter().all(|trial| trial.row.deleted.is_some());
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
+        ui.strong(format!("{} selected", trials.len()));
+        if gone {
+            if ui.button("Restore").clicked() {
+                actions.push(LibraryAction::Edit(TrialEdit::Restore));
+            }
+            return;
+        }
+        if ui.button("Open").on_hover_text("Open the trial selected last (Enter)").clicked() {
+            actions.push(LibraryAction::Open);
+        }
+        if ui.button("Compare").on_hover_text("Pin for comparison (P)").clicked() {
+            actions.push(LibraryAction::Pin);
+        }
+        if ui.available_width() < WHOLE {
+            menu(ui, "Edit", |ui| edits_ui(ui, context, view, actions));
+        } else {
+            edits_ui(ui, context, view, actions);
+        }
+    });
+}
+
+/// Everything that changes or exports the selection.
+fn edits_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    let trials = context.picked.trials.as_slice();
+    menu(ui, "Label", |ui| label_ui(ui, context, trials, actions));
+    menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
+    menu(ui, "Note", |ui| note_ui(ui, trials, actions));
+    menu(ui, "Export", |ui| {
+        for format in TrialFormat::ALL {
+            let text = format!("{} into a folder beside the store", format.name().to_uppercase());
+            if ui.button(text).clicked() {
+                actions.push(LibraryAction::Export(format));
+                ui.close();
+            }
+        }
+    });
+    if ui.button("Discard").on_hover_text("Discard (Del); Ctrl+Z brings them back").clicked() {
+        actions.push(LibraryAction::Edit(TrialEdit::Discard));
+        ui.close();
+    }
+}
+
+/// Menu that stays open while text is written; in another menu a part of that.
+fn menu(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let contents = |ui: &mut Ui| {
+        ui.set_width(MENU);
+        contents(ui);
+    };
+    if is_in_menu(ui) {
+        SubMenuButton::new(title).config(config).ui(ui, contents);
+    } else {
+        MenuButton::new(title).config(config).ui(ui, contents);
+    }
+}
+
+/// What a menu offers below its field.
+fn offers(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    ScrollArea::vertical().max_height(OFFERS).show(ui, contents);
+}
+
+/// Field for a word; the word once it is entered.
+fn word_ui(ui: &mut Ui, name: &str, hint: &str, done: &str) -> Option<String> {
+    let id = ui.scope_id().with(name);
+    let mut word = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    let field = ui.add(TextEdit::singleline(&mut word).hint_text(hint).desired_width(f32::INFINITY));
+    field.widget_info(|| {
+        let mut info = egui::WidgetInfo::text_edit(true, &word, &word, hint);
+        info.label = Some(name.to_owned());
+        info
+    });
+    let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+    let written = !word.trim().is_empty();
+    let clicked = ui.add_enabled(written, Button::new(done)).clicked();
+    let given = ((entered || clicked) && written).then(|| std::mem::take(&mut word));
+    ui.data_mut(|data| data.insert_temp(id, word));
+    if given.is_some() {
+        ui.close();
+    }
+    given
+}
+
+fn label_ui(ui: &mut Ui, context: &PanelContext<'_>, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
+    let recorded = trials.iter().filter(|trial| trial.row.source == TrialSource::Recorded).count();
+    let known = trials.len() - recorded;
+    if known > 0 {
+        let text = format!(
+            "{known} of {} {} simulated or imported: the object is known, a label leaves {} alone.",
+            trials.len(),
+            if known == 1 { "is" } else { "are" },
+            if known == 1 { "it" } else { "them" },
+        );
+        wrapped(ui, RichText::new(text).small().weak());
+    }
+    if recorded == 0 {
+        return;
+    }
+    let done = format!("Label {recorded}");
+    let mut given = word_ui(ui, "Label of the selection", "name of the object", &done);
+    offers(ui, |ui| {
+        for object in context.labels.iter().flat_map(|labels| &labels.progress.objects) {
+            if ui.button(object_title(&object.name)).clicked() {
+                given = Some(object.name.clone());
+                ui.close();
+            }
+        }
+    });
+    actions_of(given.map(TrialEdit::Label), actions);
+}
+
+/// Tags that all have are removed by a click, others are added.
+fn tag_ui(ui: &mut Ui, view: &LibraryView, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
+    let mut edit = word_ui(ui, "Tag of the selection", "new tag", "Add").map(|tag| TrialEdit::Tag(vec![tag]));
+    offers(ui, |ui| {
+        for (tag, _) in &view.counts.tags {
+            let all = trials.iter().all(|trial| trial.row.tags.contains(tag));
+            if ui.selectable_label(all, tag).clicked() {
+                let tags = vec![tag.clone()];
+                edit = Some(if all { TrialEdit::Untag(tags) } else { TrialEdit::Tag(tags) });
+                ui.close();
+            }
+        }
+    });
+    actions_of(edit, actions);
+}
+
+fn note_ui(ui: &mut Ui, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
+    let mut edit = word_ui(ui, "Note of the selection", "note; replaces the present one", "Set").map(TrialEdit::Note);
+    if trials.iter().any(|trial| !trial.row.note.is_empty()) && ui.button("Remove the note").clicked() {
+        edit = Some(TrialEdit::Note(String::new()));
+        ui.close();
+    }
+    actions_of(edit, actions);
+}
+
+fn actions_of(edit: Option<TrialEdit>, actions: &mut Actions) {
+    edit.into_iter().for_each(|edit| actions.push(LibraryAction::Edit(edit)));
+}

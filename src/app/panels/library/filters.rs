@@ -1,0 +1,149 @@
+//! Filters of the library: a menu with all of them, chips for the usual ones and for those that are set.
+
+use super::columns;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::library::LibraryAction;
+use egui::{RichText, ScrollArea, Ui};
+use palpate_lab::workers::LibraryView;
+use palpate_sim::objects::object_title;
+use palpate_sim::scene::PRESETS;
+use palpate_store::labels::Flag;
+use palpate_store::{Counted, Day, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
+use palpate_tactile::trial::TrialSource;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    let query = &context.picked.query;
+    let mut wanted = query.clone();
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
+        ui.menu_button("Filter", |ui| menu_ui(ui, view, &mut wanted)).response.on_hover_text("Show some trials only");
+        if ui.available_width() < columns::TABLE {
+            ui.menu_button("Sort", |ui| order_ui(ui, &mut wanted.order)).response.on_hover_text("Order of the list");
+        }
+        for (name, days) in [("today", [Some(0), None]), ("yesterday", [Some(1), Some(1)])] {
+            let [since, until] = days.map(|ago| ago.map(Day::Ago));
+            let set = query.since == since && query.until == until;
+            if ui.selectable_label(set, small(name)).clicked() {
+                [wanted.since, wanted.until] = if set { [None, None] } else { [since, until] };
+            }
+        }
+        let counts = &view.counts;
+        if query.unlabelled || counts.unlabelled > 0 {
+            let text = format!("unlabelled {}", counts.unlabelled);
+            if ui.selectable_label(query.unlabelled, small(&text)).clicked() {
+                wanted.unlabelled = !query.unlabelled;
+            }
+        }
+        let gone = query.shown == Shown::Discarded;
+        if gone || counts.discarded > 0 {
+            let text = format!("discarded {}", counts.discarded);
+            if ui.selectable_label(gone, small(&text)).clicked() {
+                wanted.shown = if gone { Shown::Kept } else { Shown::Discarded };
+            }
+        }
+        set_ui(ui, &mut wanted);
+    });
+    if wanted != *query {
+        actions.push(LibraryAction::Find(wanted));
+    }
+}
+
+fn small(text: &str) -> RichText {
+    RichText::new(text).small()
+}
+
+/// Chips of filters that are set; a click removes one.
+fn set_ui(ui: &mut Ui, query: &mut TrialQuery) {
+    let mut chip = |text: String| {
+        let clicked = ui.selectable_label(true, small(&format!("{text}  \u{d7}"))).on_hover_text("Remove").clicked();
+        (!clicked).then_some(())
+    };
+    let keep = |value: &mut Option<String>, name: &str, chip: &mut dyn FnMut(String) -> Option<()>| {
+        if let Some(text) = value.as_ref()
+            && chip(format!("{name} {text}")).is_none()
+        {
+            *value = None;
+        }
+    };
+    if let Some(name) = &query.object
+        && chip(object_title(name)).is_none()
+    {
+        query.object = None;
+    }
+    query.source = query.source.filter(|source| chip(columns::source(*source).to_owned()).is_some());
+    query.quality = query.quality.filter(|quality| chip(quality.name().to_owned()).is_some());
+    query.flag = query.flag.filter(|flag| chip(flag.label().to_owned()).is_some());
+    keep(&mut query.tag, "tag", &mut chip);
+    keep(&mut query.preset, "preset", &mut chip);
+    keep(&mut query.collection, "in", &mut chip);
+    keep(&mut query.sensors, "sensors", &mut chip);
+}
+
+/// All filters.
+fn menu_ui(ui: &mut Ui, view: &LibraryView, query: &mut TrialQuery) {
+    let counts = &view.counts;
+    counted_ui(ui, "Object", &counts.objects, object_title, &mut query.object);
+    choice_ui(ui, "Source", TrialSource::ALL.map(|source| (columns::source(source), source)), &mut query.source);
+    choice_ui(ui, "Quality", TrialQuality::ALL.map(|quality| (quality.name(), quality)), &mut query.quality);
+    choice_ui(ui, "Flag", Flag::ALL.map(|flag| (flag.label(), flag)), &mut query.flag);
+    choice_ui(ui, "Preset of poses", PRESETS.map(|p| (p.name, p.name.to_owned())), &mut query.preset);
+    counted_ui(ui, "Tag", &counts.tags, str::to_owned, &mut query.tag);
+    counted_ui(ui, "Collection", &counts.collections, str::to_owned, &mut query.collection);
+}
+
+/// Submenu with a few choices; choosing the set one again removes it.
+fn choice_ui<T: Clone + PartialEq, const N: usize>(
+    ui: &mut Ui,
+    title: &str,
+    choices: [(&str, T); N],
+    value: &mut Option<T>,
+) {
+    ui.menu_button(title, |ui| {
+        for (name, choice) in choices {
+            let set = value.as_ref() == Some(&choice);
+            if ui.selectable_label(set, name).clicked() {
+                *value = (!set).then_some(choice);
+                ui.close();
+            }
+        }
+    });
+}
+
+/// Submenu with the values that occur.
+fn counted_ui(
+    ui: &mut Ui,
+    title: &str,
+    counts: &[Counted],
+    shown: impl Fn(&str) -> String,
+    value: &mut Option<String>,
+) {
+    ui.add_enabled_ui(!counts.is_empty(), |ui| {
+        ui.menu_button(title, |ui| {
+            ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
+                for (name, count) in counts {
+                    let set = value.as_ref() == Some(name);
+                    if ui.selectable_label(set, format!("{}  {count}", shown(name))).clicked() {
+                        *value = (!set).then(|| name.clone());
+                        ui.close();
+                    }
+                }
+            });
+        });
+    });
+}
+
+/// Columns to sort by, and the direction.
+fn order_ui(ui: &mut Ui, order: &mut TrialOrder) {
+    for column in TrialColumn::ALL {
+        if ui.selectable_label(order.column == column, column.name()).clicked() {
+            order.column = column;
+            ui.close();
+        }
+    }
+    ui.separator();
+    if ui.selectable_label(order.descending, "last first").clicked() {
+        order.descending = !order.descending;
+        ui.close();
+    }
+}

@@ -1,0 +1,99 @@
+//! All trials: search, filters, a table that becomes a list of two lines where it is narrow, and edits of the selection.
+
+mod bar;
+mod columns;
+mod filters;
+mod rows;
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::library::LibraryAction;
+use crate::app::theme::colour;
+use egui::{Frame, Margin, Panel, RichText, TextEdit, Ui};
+use palpate_lab::workers::LibraryView;
+use palpate_store::TrialQuery;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let Some(view) = context.library else {
+        ui.weak("Reading the store ..");
+        actions.push(LibraryAction::Find(TrialQuery::default()));
+        return;
+    };
+    if !context.picked.trials.is_empty() {
+        let fill = colour(context.view.theme.colours().raised);
+        let frame = Frame::new().fill(fill).corner_radius(4).inner_margin(Margin::same(6));
+        Panel::bottom("selected trials").frame(frame).show(ui, |ui| bar::ui(ui, context, view, actions));
+    }
+    search_ui(ui, context, view, actions);
+    filters::ui(ui, context, view, actions);
+    if context.picked.query.is_filtered() || !view.complete {
+        count_ui(ui, context, view, actions);
+    }
+    if view.found.is_empty() {
+        return empty_ui(ui, context, view);
+    }
+    rows::ui(ui, context, view, actions);
+}
+
+/// Field for words; its text is asked for with every letter.
+fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    let picked = context.picked;
+    let mut search = picked.query.search.clone();
+    let hint = format!("Search {} trials  ( / )", grouped(view.counts.kept));
+    let field = ui.add(TextEdit::singleline(&mut search).hint_text(hint).desired_width(f32::INFINITY));
+    field.widget_info(|| {
+        let mut info = egui::WidgetInfo::text_edit(true, &picked.query.search, &search, "");
+        info.label = Some("Search trials".to_owned());
+        info
+    });
+    if picked.focus_search {
+        field.request_focus();
+        actions.push(LibraryAction::SearchFocused);
+    }
+    if search != picked.query.search {
+        actions.push(LibraryAction::Find(TrialQuery { search, ..picked.query.clone() }));
+    }
+}
+
+/// How many trials were found; without filters the search field says how many there are.
+fn count_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    ui.horizontal(|ui| {
+        let text = format!("{} of {} trials", grouped(view.found.len()), grouped(view.counts.kept));
+        ui.label(RichText::new(text).small().weak());
+        if !view.complete {
+            ui.label(RichText::new("reading older ones ..").small().weak());
+        }
+        let query = &context.picked.query;
+        if query.is_filtered() && ui.small_button("Clear").on_hover_text("Remove search and filters").clicked() {
+            actions.push(LibraryAction::Find(query.cleared()));
+        }
+    });
+}
+
+fn empty_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView) {
+    ui.add_space(12.0);
+    ui.vertical_centered(|ui| {
+        if !view.complete {
+            ui.weak("Reading the store ..");
+        } else if context.picked.query.is_filtered() {
+            ui.weak("No trial matches. Clear the search and the filters to see all.");
+        } else {
+            ui.weak("No trials yet.");
+            ui.weak("Play a grasp in Demo mode (Ctrl+1), record one of the real gripper with R, or import a file:");
+            ui.monospace("palpate trials import FILE.csv");
+        }
+    });
+}
+
+/// A number with its thousands apart: 12 345.
+fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push('\u{2009}');
+        }
+        text.push(digit);
+    }
+    text
+}

@@ -1,0 +1,306 @@
+//! Rows of the library: a table, or a list of two lines where it is narrow. Only rows in sight are drawn.
+
+use super::columns::{self, Shows, cell, fitting, title};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::library::{LibraryAction, Reach};
+use crate::app::theme::colour;
+use crate::app::widgets::sparkline;
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2, vec2};
+use palpate_geometry::palette::ThemeColours;
+use palpate_lab::workers::LibraryView;
+use palpate_store::labels::TrialEdit;
+use palpate_store::{LibraryTrial, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
+use palpate_tactile::trial::TrialId;
+use std::ops::Range;
+
+/// Heights of rows in the table and in the list (points).
+const TABLE_ROW: f32 = 30.0;
+const LIST_ROW: f32 = 42.0;
+/// Room between a column's text and the next column (points).
+const GAP: f32 = 8.0;
+/// Room of the scroll bar (points).
+const SCROLL_BAR: f32 = 10.0;
+
+pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+    let room = ui.available_width() - SCROLL_BAR;
+    let table = (room >= columns::TABLE).then(|| fitting(room));
+    if let Some(columns) = &table {
+        header_ui(ui, context, columns, actions);
+    }
+    let height = if table.is_some() { TABLE_ROW } else { LIST_ROW };
+    ui.spacing_mut().item_spacing.y = 0.0;
+    let seen = ui.scope_id().with("rows");
+    let mut list = ScrollArea::vertical().auto_shrink(false);
+    if let Some(offset) = scroll_offset(ui, seen, context, view, height) {
+        list = list.vertical_scroll_offset(offset);
+    }
+    let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
+        for trial in &view.found[rows.clone()] {
+            row_ui(ui, context, view, trial, (table.as_deref(), height), actions);
+        }
+        rows
+    });
+    draw_seen(ui, seen, view, &shown.inner, actions);
+    ui.data_mut(|data| data.insert_temp(seen, (shown.inner.start, shown.inner.end, context.picked.cursor)));
+}
+
+/// Asks for the sparklines of rows in sight, once for each set of rows.
+fn draw_seen(ui: &Ui, seen: egui::Id, view: &LibraryView, rows: &Range<usize>, actions: &mut Actions) {
+    let missing = |trial: &&std::sync::Arc<LibraryTrial>| !view.sparklines.contains_key(&trial.row.id);
+    let ids: Vec<TrialId> = view.found[rows.clone()].iter().filter(missing).map(|trial| trial.row.id).collect();
+    let asked = seen.with("asked");
+    let before = ui.data(|data| data.get_temp::<Vec<TrialId>>(asked)).unwrap_or_default();
+    // Those asked for before are on their way.
+    if ids.iter().any(|id| !before.contains(id)) {
+        actions.push(LibraryAction::Draw(ids.clone()));
+        ui.data_mut(|data| data.insert_temp(asked, ids));
+    }
+}
+
+/// Offset that brings a newly selected trial into sight.
+fn scroll_offset(ui: &Ui, seen: egui::Id, context: &PanelContext<'_>, view: &LibraryView, height: f32) -> Option<f32> {
+    let (first, end, before) = ui.data(|data| data.get_temp::<(usize, usize, Option<TrialId>)>(seen))?;
+    let cursor = context.picked.cursor.filter(|_| context.picked.cursor != before)?;
+    let place = view.found.iter().position(|trial| trial.row.id == cursor)?;
+    if (first + 1..end.saturating_sub(1)).contains(&place) {
+        return None;
+    }
+    let room = ui.available_height();
+    let at = place as f32 * height;
+    Some(if place <= first { at } else { (at + height - room).max(0.0) })
+}
+
+/// Titles of columns; a click sorts.
+fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, columns: &[(Shows, f32)], actions: &mut Actions) {
+    let colours = context.view.theme.colours();
+    let query = &context.picked.query;
+    let (line, _) = ui.allocate_exact_size(vec2(ui.available_width(), 22.0), Sense::hover());
+    ui.painter().hline(line.x_range(), line.bottom() - 0.5, egui::Stroke::new(1.0, colour(colours.border)));
+    for (shows, rect) in placed(columns, line) {
+        let Shows::Text(column) = shows else { continue };
+        let response = ui.interact(rect, ui.scope_id().with(("sort", column.name())), Sense::click());
+        let sorted = query.order.column == column;
+        let name = format!("Sort by {}", column.name());
+        response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, sorted, &name));
+        let ink = if sorted || response.hovered() { colours.text } else { colours.quiet_text };
+        let words = Rect::from_min_max(rect.min, pos2(rect.right() - GAP, rect.bottom()));
+        let end = text(ui, words, Align2::LEFT_CENTER, title(column), 11.5, colour(ink));
+        if sorted {
+            triangle(
+                ui,
+                pos2((end + 7.0).min(rect.right() - 5.0), rect.center().y),
+                query.order.descending,
+                colour(ink),
+            );
+        }
+        if response.clicked() {
+            let descending = if sorted { !query.order.descending } else { column == TrialColumn::Date };
+            let order = TrialOrder { column, descending };
+            actions.push(LibraryAction::Find(TrialQuery { order, ..query.clone() }));
+        }
+    }
+}
+
+/// Mark of the direction: up for rising values, down for falling ones.
+fn triangle(ui: &Ui, at: egui::Pos2, descending: bool, ink: Color32) {
+    let tip = if descending { 3.0 } else { -3.0 };
+    let corners = vec![at + vec2(-3.5, -tip), at + vec2(3.5, -tip), at + vec2(0.0, tip)];
+    ui.painter().add(egui::Shape::convex_polygon(corners, ink, egui::Stroke::NONE));
+}
+
+/// Places of columns in a line.
+fn placed(columns: &[(Shows, f32)], line: Rect) -> Vec<(Shows, Rect)> {
+    let mut left = line.left() + 4.0;
+    let place = |(shows, width): &(Shows, f32)| {
+        let rect = Rect::from_min_max(pos2(left, line.top()), pos2((left + width).min(line.right()), line.bottom()));
+        left += width;
+        (*shows, rect)
+    };
+    columns.iter().map(place).collect()
+}
+
+fn row_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    view: &LibraryView,
+    trial: &LibraryTrial,
+    (table, height): (Option<&[(Shows, f32)]>, f32),
+    actions: &mut Actions,
+) {
+    let colours = context.view.theme.colours();
+    let id = trial.row.id;
+    let selected = context.picked.selected.contains(&id);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
+    let name = format!("Trial {id}, {}", trial.title);
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &name));
+    if selected || response.hovered() || response.has_focus() {
+        let share = if selected { 0.30 } else { 0.10 };
+        ui.painter().rect_filled(
+            rect.shrink2(vec2(0.0, 1.0)),
+            4.0,
+            colour(colours.background.mix(colours.accent, share)),
+        );
+    }
+    if context.picked.cursor == Some(id) {
+        let edge = Rect::from_min_size(rect.min + vec2(0.0, 3.0), vec2(2.5, height - 6.0));
+        ui.painter().rect_filled(edge, 1.0, colour(colours.accent));
+    }
+    match table {
+        Some(columns) => table_row(ui, context, view, trial, &placed(columns, rect)),
+        None => list_row(ui, context, view, trial, rect),
+    }
+    answer(ui, &response, trial, selected, actions);
+    response.on_hover_ui(|ui| hint_ui(ui, view, trial));
+}
+
+/// Clicks on a row.
+fn answer(ui: &Ui, response: &Response, trial: &LibraryTrial, selected: bool, actions: &mut Actions) {
+    let id = trial.row.id;
+    let modifiers = ui.input(|input| input.modifiers);
+    if response.clicked() {
+        let reach = match (modifiers.shift, modifiers.command) {
+            (true, _) => Reach::Range,
+            (_, true) => Reach::Toggle,
+            _ => Reach::Alone,
+        };
+        actions.push(LibraryAction::Select(id, reach));
+    }
+    if response.double_clicked() && !modifiers.shift && !modifiers.command {
+        actions.push(LibraryAction::Open);
+    }
+    // A menu is about the selection; opened beside it, about its row.
+    if response.secondary_clicked() && !selected {
+        actions.push(LibraryAction::Select(id, Reach::Alone));
+    }
+    response.context_menu(|ui| {
+        let gone = trial.row.deleted.is_some();
+        let discard = if gone { ("Restore", TrialEdit::Restore) } else { ("Discard", TrialEdit::Discard) };
+        let choices = [("Open", LibraryAction::Open), ("Compare", LibraryAction::Pin)];
+        let choices = choices.into_iter().filter(|_| !gone);
+        for (name, action) in choices.chain([(discard.0, LibraryAction::Edit(discard.1))]) {
+            if ui.button(name).clicked() {
+                actions.push(action);
+                ui.close();
+            }
+        }
+    });
+}
+
+/// Everything that is known, for a row whose texts may be cut.
+fn hint_ui(ui: &mut Ui, view: &LibraryView, trial: &LibraryTrial) {
+    ui.strong(format!("Trial {}: {}", trial.row.id, trial.title));
+    let row = &trial.row;
+    let samples = format!("{} samples", row.samples);
+    ui.label([cell(view, trial, TrialColumn::Date), cell(view, trial, TrialColumn::Source), samples].join(", "));
+    for (title, text) in [
+        ("object", &row.object),
+        ("collection", row.collection.as_ref().unwrap_or(&String::new())),
+        ("sensors", &row.sensors),
+        ("tags", &row.tags.join(", ")),
+        ("note", &row.note),
+    ] {
+        if !text.is_empty() {
+            ui.label(format!("{title}: {text}"));
+        }
+    }
+    for found in &row.flags {
+        ui.label(format!("{}: {}", found.flag.label(), found.remark));
+    }
+    if row.warnings > 0 {
+        ui.label(format!("{} warning(s); open it to read them", row.warnings));
+    }
+    if !row.sound {
+        ui.label("unsound: data sets exclude it");
+    }
+}
+
+fn table_row(ui: &Ui, context: &PanelContext<'_>, view: &LibraryView, trial: &LibraryTrial, places: &[(Shows, Rect)]) {
+    let colours = context.view.theme.colours();
+    for (shows, rect) in places {
+        let inner = Rect::from_min_max(rect.min, pos2(rect.right() - GAP, rect.bottom()));
+        match shows {
+            Shows::Thumbnail => thumbnail(ui, context, trial, inner.shrink2(vec2(0.0, 3.0))),
+            Shows::Sparkline => {
+                if let Some(lines) = view.sparklines.get(&trial.row.id) {
+                    sparkline(ui, context.view.theme, lines, inner.shrink2(vec2(0.0, 4.0)));
+                }
+            }
+            Shows::Text(column) => {
+                let ink = ink(&colours, trial, *column);
+                text(ui, inner, Align2::LEFT_CENTER, &cell(view, trial, *column), 13.0, colour(ink));
+            }
+        }
+    }
+}
+
+/// Two lines: title and date, then the rest in small print.
+fn list_row(ui: &Ui, context: &PanelContext<'_>, view: &LibraryView, trial: &LibraryTrial, rect: Rect) {
+    let colours = context.view.theme.colours();
+    let inside = rect.shrink2(vec2(6.0, 4.0));
+    let side = inside.height();
+    let picture = Rect::from_min_size(inside.min, vec2(side, side));
+    if context.thumbnails.contains_key(&trial.row.object) {
+        thumbnail(ui, context, trial, picture);
+    } else if let Some(lines) = view.sparklines.get(&trial.row.id) {
+        sparkline(ui, context.view.theme, lines, picture);
+    }
+    let words = Rect::from_min_max(pos2(picture.right() + GAP, inside.top()), inside.max);
+    let date = cell(view, trial, TrialColumn::Date);
+    let quiet = colour(colours.quiet_text);
+    let width = ui.painter().layout_no_wrap(date.clone(), FontId::proportional(11.5), quiet).size().x;
+    let upper = Rect::from_min_max(words.min, pos2(words.right(), words.center().y));
+    text(ui, upper, Align2::RIGHT_CENTER, &date, 11.5, quiet);
+    let title = Rect::from_min_max(upper.min, pos2(upper.right() - width - GAP, upper.bottom()));
+    let ink_of = |column: TrialColumn| colour(ink(&colours, trial, column));
+    let name = cell(view, trial, TrialColumn::Object);
+    text(ui, title, Align2::LEFT_CENTER, &name, 13.5, ink_of(TrialColumn::Object));
+    let lower = Rect::from_min_max(pos2(words.left(), words.center().y), words.max);
+    let quality = cell(view, trial, TrialColumn::Quality);
+    let plain = trial.row.deleted.is_none() && trial.quality() == TrialQuality::Sound;
+    let left = if plain {
+        lower.left()
+    } else {
+        text(ui, lower, Align2::LEFT_CENTER, &quality, 11.5, ink_of(TrialColumn::Quality)) + GAP
+    };
+    let preset = trial.row.preset.map(|name| format!("preset {name}")).unwrap_or_default();
+    let tags: String = trial.row.tags.iter().map(|tag| format!("#{tag} ")).collect();
+    let number = format!("no {}", trial.row.id);
+    let parts = [number, cell(view, trial, TrialColumn::Source), preset, tags, trial.row.note.clone()];
+    let parts: Vec<&str> = parts.iter().map(|part| part.trim()).filter(|part| !part.is_empty()).collect();
+    let rest = Rect::from_min_max(pos2(left, lower.top()), lower.max);
+    text(ui, rest, Align2::LEFT_CENTER, &parts.join("  \u{b7}  "), 11.5, quiet);
+}
+
+fn ink(colours: &ThemeColours, trial: &LibraryTrial, column: TrialColumn) -> palpate_geometry::palette::Rgb {
+    match column {
+        TrialColumn::Quality if trial.row.deleted.is_some() => colours.error,
+        TrialColumn::Quality => match trial.quality() {
+            TrialQuality::Sound => colours.quiet_text,
+            TrialQuality::Warned => colours.warning,
+            TrialQuality::Unsound => colours.error,
+        },
+        TrialColumn::Object if trial.row.object.is_empty() => colours.warning,
+        TrialColumn::Object => colours.text,
+        _ => colours.quiet_text,
+    }
+}
+
+fn thumbnail(ui: &Ui, context: &PanelContext<'_>, trial: &LibraryTrial, place: Rect) {
+    let Some(texture) = context.thumbnails.get(&trial.row.object) else { return };
+    let side = place.width().min(place.height());
+    let square = Rect::from_center_size(place.center(), vec2(side, side));
+    egui::Image::new(texture).corner_radius(3.0).paint_at(ui, square);
+}
+
+/// Writes one line, cut where there is no room; its right end.
+fn text(ui: &Ui, place: Rect, align: Align2, text: &str, size: f32, ink: Color32) -> f32 {
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(size), ink);
+    job.wrap = TextWrapping::truncate_at_width(place.width().max(0.0));
+    let galley = ui.painter().layout_job(job);
+    let at = align.align_size_within_rect(galley.size(), place);
+    let right = at.right();
+    ui.painter().with_clip_rect(place.expand2(vec2(1.0, 0.0)).intersect(ui.clip_rect())).galley(at.min, galley, ink);
+    right
+}

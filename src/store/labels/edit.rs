@@ -1,0 +1,56 @@
+//! Changes of trials that a person makes, one or many at once.
+
+/// A change of trials.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TrialEdit {
+    /// Label trials of the real gripper with their object.
+    Label(String),
+    /// Set the note; an empty text removes it.
+    Note(String),
+    /// Replace all tags.
+    Tags(Vec<String>),
+    /// Add tags.
+    Tag(Vec<String>),
+    /// Remove tags.
+    Untag(Vec<String>),
+    /// Mark the label as unsure, or remove the mark.
+    Unsure(bool),
+    /// Mark as deleted; can be restored.
+    Discard,
+    /// Restore deleted trials.
+    Restore,
+}
+
+/// Result of an edit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Edited {
+    /// Trials that it changed.
+    pub changed: usize,
+    /// Trials that a label left out, as their object is known.
+    pub known: usize,
+}
+
+impl Edited {
+    /// What was done, in a sentence.
+    pub fn sentence(&self, edit: &TrialEdit) -> String {
+        let Self { changed, known } = *self;
+        let done = match edit {
+            TrialEdit::Label(object) => format!("labelled {}", object.trim()),
+            TrialEdit::Note(note) if note.trim().is_empty() => "without note now".to_owned(),
+            TrialEdit::Note(_) => "given a note".to_owned(),
+            TrialEdit::Tags(tags) => format!("tagged [{}]", tags.join(", ")),
+            TrialEdit::Tag(tags) => format!("tagged {}", tags.join(", ")),
+            TrialEdit::Untag(tags) => format!("no longer tagged {}", tags.join(", ")),
+            TrialEdit::Unsure(true) => "marked as unsure".to_owned(),
+            TrialEdit::Unsure(false) => "no longer unsure".to_owned(),
+            TrialEdit::Discard => "discarded".to_owned(),
+            TrialEdit::Restore => "restored".to_owned(),
+        };
+        let keep = match known {
+            0 => String::new(),
+            1 => "; 1 is simulated or imported and keeps its object".to_owned(),
+            _ => format!("; {known} are simulated or imported and keep their object"),
+        };
+        format!("{changed} {} {done}{keep}", if changed == 1 { "trial" } else { "trials" })
+    }
+}

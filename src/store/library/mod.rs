@@ -1,0 +1,188 @@
+//! The library: all trials in memory, read once and kept up to date, so that search, filters and order of 100 000 trials
+//! take milliseconds.
+//!
+//! New trials have higher numbers, and every other change of a row has an entry in the journal, so that few rows are
+//! read again. The rows of trials that were being recorded at the last look are read again too.
+
+mod counts;
+mod order;
+mod quality;
+mod query;
+
+pub use counts::{Counted, LibraryCounts};
+pub use order::{TrialColumn, TrialOrder};
+pub use quality::TrialQuality;
+pub use query::{Day, Shown, TrialQuery};
+
+use super::store::{Store, json};
+use super::store_error::StoreError;
+use super::trial_rows::TrialRow;
+use crate::labels::shown_name;
+use palpate_sim::objects::object_title;
+use palpate_tactile::trial::TrialId;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// A trial in the library.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LibraryTrial {
+    /// The trial.
+    pub row: TrialRow,
+    /// Title of its object, or `unlabelled`.
+    pub title: Arc<str>,
+    /// Everything that a search looks at, in lower case.
+    words: Box<str>,
+}
+
+impl LibraryTrial {
+    fn new(row: TrialRow, titles: &mut BTreeMap<String, Arc<str>>) -> Self {
+        let title = match titles.get(&row.object) {
+            Some(title) => Arc::clone(title),
+            None => {
+                let title: Arc<str> = object_title(shown_name(&row.object)).into();
+                titles.insert(row.object.clone(), Arc::clone(&title));
+                title
+            }
+        };
+        let collection = row.collection.as_deref().unwrap_or_default();
+        let (id, tags) = (row.id.to_string(), row.tags.join(" "));
+        let words = [&*title, &row.object, &id, &row.note, &tags, collection, &row.sensors].join("\n");
+        Self { words: words.to_lowercase().into(), title, row }
+    }
+
+    /// The title in lower case, with which the words begin.
+    fn lower_title(&self) -> &str {
+        self.words.split_once('\n').map_or(&*self.words, |(title, _)| title)
+    }
+
+    /// Quality in one word.
+    pub fn quality(&self) -> TrialQuality {
+        TrialQuality::of(&self.row)
+    }
+}
+
+/// All trials of a store.
+#[derive(Debug, Default)]
+pub struct Library {
+    trials: BTreeMap<TrialId, Arc<LibraryTrial>>,
+    titles: BTreeMap<String, Arc<str>>,
+    /// Trials that were being recorded at the last look.
+    recording: BTreeSet<TrialId>,
+    /// Last entry of the journal that is contained.
+    journal: Option<i64>,
+    /// Everything is read.
+    complete: bool,
+}
+
+impl Library {
+    /// The whole library of a store.
+    pub fn read(store: &Store) -> Result<Self, StoreError> {
+        let mut library = Self::default();
+        while !library.read_on(store, usize::MAX)? {}
+        Ok(library)
+    }
+
+    /// Reads the next older trials, at most this many, the newest first; true once all are read.
+    pub fn read_on(&mut self, store: &Store, most: usize) -> Result<bool, StoreError> {
+        if !self.complete {
+            if self.journal.is_none() {
+                self.journal = Some(last_entry(store)?);
+            }
+            let below = self.trials.keys().next().copied().unwrap_or(TrialId::MAX);
+            let most = i64::try_from(most).unwrap_or(i64::MAX);
+            let rows = store.rows("WHERE id < ?1 ORDER BY id DESC LIMIT ?2", [below, most])?;
+            self.complete = rows.is_empty() || i64::try_from(rows.len()).is_ok_and(|read| read < most);
+            self.take(rows);
+        }
+        Ok(self.complete)
+    }
+
+    /// Reads again what has changed since; true where something had.
+    pub fn catch_up(&mut self, store: &Store) -> Result<bool, StoreError> {
+        let (Some(journal), Some(oldest)) = (self.journal, self.trials.keys().next().copied()) else {
+            self.complete = false;
+            return Ok(true);
+        };
+        let newest = self.trials.keys().next_back().copied().unwrap_or(oldest);
+        self.journal = Some(last_entry(store)?);
+        let mut stale: BTreeSet<TrialId> = changed_since(store, journal)?;
+        stale.retain(|id| (oldest..=newest).contains(id));
+        stale.extend(&self.recording);
+        let stale: Vec<TrialId> = stale.into_iter().collect();
+        let mut rows = store.rows("WHERE id > ?1 ORDER BY id", [newest])?;
+        rows.extend(store.rows("WHERE id IN (SELECT value FROM json_each(?1))", [json(&stale)])?);
+        let mut changed = self.take(rows);
+        if self.complete && count(store)? != self.trials.len() {
+            let kept = ids(store)?;
+            self.trials.retain(|id, _| kept.contains(id));
+            self.recording.retain(|id| kept.contains(id));
+            changed = true;
+        }
+        Ok(changed)
+    }
+
+    /// True where a row was new or other than before.
+    fn take(&mut self, rows: Vec<TrialRow>) -> bool {
+        let mut changed = false;
+        for row in rows {
+            let id = row.id;
+            if row.state == "complete" {
+                self.recording.remove(&id);
+            } else {
+                self.recording.insert(id);
+            }
+            if self.trials.get(&id).is_none_or(|known| known.row != row) {
+                self.trials.insert(id, Arc::new(LibraryTrial::new(row, &mut self.titles)));
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Trials that match a query, in its order.
+    pub fn find(&self, store: &Store, query: &TrialQuery) -> Result<Vec<Arc<LibraryTrial>>, StoreError> {
+        let matcher = query.matcher(store)?;
+        let found: Vec<Arc<LibraryTrial>> =
+            self.trials.values().filter(|trial| matcher.matches(trial)).cloned().collect();
+        Ok(query.order.sorted(&found))
+    }
+
+    /// A trial by its number.
+    pub fn trial(&self, id: TrialId) -> Option<&Arc<LibraryTrial>> {
+        self.trials.get(&id)
+    }
+
+    /// Counts of what filters offer.
+    pub fn counts(&self) -> LibraryCounts {
+        LibraryCounts::of(self.trials.values().map(|trial| &**trial))
+    }
+
+    /// True once everything is read.
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+}
+
+fn last_entry(store: &Store) -> Result<i64, StoreError> {
+    let sql = "SELECT coalesce(max(number), 0) FROM journal";
+    store.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| store.fault(&e))
+}
+
+/// Trials that have entries in the journal after this one.
+fn changed_since(store: &Store, entry: i64) -> Result<BTreeSet<TrialId>, StoreError> {
+    let sql = "SELECT trials.id FROM journal JOIN trials ON trials.uid = journal.trial WHERE journal.number > ?1";
+    let found = store.connection.prepare_cached(sql);
+    let found = found.and_then(|mut statement| statement.query_map([entry], |row| row.get(0))?.collect());
+    found.map_err(|e| store.fault(&e))
+}
+
+fn count(store: &Store) -> Result<usize, StoreError> {
+    let count = store.connection.query_row("SELECT count(*) FROM trials", [], |row| row.get::<_, i64>(0));
+    count.map(|count| usize::try_from(count).unwrap_or(0)).map_err(|e| store.fault(&e))
+}
+
+fn ids(store: &Store) -> Result<BTreeSet<TrialId>, StoreError> {
+    let found = store.connection.prepare("SELECT id FROM trials");
+    let found = found.and_then(|mut statement| statement.query_map([], |row| row.get(0))?.collect());
+    found.map_err(|e| store.fault(&e))
+}

@@ -1,0 +1,150 @@
+//! The list of trials: what is known of each without its data.
+
+use super::store::{Store, source_named};
+use super::store_error::StoreError;
+use crate::labels::{FlagRemark, flaws};
+use palpate_sim::frame::Quality;
+use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
+use palpate_tactile::trial::{TrialId, TrialSource};
+use rusqlite::{Params, Row};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One row of the list of trials.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrialRow {
+    /// Number in this store.
+    pub id: TrialId,
+    /// Time of its beginning, UTC.
+    pub created: String,
+    /// The same in local time, to the minute: `2026-11-21T15:36`.
+    pub local: String,
+    /// `recording`, or `complete`.
+    pub state: String,
+    /// Origin.
+    #[serde(rename = "rig")]
+    pub source: TrialSource,
+    /// Name of the object; empty while unlabelled.
+    pub object: String,
+    /// Seed of the pose.
+    pub seed: u64,
+    /// Data set that it belongs to.
+    pub collection: Option<String>,
+    /// Preset of poses that a simulated trial was drawn from.
+    pub preset: Option<&'static str>,
+    /// Parts or channels of a real gripper, channels of an imported trial; empty for a simulated one.
+    pub sensors: String,
+    /// Size and shape of the object, for imported trials that state them.
+    pub properties: Option<(String, String)>,
+    /// Samples stored.
+    pub samples: i64,
+    /// Whether it stayed finite and converged.
+    pub sound: bool,
+    /// Number of warnings.
+    pub warnings: usize,
+    /// Note.
+    pub note: String,
+    /// Tags.
+    pub tags: Vec<String>,
+    /// The label is marked as unsure.
+    pub unsure: bool,
+    /// Flags, for a trial of the real gripper.
+    pub flags: Vec<FlagRemark>,
+    /// Time of deletion, UTC.
+    pub deleted: Option<String>,
+}
+
+/// Columns that [`RowReader`] reads. Sensors: the parts of a board, else its channels; or the imported channels.
+const ROWS: &str =
+    "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, collection, size,
+    shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END,
+    strftime('%Y-%m-%dT%H:%M', created, 'localtime'),
+    CASE rig WHEN 'sim' THEN substr(scene, instr(scene, '[pose]'), 400) END,
+    CASE rig
+        WHEN 'serial' THEN coalesce((SELECT group_concat(part, ' ') FROM parts WHERE parts.trial = trials.id),
+            CASE WHEN json_valid(about) THEN about ->> '$.board.channels' END)
+        WHEN 'import' THEN (SELECT channels FROM readings WHERE readings.trial = trials.id)
+    END
+    FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id";
+
+/// Reads rows; presets are looked up once per text.
+#[derive(Default)]
+struct RowReader {
+    presets: BTreeMap<String, Option<&'static str>>,
+}
+
+impl RowReader {
+    /// A row of [`ROWS`].
+    fn read(&mut self, row: &Row<'_>) -> rusqlite::Result<Result<TrialRow, StoreError>> {
+        let source = match source_named(row.get(0)?, &row.get::<_, String>(3)?) {
+            Ok(source) => source,
+            Err(error) => return Ok(Err(error)),
+        };
+        let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
+        let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
+        let object: String = row.get(4)?;
+        let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
+        Ok(Ok(TrialRow {
+            id: row.get(0)?,
+            created: row.get(1)?,
+            local: row.get(17)?,
+            state: row.get(2)?,
+            source,
+            seed: row.get::<_, i64>(5)?.cast_unsigned(),
+            collection: row.get(10)?,
+            preset: row.get::<_, Option<String>>(18)?.and_then(|text| self.preset(&text)),
+            sensors: sensors(row.get::<_, Option<String>>(19)?.unwrap_or_default()),
+            properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
+            samples: row.get(6)?,
+            sound: quality.is_some_and(|quality| quality.is_sound()),
+            warnings: warnings.len(),
+            note: row.get(13)?,
+            tags: json_or_default(&row.get::<_, String>(14)?),
+            unsure: row.get(15)?,
+            flags: flaws(flags, Some(&object)),
+            deleted: row.get(9)?,
+            object,
+        }))
+    }
+
+    /// Preset of a scene, from the text of its table of poses.
+    fn preset(&mut self, text: &str) -> Option<&'static str> {
+        let table = text.find("\n[").map_or(text, |end| &text[..end]);
+        if let Some(known) = self.presets.get(table) {
+            return *known;
+        }
+        let poses = Scene::from_toml(table).ok().map(|scene| PoseSpread { between: Between::default(), ..scene.pose });
+        let found = PRESETS.iter().find(|preset| Some(preset.poses()) == poses).map(|preset| preset.name);
+        self.presets.insert(table.to_owned(), found);
+        found
+    }
+}
+
+/// Names of channels out of their JSON; parts are separated by spaces already.
+fn sensors(text: String) -> String {
+    match serde_json::from_str::<Vec<String>>(&text) {
+        Ok(channels) => channels.join(" "),
+        Err(_) => text,
+    }
+}
+
+fn json_or_default<T: Default + serde::de::DeserializeOwned>(text: &str) -> T {
+    serde_json::from_str(text).unwrap_or_default()
+}
+
+impl Store {
+    /// All trials, oldest first; with or without deleted ones.
+    pub fn list(&self, with_deleted: bool) -> Result<Vec<TrialRow>, StoreError> {
+        self.rows("WHERE ?1 OR deleted IS NULL ORDER BY id", [with_deleted])
+    }
+
+    /// Rows that a condition in SQL chooses.
+    pub(super) fn rows(&self, condition: &str, values: impl Params) -> Result<Vec<TrialRow>, StoreError> {
+        let mut reader = RowReader::default();
+        let rows: rusqlite::Result<Vec<Result<TrialRow, StoreError>>> = self
+            .connection
+            .prepare_cached(&format!("{ROWS} {condition}"))
+            .and_then(|mut statement| statement.query_map(values, |row| reader.read(row))?.collect());
+        rows.map_err(|e| self.fault(&e))?.into_iter().collect()
+    }
+}

@@ -1,0 +1,271 @@
+//! The trial library: found, sorted, labelled, tagged, discarded and exported, many trials at once, in the window and on
+//! the command line, each of which sees what the other does.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::cpu_renderer::CpuRenderer;
+use crate::program::{json, refused, run};
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use palpate::app::{ALL_PANELS, LibraryAction, Mode, ViewAction};
+use palpate_lab::grasping::grasp;
+use palpate_sim::objects::catalogue;
+use palpate_sim::scene::Scene;
+use palpate_store::labels::TrialEdit;
+use palpate_store::{BoardInfo, ImportedTrial, Store, TrialQuery};
+use palpate_tactile::Signals;
+use palpate_tactile::trial::{TrialHeader, TrialId};
+
+/// Trials 1 and 2 simulated (lemon, tomato), 3 to 5 recorded (lemon, cube, unlabelled), 6 imported (mug).
+fn fill(store: &mut Store) {
+    for (seed, name) in [(1, "lemon"), (2, "tomato")] {
+        let mut scene = Scene::default();
+        name.clone_into(&mut scene.object.source);
+        let mut trial = grasp(&scene, scene.load_object().unwrap().as_ref(), seed);
+        trial.header.seed = seed;
+        store.insert(&trial).unwrap();
+    }
+    for object in ["lemon", "cube", ""] {
+        let id = store.begin_board(&TrialHeader::new(object, Scene::default()), &BoardInfo::default()).unwrap();
+        store.finish_board(id, &BoardInfo::default(), &[]).unwrap();
+    }
+    let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 1.0], values: vec![1.0, 2.0] };
+    let (name, label) = ("first".to_owned(), "mug".to_owned());
+    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }]).unwrap();
+    store.labels().set_note(3, "slipped at the end").unwrap();
+}
+
+fn title(name: &str) -> String {
+    catalogue().iter().find(|built_in| built_in.name == name).unwrap().title.clone()
+}
+
+#[test]
+fn the_terminal_lists_and_changes_what_matches() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fill(&mut Store::open(&at.join("trials.sqlite")).unwrap());
+    let list = |filters: &[&str]| -> Vec<i64> {
+        let rows = json(at, &[&["trials", "list", "--json"], filters].concat());
+        rows.as_array().unwrap().iter().map(|row| row["id"].as_i64().unwrap()).collect()
+    };
+    assert_eq!(list(&[]), [1, 2, 3, 4, 5, 6]);
+    assert_eq!((list(&["--object", "Lemon"]), list(&["--label", "mug"])), (vec![1, 3], vec![6]));
+    assert_eq!((list(&["--search", "lemon slipped"]), list(&["--unlabelled"])), (vec![3], vec![5]));
+    assert_eq!((list(&["--source", "serial"]), list(&["--collection", "mine"])), (vec![3, 4, 5], vec![6]));
+    assert_eq!((list(&["--preset", "m"]), list(&["--sensors", "grip"])), (vec![1, 2], vec![6]));
+    assert_eq!((list(&["--until", "yesterday"]), list(&["--since", "today"]).len()), (vec![], 6));
+    assert_eq!(list(&["--sort", "object", "--reverse", "--limit", "2"]), [5, 2]);
+    assert_eq!(list(&["--quality", "unsound"]), [0i64; 0]);
+    let plain = run(at, &["trials", "list", "--search", "tomato", "--limit", "1"]);
+    assert!(plain.out.contains("tomato") && plain.out.lines().count() == 2, "{plain:?}");
+    assert!(run(at, &["trials", "list", "--search", "zebra"]).out.contains("no trial matches"));
+    for (option, value) in [("--since", "soon"), ("--sort", "colour"), ("--flag", "odd"), ("--quality", "fine")] {
+        let ran = run(at, &["trials", "list", option, value]);
+        assert!(ran.code == Some(2) && ran.err.contains(value) && ran.err.contains("choose"), "{ran:?}");
+    }
+    // Many at once, by numbers and by filters; the number of trials is said.
+    let said = |arguments: &[&str]| {
+        let ran = run(at, arguments);
+        assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");
+        (ran.out, ran.err)
+    };
+    let (out, err) = said(&["trials", "tag", "matching", "wet", "late", "--add", "--search", "lemon"]);
+    assert!(out.contains("2 trials tagged wet, late") && err.contains("2 trials match"), "{out}{err}");
+    assert_eq!((list(&["--tag", "wet"]), list(&["--search", "late"])), (vec![1, 3], vec![1, 3]));
+    said(&["trials", "tag", "1-3", "wet", "--remove"]);
+    assert_eq!((list(&["--tag", "wet"]), list(&["--tag", "late"])), (vec![], vec![1, 3]));
+    assert!(said(&["trials", "undo"]).0.contains("undone: trials 1, 3: tags [wet, late] -> [late]"));
+    assert_eq!(list(&["--tag", "wet"]), [1, 3]);
+    // A label leaves simulated and imported trials alone.
+    let (out, _) = said(&["trials", "label", "1,3-6", "tomato"]);
+    assert!(out.contains("3 trials labelled tomato; 2 are simulated or imported and keep their object"), "{out}");
+    assert_eq!(list(&["--object", &title("tomato")]), [2, 3, 4, 5]);
+    assert!(said(&["trials", "undo"]).0.contains("trials 3, 4, 5: label -> tomato"));
+    assert_eq!((list(&["--unlabelled"]), list(&["--object", "cube"])), (vec![5], vec![4]));
+    refused(at, &["trials", "label", "1,6", "ball"], &["only trials of the real gripper"]);
+    said(&["trials", "discard", "2-4", "6"]);
+    assert_eq!((list(&[]), list(&["--discarded"])), (vec![1, 5], vec![2, 3, 4, 6]));
+    said(&["trials", "undo"]);
+    assert_eq!((list(&[]).len(), list(&["--discarded"])), (6, vec![]));
+    said(&["trials", "redo"]);
+    said(&["trials", "restore", "matching", "--object", "lemon"]);
+    assert_eq!(list(&["--deleted"]), [1, 2, 3, 4, 5, 6]);
+    assert_eq!(list(&[]), [1, 3, 5]);
+    said(&["trials", "export", "matching", "--source", "sim", "--out", "csv"]);
+    assert!(at.join("csv/trial_1_lemon.csv").is_file() && !at.join("csv/trial_3_lemon.csv").exists());
+    refused(at, &["trials", "delete", "matching"], &["needs a filter"]);
+    refused(at, &["trials", "delete", "matching", "--object", "zebra"], &["no trial matches"]);
+    assert_eq!(run(at, &["trials", "delete", "9-7"]).code, Some(2));
+}
+
+fn library(size: [f32; 2]) -> Bench {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "library");
+    let mut bench = Bench::new(BenchSetup { panel, size, fill, ..BenchSetup::default() }, CpuRenderer::default());
+    bench.until_shown(true, "Trial 6, mug");
+    bench
+}
+
+/// Rows in the order of the list.
+fn rows(bench: &Bench) -> Vec<String> {
+    let found = bench.harness.query_all_by_label_contains("Trial ");
+    let mut rows: Vec<(f32, String)> = found
+        .filter(|node| node.accesskit_node().role() == Role::Button)
+        .map(|node| (node.rect().top(), node.accesskit_node().label().unwrap_or_default()))
+        .filter(|(_, label)| label.starts_with("Trial "))
+        .collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    rows.into_iter().map(|(_, label)| label.split(',').next().unwrap_or_default().replace("Trial ", "")).collect()
+}
+
+fn until_rows(bench: &mut Bench, wanted: &[&str]) {
+    for _ in 0..2000 {
+        if rows(bench) == wanted {
+            return;
+        }
+        bench.wait();
+    }
+    panic!("{:?}, not {wanted:?}; said: {:?}", rows(bench), bench.workbench().messages());
+}
+
+#[test]
+fn the_panel_finds_sorts_and_selects() {
+    for size in [[300.0, 700.0], [900.0, 600.0]] {
+        let mut bench = library(size);
+        until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
+        bench.harness.get_by_label("Search trials").focus();
+        bench.harness.step();
+        bench.harness.get_by_label("Search trials").type_text("lemon");
+        bench.harness.step();
+        until_rows(&mut bench, &["3", "1"]);
+        bench.until_shown(true, "2 of 6 trials");
+        bench.harness.get_by_label("Clear").click();
+        bench.harness.step();
+        until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
+        bench.harness.get_by_label("unlabelled 1").click();
+        bench.harness.step();
+        until_rows(&mut bench, &["5"]);
+        bench.harness.get_by_label("unlabelled 1").click();
+        bench.harness.step();
+        until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
+        bench.harness.get_by_label("yesterday").click();
+        bench.harness.step();
+        bench.until_shown(true, "No trial matches");
+        bench.harness.get_by_label("Clear").click();
+        bench.harness.step();
+        until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
+        if size[0] > 500.0 {
+            bench.harness.get_by_label("Sort by object").click();
+            bench.harness.step();
+            until_rows(&mut bench, &["1", "3", "6", "4", "2", "5"]);
+            bench.harness.get_by_label("Sort by id").click();
+            bench.harness.step();
+            until_rows(&mut bench, &["1", "2", "3", "4", "5", "6"]);
+        } else {
+            bench.harness.get_by_label("Sort").click();
+            bench.harness.run_steps(3);
+            bench.harness.get_by_label("id").click();
+            bench.harness.step();
+            until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
+        }
+        // A click selects one, with Shift all between, with Ctrl one more.
+        let row = |bench: &mut Bench, name: &str, modifiers: Modifiers| {
+            bench.harness.get_by_label(name).click_modifiers(modifiers);
+            bench.harness.run_steps(2);
+        };
+        row(&mut bench, &format!("Trial 2, {}", title("tomato")), Modifiers::NONE);
+        bench.until_shown(true, "1 selected");
+        row(&mut bench, &format!("Trial 4, {}", title("cube")), Modifiers::SHIFT);
+        bench.until_shown(true, "3 selected");
+        row(&mut bench, "Trial 6, mug", Modifiers::COMMAND);
+        bench.until_shown(true, "4 selected");
+        // Tagged together, and taken back together by another program's undo.
+        bench.tell(LibraryAction::Edit(TrialEdit::Tag(vec!["wet".to_owned()])));
+        bench.until_told("4 trials tagged wet");
+        let tagged = |bench: &Bench| -> Vec<TrialId> {
+            let rows = bench.store().list(false).unwrap();
+            rows.iter().filter(|row| !row.tags.is_empty()).map(|row| row.id).collect()
+        };
+        assert_eq!(tagged(&bench), [2, 3, 4, 6]);
+        bench.store().journal().undo().unwrap();
+        assert_eq!(tagged(&bench), [0i64; 0]);
+        if size[0] < 500.0 {
+            bench.harness.get_by_label("Edit").click();
+            bench.harness.run_steps(3);
+        }
+        bench.harness.get_by_label("Discard").click();
+        bench.until_told("4 trials discarded");
+        until_left(&mut bench);
+    }
+}
+
+/// The trials that were not discarded, in either direction.
+fn until_left(bench: &mut Bench) {
+    bench.until_shown(true, "discarded 4");
+    let mut left = rows(bench);
+    left.sort();
+    assert_eq!(left, ["1", "5"]);
+}
+
+#[test]
+fn what_the_terminal_changes_shows_in_the_window_and_the_other_way_round() {
+    let mut bench = library([900.0, 600.0]);
+    let at = bench.store_folder().to_owned();
+    assert_eq!(run(&at, &["trials", "label", "5", "syringe"]).code, Some(0));
+    bench.until_shown(true, &format!("Trial 5, {}", title("syringe")));
+    assert_eq!(run(&at, &["trials", "discard", "1-3"]).code, Some(0));
+    until_rows(&mut bench, &["6", "5", "4"]);
+    assert_eq!(run(&at, &["trials", "undo"]).code, Some(0));
+    until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
+    bench.tell(LibraryAction::Find(TrialQuery { search: "lemon".to_owned(), ..TrialQuery::default() }));
+    until_rows(&mut bench, &["3", "1"]);
+    bench.tell(LibraryAction::SelectAll);
+    bench.tell(LibraryAction::Edit(TrialEdit::Note("ripe".to_owned())));
+    bench.until_told("2 trials given a note");
+    assert!(run(&at, &["trials", "list", "--search", "ripe"]).out.lines().count() == 3);
+}
+
+#[test]
+fn a_label_from_the_terminal_shows_in_label_mode() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "trials");
+    let setup = BenchSetup { panel, size: [300.0, 400.0], fill, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.until_shown(true, "Trial 5, unlabelled");
+    let at = bench.store_folder().to_owned();
+    assert_eq!(run(&at, &["trials", "label", "5", "syringe"]).code, Some(0));
+    bench.until_shown(true, &format!("Trial 5, {}", title("syringe")));
+}
+
+#[test]
+fn keys_walk_through_the_library_and_open_trials() {
+    let setup = BenchSetup { size: [1400.0, 900.0], fill, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.tell(ViewAction::SetMode(Mode::Inspect));
+    bench.until_shown(true, "Trial 6, mug");
+    let press = |bench: &mut Bench, modifiers: Modifiers, key: Key| {
+        bench.harness.key_press_modifiers(modifiers, key);
+        bench.harness.run_steps(2);
+    };
+    press(&mut bench, Modifiers::NONE, Key::ArrowDown);
+    bench.until_shown(true, "1 selected");
+    press(&mut bench, Modifiers::SHIFT, Key::ArrowDown);
+    press(&mut bench, Modifiers::SHIFT, Key::ArrowDown);
+    bench.until_shown(true, "3 selected");
+    press(&mut bench, Modifiers::COMMAND, Key::A);
+    bench.until_shown(true, "6 selected");
+    press(&mut bench, Modifiers::NONE, Key::Slash);
+    assert!(bench.harness.get_by_label("Search trials").accesskit_node().is_focused());
+    bench.harness.get_by_label("Search trials").type_text("tomato");
+    bench.harness.step();
+    until_rows(&mut bench, &["2"]);
+    press(&mut bench, Modifiers::NONE, Key::Enter);
+    press(&mut bench, Modifiers::NONE, Key::ArrowDown);
+    bench.until_shown(true, "1 selected");
+    press(&mut bench, Modifiers::NONE, Key::Enter);
+    bench.harness.get_by_label("This trial").click();
+    bench.until_shown(true, "Phases");
+    press(&mut bench, Modifiers::NONE, Key::Delete);
+    bench.until_told("1 trial discarded");
+    press(&mut bench, Modifiers::COMMAND, Key::Z);
+    bench.until_told("undone: trial 2: discarded");
+    until_rows(&mut bench, &["2"]);
+}
