@@ -72,6 +72,7 @@
 //! | a gripper | a file in `src/lab/gripper/` that implements [`palpate_lab::gripper::Gripper`] |
 //! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
 //! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
+//! | a file format for trials | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |

@@ -11,6 +11,7 @@
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
+//! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the emulated gripper calibrated and fitted.
@@ -41,6 +42,7 @@ mod cpu_renderer;
 mod desk;
 mod determinism;
 mod emulator;
+mod exports;
 mod files;
 mod fuzz;
 mod golden;
