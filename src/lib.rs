@@ -75,6 +75,7 @@
 //! | an edit of many trials | `src/store/labels/edit.rs` and `src/store/label_repository.rs` |
 //! | a format of exported trials | `src/store/trial_export.rs` |
 //! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
+//! | a file format for trials | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |

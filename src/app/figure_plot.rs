@@ -123,11 +123,12 @@ fn add_series(plot_ui: &mut egui_plot::PlotUi<'_>, plot: &Plot, series: &DataSer
     }
     let width = match series.line {
         LineStyle::None => None,
-        LineStyle::Thin => Some(1.3),
+        LineStyle::Thin | LineStyle::Dashed => Some(1.3),
         LineStyle::Bold => Some(3.5),
     };
     if let Some(width) = width {
-        let line = Line::new(series.name.clone(), places.clone()).color(ink).width(width);
+        let style = if series.line == LineStyle::Dashed { Dashes::dashed_dense() } else { Dashes::Solid };
+        let line = Line::new(series.name.clone(), places.clone()).color(ink).width(width).style(style);
         plot_ui.line(line.allow_hover(false));
     }
     let (shape, filled) = match series.marker {

@@ -11,7 +11,7 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` | look, graphics, time shown |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` | look, graphics, time shown |
 //! | messages | `notices.rs` | messages to the user |
 //! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
@@ -27,6 +27,7 @@
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
 //! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` | panels beside each other; command palette; file dialog inside the window |
 //! | workbench | `workbench.rs` | owner of all features |
+//! | picture | `offscreen.rs` | the window as a picture, without a display |
 //! | window | `mod.rs` | the window |
 //!
 //! | to add | write | and register in |
@@ -40,6 +41,7 @@ mod bars;
 mod channel_curves;
 mod context;
 mod derived;
+mod export;
 mod features;
 mod figure_plot;
 mod files;
@@ -48,6 +50,7 @@ mod icons;
 mod keys;
 mod modes;
 mod notices;
+mod offscreen;
 mod palette;
 mod panels;
 mod path_dialog;
@@ -67,6 +70,7 @@ mod workbench;
 pub use actions::{Action, Actions};
 pub use context::PanelContext;
 pub use derived::Derivation;
+pub use export::{ExportRequest, FileExportError, RunningExport};
 pub use features::files::FileAction;
 pub use features::gripper::GripperAction;
 pub use features::inspect::{ComparedTrace, InspectAction, Inspected, Pinned};
@@ -77,6 +81,7 @@ pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
 pub use features::view::{PathLayer, ViewAction, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
+pub use offscreen::{OffscreenError, OffscreenWindow, window_picture};
 pub use panels::{ALL as ALL_PANELS, PanelKind};
 pub use playback::Seek;
 pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
@@ -88,7 +93,6 @@ use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::listen_to_port;
 use palpate_lab::workers::{GripperCommand, examine_port, explain_scene, fit_trials};
 use palpate_learn::shipped_model;
-use palpate_render::wgpu;
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -120,7 +124,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
             .with_app_id("palpate")
             .with_inner_size(FIRST_SIZE)
             .with_min_inner_size(LEAST_SIZE),
-        wgpu_options: wgpu_options(),
+        wgpu_options: viewport::wgpu_options(),
         event_loop_builder: surroundings.event_loop_hook(),
         ..Default::default()
     };
@@ -153,17 +157,6 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         Ok(Box::new(Window { workbench }))
     });
     eframe::run_native("palpate", native, creator).map_err(|error| surroundings.explain(&error))
-}
-
-/// Requests no more of the graphics driver than the renderer needs.
-fn wgpu_options() -> egui_wgpu::WgpuConfiguration {
-    let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
-    setup.device_descriptor = Arc::new(|adapter| wgpu::DeviceDescriptor {
-        label: Some("palpate window"),
-        required_limits: palpate_render::wanted_limits(adapter),
-        ..Default::default()
-    });
-    egui_wgpu::WgpuConfiguration { wgpu_setup: setup.into(), ..Default::default() }
 }
 
 /// Key of the view state in eframe's storage.

@@ -6,6 +6,7 @@ use palpate_geometry::drawing::DrawList;
 use palpate_lab::picture::PictureView;
 use palpate_render::wgpu;
 use palpate_render::{Blit, Renderer};
+use std::sync::Arc;
 
 /// Renderer and blit, kept by egui between frames.
 #[derive(Debug)]
@@ -25,6 +26,17 @@ impl Viewport {
         };
         state.renderer.write().callback_resources.insert(viewport);
     }
+}
+
+/// Requests no more of the graphics driver than the renderer needs.
+pub(super) fn wgpu_options() -> egui_wgpu::WgpuConfiguration {
+    let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
+    setup.device_descriptor = Arc::new(|adapter| wgpu::DeviceDescriptor {
+        label: Some("palpate window"),
+        required_limits: palpate_render::wanted_limits(adapter),
+        ..Default::default()
+    });
+    egui_wgpu::WgpuConfiguration { wgpu_setup: setup.into(), ..Default::default() }
 }
 
 /// Contents of a picture; while they stay the same nothing is drawn again.

@@ -13,7 +13,10 @@ mod help;
 mod interrupt;
 mod learning;
 mod link;
+mod movie;
+mod output;
 mod plan;
+mod plot;
 mod recognise;
 mod record;
 mod replay;
@@ -77,8 +80,12 @@ enum Command {
     Record(record::RecordArguments),
     /// Replay a stored trial or captured bytes as the live gripper: rows and recognition.
     Replay(replay::ReplayArguments),
-    /// Draw a scene or a stored trial to a PNG file.
+    /// Draw a scene, a stored trial or the whole window to a PNG file, or compare it with a golden one.
     Snapshot(snapshot::SnapshotArguments),
+    /// Draw curves or heat maps of stored trials to an SVG or PNG file.
+    Plot(plot::PlotArguments),
+    /// Write a stored trial as a movie: animated PNG, GIF or a folder of pictures.
+    Movie(movie::MovieArguments),
     /// Explain which effects a scene calls for, and what each costs and changes.
     Scene(scene::SceneCommandArguments),
     /// Show or change the labelling plan: trials wanted and done, and the next one.
@@ -207,6 +214,8 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Record(record)) => record::run(record, store)?,
         Some(Command::Replay(replay)) => replay::run(replay, store)?,
         Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
+        Some(Command::Plot(plot)) => plot::run(plot, store)?,
+        Some(Command::Movie(movie)) => movie::run(movie, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Plan(plan)) => plan::run(plan, store)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,

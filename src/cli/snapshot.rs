@@ -1,12 +1,15 @@
 //! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
 use super::Failure;
-use super::setup::{SceneArguments, read_store};
+use super::output::{check_folder, write_new};
+use super::setup::{SceneArguments, read_store, store_path};
 use super::terminal::say;
+use crate::app::{Mode, OffscreenWindow, window_picture};
 use glam::Vec2;
-use palpate_geometry::drawing::{Camera, DrawList, StandardView};
+use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::prepare;
+use palpate_lab::inspection::{OpenOptions, OpenTrial};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::frame::Frame;
@@ -18,7 +21,10 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   palpate snapshot cube --view front --theme light --out cube.png
   palpate snapshot --trial 1 --at 2.9 --out held.png
-  palpate snapshot ball --ghost --bare --out both.png")]
+  palpate snapshot ball --ghost --bare --out both.png
+  palpate snapshot --panels lemon --at 2.9 --out window.png
+  palpate snapshot --panels --trial 1 --out inspect.png
+  palpate snapshot cube --out now.png --compare golden/cube.png --tolerance 2 --pixels 150")]
 pub(super) struct SnapshotArguments {
     /// Built-in name, a URDF, OBJ or STL file, or `empty` (default: that of the scene).
     object: Option<String>,
@@ -27,15 +33,21 @@ pub(super) struct SnapshotArguments {
     /// Draw this stored trial instead of simulating.
     #[arg(long, value_name = "ID", conflicts_with_all = ["object", "scene"])]
     trial: Option<TrialId>,
-    /// Time to draw, from the start (s).
-    #[arg(long, value_name = "SECONDS", default_value_t = 2.9)]
-    at: f64,
+    /// Time to draw, from the start (s; default: 2.9 s, or the end of a shorter grasp).
+    #[arg(long, value_name = "SECONDS")]
+    at: Option<f64>,
+    /// Draw the whole window, with its panels.
+    #[arg(long, conflicts_with_all = ["view", "ghost", "no_forces", "bare"])]
+    panels: bool,
+    /// Mode of the window: demo, inspect or label (default: inspect with --trial, else demo).
+    #[arg(long, value_name = "NAME", requires = "panels", value_parser = parse_mode)]
+    mode: Option<Mode>,
     /// View: home, front, back, left, right, top or bottom.
     #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
     view: StandardView,
-    /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
-    size: [u32; 2],
+    /// Width and height in pixels (default: 1280x800; a window 1280x820).
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
     /// Theme: dark or light.
     #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
     theme: Theme,
@@ -49,20 +61,43 @@ pub(super) struct SnapshotArguments {
     #[arg(long)]
     bare: bool,
     /// PNG file to write.
-    #[arg(long, value_name = "FILE.png")]
-    out: PathBuf,
+    #[arg(long, value_name = "FILE.png", required_unless_present = "compare")]
+    out: Option<PathBuf>,
+    /// Compare with this PNG file; exit code 1 where they differ. With --out, a picture of the differences is beside it.
+    #[arg(long, value_name = "GOLDEN.png")]
+    compare: Option<PathBuf>,
+    /// Largest difference of a colour channel that does not count, 0 to 255.
+    #[arg(long, value_name = "N", default_value_t = 2, requires = "compare")]
+    tolerance: u8,
+    /// Most pixels that may differ.
+    #[arg(long, value_name = "M", default_value_t = 0, requires = "compare")]
+    pixels: usize,
 }
 
-fn parse_view(text: &str) -> Result<StandardView, String> {
+/// Time that is drawn where none is asked for (s): well within the hold.
+const USUAL_S: f64 = 2.9;
+/// Size of a window where none is asked for (pixels).
+const WINDOW: [u32; 2] = [1280, 820];
+
+fn parse_mode(text: &str) -> Result<Mode, String> {
+    match text {
+        "demo" => Ok(Mode::Demo),
+        "inspect" => Ok(Mode::Inspect),
+        "label" => Ok(Mode::Label),
+        _ => Err("choose demo, inspect or label".to_owned()),
+    }
+}
+
+pub(super) fn parse_view(text: &str) -> Result<StandardView, String> {
     let found = StandardView::ALL.into_iter().find(|view| view.name() == text);
     found.ok_or_else(|| "choose home, front, back, left, right, top or bottom".to_owned())
 }
 
-fn parse_theme(text: &str) -> Result<Theme, String> {
+pub(super) fn parse_theme(text: &str) -> Result<Theme, String> {
     Theme::ALL.into_iter().find(|theme| theme.name() == text).ok_or_else(|| "choose dark or light".to_owned())
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let parsed = || {
         let (width, height) = text.split_once('x')?;
         Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?])
@@ -74,15 +109,129 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 }
 
 pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<(), Failure> {
+    if let Some(out) = &arguments.out {
+        check_folder(out)?;
+    }
+    // Read first: a missing file is known before anything is drawn.
+    let golden = arguments.compare.as_ref().map(|path| golden(path)).transpose()?;
+    let picture = if arguments.panels { window(arguments, store)? } else { scene_picture(arguments, store)? };
+    if let Some(out) = &arguments.out {
+        write_new(out, &picture.to_png()?)?;
+    }
+    if let Some(golden) = golden {
+        compare(arguments, &picture, &golden)?;
+    }
+    arguments.out.as_ref().map_or(Ok(()), |out| say(out.display()))
+}
+
+fn golden(path: &Path) -> Result<Picture, Failure> {
+    let named =
+        |cause: &dyn std::fmt::Display| -> Failure { format!("cannot read \"{}\": {cause}", path.display()).into() };
+    let bytes = std::fs::read(path).map_err(|e| named(&e))?;
+    Picture::from_png(&bytes).map_err(|e| named(&e))
+}
+
+/// Prints how a picture differs from the golden one; an error where it differs too much.
+fn compare(arguments: &SnapshotArguments, picture: &Picture, golden: &Picture) -> Result<(), Failure> {
+    let difference = picture.difference(golden, arguments.tolerance)?;
+    let text = format!(
+        "{} pixels differ by more than {}, the most by {}",
+        difference.pixels, arguments.tolerance, difference.largest
+    );
+    if difference.pixels <= arguments.pixels {
+        return say(text);
+    }
+    let beside = match &arguments.out {
+        Some(out) => {
+            let path = out.with_extension("diff.png");
+            write_new(&path, &difference.picture.to_png()?)?;
+            format!(". See \"{}\"", path.display())
+        }
+        None => ". --out FILE.png writes the picture, and one of the differences beside it".to_owned(),
+    };
+    Err(format!("{text}; {} may{beside}", arguments.pixels).into())
+}
+
+/// The whole window. The store of the user is only opened where it is shown.
+fn window(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<Picture, Failure> {
+    let inspect = if arguments.trial.is_some() { Mode::Inspect } else { Mode::Demo };
+    let mode = arguments.mode.unwrap_or(inspect);
+    if arguments.trial.is_some() && mode != Mode::Inspect {
+        return Err("--trial opens in mode inspect; leave out --mode, or the trial".into());
+    }
+    let mut scene = arguments.scene.scene(arguments.object.as_deref())?;
+    let mut at_s = arguments.at.unwrap_or(USUAL_S);
+    match arguments.trial {
+        Some(id) => {
+            let trial = OpenTrial::open(&read_store(store)?, id, &OpenOptions::default())?;
+            scene = trial.header.scene.clone();
+            at_s = chosen_time(arguments.at, trial.span_s()[1], &format!("trial {id}"))?;
+        }
+        None if mode == Mode::Demo => {
+            at_s = chosen_time(arguments.at, scene.timing.duration_s, "the grasp")?;
+        }
+        None => {}
+    }
+    // Panels must not leave a store behind, and the simulation nothing in one.
+    let empty = tempfile_folder()?;
+    let path = store_path(store)?;
+    let shown = if mode == Mode::Demo || !path.exists() { empty.path().join("trials.sqlite") } else { path };
+    let size = arguments.size.unwrap_or(WINDOW);
+    let (theme, trial) = (arguments.theme, arguments.trial);
+    Ok(window_picture(&OffscreenWindow { scene, store: shown, mode, theme, size, trial, at_s })?)
+}
+
+/// Time to draw: the one asked for, which must be before the end, or the usual one.
+fn chosen_time(asked: Option<f64>, end_s: f64, what: &str) -> Result<f64, Failure> {
+    match asked {
+        Some(at) if at > end_s + SAMPLE_S => {
+            Err(format!("--at {at} is beyond the end: {what} lasts {end_s:.2} s").into())
+        }
+        Some(at) if at < 0.0 || at.is_nan() => {
+            Err(format!("--at {at} is before the start; {what} lasts {end_s:.2} s").into())
+        }
+        Some(at) => Ok(at),
+        None => Ok(USUAL_S.min(end_s)),
+    }
+}
+
+/// About a sample: the last one is a little before the end.
+const SAMPLE_S: f64 = 0.02;
+
+/// A folder in the system's place for temporary files, which is removed at the end.
+struct TemporaryFolder(PathBuf);
+
+impl TemporaryFolder {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        // The system removes what is left behind.
+        let _gone = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn tempfile_folder() -> Result<TemporaryFolder, Failure> {
+    let path = std::env::temp_dir().join(format!("palpate-window-{}", std::process::id()));
+    std::fs::create_dir_all(&path)?;
+    Ok(TemporaryFolder(path))
+}
+
+/// The 3-D view alone.
+fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<Picture, Failure> {
     let (stage, frame, badge) = match arguments.trial {
         Some(id) => stored(arguments, store, id)?,
         None => simulated(arguments, Engine::Own)?,
     };
     let ghost = if arguments.ghost { Some(simulated(arguments, Engine::Other)?.1) } else { None };
+    let size = arguments.size.unwrap_or([1280, 800]);
     let view = PictureView {
         camera: Camera::default().turned_to(arguments.view),
         theme: arguments.theme,
-        size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
+        size: Vec2::new(size[0] as f32, size[1] as f32),
         forces: !arguments.no_forces,
         annotations: !arguments.bare,
         badge: Some(badge).filter(|_| !arguments.bare),
@@ -94,16 +243,9 @@ pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result
     if let Some(ghost) = &ghost {
         list.ghosts = stage.ghosts(ghost, view.theme);
     }
-    draw(&list, arguments.size, &arguments.out)?;
-    say(arguments.out.display())
-}
-
-/// Draws a list off-screen and writes it.
-fn draw(list: &DrawList, size: [u32; 2], out: &Path) -> Result<(), Failure> {
     let gpu = Gpu::headless(DriverChoice::Any)?;
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    Picture::draw(&gpu, &mut renderer, list, size, 1.0)?.save(out)?;
-    Ok(())
+    Ok(Picture::draw(&gpu, &mut renderer, &list, size, 1.0)?)
 }
 
 /// Engine to simulate with: that of the scene, or the other one.
@@ -119,11 +261,12 @@ fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Fr
     if engine == Engine::Other {
         scene.solver.engine = scene.solver.engine.other();
     }
+    let at_s = chosen_time(arguments.at, scene.timing.duration_s, "the grasp")?;
     let object = scene.load_object()?;
     let mut run = prepare(&scene, object.as_ref(), 0);
     let stage = Stage::new(&scene, object.as_ref(), run.begun().data.world_from_gripper);
     let mut frame = run.gripper_mut().run_mut().first_look();
-    while frame.t < arguments.at {
+    while frame.t < at_s {
         match run.next_frame() {
             Some(next) => frame = next.clone(),
             None => break,
@@ -145,7 +288,8 @@ fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> R
     let object = scene.load_object()?;
     let stage = Stage::new(scene, object.as_ref(), trial.data.world_from_gripper);
     let frames = trial.frames();
-    let frame = frames.iter().rfind(|f| f.t <= arguments.at).or(frames.first());
+    let at_s = chosen_time(arguments.at, frames.last().map_or(0.0, |frame| frame.t), &format!("trial {id}"))?;
+    let frame = frames.iter().rfind(|f| f.t <= at_s + 1e-9).or(frames.first());
     let frame = frame.cloned().ok_or_else(|| format!("trial {id} has no samples"))?;
     Ok((stage, frame, format!("TRIAL {id}, SIMULATED")))
 }

@@ -1,5 +1,6 @@
 //! `palpate trials`: manages the store of trials.
 
+mod exchange;
 mod labels;
 mod selection;
 mod show;
@@ -8,10 +9,10 @@ use super::Failure;
 use super::setup::{existing_store, open_store, read_store};
 use super::terminal::{note, say, say_json, table, warn};
 use labels::LabelCommand;
+use palpate_lab::datasets::SensorView;
+use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
-use palpate_store::{
-    Library, Shown, Store, TrialColumn, TrialFormat, TrialOrder, TrialQuery, TrialRow, export_trial, read_trials_csv,
-};
+use palpate_store::{Library, Shown, Store, TrialColumn, TrialFormat, TrialOrder, TrialQuery, TrialRow, export_trial};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{PressureArea, SensorLayout};
 use selection::{Filters, Numbers, chosen};
@@ -24,6 +25,8 @@ use std::path::{Path, PathBuf};
   palpate trials list --object lemon --since yesterday --quality sound
   palpate trials show 1
   palpate trials export 1 2 3 --out csv/
+  palpate trials export 1 2 3 --out grasps.mcap
+  palpate trials import grasps.mcap
   palpate trials label 7 lemon
   palpate trials tag matching wet --add --search slipped
   palpate trials discard 7-9
@@ -71,7 +74,8 @@ enum TrialsCommand {
     },
     #[command(flatten)]
     Labels(LabelCommand),
-    /// Export trials as CSV files; with --labelled, all labelled trials of the real gripper as a data set.
+    /// Export trials as CSV files, or into one file of other programs: .mcap (ROS 2, Foxglove, PlotJuggler), .npz (numpy) or
+    /// .parquet (where built with it); with --labelled, all labelled trials of the real gripper as a data set.
     Export {
         /// Trial numbers: 7, 3,7-9, or `matching` with filters.
         #[arg(required_unless_present = "labelled", value_name = "TRIALS")]
@@ -82,7 +86,7 @@ enum TrialsCommand {
         /// import`) and raw/ (counts and bytes).
         #[arg(long, conflicts_with_all = ["ids", "layout", "hull", "unsound"])]
         labelled: bool,
-        /// Folder, or file for a single trial.
+        /// Folder, CSV file for a single trial, or a file of another format for any number.
         #[arg(long, value_name = "PATH")]
         out: PathBuf,
         /// Sensor layout: C1 to C8, each also with force, as C1+F.
@@ -94,12 +98,18 @@ enum TrialsCommand {
         /// Include trials that diverged, did not converge or did not come to rest.
         #[arg(long)]
         unsound: bool,
+        /// Recognition model whose answers .mcap and .npz files hold (default: the shipped one).
+        #[arg(long, value_name = "FILE", conflicts_with = "labelled")]
+        model: Option<PathBuf>,
     },
-    /// Import grasps from CSV files with the columns trial, label, t_s and any channels.
+    /// Import grasps from CSV files with the columns trial, label, t_s and any channels, or from MCAP files.
     Import {
-        /// CSV files. Optional columns for stage one: size (tiny, large), shape (cubic, cylindrical, spherical).
+        /// CSV or MCAP files. Optional columns for stage one: size (tiny, large), shape (cubic, cylindrical, spherical).
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
+        /// Object of MCAP files that other programs wrote (default: the name of the file).
+        #[arg(long, value_name = "NAME")]
+        label: Option<String>,
     },
     /// Copy trials from other stores into this one, without duplicates.
     Merge {
@@ -155,15 +165,19 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
         TrialsCommand::Export { labelled: true, out, .. } => labels::export(&store, out),
-        TrialsCommand::Export { ids, filters, out, layout, hull, unsound, .. } => {
+        TrialsCommand::Export { ids, filters, out, layout, hull, unsound, model, .. } => {
             let ids = &chosen(&store, ids, filters, Shown::Kept)?;
             let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
+            if let Some(format) = ExchangeFormat::of(out) {
+                let sensors = SensorView { layout: layout.clone(), area, ..SensorView::default() };
+                return exchange::export(&store, (&ids, format), (out, model.as_deref()), sensors);
+            }
             export(&store, &ids, out, &SensorLayout::named(layout)?, area)
         }
-        TrialsCommand::Import { files } => {
+        TrialsCommand::Import { files, label } => {
             for file in files {
-                import(&mut store, file)?;
+                import(&mut store, file, label.as_deref())?;
             }
             Ok(())
         }
@@ -191,8 +205,8 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
 
 const NONE_YET: &str = "no trials yet: `palpate grasp lemon` records one";
 
-fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
-    let import = read_trials_csv(file)?;
+fn import(store: &mut Store, file: &Path, label: Option<&str>) -> Result<(), Failure> {
+    let import = exchange::read(file, label)?;
     for warning in &import.warnings {
         warn(warning);
     }

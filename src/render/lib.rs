@@ -16,6 +16,8 @@
 //! | 3 | `passes` | one file for each kind of item, beside its shader of the same name |
 //! | 4 | `renderer` | draws a list into its own texture ([`Renderer`]) |
 //! | 5 | `picture` | pixels in memory, PNG ([`Picture`]) |
+//! | 6 | `difference` | how two pictures differ ([`Picture::difference`]) |
+//! | 6 | `movie` | pictures one after the other as animated PNG or GIF ([`MovieWriter`]) |
 //! | 6 | `figure` | figures with axes as SVG and as pixels ([`figure_svg`], [`figure_picture`]), without a graphics card |
 //!
 //! # Example
@@ -33,9 +35,11 @@
 //! ```
 
 mod blit;
+mod difference;
 mod figure;
 mod frame;
 mod gpu;
+mod movie;
 mod passes;
 mod picture;
 mod renderer;
@@ -45,8 +49,10 @@ mod targets;
 mod text;
 
 pub use blit::Blit;
+pub use difference::{PictureDifference, SizeMismatch};
 pub use figure::{FigureError, figure_picture, figure_svg};
 pub use gpu::{DriverChoice, Gpu, GpuError, describe_adapter, wanted_limits};
+pub use movie::{MovieError, MovieFormat, MovieWriter};
 pub use picture::{Picture, PictureError};
 pub use renderer::Renderer;
 pub use shaders::all_shaders;

@@ -24,6 +24,12 @@ pub enum PictureError {
         /// Message of the driver.
         cause: String,
     },
+    /// The picture could not be packed.
+    #[error("the picture cannot be written as PNG: {cause}")]
+    Encode {
+        /// Message of the encoder.
+        cause: String,
+    },
     /// The bytes are no picture.
     #[error("these bytes are not a PNG picture: {cause}")]
     Decode {
@@ -51,11 +57,23 @@ impl Picture {
     ) -> Result<Self, PictureError> {
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         renderer.render(&gpu.device, &gpu.queue, &mut encoder, list, size, pixels_per_point);
+        let (texture, _) =
+            renderer.picture_texture().ok_or_else(|| PictureError::Device { cause: "nothing was drawn".to_owned() })?;
+        Self::read_back(&gpu.device, &gpu.queue, encoder, texture)
+    }
+
+    /// Runs the commands and reads a texture back that they draw. It holds RGBA or BGRA, eight bits each.
+    pub fn read_back(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        mut encoder: wgpu::CommandEncoder,
+        texture: &wgpu::Texture,
+    ) -> Result<Self, PictureError> {
         let fault = |cause: &dyn std::fmt::Display| PictureError::Device { cause: cause.to_string() };
-        let (texture, [width, height]) = renderer.picture_texture().ok_or_else(|| fault(&"nothing was drawn"))?;
+        let (width, height) = (texture.width(), texture.height());
         // Rows of a copy start at multiples of 256 bytes.
         let row = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("read back"),
             size: u64::from(row) * u64::from(height),
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
@@ -73,20 +91,24 @@ impl Picture {
             },
             texture.size(),
         );
-        gpu.queue.submit([encoder.finish()]);
+        queue.submit([encoder.finish()]);
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.slice(..).map_async(wgpu::MapMode::Read, move |outcome| {
             // The receiver waits below; it is gone only if this function has returned with an error.
             let _received = sender.send(outcome);
         });
-        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| fault(&e))?;
+        device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| fault(&e))?;
         match receiver.recv() {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(fault(&error)),
             Err(error) => return Err(fault(&error)),
         }
         let mapped = buffer.slice(..).get_mapped_range().map_err(|e| fault(&e))?;
-        let rgba = mapped.chunks_exact(row as usize).flat_map(|r| &r[..width as usize * 4]).copied().collect();
+        let mut rgba: Vec<u8> =
+            mapped.chunks_exact(row as usize).flat_map(|r| &r[..width as usize * 4]).copied().collect();
+        if matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb) {
+            rgba.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
+        }
         Ok(Self { width, height, rgba })
     }
 
@@ -95,6 +117,15 @@ impl Picture {
         let decoded = image::load_from_memory_with_format(bytes, image::ImageFormat::Png);
         let pixels = decoded.map_err(|e| PictureError::Decode { cause: e.to_string() })?.into_rgba8();
         Ok(Self { width: pixels.width(), height: pixels.height(), rgba: pixels.into_raw() })
+    }
+
+    /// The bytes of a PNG file.
+    pub fn to_png(&self) -> Result<Vec<u8>, PictureError> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let (format, colours) = (image::ImageFormat::Png, image::ColorType::Rgba8);
+        image::write_buffer_with_format(&mut bytes, &self.rgba, self.width, self.height, colours, format)
+            .map_err(|cause| PictureError::Encode { cause: cause.to_string() })?;
+        Ok(bytes.into_inner())
     }
 
     /// Writes a PNG file, making its folder where it does not exist.

@@ -11,6 +11,7 @@
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
+//! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `library`: all trials found and changed, in the window and on the command line.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
@@ -42,6 +43,7 @@ mod cpu_renderer;
 mod desk;
 mod determinism;
 mod emulator;
+mod exports;
 mod files;
 mod fuzz;
 mod golden;

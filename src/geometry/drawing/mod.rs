@@ -3,13 +3,15 @@
 //! World coordinates in metres, z up. Overlay coordinates in points from the top left corner; a point is a pixel on an
 //! ordinary screen.
 
+mod axis;
 mod camera;
 mod figure;
 mod heat_map;
 mod overlay;
 
+pub use axis::PlotAxis;
 pub use camera::{Camera, StandardView};
-pub use figure::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
+pub use figure::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, ReferenceLine, SpreadBand};
 pub use heat_map::{CellAxis, ColourScale, HeatMap};
 pub use overlay::{Align, Overlay, Shape2};
 

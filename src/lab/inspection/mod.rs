@@ -2,12 +2,14 @@
 //! phases of the grasp, and what the recogniser answered.
 
 mod comparison;
+mod figures;
 mod open_trial;
 mod phases;
 #[cfg(test)]
 pub(crate) mod test_trials;
 
 pub use comparison::{Alignment, MeanColumn, MeanTrial};
+pub use figures::{FigureDataError, FigureOptions, HeatKind, caption, comparison_figure, scene_hash};
 pub use open_trial::{Column, Instant, OpenOptions, OpenTrial, OpenTrialError};
 pub(crate) use phases::onset;
 pub use phases::{PhaseSpan, TouchPhase, phases_of_frames};

@@ -4,8 +4,8 @@ use super::FigureError;
 use palpate_geometry::drawing::{Align, Marker};
 use palpate_geometry::palette::{Rgb, Theme, ThemeColours};
 use plotters::prelude::{DrawingBackend, FontStyle, IntoFont, RGBColor, ShapeStyle, TextStyle};
-use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color as _, register_font};
 use std::fmt::Display;
 
 /// Units of a backend's grid per point.
@@ -20,13 +20,15 @@ pub(super) struct TextMetrics {
     per_em: f64,
     /// Depth of the baseline below the top of a text, as a share of its font size.
     baseline: f64,
+    /// Whether lines through many points are one element.
+    polylines: bool,
 }
 
 impl TextMetrics {
     /// plotters-svg writes an em of the size over 1.24, 0.76 em below the top.
-    pub(super) const SVG: Self = Self { per_em: 1.24, baseline: 0.76 / 1.24 };
+    pub(super) const SVG: Self = Self { per_em: 1.24, baseline: 0.76 / 1.24, polylines: true };
     /// ab_glyph scales by ascent plus descent, and plotters draws the baseline at half the size.
-    pub(super) const BITMAP: Self = Self { per_em: 1.15, baseline: 0.5 };
+    pub(super) const BITMAP: Self = Self { per_em: 1.15, baseline: 0.5, polylines: false };
 }
 
 /// A text to be drawn.
@@ -81,6 +83,20 @@ impl<B: DrawingBackend> Canvas<B> {
             }
         }
         Ok(())
+    }
+
+    /// A line through many points.
+    pub(super) fn curve(&mut self, points: &[[f64; 2]], width: f64, colour: Rgb) -> Result<(), FigureError> {
+        if !self.text.polylines || points.len() < 2 {
+            return self.path(points, width, colour);
+        }
+        self.backend.draw_path(points.iter().copied().map(grid), &style(colour, width)).map_err(failed)
+    }
+
+    /// A polygon, filled with a translucent colour.
+    pub(super) fn veil(&mut self, outline: &[[f64; 2]], colour: Rgb, opacity: f64) -> Result<(), FigureError> {
+        let style = style(colour, 1.0).color.mix(opacity);
+        self.backend.fill_polygon(outline.iter().copied().map(grid), &style).map_err(failed)
     }
 
     pub(super) fn rectangle(&mut self, [low, high]: [[f64; 2]; 2], colour: Rgb) -> Result<(), FigureError> {

@@ -1,17 +1,17 @@
 //! Layout of a figure: title, plots beside each other, each with its legend and axes, and the note.
 
 use super::FigureError;
+use super::areas::{bar_room, draw_band, draw_bar, draw_cells};
 use super::canvas::{Canvas, Text};
+use super::frame::{Frame, SMALL};
 use super::labels::{Box2, NEAR, Wanted, place};
 use palpate_geometry::drawing::{Align, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
-use palpate_geometry::palette::series_colour;
+use palpate_geometry::palette::{Rgb, series_colour};
 use plotters::prelude::DrawingBackend;
-use std::ops::RangeInclusive;
 
 /// Sizes of text (points per em).
 const TITLE: f64 = 15.0;
 const PLOT_TITLE: f64 = 13.0;
-const SMALL: f64 = 11.0;
 /// Margin of the figure and room between plots (points).
 const MARGIN: f64 = 14.0;
 const BETWEEN: f64 = 26.0;
@@ -112,43 +112,29 @@ fn draw_plot<B: DrawingBackend>(
     y += 7.0;
 
     let [x_bounds, y_bounds] = plot.bounds();
-    let y_marks = plot.y.marks(&y_bounds);
+    let y_marks = plot.y_marks(&y_bounds);
     let widths = y_marks.iter().map(|(_, mark)| canvas.width(mark, SMALL)).collect::<Result<Vec<f64>, _>>()?;
+    let axes_right = right - bar_room(canvas, plot)?;
     let axis = left + widths.into_iter().fold(0.0, f64::max) + 6.0;
     let low = bottom - 2.0 * LINE - 6.0;
-    if axis + 10.0 > right || y + 10.0 > low {
+    if axis + 10.0 > axes_right || y + 10.0 > low {
         return Ok(()); // too small for axes
     }
-    let frame = Frame { room: [[axis, y], [right, low]], x: x_bounds, y: y_bounds };
+    let frame = Frame { room: [[axis, y], [axes_right, low]], x: x_bounds, y: y_bounds };
+    if let Some(heat) = &plot.heat {
+        draw_cells(canvas, plot, &frame, heat)?;
+        draw_bar(canvas, heat, [[axes_right, y], [right, low]])?;
+    }
     draw_axes(canvas, plot, &frame, &y_marks)?;
-    let middle = [0.5 * (axis + right), bottom];
+    for band in &plot.bands {
+        draw_band(canvas, plot, &frame, band)?;
+    }
+    let middle = [0.5 * (axis + axes_right), bottom];
     canvas.text(&Text { text: &plot.x.title, at: middle, align: Align::Centre, size: SMALL, colour: quiet })?;
     for series in &plot.series {
         draw_series(canvas, plot, &frame, series)?;
     }
     draw_labels(canvas, plot, &frame)
-}
-
-/// Axes on the page.
-struct Frame {
-    room: Box2,
-    x: RangeInclusive<f64>,
-    y: RangeInclusive<f64>,
-}
-
-impl Frame {
-    /// Place of coordinates on the page.
-    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let share = |range: &RangeInclusive<f64>, c: f64| (c - range.start()) / (range.end() - range.start());
-        let [low, high] = self.room;
-        [low[0] + share(&self.x, x) * (high[0] - low[0]), high[1] - share(&self.y, y) * (high[1] - low[1])]
-    }
-
-    /// Place of values of a plot; `None` outside of the axes.
-    fn of(&self, plot: &Plot, at: [f64; 2]) -> Option<[f64; 2]> {
-        let place = plot.place(at)?;
-        (self.x.contains(&place[0]) && self.y.contains(&place[1])).then(|| self.at(place))
-    }
 }
 
 fn draw_axes<B: DrawingBackend>(
@@ -167,7 +153,8 @@ fn draw_axes<B: DrawingBackend>(
             canvas.path(&[[x, bottom], [x, bottom + 3.0]], 0.75, border)?;
             continue;
         }
-        canvas.path(&[[x, top], [x, bottom]], 0.5, faint)?;
+        let end = if plot.heat.is_some() { bottom + 3.0 } else { top };
+        canvas.path(&[[x, end], [x, bottom]], 0.5, faint)?;
         let half = 0.5 * canvas.width(&mark, SMALL)?;
         if x - half > last_end {
             let at = [x, bottom + LINE];
@@ -181,7 +168,8 @@ fn draw_axes<B: DrawingBackend>(
             canvas.path(&[[left - 3.0, y], [left, y]], 0.75, border)?;
             continue;
         }
-        canvas.path(&[[left, y], [right, y]], 0.5, faint)?;
+        let end = if plot.heat.is_some() { left - 3.0 } else { right };
+        canvas.path(&[[left, y], [end, y]], 0.5, faint)?;
         let at = [left - 6.0, y + 0.34 * SMALL];
         canvas.text(&Text { text: mark, at, align: Align::Right, size: SMALL, colour: quiet })?;
     }
@@ -196,12 +184,12 @@ fn draw_axes<B: DrawingBackend>(
         let (x_first, y_first) = (*frame.x.start(), *frame.y.start());
         if line.horizontal {
             let [_, y] = frame.at([x_first, at]);
-            dashes(canvas, [left, y], [right, y])?;
+            dashes(canvas, &[[left, y], [right, y]], REFERENCE_DASHES, quiet)?;
             let at = [right - 2.0, y - 4.0];
             canvas.text(&Text { text: &line.text, at, align: Align::Right, size: SMALL, colour: quiet })?;
         } else {
             let [x, _] = frame.at([at, y_first]);
-            dashes(canvas, [x, top], [x, bottom])?;
+            dashes(canvas, &[[x, top], [x, bottom]], REFERENCE_DASHES, quiet)?;
             let fits = x + 4.0 + canvas.width(&line.text, SMALL)? <= right;
             let (align, x) = if fits { (Align::Left, x + 4.0) } else { (Align::Right, x - 4.0) };
             canvas.text(&Text { text: &line.text, at: [x, top + SMALL], align, size: SMALL, colour: quiet })?;
@@ -210,28 +198,66 @@ fn draw_axes<B: DrawingBackend>(
     Ok(())
 }
 
-/// A dashed line, level or upright.
-fn dashes<B: DrawingBackend>(canvas: &mut Canvas<B>, from: [f64; 2], to: [f64; 2]) -> Result<(), FigureError> {
-    const DASH: f64 = 5.0;
-    const GAP: f64 = 4.0;
-    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-    let colour = canvas.colours.quiet_text;
-    let at = |s: f64| [0, 1].map(|k| from[k] + (to[k] - from[k]) * (s / length));
-    let mut s = 0.0;
-    while s < length {
-        canvas.path(&[at(s), at((s + DASH).min(length))], 0.9, colour)?;
-        s += DASH + GAP;
+/// A dashed line through points. Curves have longer dashes than reference lines.
+fn dashes<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    points: &[[f64; 2]],
+    ([dash, gap], width): ([f64; 2], f64),
+    colour: Rgb,
+) -> Result<(), FigureError> {
+    let mut piece: Vec<[f64; 2]> = points.first().copied().into_iter().collect();
+    // Length left of the dash or gap that is being drawn.
+    let (mut drawn, mut left) = (true, dash);
+    for pair in points.windows(2) {
+        let [mut from, to] = [pair[0], pair[1]];
+        let mut length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        while length >= left {
+            from = [0, 1].map(|k| from[k] + (to[k] - from[k]) * (left / length));
+            length -= left;
+            piece.push(from);
+            if drawn {
+                canvas.curve(&piece, width, colour)?;
+            }
+            piece = vec![from];
+            drawn = !drawn;
+            left = if drawn { dash } else { gap };
+        }
+        left -= length;
+        piece.push(to);
     }
-    Ok(())
+    if drawn { canvas.curve(&piece, width, colour) } else { Ok(()) }
 }
+
+/// Lengths of a dash and of a gap, and the width, of a reference line.
+const REFERENCE_DASHES: ([f64; 2], f64) = ([5.0, 4.0], 0.9);
+/// The same of a dashed curve.
+const CURVE_DASHES: ([f64; 2], f64) = ([7.0, 4.0], 1.25);
 
 fn line_width(line: LineStyle) -> Option<f64> {
     match line {
         LineStyle::None => None,
-        LineStyle::Thin => Some(1.25),
+        LineStyle::Thin | LineStyle::Dashed => Some(CURVE_DASHES.1),
         LineStyle::Bold => Some(3.0),
     }
 }
+
+fn draw_line<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    points: &[[f64; 2]],
+    line: LineStyle,
+    colour: Rgb,
+) -> Result<(), FigureError> {
+    match (line, line_width(line)) {
+        (LineStyle::Dashed, _) => dashes(canvas, points, CURVE_DASHES, colour),
+        // Round corners cost an element each, so that only short lines have them.
+        (_, Some(width)) if points.len() > MANY => canvas.curve(points, width, colour),
+        (_, Some(width)) => canvas.path(points, width, colour),
+        (_, None) => Ok(()),
+    }
+}
+
+/// Points from which on a line is drawn in one piece.
+const MANY: usize = 40;
 
 /// Line and marker of a series in the legend.
 fn draw_sample<B: DrawingBackend>(
@@ -240,9 +266,7 @@ fn draw_sample<B: DrawingBackend>(
     [x, y]: [f64; 2],
 ) -> Result<(), FigureError> {
     let colour = series_colour(series.colour, canvas.theme);
-    if let Some(width) = line_width(series.line) {
-        canvas.path(&[[x, y], [x + SAMPLE, y]], width, colour)?;
-    }
+    draw_line(canvas, &[[x, y], [x + SAMPLE, y]], series.line, colour)?;
     canvas.marker(series.marker, [x + 0.5 * SAMPLE, y], RADIUS, colour)
 }
 
@@ -265,11 +289,15 @@ fn draw_series<B: DrawingBackend>(
             canvas.path(&[low, high], 1.0, spread_colour)?;
         }
     }
-    let places: Vec<[f64; 2]> = series.points.iter().filter_map(|point| frame.of(plot, point.at)).collect();
-    if let Some(width) = line_width(series.line) {
-        canvas.path(&places, width, colour)?;
+    // A point without a number interrupts the line.
+    for run in series.points.split(|point| point.at.iter().any(|c| c.is_nan())) {
+        let places: Vec<[f64; 2]> = run.iter().filter_map(|point| frame.of(plot, point.at)).collect();
+        draw_line(canvas, &places, series.line, colour)?;
     }
-    for place in places {
+    if series.marker == Marker::None {
+        return Ok(());
+    }
+    for place in series.points.iter().filter_map(|point| frame.of(plot, point.at)) {
         canvas.marker(series.marker, place, RADIUS, colour)?;
     }
     Ok(())

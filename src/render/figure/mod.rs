@@ -3,7 +3,9 @@
 //! Both are drawn from the same layout on a grid of quarter points. Text uses the font that the window ships, so that no
 //! font has to be installed; an SVG names it, and falls back to a usual one.
 
+mod areas;
 mod canvas;
+mod frame;
 mod labels;
 mod layout;
 
@@ -69,7 +71,10 @@ fn halved(fine: &[u8], width: usize, height: usize) -> Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_geometry::drawing::{DataPoint, DataSeries, LineStyle, Marker, Plot, PlotAxis};
+    use palpate_geometry::drawing::{
+        CellAxis, ColourScale, DataPoint, DataSeries, HeatMap, LineStyle, Marker, Plot, PlotAxis, SpreadBand,
+    };
+    use palpate_geometry::palette::Rgb;
 
     fn figure() -> Figure {
         let points = (0..5).map(|n| DataPoint { label: format!("point {n}"), ..DataPoint::new(10f64.powi(n), 1.0) });
@@ -85,7 +90,7 @@ mod tests {
             x: PlotAxis::logarithmic("cost (ms)"),
             y: PlotAxis::linear("error"),
             series: vec![series],
-            references: Vec::new(),
+            ..Plot::default()
         };
         Figure { title: "Two plots".to_owned(), plots: vec![plot.clone(), plot], columns: 0, note: "a note".to_owned() }
     }
@@ -112,6 +117,58 @@ mod tests {
             assert!(count(theme.colours().background) > 500_000);
             assert!(count(palpate_geometry::palette::series_colour(0, theme)) > 2000);
         }
+        Ok(())
+    }
+
+    #[test]
+    fn cells_fill_the_axes_in_the_colours_of_their_values() -> Result<(), FigureError> {
+        let axis = |name: &str, count: usize, range: [f64; 2]| CellAxis {
+            name: name.to_owned(),
+            unit: String::new(),
+            count,
+            range,
+        };
+        let heat = HeatMap {
+            title: "left".to_owned(),
+            quantity: "pressure".to_owned(),
+            unit: "kPa".to_owned(),
+            x: axis("time", 3, [0.0, 3.0]),
+            y: axis("row", 2, [0.5, 2.5]),
+            values: vec![0.5, 0.7, 1.0, 1.0, f32::NAN, 0.5],
+            scale: ColourScale::Load(1.0),
+        };
+        let figure = Figure { plots: vec![Plot::of_heat_map(heat.clone())], ..Figure::default() };
+        for theme in Theme::ALL {
+            let picture = figure_picture(&figure, theme, [400, 200])?;
+            let places = |wanted: Option<Rgb>| {
+                let Rgb(r, g, b) = wanted.expect("a colour");
+                let found = picture.rgba.chunks_exact(4).enumerate().filter(move |(_, p)| p[..3] == [r, g, b]);
+                found.map(|(place, _)| place / picture.width as usize).collect::<Vec<usize>>()
+            };
+            let [middle, bright] = [0.5, 1.0].map(|value| places(heat.scale.colour(value)));
+            assert!(middle.len() > 5000 && bright.len() > 5000, "{} {}", middle.len(), bright.len());
+            assert!(middle.len().abs_diff(bright.len()) < middle.len() / 10, "two cells each");
+            // Only the first row has a value of 0.7, and it is the upper one.
+            let upper = places(heat.scale.colour(0.7));
+            assert!(upper.iter().max() < bright.iter().max(), "rows count down");
+        }
+        assert!(figure_svg(&figure, Theme::Light, [400, 200])?.contains("pressure (kPa)"));
+        Ok(())
+    }
+
+    #[test]
+    fn a_line_ends_where_a_number_is_missing_and_a_band_is_filled() -> Result<(), FigureError> {
+        let points = (0..90).map(|n| DataPoint::new(f64::from(n), if n == 45 { f64::NAN } else { 1.0 }));
+        let series = DataSeries { line: LineStyle::Thin, points: points.collect(), ..DataSeries::default() };
+        let dashed = DataSeries { line: LineStyle::Dashed, colour: 1, ..series.clone() };
+        let band = SpreadBand { colour: 2, points: (0..9).map(|n| [f64::from(n), 0.0, 2.0]).collect() };
+        let count = |plot: Plot, tag: &str| -> Result<usize, FigureError> {
+            let figure = Figure { plots: vec![plot], ..Figure::default() };
+            Ok(figure_svg(&figure, Theme::Dark, [600, 300])?.matches(tag).count())
+        };
+        assert_eq!(count(Plot { series: vec![series], ..Plot::default() }, "<polyline")?, 2);
+        assert!(count(Plot { series: vec![dashed], ..Plot::default() }, "<polyline")? > 20);
+        assert_eq!(count(Plot { bands: vec![band], ..Plot::default() }, "<polygon")?, 1);
         Ok(())
     }
 

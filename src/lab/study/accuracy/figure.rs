@@ -53,6 +53,7 @@ pub fn accuracy_plot(study: &AccuracyStudy, group: SceneGroup) -> Plot {
         y: PlotAxis::logarithmic("error of curvature (1/m)"),
         references: floor.into_iter().collect(),
         series,
+        ..Plot::default()
     }
 }
 
@@ -92,8 +93,8 @@ fn by_kind(study: &AccuracyStudy) -> Plot {
         title: "Tolerances by kind of object".to_owned(),
         x: PlotAxis::logarithmic("CPU time of a grasp of 4 s (ms)"),
         y: PlotAxis::logarithmic("error of curvature (1/m)"),
-        references: Vec::new(),
         series: series.filter(|series| !series.points.is_empty()).collect(),
+        ..Plot::default()
     }
 }
 
@@ -137,6 +138,7 @@ fn worth(study: &AccuracyStudy) -> Plot {
         y: PlotAxis::linear("macro F1 after one grasp"),
         references: knee.into_iter().collect(),
         series,
+        ..Plot::default()
     }
 }
 

@@ -209,6 +209,7 @@ fn plot(report: &AuditReport, title: &str, effects: &[Effect]) -> Plot {
         y: PlotAxis::logarithmic("change / visible change (0.1 1/m, 10 mN)"),
         references: vec![line(true, "seen"), line(false, "on from here")],
         series,
+        ..Plot::default()
     }
 }
 

@@ -150,6 +150,7 @@ pub fn stability_figure(stored: &StoredStudy<StabilityReport>) -> Figure {
                 y: share("silently wrong, % of the scenes"),
                 references: vec![target.clone()],
                 series: series(&|row| row.cost, true),
+                ..Plot::default()
             },
             Plot {
                 title: "false alarms".to_owned(),
@@ -157,6 +158,7 @@ pub fn stability_figure(stored: &StoredStudy<StabilityReport>) -> Figure {
                 y: share("silently wrong, % of the scenes"),
                 references: vec![target],
                 series: series(&|row| 100.0 * row.false_alarms, false),
+                ..Plot::default()
             },
         ],
         columns: 1,

@@ -1,0 +1,168 @@
+//! Files out of the window: figures, the 3-D view and trials, written by a thread of their own.
+
+use palpate_geometry::drawing::{DrawList, Figure};
+use palpate_geometry::palette::Theme;
+use palpate_lab::exchange::{ExchangeError, NewFile, write_trials};
+use palpate_lab::inspection::OpenOptions;
+use palpate_lab::workers::Wake;
+use palpate_render::{
+    DriverChoice, FigureError, Gpu, GpuError, Picture, PictureError, Renderer, figure_picture, figure_svg,
+};
+use palpate_store::{Store, StoreError};
+use palpate_tactile::trial::TrialId;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+/// Something to be written to a file. The extension of the file chooses the format.
+#[derive(Clone, Debug)]
+pub enum ExportRequest {
+    /// A figure, width and height in points: .svg, or .png with two pixels per point.
+    Figure(Figure, Theme, [u32; 2]),
+    /// The 3-D view, width and height in pixels: .png.
+    View3d(Box<DrawList>, [u32; 2]),
+    /// Trials of a store: the formats of [`palpate_lab::exchange::FORMATS`].
+    Trials(PathBuf, Vec<TrialId>, OpenOptions),
+}
+
+/// Reason why nothing was written.
+#[derive(Debug, thiserror::Error)]
+pub enum FileExportError {
+    /// No format has this extension.
+    #[error("cannot write \"{path}\": choose {known}", path = path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// Formats of what is exported.
+        known: &'static str,
+    },
+    /// The file cannot be written.
+    #[error("cannot write \"{path}\": {cause}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Message of the system.
+        cause: String,
+    },
+    /// The figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// The picture cannot be drawn.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// There is no graphics driver.
+    #[error(transparent)]
+    Driver(#[from] GpuError),
+    /// The store cannot be opened.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The trials cannot be written.
+    #[error(transparent)]
+    Trials(#[from] ExchangeError),
+    /// The thread ended without an answer.
+    #[error("the export ended with an internal error")]
+    Ended,
+}
+
+impl ExportRequest {
+    /// Writes it; the file appears whole or not at all. `stop` ends an export of trials.
+    pub fn write(self, path: &Path, stop: &AtomicBool) -> Result<(), FileExportError> {
+        let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+        let unknown = |known: &'static str| FileExportError::UnknownFormat { path: path.to_owned(), known };
+        let bytes = match self {
+            Self::Figure(figure, theme, size) if is("svg") => figure_svg(&figure, theme, size)?.into_bytes(),
+            Self::Figure(figure, theme, size) if is("png") => figure_picture(&figure, theme, size)?.to_png()?,
+            Self::Figure(..) => return Err(unknown("an .svg or a .png file")),
+            Self::View3d(list, size) if is("png") => {
+                let gpu = Gpu::headless(DriverChoice::Any)?;
+                let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+                Picture::draw(&gpu, &mut renderer, &list, size, 1.0)?.to_png()?
+            }
+            Self::View3d(..) => return Err(unknown("a .png file")),
+            Self::Trials(store, ids, options) => {
+                let store = Store::open(&store)?;
+                write_trials(&store, &ids, &options, path, &mut |_, _| !stop.load(Ordering::Relaxed))?;
+                return Ok(());
+            }
+        };
+        let write = || {
+            let mut file = NewFile::create(path)?;
+            file.write_all(&bytes)?;
+            file.finish()
+        };
+        write().map_err(|e: std::io::Error| FileExportError::Write { path: path.to_owned(), cause: e.to_string() })
+    }
+}
+
+/// An export that runs in a thread. Dropping it ends an export of trials, which then leaves no file.
+#[derive(Debug)]
+pub struct RunningExport {
+    path: PathBuf,
+    stop: Arc<AtomicBool>,
+    outcome: Receiver<Result<(), FileExportError>>,
+}
+
+impl RunningExport {
+    /// Starts the thread; it calls `wake` at its end.
+    pub fn start(request: ExportRequest, path: PathBuf, wake: Wake) -> std::io::Result<Self> {
+        let (sender, outcome) = channel();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (target, stopped) = (path.clone(), Arc::clone(&stop));
+        std::thread::Builder::new().name("export".to_owned()).spawn(move || {
+            // Nobody listens any more where the window was closed.
+            let _heard = sender.send(request.write(&target, &stopped));
+            wake();
+        })?;
+        Ok(Self { path, stop, outcome })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The outcome, once; none while it runs.
+    pub fn outcome(&self) -> Option<Result<(), FileExportError>> {
+        match self.outcome.try_recv() {
+            Ok(outcome) => Some(outcome),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(Err(FileExportError::Ended)),
+        }
+    }
+}
+
+impl Drop for RunningExport {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn a_figure_is_written_by_a_thread_in_the_format_of_its_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, begin) in [("a.svg", &b"<svg"[..]), ("a.PNG", b"\x89PNG")] {
+            let path = folder.path().join(name);
+            let (sender, woken) = channel();
+            let wake: Wake = Arc::new(move || {
+                let _heard = sender.send(());
+            });
+            let request = ExportRequest::Figure(Figure::default(), Theme::Light, [200, 100]);
+            let running = RunningExport::start(request, path.clone(), wake).expect("starts");
+            woken.recv_timeout(Duration::from_secs(60)).expect("ends");
+            assert!(running.outcome().is_some_and(|outcome| outcome.is_ok()));
+            assert!(std::fs::read(&path).expect("written").starts_with(begin));
+        }
+        let stop = AtomicBool::new(false);
+        let wrong = ExportRequest::Figure(Figure::default(), Theme::Light, [200, 100]);
+        let error = wrong.write(&folder.path().join("a.pdf"), &stop).expect_err("refused").to_string();
+        assert!(error.contains("choose an .svg or a .png file"), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("reads").count(), 2);
+    }
+}

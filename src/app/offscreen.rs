@@ -1,0 +1,259 @@
+//! The whole window as a picture, without a display: the same workbench, drawn into a texture.
+
+use crate::app::features::inspect::InspectAction;
+use crate::app::features::tools::GripperToolsSetup;
+use crate::app::features::view::{ViewAction, ViewState};
+use crate::app::modes::mode::Mode;
+use crate::app::playback::Seek;
+use crate::app::startup::ThreadError;
+use crate::app::viewport::wgpu_options;
+use crate::app::workbench::{Workbench, WorkbenchSetup};
+use egui_wgpu::{RenderState, RendererOptions, ScreenDescriptor};
+use palpate_geometry::palette::Theme;
+use palpate_lab::datasets::models_folder;
+use palpate_lab::gripper::listen_to_port;
+use palpate_lab::workers::{Command, examine_port, explain_scene, fit_trials};
+use palpate_learn::shipped_model;
+use palpate_render::{Picture, PictureError, wgpu};
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::TrialId;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// A window to be drawn.
+#[derive(Clone, Debug)]
+pub struct OffscreenWindow {
+    /// Scene of the simulation.
+    pub scene: Scene,
+    /// Store of trials.
+    pub store: PathBuf,
+    /// Mode.
+    pub mode: Mode,
+    /// Theme.
+    pub theme: Theme,
+    /// Width and height (pixels, which are points).
+    pub size: [u32; 2],
+    /// Stored trial to open.
+    pub trial: Option<TrialId>,
+    /// Time of the simulated grasp, or of the trial (s).
+    pub at_s: f64,
+}
+
+/// Reason why there is no picture of the window.
+#[derive(Debug, thiserror::Error)]
+pub enum OffscreenError {
+    /// No graphics driver.
+    #[error("no graphics driver can draw the window ({0}); install one, such as mesa-vulkan-drivers")]
+    Driver(String),
+    /// A thread of the window cannot be started.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
+    /// The texture cannot be read.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The window did not come to show what was asked for.
+    #[error("the window did not show {wanted} within {seconds} s{}", said.as_ref().map(|s| format!("; it said: {s}")).unwrap_or_default())]
+    Late {
+        /// What was waited for.
+        wanted: &'static str,
+        /// How long (s).
+        seconds: u64,
+        /// Last message of the window.
+        said: Option<String>,
+    },
+}
+
+/// Longest wait for the simulation or the trial.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// The window has settled when its threads were quiet for so long.
+const QUIET: Duration = Duration::from_millis(400);
+/// Frames that end its animations, and time between them (s).
+const LAST_FRAMES: usize = 12;
+const FRAME_S: f64 = 0.1;
+
+/// Draws the window once it shows the grasp at its time, or the trial.
+pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenError> {
+    let state = render_state(window.size)?;
+    let ctx = egui::Context::default();
+    let (wake, woken) = channel();
+    let setup = WorkbenchSetup {
+        scene: window.scene.clone(),
+        store: window.store.clone(),
+        view: ViewState { theme: window.theme, ..ViewState::default() },
+        model: shipped_model().map(Arc::new),
+        explain: Arc::new(explain_scene),
+        listen: Arc::new(listen_to_port),
+        tools: GripperToolsSetup {
+            examine: Arc::new(examine_port),
+            fit: Arc::new(fit_trials),
+            models: models_folder(),
+        },
+        playing: false,
+        system_dialogs: false,
+        wake: Arc::new(move || {
+            // Threads may outlive the picture by a moment.
+            let _heard = wake.send(());
+        }),
+        render_state: Some(&state),
+    };
+    let workbench = Workbench::new(&ctx, setup)?;
+    let mut drawn = Drawn { ctx, state, workbench, size: window.size, time_s: 0.0, shapes: Vec::new(), woken };
+    drawn.show(window)?;
+    drawn.settle();
+    drawn.picture()
+}
+
+fn render_state(size: [u32; 2]) -> Result<RenderState, OffscreenError> {
+    let options = wgpu_options();
+    let failed = |cause: &dyn std::fmt::Display| OffscreenError::Driver(cause.to_string());
+    let create = async {
+        let instance = options.wgpu_setup.new_instance().await;
+        RenderState::create(&options, &instance, None, RendererOptions::PREDICTABLE).await
+    };
+    let state = pollster::block_on(create).map_err(|e| failed(&e))?;
+    let most = state.device.limits().max_texture_dimension_2d;
+    if size.iter().any(|side| *side > most) {
+        return Err(failed(&format!("it draws at most {most} x {most} pixels")));
+    }
+    Ok(state)
+}
+
+/// A workbench that is drawn frame by frame.
+struct Drawn {
+    ctx: egui::Context,
+    state: RenderState,
+    workbench: Workbench,
+    size: [u32; 2],
+    /// Time on the window's own clock, so that animations do not depend on the machine.
+    time_s: f64,
+    shapes: Vec<egui::epaint::ClippedShape>,
+    woken: Receiver<()>,
+}
+
+impl Drawn {
+    /// Draws one frame.
+    fn frame(&mut self) {
+        let [width, height] = self.size.map(|side| side as f32);
+        let input = egui::RawInput {
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height))),
+            time: Some(self.time_s),
+            predicted_dt: FRAME_S as f32,
+            max_texture_side: Some(self.state.device.limits().max_texture_dimension_2d as usize),
+            ..egui::RawInput::default()
+        };
+        self.time_s += FRAME_S;
+        let mut output = self.ctx.run_ui(input, |ui| self.workbench.ui(ui));
+        let mut renderer = self.state.renderer.write();
+        let mut set: Vec<_> = output.textures_delta.set.drain().collect();
+        set.sort_by_key(|(id, _)| *id);
+        for (id, deltas) in set {
+            for delta in deltas {
+                renderer.update_texture(&self.state.device, &self.state.queue, id, &delta);
+            }
+        }
+        let mut free: Vec<_> = output.textures_delta.free.drain().collect();
+        free.sort();
+        free.iter().for_each(|id| renderer.free_texture(id));
+        self.shapes = std::mem::take(&mut output.shapes);
+    }
+
+    /// Draws until something is so.
+    fn until(&mut self, wanted: &'static str, is_so: impl Fn(&Workbench) -> bool) -> Result<(), OffscreenError> {
+        let began = Instant::now();
+        loop {
+            self.frame();
+            if is_so(&self.workbench) {
+                return Ok(());
+            }
+            if began.elapsed() > PATIENCE {
+                let said = self.workbench.messages().back().cloned();
+                return Err(OffscreenError::Late { wanted, seconds: PATIENCE.as_secs(), said });
+            }
+            // Nothing came: look again all the same.
+            let _quiet = self.woken.recv_timeout(Duration::from_millis(100));
+        }
+    }
+
+    /// Brings the window to what is to be seen.
+    fn show(&mut self, window: &OffscreenWindow) -> Result<(), OffscreenError> {
+        let ctx = self.ctx.clone();
+        self.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
+        if window.mode != Mode::Demo {
+            self.workbench.act(&ctx, ViewAction::SetMode(window.mode));
+        }
+        if let Some(id) = window.trial {
+            self.workbench.act(&ctx, InspectAction::Open(id));
+            self.until("the trial", |workbench| workbench.inspected().is_some_and(|open| open.trial.id == id))?;
+            self.workbench.act(&ctx, InspectAction::Seek(Seek::To(window.at_s)));
+            return Ok(());
+        }
+        // Steps are recorded, so that only the mode of the simulation takes any.
+        while let Some(now) = self.workbench.snapshot().filter(|_| window.mode == Mode::Demo) {
+            if now.frame.t > window.at_s - 1e-9 || now.status.finished {
+                break;
+            }
+            self.workbench.act(&ctx, Command::Step);
+            let before = now.frame.t;
+            self.until("the grasp", |workbench| {
+                workbench.snapshot().is_some_and(|s| s.frame.t > before || s.status.finished)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Draws until all threads are quiet and animations have ended.
+    fn settle(&mut self) {
+        let began = Instant::now();
+        while began.elapsed() < PATIENCE {
+            self.frame();
+            if self.woken.recv_timeout(QUIET).is_err() {
+                break;
+            }
+        }
+        for _ in 0..LAST_FRAMES {
+            self.frame();
+        }
+    }
+
+    /// Draws the last frame into a texture and reads it back.
+    fn picture(self) -> Result<Picture, OffscreenError> {
+        let Self { ctx, state, size, shapes, .. } = self;
+        let screen = ScreenDescriptor { pixels_per_point: 1.0, size_in_pixels: size };
+        let jobs = ctx.tessellate(shapes, 1.0);
+        let (device, queue) = (&state.device, &state.queue);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut renderer = state.renderer.write();
+        let before = renderer.update_buffers(device, queue, &mut encoder, &jobs, &screen);
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("window"),
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: state.target_format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        {
+            let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("window"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &view,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                    depth_slice: None,
+                })],
+                ..Default::default()
+            });
+            renderer.render(&mut pass.forget_lifetime(), &jobs, &screen);
+        }
+        queue.submit(before);
+        Ok(Picture::read_back(device, queue, encoder, &texture)?)
+    }
+}

@@ -1,0 +1,253 @@
+//! `palpate movie`: a stored trial as an animated picture, without a window.
+
+use super::Failure;
+use super::interrupt::stop_flag;
+use super::output::check_folder;
+use super::setup::{read_store, within};
+use super::snapshot::{parse_size, parse_theme, parse_view};
+use super::terminal::{note, say};
+use glam::Vec2;
+use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_geometry::palette::Theme;
+use palpate_lab::exchange::{NewFile, unfinished};
+use palpate_lab::inspection::{OpenOptions, OpenTrial};
+use palpate_lab::picture::{PictureView, Stage};
+use palpate_render::{DriverChoice, Gpu, MovieFormat, MovieWriter, Picture, Renderer};
+use palpate_tactile::trial::{TrialId, TrialSource};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// Arguments of `palpate movie`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate movie 1 --out grasp.apng
+  palpate movie 1 --view front --speed 0.25 --from 0.5 --to 1.5 --out contact.gif
+  palpate movie 1 --size 1280x800 --fps 30 --out frames/
+
+A folder gets a PNG file per picture, for any other encoder. Fingers of the real gripper are drawn as arcs of the
+curvature that their strips read.")]
+pub(super) struct MovieArguments {
+    /// Trial number.
+    trial: TrialId,
+    /// View: home, front, back, left, right, top or bottom.
+    #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
+    view: StandardView,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "640x400", value_parser = parse_size)]
+    size: [u32; 2],
+    /// Theme: dark or light.
+    #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
+    theme: Theme,
+    /// Speed, as a multiple of real time.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = within(0.01..=64.0))]
+    speed: f64,
+    /// Time of the first picture (s; default: the first sample).
+    #[arg(long, value_name = "SECONDS")]
+    from: Option<f64>,
+    /// Time of the last picture (s; default: the last sample).
+    #[arg(long, value_name = "SECONDS")]
+    to: Option<f64>,
+    /// Pictures per second.
+    #[arg(long, value_name = "N", default_value_t = 25.0, value_parser = within(1.0..=100.0))]
+    fps: f64,
+    /// Leave out force arrows.
+    #[arg(long)]
+    no_forces: bool,
+    /// Leave out axis gizmo, scale bar and legend.
+    #[arg(long)]
+    bare: bool,
+    /// File to write (.apng, .png or .gif), or a folder for one PNG file per picture.
+    #[arg(long, value_name = "PATH")]
+    out: PathBuf,
+}
+
+/// Most pictures: ten minutes at 25 per second.
+const MOST_PICTURES: f64 = 15_000.0;
+
+pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let out = &arguments.out;
+    let target = Target::of(out)?;
+    let store = read_store(store)?;
+    let id = arguments.trial;
+    let open = OpenTrial::open(&store, id, &OpenOptions { scenery: true, ..OpenOptions::default() })?;
+    let Some(stage) = open.stage.clone().filter(|_| !open.frames.is_empty()) else {
+        let text = format!(
+            "trial {id} ({}) has no poses and no curvature to draw fingers from. Use `palpate plot {id} --out FILE.svg` or \
+             `palpate trials show {id}`",
+            open.source_title()
+        );
+        return Err(text.into());
+    };
+    let times = times(arguments, &open)?;
+    let gpu = Gpu::headless(DriverChoice::Any)?;
+    let mut shot =
+        Shot { renderer: Renderer::new(&gpu.device, &gpu.queue), gpu, stage: &stage, open: &open, arguments };
+    let stop = stop_flag()?;
+    let mut writer = Writer::begin(&target, out, arguments, times.len())?;
+    for (number, t_s) in times.iter().enumerate() {
+        if stop.load(Ordering::Relaxed) {
+            writer.give_up();
+            return Err("stopped; nothing was written".into());
+        }
+        writer.add(number, &shot.picture(*t_s)?)?;
+    }
+    writer.finish(out)?;
+    note(&format!("{} pictures", times.len()));
+    say(out.display())
+}
+
+/// Times of the pictures (s).
+fn times(arguments: &MovieArguments, open: &OpenTrial) -> Result<Vec<f64>, Failure> {
+    let [first, last] = open.span_s();
+    let (from, to) = (arguments.from.unwrap_or(first), arguments.to.unwrap_or(last));
+    // The first sample is not at zero, from which people count.
+    let within = |t: f64| (first.min(0.0) - 1e-9..=last + 1e-9).contains(&t);
+    if !within(from) || !within(to) || from > to {
+        let text = format!(
+            "trial {} runs from {first:.3} s to {last:.3} s: choose --from and --to within it, in this order",
+            open.id
+        );
+        return Err(text.into());
+    }
+    let step = arguments.speed / arguments.fps;
+    let count = ((to - from) / step + 1e-9).floor() + 1.0;
+    if count > MOST_PICTURES {
+        let text = format!("{count:.0} pictures are more than {MOST_PICTURES:.0}: raise --speed, or lower --fps");
+        return Err(text.into());
+    }
+    Ok((0..count as usize).map(|k| from + step * k as f64).collect())
+}
+
+/// Draws pictures of a trial.
+struct Shot<'a> {
+    gpu: Gpu,
+    renderer: Renderer,
+    stage: &'a Stage,
+    open: &'a OpenTrial,
+    arguments: &'a MovieArguments,
+}
+
+impl Shot<'_> {
+    fn picture(&mut self, t_s: f64) -> Result<Picture, Failure> {
+        let Self { gpu, renderer, stage, open, arguments } = self;
+        let source = match open.source {
+            TrialSource::Simulated => "SIMULATED",
+            TrialSource::Recorded => "REAL GRIPPER, FINGERS AS ARCS",
+            TrialSource::Imported => "IMPORTED, FINGERS AS ARCS",
+        };
+        let (centre, radius) = stage.bounds();
+        let view = PictureView {
+            camera: Camera::default().turned_to(arguments.view).framing(centre, radius),
+            theme: arguments.theme,
+            size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
+            forces: !arguments.no_forces,
+            annotations: !arguments.bare,
+            badge: (!arguments.bare).then(|| format!("TRIAL {}, {source}, {t_s:.2} s", open.id)),
+            ..PictureView::default()
+        };
+        let now = open.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
+        Ok(Picture::draw(gpu, renderer, &stage.draw(now, &view), arguments.size, 1.0)?)
+    }
+}
+
+/// Where pictures go.
+enum Target {
+    File(MovieFormat),
+    Folder,
+}
+
+impl Target {
+    fn of(out: &Path) -> Result<Self, Failure> {
+        let extension = out.extension().map(|extension| extension.to_ascii_lowercase());
+        let target = match extension.as_ref().and_then(|extension| extension.to_str()) {
+            Some("apng" | "png") => Self::File(MovieFormat::Apng),
+            Some("gif") => Self::File(MovieFormat::Gif),
+            None => Self::Folder,
+            Some(other) => {
+                let text = format!("no movie format \".{other}\": choose .apng, .gif, or a folder for PNG files");
+                return Err(text.into());
+            }
+        };
+        check_folder(out)?;
+        if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
+            return Err(format!("\"{}\" is not empty; choose an empty or new folder", out.display()).into());
+        }
+        Ok(target)
+    }
+}
+
+/// Writes pictures; what is not finished leaves nothing.
+enum Writer {
+    File { movie: MovieWriter<SharedFile>, file: SharedFile },
+    Folder(PathBuf),
+}
+
+/// The file of a movie, which its encoder writes to and which gets its name at the end.
+#[derive(Clone)]
+struct SharedFile(std::rc::Rc<std::cell::RefCell<NewFile>>);
+
+impl std::io::Write for SharedFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.borrow_mut().flush()
+    }
+}
+
+impl Writer {
+    fn begin(target: &Target, out: &Path, arguments: &MovieArguments, pictures: usize) -> Result<Self, Failure> {
+        let failed =
+            |cause: std::io::Error| -> Failure { format!("cannot write \"{}\": {cause}", out.display()).into() };
+        match target {
+            Target::File(format) => {
+                let file = NewFile::create(out).map_err(failed)?;
+                let file = SharedFile(std::rc::Rc::new(std::cell::RefCell::new(file)));
+                let movie = MovieWriter::new(file.clone(), *format, arguments.size, pictures as u32, arguments.fps)?;
+                Ok(Self::File { movie, file })
+            }
+            Target::Folder => {
+                let folder = unfinished(out);
+                std::fs::create_dir_all(&folder).map_err(failed)?;
+                Ok(Self::Folder(folder))
+            }
+        }
+    }
+
+    fn add(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
+        let written = match self {
+            Self::File { movie, .. } => movie.add(picture).map_err(Failure::from),
+            Self::Folder(folder) => {
+                picture.save(&folder.join(format!("frame_{:05}.png", number + 1))).map_err(Failure::from)
+            }
+        };
+        written.inspect_err(|_cause| self.give_up())
+    }
+
+    /// Removes the pictures so far. A file removes itself.
+    fn give_up(&self) {
+        if let Self::Folder(folder) = self {
+            // Nothing more can be done about remains that cannot be removed.
+            let _gone = std::fs::remove_dir_all(folder);
+        }
+    }
+
+    fn finish(self, out: &Path) -> Result<(), Failure> {
+        let failed =
+            |cause: std::io::Error| -> Failure { format!("cannot write \"{}\": {cause}", out.display()).into() };
+        match self {
+            Self::File { movie, file } => {
+                movie.finish()?;
+                let file = std::rc::Rc::into_inner(file.0).ok_or("the movie is still being written")?;
+                file.into_inner().finish().map_err(failed)
+            }
+            Self::Folder(folder) => {
+                if out.is_dir() {
+                    std::fs::remove_dir(out).map_err(failed)?;
+                }
+                std::fs::rename(&folder, out).map_err(failed)
+            }
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! Files that commands write: whole or not at all, into folders that exist.
+
+use super::Failure;
+use palpate_lab::exchange::NewFile;
+use std::io::Write as _;
+use std::path::Path;
+
+/// Writes a file.
+pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let write = || {
+        let mut file = NewFile::create(path)?;
+        file.write_all(bytes)?;
+        file.finish()
+    };
+    check_folder(path)?;
+    write().map_err(|cause: std::io::Error| format!("cannot write \"{}\": {cause}", path.display()).into())
+}
+
+/// Refuses a path in a folder that does not exist, before any work is done for it.
+pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+        Some(folder) => {
+            let (path, folder) = (path.display(), folder.display());
+            Err(format!("cannot write \"{path}\": there is no folder \"{folder}\". Create it, or choose another --out")
+                .into())
+        }
+        None => Ok(()),
+    }
+}

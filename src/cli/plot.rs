@@ -1,0 +1,111 @@
+//! `palpate plot`: figures of stored trials, as SVG or PNG.
+
+use super::Failure;
+use super::output::check_folder;
+use super::setup::read_store;
+use super::snapshot::{parse_size, parse_theme};
+use super::terminal::say;
+use crate::app::ExportRequest;
+use palpate_geometry::palette::Theme;
+use palpate_lab::datasets::SensorView;
+use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, OpenOptions, OpenTrial, comparison_figure};
+use palpate_tactile::trial::TrialId;
+use palpate_tactile::{PressureArea, SensorLayout};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Arguments of `palpate plot`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate plot 1 --out grasp.svg
+  palpate plot 1 2 --channels pressure,line --align contact --out lemon_tomato.png
+  palpate plot 1 2 3 4 --mean --channels curvature --out classes.svg
+  palpate plot 1 --heat joints --out joints.svg
+
+Each plot is one of --channels: the name of a channel (pressure_left), the beginning of names (pressure), or line.
+See also: palpate trials list, palpate help sensors")]
+pub(super) struct PlotArguments {
+    /// Trial numbers.
+    #[arg(required = true)]
+    trials: Vec<TrialId>,
+    /// Channels, one plot each (default: every quantity).
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    channels: Vec<String>,
+    /// Common time of several trials: start or contact.
+    #[arg(long, value_name = "NAME", default_value = "start", value_parser = parse_align)]
+    align: Alignment,
+    /// Mean and standard deviation of the trials of each object, in place of single trials.
+    #[arg(long, conflicts_with = "heat")]
+    mean: bool,
+    /// Raw counts of the real gripper, in place of channels derived from them.
+    #[arg(long, conflicts_with = "heat")]
+    raw: bool,
+    /// Heat maps over time: joints (angle of each) or pads (pressure on each row of taxels).
+    #[arg(long, value_name = "NAME", value_parser = parse_heat)]
+    heat: Option<HeatKind>,
+    /// Sensor layout through which simulated trials are read: C1 to C8, each also with force, as C1+F.
+    #[arg(long, value_name = "NAME", default_value = "C1+F")]
+    layout: String,
+    /// Divide force by the convex hull of the contacts, as the paper does.
+    #[arg(long)]
+    hull: bool,
+    /// Theme: dark or light.
+    #[arg(long, value_name = "NAME", default_value = "light", value_parser = parse_theme)]
+    theme: Theme,
+    /// Width and height in points; a PNG has two pixels per point (default: by the number of plots).
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// File to write: .svg or .png.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+fn parse_align(text: &str) -> Result<Alignment, String> {
+    let found = Alignment::ALL.into_iter().find(|align| align.name() == text);
+    found.ok_or_else(|| "choose start or contact".to_owned())
+}
+
+fn parse_heat(text: &str) -> Result<HeatKind, String> {
+    match text {
+        "joints" => Ok(HeatKind::Joints),
+        "pads" => Ok(HeatKind::Pads),
+        _ => Err("choose joints or pads".to_owned()),
+    }
+}
+
+pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let out = &arguments.out;
+    if !out.extension().is_some_and(|own| ["svg", "png"].iter().any(|known| own.eq_ignore_ascii_case(known))) {
+        return Err(format!("cannot write \"{}\": choose an .svg or a .png file", out.display()).into());
+    }
+    check_folder(out)?;
+    SensorLayout::named(&arguments.layout)?;
+    let store = read_store(store)?;
+    let area = if arguments.hull { PressureArea::Hull } else { PressureArea::Participation };
+    let options = OpenOptions {
+        sensors: SensorView { layout: arguments.layout.clone(), area, ..SensorView::default() },
+        scenery: arguments.heat.is_some(),
+        ..OpenOptions::default()
+    };
+    let open = |id: &TrialId| OpenTrial::open(&store, *id, &options);
+    let trials = arguments.trials.iter().map(open).collect::<Result<Vec<OpenTrial>, _>>()?;
+    let trials: Vec<&OpenTrial> = trials.iter().collect();
+    let figure = comparison_figure(
+        &trials,
+        &FigureOptions {
+            channels: arguments.channels.clone(),
+            align: arguments.align,
+            mean: arguments.mean,
+            raw: arguments.raw,
+            heat: arguments.heat,
+        },
+    )?;
+    let columns = figure.columns.max(1);
+    let rows = figure.plots.len().div_ceil(columns).max(1);
+    let size = arguments.size.unwrap_or([
+        (420 * columns.max(2)).min(1260) as u32,
+        (330 * rows + 40 + 15 * figure.note.lines().count()).min(2048) as u32,
+    ]);
+    ExportRequest::Figure(figure, arguments.theme, size).write(out, &AtomicBool::new(false))?;
+    say(out.display())
+}

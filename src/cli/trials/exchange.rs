@@ -1,0 +1,39 @@
+//! Trials in and out as files of other programs: MCAP, NPZ, Parquet.
+
+use super::super::Failure;
+use super::super::interrupt::stop_flag;
+use super::super::output::check_folder;
+use super::super::recognise::load_model;
+use super::super::terminal::say;
+use palpate_lab::datasets::SensorView;
+use palpate_lab::exchange::{ExchangeFormat, read_mcap};
+use palpate_lab::inspection::OpenOptions;
+use palpate_store::{Import, Store, read_trials_csv};
+use palpate_tactile::trial::TrialId;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Writes trials into one file.
+pub(super) fn export(
+    store: &Store,
+    (ids, format): (&[TrialId], &ExchangeFormat),
+    (out, model): (&Path, Option<&Path>),
+    sensors: SensorView,
+) -> Result<(), Failure> {
+    check_folder(out)?;
+    let model = Some(Arc::new(load_model(model)?));
+    let options = OpenOptions { sensors, model, ..OpenOptions::default() };
+    let stop = stop_flag()?;
+    format.write(store, ids, &options, out, &mut |_, _| !stop.load(Ordering::Relaxed))?;
+    say(out.display())
+}
+
+/// Reads the trials of a file: MCAP, or else CSV. `label` names the object of a file that does not.
+pub(super) fn read(file: &Path, label: Option<&str>) -> Result<Import, Failure> {
+    if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
+        let stem = file.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        return Ok(read_mcap(file, label.or(stem.as_deref()).unwrap_or("import"))?);
+    }
+    Ok(read_trials_csv(file)?)
+}

@@ -1,0 +1,131 @@
+//! What a stored trial gives to other programs: its channels, poses, labels and origin, whatever its source.
+
+use super::ExchangeError;
+use crate::inspection::{OpenOptions, OpenTrial};
+use glam::{DMat3, DQuat};
+use palpate_geometry::Pose;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{GripperModel, Side};
+use palpate_store::{Store, TrialRow};
+use palpate_tactile::trial::{TrialData, TrialId, TrialSource};
+use std::collections::BTreeMap;
+
+/// A trial to be written.
+pub(super) struct TrialContent {
+    /// The opened trial: channels, phases, answers.
+    pub(super) open: OpenTrial,
+    /// Samples with any number; those left out mark gaps.
+    pub(super) samples: Vec<usize>,
+    /// Fingers and object of a simulated trial, in their own samples.
+    pub(super) frames: Vec<Frame>,
+    /// Pose of the gripper in the world in which a simulated trial began.
+    pub(super) world_from_gripper: Option<Pose>,
+    /// Note, tags and doubt of the label.
+    pub(super) row: Option<TrialRow>,
+    /// Calibrations of a real gripper's parts, as JSON.
+    pub(super) calibrations: Option<String>,
+}
+
+/// Trials of a store, opened one by one for writing.
+pub(super) struct Contents<'a> {
+    store: &'a Store,
+    rows: BTreeMap<TrialId, TrialRow>,
+    options: &'a OpenOptions,
+}
+
+impl<'a> Contents<'a> {
+    pub(super) fn new(store: &'a Store, options: &'a OpenOptions) -> Result<Self, ExchangeError> {
+        let rows = store.list(false)?.into_iter().map(|row| (row.id, row)).collect();
+        Ok(Self { store, rows, options })
+    }
+
+    pub(super) fn load(&self, id: TrialId) -> Result<TrialContent, ExchangeError> {
+        let open = OpenTrial::open(self.store, id, self.options)?;
+        let (frames, world_from_gripper) = match self.store.load(id)?.data {
+            TrialData::Simulated(data) => (data.frames, Some(data.world_from_gripper)),
+            TrialData::Recorded(_) | TrialData::Imported(_) => (Vec::new(), None),
+        };
+        let read =
+            |k: usize| open.line_bar[k].is_finite() || open.columns.iter().any(|column| column.values[k].is_finite());
+        let samples = (0..open.t_s.len()).filter(|k| read(*k)).collect();
+        let calibrations = match open.source {
+            TrialSource::Recorded => Some(self.calibrations(id)?),
+            TrialSource::Simulated | TrialSource::Imported => None,
+        };
+        let row = self.rows.get(&id).cloned();
+        Ok(TrialContent { open, samples, frames, world_from_gripper, row, calibrations })
+    }
+
+    fn calibrations(&self, id: TrialId) -> Result<String, ExchangeError> {
+        let repository = self.store.calibrations();
+        let ids = repository.serving(Some(id), &[])?.ids;
+        let used = ids.into_iter().map(|id| repository.get(id)).collect::<Result<Vec<_>, _>>()?;
+        serde_json::to_string_pretty(&used).map_err(|e| ExchangeError::Encode { id, cause: e.to_string() })
+    }
+}
+
+impl TrialContent {
+    /// Pose of the gripper in the world at a frame.
+    pub(super) fn gripper_pose(&self, frame: &Frame) -> Pose {
+        frame.world_from_gripper(&self.world_from_gripper.unwrap_or_default())
+    }
+
+    /// The frame at a time (s): the last one until then.
+    pub(super) fn frame_at(&self, t_s: f64) -> Option<&Frame> {
+        let after = self.frames.partition_point(|frame| frame.t <= t_s + 1e-9);
+        self.frames.get(after.saturating_sub(1))
+    }
+}
+
+/// Pose of a finger's segment in the gripper: z towards the tip, x out of the pad, so that joints turn about y.
+pub(super) fn segment_pose(frame: &Frame, gripper: &GripperModel, side: Side, segment: usize) -> Pose {
+    let finger = frame.placed(gripper, side);
+    let axes = finger.axes(segment);
+    let (along, inward) = (axes.x_axis, axes.z_axis);
+    let rotation = DQuat::from_mat3(&DMat3::from_cols(inward, along.cross(inward), along));
+    Pose::new(finger.point(segment, 0.0, 0.0, 0.0), rotation)
+}
+
+/// Name of a joint, counted from 1 at the palm.
+pub(super) fn joint_name(side: Side, joint: usize) -> String {
+    format!("{}_joint_{joint}", side.name())
+}
+
+/// Name of a segment, counted from 0 at the palm.
+pub(super) fn segment_name(side: Side, segment: usize) -> String {
+    format!("{}_segment_{segment}", side.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sim::gripper::{Phase, Sway};
+
+    #[test]
+    fn joints_turn_about_y_from_one_segment_to_the_next() {
+        let gripper = GripperModel::default();
+        let joints = gripper.finger.joints;
+        let q: Vec<f64> = (0..2 * joints).map(|k| 0.01 * k as f64).collect();
+        let frame = Frame {
+            sample: 0,
+            t: 0.0,
+            line_bar: 0.0,
+            phase: Phase::Close,
+            q,
+            sways: [Sway::NONE; 2],
+            hand: glam::DVec3::ZERO,
+            world_from_object: None,
+            taxels: Vec::new(),
+        };
+        let lengths: Vec<f64> = gripper.finger.segment_lengths().collect();
+        for side in Side::BOTH {
+            for joint in 1..=joints {
+                let [from, to] = [joint - 1, joint].map(|segment| segment_pose(&frame, &gripper, side, segment));
+                let turn = DQuat::from_rotation_y(frame.joints(side)[joint - 1]);
+                let end = from.point(glam::DVec3::Z * lengths[joint - 1]);
+                assert!((end - to.position).length() < 1e-12);
+                assert!((from.rotation * turn).angle_between(to.rotation) < 1e-6);
+            }
+        }
+    }
+}

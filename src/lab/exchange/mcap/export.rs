@@ -1,0 +1,282 @@
+//! Trials as MCAP.
+
+use super::container::{McapWriter, Pairs};
+use super::messages::{self, MessageKind};
+use super::{CHANNELS, TRIAL};
+use crate::exchange::content::{Contents, TrialContent, joint_name, segment_name, segment_pose};
+use crate::exchange::urdf::gripper_urdf;
+use crate::exchange::{Allow, ExchangeError, NewFile, Request, step};
+use crate::inspection::scene_hash;
+use palpate_geometry::Pose;
+use palpate_learn::Pmf;
+use palpate_sim::gripper::Side;
+use palpate_tactile::Quantity;
+use palpate_tactile::trial::TrialSource;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Time between trials that were not recorded one after the other (ns).
+const BETWEEN: u64 = 1_000_000_000;
+
+/// Writes trials into one file.
+pub(crate) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
+    let failed = |error: io::Error| ExchangeError::write(path, &error);
+    let contents = Contents::new(request.store, request.options)?;
+    let file = NewFile::create(path).map_err(failed)?;
+    let library = format!("palpate {}", env!("CARGO_PKG_VERSION"));
+    let mut out = Bag {
+        writer: McapWriter::new(file, &library).map_err(failed)?,
+        schemas: BTreeMap::new(),
+        channels: BTreeMap::new(),
+    };
+    let mut earliest = 0;
+    for (done, id) in request.ids.iter().enumerate() {
+        step(allow, done, request.ids.len())?;
+        let content = contents.load(*id)?;
+        let recorded = utc_ns(&content.open.created).unwrap_or(0);
+        let begin = recorded.max(earliest);
+        let end = out.trial(&content, begin).map_err(failed)?;
+        earliest = end + BETWEEN;
+    }
+    out.writer.finish().and_then(NewFile::finish).map_err(failed)
+}
+
+/// A file, with the schemas and channels that it has so far.
+struct Bag<W: Write> {
+    writer: McapWriter<W>,
+    schemas: BTreeMap<&'static str, u16>,
+    channels: BTreeMap<(String, Pairs), u16>,
+}
+
+impl<W: Write> Bag<W> {
+    /// Number of a channel, which is added where it is new.
+    fn channel(&mut self, kind: MessageKind, topic: &str, metadata: Pairs) -> u16 {
+        if let Some(known) = self.channels.get(&(topic.to_owned(), metadata.clone())) {
+            return *known;
+        }
+        let schema = match self.schemas.get(kind.name()) {
+            Some(known) => *known,
+            None => {
+                let id = self.writer.schema(kind.name(), &kind.definition());
+                self.schemas.insert(kind.name(), id);
+                id
+            }
+        };
+        let id = self.writer.channel(schema, topic, &metadata);
+        self.channels.insert((topic.to_owned(), metadata), id);
+        id
+    }
+
+    fn text(&mut self, topic: &str, ns: u64, text: &str) -> io::Result<()> {
+        let channel = self.channel(MessageKind::Text, topic, Pairs::new());
+        self.writer.message(channel, ns, &messages::text(text))
+    }
+
+    /// Writes a trial that begins at a time (ns); returns the time of its end.
+    fn trial(&mut self, content: &TrialContent, begin: u64) -> io::Result<u64> {
+        let open = &content.open;
+        let first_s = open.span_s()[0];
+        let at = |t_s: f64| begin + ((t_s - first_s).max(0.0) * 1e9).round() as u64;
+        let end = at(open.span_s()[1]);
+        if content.world_from_gripper.is_some() {
+            self.text("/robot_description", begin, &gripper_urdf(&open.header.scene.gripper))?;
+        }
+        self.text("/label", begin, &label_json(content).to_string())?;
+        for span in &open.phases {
+            self.text("/phase", at(span.from_s), span.phase.name())?;
+        }
+        self.samples(content, &at)?;
+        self.motion(content, &at)?;
+        self.answers(content, &at)?;
+        self.metadata(content, [begin, end])?;
+        let id = open.id;
+        if open.source == TrialSource::Simulated {
+            let scene = open.header.scene.to_toml();
+            self.writer.attachment(begin, &format!("trial_{id}_scene.toml"), "application/toml", scene.as_bytes())?;
+        }
+        if let Some(calibrations) = &content.calibrations {
+            let name = format!("trial_{id}_calibrations.json");
+            self.writer.attachment(begin, &name, "application/json", calibrations.as_bytes())?;
+        }
+        Ok(end)
+    }
+
+    /// All channels together, and the line pressure.
+    fn samples(&mut self, content: &TrialContent, at: &dyn Fn(f64) -> u64) -> io::Result<()> {
+        let open = &content.open;
+        let mut names = vec!["t_s"];
+        names.extend(open.columns.iter().map(|column| column.name.as_str()));
+        let mut units = vec!["s"];
+        units.extend(open.columns.iter().map(|column| column.unit));
+        let json = |texts: &[&str]| serde_json::Value::from(texts.to_vec()).to_string();
+        let metadata = Pairs::from([("names".to_owned(), json(&names)), ("units".to_owned(), json(&units))]);
+        let channels = self.channel(MessageKind::Numbers, CHANNELS, metadata);
+        let line = self.channel(MessageKind::FluidPressure, "/line_pressure", Pairs::new());
+        let bends = |side: Side| {
+            open.columns.iter().find(move |column| {
+                column.channel.as_ref().is_some_and(|own| own.quantity == Quantity::Curvature && own.side == side)
+            })
+        };
+        let strips: Vec<_> =
+            if content.frames.is_empty() { Side::BOTH.into_iter().filter_map(bends).collect() } else { Vec::new() };
+        let strip_names: Vec<String> = strips.iter().map(|column| column.name.clone()).collect();
+        for k in content.samples.iter().copied() {
+            let t_s = open.t_s[k];
+            let ns = at(t_s);
+            let mut row = vec![t_s];
+            row.extend(open.columns.iter().map(|column| f64::from(column.values[k])));
+            self.writer.message(channels, ns, &messages::numbers("channels", row.into_iter()))?;
+            if open.line_bar[k].is_finite() {
+                self.writer.message(line, ns, &messages::fluid_pressure(ns, 1e5 * open.line_bar[k]))?;
+            }
+            if !strips.is_empty() {
+                let joints = self.channel(MessageKind::JointState, "/joint_states", Pairs::new());
+                let read: Vec<f64> = strips.iter().map(|column| f64::from(column.values[k])).collect();
+                self.writer.message(joints, ns, &messages::joint_state(ns, &strip_names, &read))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Joints and poses of a simulated trial.
+    fn motion(&mut self, content: &TrialContent, at: &dyn Fn(f64) -> u64) -> io::Result<()> {
+        if content.frames.is_empty() {
+            return Ok(());
+        }
+        let gripper = &content.open.header.scene.gripper;
+        let joints = gripper.finger.joints;
+        let names: Vec<String> = Side::BOTH.iter().flat_map(|s| (1..=joints).map(|j| joint_name(*s, j))).collect();
+        let states = self.channel(MessageKind::JointState, "/joint_states", Pairs::new());
+        let poses = self.channel(MessageKind::Transforms, "/tf", Pairs::new());
+        for frame in &content.frames {
+            let ns = at(frame.t);
+            self.writer.message(states, ns, &messages::joint_state(ns, &names, &frame.q))?;
+            let world_from_gripper = content.gripper_pose(frame);
+            let mut placed = vec![("palm".to_owned(), world_from_gripper)];
+            for side in Side::BOTH {
+                for segment in 0..=joints {
+                    let pose = world_from_gripper * segment_pose(frame, gripper, side, segment);
+                    placed.push((segment_name(side, segment), pose));
+                }
+            }
+            placed.extend(frame.world_from_object.map(|pose: Pose| ("object".to_owned(), pose)));
+            self.writer.message(poses, ns, &messages::transforms(ns, &placed))?;
+        }
+        Ok(())
+    }
+
+    /// Probabilities of classes at each sample, and the verdict.
+    fn answers(&mut self, content: &TrialContent, at: &dyn Fn(f64) -> u64) -> io::Result<()> {
+        let open = &content.open;
+        let Some(last) = open.answers.last() else { return Ok(()) };
+        let classes: Vec<&str> = last.labels.classes.iter().map(|class| class.name.as_str()).collect();
+        let json = serde_json::Value::from(classes.clone()).to_string();
+        let channel = self.channel(
+            MessageKind::Numbers,
+            "/recognition/probabilities",
+            Pairs::from([("classes".to_owned(), json)]),
+        );
+        for k in content.samples.iter().copied() {
+            let Some(pmf) = open.answers.get(k).and_then(|answer| answer.verdict.as_ref()).map(|own| &own.pmf) else {
+                continue;
+            };
+            let row = pmf.probabilities().iter().copied();
+            self.writer.message(channel, at(open.t_s[k]), &messages::numbers("probabilities", row))?;
+        }
+        let Some(verdict) = &last.verdict else { return Ok(()) };
+        let named = |pmf: &Pmf, names: &[&str]| -> serde_json::Map<String, serde_json::Value> {
+            names.iter().zip(pmf.probabilities()).map(|(name, p)| ((*name).to_owned(), (*p).into())).collect()
+        };
+        let mut report = serde_json::json!({
+            "decided": last.decided(),
+            "probabilities": named(&verdict.pmf, &classes),
+        });
+        if let (Some(own), Some(report)) = (&verdict.properties, report.as_object_mut()) {
+            let texts = |all: &'_ [String]| all.iter().map(String::as_str).map(str::to_owned).collect::<Vec<String>>();
+            let (sizes, shapes) = (texts(&last.labels.sizes), texts(&last.labels.shapes));
+            let list = |all: &[String], pmf: &Pmf| named(pmf, &all.iter().map(String::as_str).collect::<Vec<_>>());
+            report.insert("size".to_owned(), list(&sizes, &own.size).into());
+            report.insert("shape".to_owned(), list(&shapes, &own.shape).into());
+        }
+        self.text("/recognition/verdict", at(open.span_s()[1]), &report.to_string())
+    }
+
+    fn metadata(&mut self, content: &TrialContent, [begin, end]: [u64; 2]) -> io::Result<()> {
+        let open = &content.open;
+        let label = label_json(content);
+        let mut pairs = Pairs::new();
+        for (name, value) in label.as_object().into_iter().flatten() {
+            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            pairs.insert(name.clone(), text);
+        }
+        for (name, number) in [("begin_ns", begin), ("end_ns", end), ("samples", content.samples.len() as u64)] {
+            pairs.insert(name.to_owned(), number.to_string());
+        }
+        let phases: Vec<serde_json::Value> = open
+            .phases
+            .iter()
+            .map(|span| serde_json::json!({"phase": span.phase.name(), "from_s": span.from_s, "to_s": span.to_s}))
+            .collect();
+        pairs.insert("phases".to_owned(), serde_json::Value::from(phases).to_string());
+        self.writer.metadata(TRIAL, &pairs)
+    }
+}
+
+/// Label and origin of a trial.
+fn label_json(content: &TrialContent) -> serde_json::Value {
+    let open = &content.open;
+    let row = content.row.as_ref();
+    let mut label = serde_json::json!({
+        "trial": open.id,
+        "object": open.header.object,
+        "source": open.source.name(),
+        "created": open.created,
+        "version": open.header.version,
+        "collection": open.header.collection.clone().unwrap_or_default(),
+        "note": row.map(|row| row.note.clone()).unwrap_or_default(),
+        "tags": row.map(|row| row.tags.clone()).unwrap_or_default(),
+        "unsure": row.is_some_and(|row| row.unsure),
+    });
+    if let (TrialSource::Simulated, Some(label)) = (open.source, label.as_object_mut()) {
+        label.insert("seed".to_owned(), open.header.seed.into());
+        label.insert("scene".to_owned(), scene_hash(&open.header.scene).into());
+        label.insert("layout".to_owned(), open.sensors.layout.clone().into());
+    }
+    label
+}
+
+/// Nanoseconds since 1970 of a time of the store, `2026-11-21T15:36:00.123Z`.
+pub(super) fn utc_ns(text: &str) -> Option<u64> {
+    let (date, time) = text.strip_suffix('Z').unwrap_or(text).split_once('T')?;
+    let mut date = date.split('-').map(|part| part.parse::<i64>().ok());
+    let (year, month, day) = (date.next()??, date.next()??, date.next()??);
+    let mut time = time.split(':');
+    let (hour, minute) = (time.next()?.parse::<i64>().ok()?, time.next()?.parse::<i64>().ok()?);
+    let seconds = time.next()?.parse::<f64>().ok()?;
+    if !(1970..=2200).contains(&year) || !(1..=12).contains(&month) || !(0.0..62.0).contains(&seconds) {
+        return None;
+    }
+    // Days from the civil calendar (Hinnant, "chrono-Compatible Low-Level Date Algorithms").
+    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let (era, of_era) = (y.div_euclid(400), y.rem_euclid(400));
+    let of_year = (153 * m + 2) / 5 + day - 1;
+    let days = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
+    let whole = u64::try_from((days * 24 + hour) * 3600 + minute * 60).ok()?;
+    Some(whole * 1_000_000_000 + (seconds * 1e3).round() as u64 * 1_000_000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_the_store_are_nanoseconds_since_1970() {
+        assert_eq!(utc_ns("1970-01-01T00:00:00.000Z"), Some(0));
+        assert_eq!(utc_ns("2026-11-21T15:36:00.123Z"), Some(1_795_275_360_123_000_000));
+        assert_eq!(utc_ns("2024-02-29T23:59:59Z"), Some(1_709_251_199_000_000_000));
+        for wrong in ["", "yesterday", "2026-13-01T00:00:00Z", "2026-01-01", "2026-01-01T00:00:99Z"] {
+            assert_eq!(utc_ns(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! The ROS 2 messages that are written and read: their schemas, and their fields in CDR.
+
+use super::cdr::{CdrReader, CdrWriter};
+use glam::{DQuat, DVec3};
+use palpate_geometry::Pose;
+
+/// A kind of message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MessageKind {
+    JointState,
+    FluidPressure,
+    Numbers,
+    SmallNumbers,
+    Number,
+    SmallNumber,
+    Transforms,
+    Text,
+}
+
+const HEADER: &str = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
+const TIME: &str = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+const LAYOUT: &str = "MSG: std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset\n";
+const DIMENSION: &str = "MSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n";
+
+impl MessageKind {
+    const ALL: [Self; 8] = [
+        Self::JointState,
+        Self::FluidPressure,
+        Self::Numbers,
+        Self::SmallNumbers,
+        Self::Number,
+        Self::SmallNumber,
+        Self::Transforms,
+        Self::Text,
+    ];
+
+    /// Name of its schema.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::JointState => "sensor_msgs/msg/JointState",
+            Self::FluidPressure => "sensor_msgs/msg/FluidPressure",
+            Self::Numbers => "std_msgs/msg/Float64MultiArray",
+            Self::SmallNumbers => "std_msgs/msg/Float32MultiArray",
+            Self::Number => "std_msgs/msg/Float64",
+            Self::SmallNumber => "std_msgs/msg/Float32",
+            Self::Transforms => "tf2_msgs/msg/TFMessage",
+            Self::Text => "std_msgs/msg/String",
+        }
+    }
+
+    /// The kind that a schema of any program names.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// Definition in the language of ROS 2, with those of the types that it uses.
+    pub(super) fn definition(self) -> String {
+        let (own, used): (&str, &[&str]) = match self {
+            Self::JointState => (
+                "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+                &[HEADER, TIME],
+            ),
+            Self::FluidPressure => {
+                ("std_msgs/Header header\nfloat64 fluid_pressure\nfloat64 variance\n", &[HEADER, TIME])
+            }
+            Self::Numbers => ("std_msgs/MultiArrayLayout layout\nfloat64[] data\n", &[LAYOUT, DIMENSION]),
+            Self::SmallNumbers => ("std_msgs/MultiArrayLayout layout\nfloat32[] data\n", &[LAYOUT, DIMENSION]),
+            Self::Number => ("float64 data\n", &[]),
+            Self::SmallNumber => ("float32 data\n", &[]),
+            Self::Transforms => (
+                "geometry_msgs/TransformStamped[] transforms\n",
+                &[
+                    "MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform \
+                     transform\n",
+                    "MSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n",
+                    "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
+                    "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
+                    HEADER,
+                    TIME,
+                ],
+            ),
+            Self::Text => ("string data\n", &[]),
+        };
+        let bar = "=".repeat(80);
+        used.iter().fold(own.to_owned(), |text, part| format!("{text}{bar}\n{part}"))
+    }
+}
+
+fn header(out: &mut CdrWriter, ns: u64, frame: &str) {
+    out.time(ns);
+    out.text(frame);
+}
+
+/// Positions of joints by name.
+pub(super) fn joint_state(ns: u64, names: &[String], positions: &[f64]) -> Vec<u8> {
+    let mut out = CdrWriter::new();
+    header(&mut out, ns, "palm");
+    out.u32(names.len() as u32);
+    names.iter().for_each(|name| out.text(name));
+    out.numbers(positions.iter().copied());
+    out.u32(0);
+    out.u32(0);
+    out.finish()
+}
+
+/// A pressure (Pa).
+pub(super) fn fluid_pressure(ns: u64, pressure: f64) -> Vec<u8> {
+    let mut out = CdrWriter::new();
+    header(&mut out, ns, "line");
+    out.f64(pressure);
+    out.f64(0.0);
+    out.finish()
+}
+
+/// A row of numbers.
+pub(super) fn numbers(label: &str, values: impl ExactSizeIterator<Item = f64>) -> Vec<u8> {
+    let mut out = CdrWriter::new();
+    out.u32(1);
+    out.text(label);
+    out.u32(values.len() as u32);
+    out.u32(values.len() as u32);
+    out.u32(0);
+    out.numbers(values);
+    out.finish()
+}
+
+/// Poses of frames in the world.
+pub(super) fn transforms(ns: u64, poses: &[(String, Pose)]) -> Vec<u8> {
+    let mut out = CdrWriter::new();
+    out.u32(poses.len() as u32);
+    for (child, pose) in poses {
+        header(&mut out, ns, "world");
+        out.text(child);
+        let (DVec3 { x, y, z }, DQuat { x: qx, y: qy, z: qz, w }) = (pose.position, pose.rotation);
+        [x, y, z, qx, qy, qz, w].into_iter().for_each(|number| out.f64(number));
+    }
+    out.finish()
+}
+
+/// A text.
+pub(super) fn text(text: &str) -> Vec<u8> {
+    let mut out = CdrWriter::new();
+    out.text(text);
+    out.finish()
+}
+
+/// Numbers of a message with the ends of their channels' names; none where it holds other things or is malformed.
+pub(super) fn read_numbers(kind: MessageKind, bytes: &[u8]) -> Option<Vec<(String, f64)>> {
+    let mut read = CdrReader::new(bytes)?;
+    let skip_header = |read: &mut CdrReader<'_>| {
+        read.u32()?;
+        read.u32()?;
+        read.text().map(drop)
+    };
+    let skip_layout = |read: &mut CdrReader<'_>| {
+        for _ in 0..read.length(12)? {
+            read.text()?;
+            read.u32()?;
+            read.u32()?;
+        }
+        read.u32().map(drop)
+    };
+    let counted = |values: Vec<f64>| values.into_iter().enumerate().map(|(k, v)| (format!("_{k}"), v)).collect();
+    match kind {
+        MessageKind::Number => Some(vec![(String::new(), read.f64()?)]),
+        MessageKind::SmallNumber => Some(vec![(String::new(), f64::from(read.f32()?))]),
+        MessageKind::FluidPressure => {
+            skip_header(&mut read)?;
+            Some(vec![(String::new(), read.f64()?)])
+        }
+        MessageKind::Numbers => {
+            skip_layout(&mut read)?;
+            read.numbers().map(counted)
+        }
+        MessageKind::SmallNumbers => {
+            skip_layout(&mut read)?;
+            read.small_numbers().map(counted)
+        }
+        MessageKind::JointState => {
+            skip_header(&mut read)?;
+            let count = read.length(4)?;
+            let names: Vec<&str> = (0..count).map(|_| read.text()).collect::<Option<_>>()?;
+            let mut found = Vec::new();
+            for suffix in ["", "_velocity", "_effort"] {
+                let values = read.numbers()?;
+                found.extend(names.iter().zip(values).map(|(name, value)| (format!("_{name}{suffix}"), value)));
+            }
+            Some(found)
+        }
+        MessageKind::Transforms | MessageKind::Text => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_every_kind_read_back() {
+        let names = ["left_1".to_owned(), "right_1".to_owned()];
+        let read = |kind, bytes: &[u8]| read_numbers(kind, bytes).expect("numbers");
+        let joints = read(MessageKind::JointState, &joint_state(3, &names, &[0.25, -1.0]));
+        assert_eq!(joints, [("_left_1".to_owned(), 0.25), ("_right_1".to_owned(), -1.0)]);
+        assert_eq!(read(MessageKind::FluidPressure, &fluid_pressure(3, 1e5)), [(String::new(), 1e5)]);
+        let row = numbers("channels", [1.0, 2.0].into_iter());
+        assert_eq!(read(MessageKind::Numbers, &row), [("_0".to_owned(), 1.0), ("_1".to_owned(), 2.0)]);
+        assert!(read_numbers(MessageKind::Text, &text("a")).is_none());
+        for cut in 0..row.len() {
+            assert!(read_numbers(MessageKind::Numbers, &row[..cut]).is_none());
+        }
+    }
+
+    #[test]
+    fn definitions_name_every_type_that_they_use() {
+        for kind in MessageKind::ALL {
+            let text = kind.definition();
+            assert_eq!(MessageKind::named(kind.name()), Some(kind));
+            for used in
+                ["std_msgs/Header ", "std_msgs/MultiArrayLayout ", "MultiArrayDimension[]", "TransformStamped[]"]
+            {
+                let name = used.trim_end_matches([' ', '[', ']']).rsplit('/').next().expect("a name");
+                assert!(!text.contains(used) || text.contains(&format!("/{name}\n")), "{kind:?} lacks {name}");
+            }
+        }
+    }
+}

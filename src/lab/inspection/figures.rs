@@ -1,0 +1,458 @@
+//! Figures of opened trials: one grasp, several overlaid, means of classes, and heat maps. The window shows and exports
+//! the same figures that `palpate plot` draws.
+
+use super::comparison::{Alignment, MeanTrial};
+use super::open_trial::{Column, OpenTrial};
+use super::phases::TouchPhase;
+use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time};
+use palpate_geometry::drawing::{
+    DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
+};
+use palpate_sim::gripper::Side;
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::{TrialId, TrialSource};
+
+/// What a heat map shows over time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeatKind {
+    /// Angle of each joint.
+    Joints,
+    /// Pressure on each row of taxels.
+    Pads,
+}
+
+/// Choice of what a figure shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FigureOptions {
+    /// A plot for each: the name of a channel, the beginning of names (`pressure`), or `line`; all of them where empty.
+    pub channels: Vec<String>,
+    /// Common time of several trials.
+    pub align: Alignment,
+    /// Mean and spread of the trials of each object, in place of single trials.
+    pub mean: bool,
+    /// Raw counts of a real gripper, in place of channels derived from them.
+    pub raw: bool,
+    /// Heat maps over time, in place of curves.
+    pub heat: Option<HeatKind>,
+}
+
+/// Reason why there is no figure.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FigureDataError {
+    /// No trial was chosen.
+    #[error("no trial is chosen; choose at least one")]
+    NoTrials,
+    /// A name that begins no channel.
+    #[error("trial {id} has no channel \"{name}\"; it has {known}")]
+    NoChannel {
+        /// The trial.
+        id: TrialId,
+        /// The name asked for.
+        name: String,
+        /// Names that it has.
+        known: String,
+    },
+    /// Raw counts of a trial that has none.
+    #[error("trial {id} is {source_title}: only trials of the real gripper have raw counts")]
+    NoCounts {
+        /// The trial.
+        id: TrialId,
+        /// Its source, in words.
+        source_title: &'static str,
+    },
+    /// Heat maps of a trial that has no joints or taxels.
+    #[error("trial {id} is {source_title}: only simulated trials have {what}")]
+    NoHeat {
+        /// The trial.
+        id: TrialId,
+        /// Its source, in words.
+        source_title: &'static str,
+        /// The missing part.
+        what: &'static str,
+    },
+}
+
+/// Trials named one by one in a caption.
+const NAMED: usize = 3;
+/// Names of channels in an error.
+const LISTED: usize = 24;
+
+/// Short stable name of a scene: CRC-32 of its TOML, eight hexadecimal digits.
+pub fn scene_hash(scene: &Scene) -> String {
+    format!("{:08x}", crc32fast::hash(scene.to_toml().as_bytes()))
+}
+
+/// Facts that make a figure repeatable, in lines: each trial's object, source, seed, scene and version, and the version
+/// that drew it.
+pub fn caption(trials: &[&OpenTrial]) -> String {
+    let line = |trial: &&&OpenTrial| {
+        let mut line = format!("{}: trial {}, {}", trial.title, trial.id, trial.source_title());
+        if trial.source == TrialSource::Simulated {
+            let (seed, hash) = (trial.header.seed, scene_hash(&trial.header.scene));
+            line.push_str(&format!(", seed {seed}, scene {hash}"));
+        }
+        line.push_str(&format!(", recorded by Palpate {}", trial.header.version));
+        line
+    };
+    let mut lines: Vec<String> = trials.iter().take(NAMED).map(|trial| line(&trial)).collect();
+    if trials.len() > NAMED {
+        let ids: Vec<String> = trials[NAMED..].iter().take(20).map(|trial| trial.id.to_string()).collect();
+        let more = if trials.len() > NAMED + ids.len() { ".." } else { "" };
+        lines.push(format!("and {} more: {}{more}", trials.len() - NAMED, ids.join(", ")));
+    }
+    let read = trials.iter().find(|trial| trial.source == TrialSource::Simulated);
+    let sensors = read.map(|trial| format!(", sensors {}", trial.sensors.layout)).unwrap_or_default();
+    lines.push(format!("Drawn by Palpate {}{sensors}", env!("CARGO_PKG_VERSION")));
+    lines.join("\n")
+}
+
+/// A figure of one trial, or of several over each other: a plot per quantity, a colour per trial (with one trial, per place
+/// on the finger), the right finger dashed.
+pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Result<Figure, FigureDataError> {
+    let Some(first) = trials.first() else { return Err(FigureDataError::NoTrials) };
+    let title = match trials {
+        [one] => format!("{}, trial {}", one.title, one.id),
+        _ => titles(trials),
+    };
+    let plots = match options.heat {
+        Some(kind) => heat_plots(trials, kind)?,
+        None => {
+            let simulated = trials.iter().find(|trial| trial.source != TrialSource::Recorded).filter(|_| options.raw);
+            if let Some(trial) = simulated {
+                return Err(FigureDataError::NoCounts { id: trial.id, source_title: trial.source_title() });
+            }
+            let origins = origins(trials, options.align);
+            let terms = if options.channels.is_empty() { stems(first, options.raw) } else { options.channels.clone() };
+            let plots = terms.iter().map(|term| curves(trials, &origins, term, options));
+            plots.collect::<Result<Vec<Plot>, _>>()?
+        }
+    };
+    let columns = if options.heat.is_some() { 2 } else { plots.len().min(if plots.len() == 4 { 2 } else { 3 }) };
+    Ok(Figure { title, plots, columns, note: caption(trials) })
+}
+
+/// Objects of several trials: `Lemon (2), Tomato (1)`.
+fn titles(trials: &[&OpenTrial]) -> String {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for trial in trials {
+        match counts.iter_mut().find(|(title, _)| *title == trial.title) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((&trial.title, 1)),
+        }
+    }
+    let texts: Vec<String> = counts.into_iter().map(|(title, count)| format!("{title} ({count})")).collect();
+    texts.join(", ")
+}
+
+/// Time of each trial that becomes zero (s). A single one keeps its own time, unless aligned at contact.
+fn origins(trials: &[&OpenTrial], align: Alignment) -> Vec<f64> {
+    match (trials, align) {
+        ([_], Alignment::Closing) => vec![0.0],
+        _ => trials.iter().map(|trial| align.origin_s(trial)).collect(),
+    }
+}
+
+/// Columns of a trial that a figure shows.
+fn shown(trial: &OpenTrial, raw: bool) -> impl Iterator<Item = &Column> {
+    let derived = trial.columns.iter().any(|column| column.channel.is_some());
+    trial.columns.iter().filter(move |column| {
+        let counts = trial.source == TrialSource::Recorded && column.channel.is_none();
+        if raw { counts } else { !counts || !derived }
+    })
+}
+
+/// Name of a column without the finger: `pressure` for `pressure_left_distal`.
+fn stem(column: &Column) -> &str {
+    let cut = ["_left", "_right"].iter().filter_map(|side| column.name.find(side)).min();
+    cut.map_or(&column.name, |at| &column.name[..at])
+}
+
+/// Different stems, in their order; more than nine plots cannot be read.
+fn stems(trial: &OpenTrial, raw: bool) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for column in shown(trial, raw) {
+        let stem = stem(column);
+        if !stems.iter().any(|known| known == stem) {
+            stems.push(stem.to_owned());
+        }
+    }
+    stems.truncate(9);
+    stems
+}
+
+/// Curve of a trial in a plot.
+struct Curve<'a> {
+    name: &'a str,
+    side: Option<Side>,
+    /// Factor to the shown unit.
+    factor: f64,
+    values: Box<dyn Fn(usize) -> f64 + 'a>,
+}
+
+/// Unit in which a value is shown, and the factor to it.
+fn shown_unit(unit: &str) -> (&str, f64) {
+    match unit {
+        "Pa" => ("kPa", 1e-3),
+        other => (other, 1.0),
+    }
+}
+
+fn side_of(name: &str) -> Option<Side> {
+    Side::BOTH.into_iter().find(|side| name.contains(side.name()))
+}
+
+/// Curves of a trial for a term, and their unit.
+fn found<'a>(trial: &'a OpenTrial, term: &str, raw: bool) -> Result<(Vec<Curve<'a>>, &'a str), FigureDataError> {
+    if term == "line" {
+        let values = Box::new(|k: usize| trial.line_bar[k]);
+        return Ok((vec![Curve { name: "line pressure", side: None, factor: 1.0, values }], "bar"));
+    }
+    let begins = |column: &&Column| {
+        let rest = column.name.strip_prefix(term);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))
+    };
+    let mut curves = Vec::new();
+    let mut unit = "";
+    for column in shown(trial, raw).filter(begins) {
+        let (own, factor) = shown_unit(column.unit);
+        unit = own;
+        let values = Box::new(|k: usize| f64::from(column.values[k]));
+        curves.push(Curve { name: &column.name, side: side_of(&column.name), factor, values });
+    }
+    if curves.is_empty() {
+        let mut names: Vec<&str> = shown(trial, raw).map(|column| column.name.as_str()).collect();
+        names.push("line");
+        let more = if names.len() > LISTED { ", .." } else { "" };
+        names.truncate(LISTED);
+        let known = format!("{}{more}", names.join(", "));
+        return Err(FigureDataError::NoChannel { id: trial.id, name: term.to_owned(), known });
+    }
+    Ok((curves, unit))
+}
+
+/// Title of the vertical axis of a plot.
+fn axis_title(term: &str, unit: &str) -> String {
+    let name = if term == "line" { "line pressure".to_owned() } else { term.replace('_', " ") };
+    if unit.is_empty() { name } else { format!("{name} ({unit})") }
+}
+
+fn curves(
+    trials: &[&OpenTrial],
+    origins: &[f64],
+    term: &str,
+    options: &FigureOptions,
+) -> Result<Plot, FigureDataError> {
+    let mut plot = Plot {
+        x: PlotAxis::linear(match options.align {
+            Alignment::Closing => "time (s)",
+            Alignment::Contact => "time since contact (s)",
+        }),
+        ..Plot::default()
+    };
+    for (place, (trial, origin)) in trials.iter().zip(origins).enumerate() {
+        let (curves, unit) = found(trial, term, options.raw)?;
+        plot.y = PlotAxis::linear(axis_title(term, unit));
+        for (number, curve) in curves.into_iter().enumerate().filter(|_| !options.mean) {
+            let dashed = curve.side == Some(Side::Right);
+            let (name, colour) = match trials {
+                [_] => (one_name(curve.name, term), number / if curve.side.is_some() { 2 } else { 1 }),
+                // The right finger is the dashed line of the same colour.
+                _ if dashed => (String::new(), place),
+                _ => (format!("{}, trial {}", trial.title, trial.id), place),
+            };
+            let samples = trial.t_s.iter().enumerate();
+            let points = samples.map(|(k, t_s)| [t_s - origin, (curve.values)(k) * curve.factor]);
+            plot.series.push(line(name, colour, dashed, points));
+        }
+    }
+    if options.mean {
+        means(trials, term, options, &mut plot)?;
+    }
+    plot.references = match trials {
+        [one] => phases(one, origins[0]),
+        _ if options.align == Alignment::Contact => {
+            vec![ReferenceLine { horizontal: false, at: 0.0, text: "contact".to_owned() }]
+        }
+        _ => Vec::new(),
+    };
+    Ok(plot)
+}
+
+/// Mean of the trials of each object as a line, and its standard deviation as a band.
+fn means(trials: &[&OpenTrial], term: &str, options: &FigureOptions, plot: &mut Plot) -> Result<(), FigureDataError> {
+    let mut classes: Vec<(&str, Vec<&OpenTrial>)> = Vec::new();
+    for trial in trials {
+        match classes.iter_mut().find(|(title, _)| *title == trial.title) {
+            Some((_, own)) => own.push(trial),
+            None => classes.push((&trial.title, vec![trial])),
+        }
+    }
+    for (colour, (title, own)) in classes.iter().enumerate() {
+        let Some(mean) = MeanTrial::of(own, options.align) else { continue };
+        let (curves, _) = found(own[0], term, options.raw)?;
+        for curve in curves {
+            let dashed = curve.side == Some(Side::Right);
+            let named = if dashed { String::new() } else { format!("{title} (n = {})", mean.trials) };
+            let column = mean.columns.iter().find(|column| column.name == curve.name);
+            let value = |k: usize| {
+                let (middle, spread) =
+                    column.map_or((mean.line_bar[k], 0.0), |c| (f64::from(c.mean[k]), f64::from(c.spread[k])));
+                (middle * curve.factor, spread * curve.factor)
+            };
+            let points = mean.t_s.iter().enumerate().map(|(k, t_s)| [*t_s, value(k).0]);
+            plot.series.push(line(named, colour, dashed, points));
+            let edges = |(k, t_s): (usize, &f64)| {
+                let (middle, spread) = value(k);
+                [*t_s, middle - spread, middle + spread]
+            };
+            plot.bands.push(SpreadBand { colour, points: mean.t_s.iter().enumerate().map(edges).collect() });
+        }
+    }
+    Ok(())
+}
+
+/// Name of a channel within the plot of its term: `left`, `right distal`.
+fn one_name(name: &str, term: &str) -> String {
+    let rest = name.strip_prefix(term).unwrap_or(name).trim_start_matches('_');
+    if rest.is_empty() { name.replace('_', " ") } else { rest.replace('_', " ") }
+}
+
+fn line(name: String, colour: usize, dashed: bool, points: impl Iterator<Item = [f64; 2]>) -> DataSeries {
+    DataSeries {
+        name,
+        colour,
+        line: if dashed { LineStyle::Dashed } else { LineStyle::Thin },
+        points: points.map(|[x, y]| DataPoint::new(x, y)).collect(),
+        ..DataSeries::default()
+    }
+}
+
+/// Marks at the beginnings of contact, hold and release.
+fn phases(trial: &OpenTrial, origin: f64) -> Vec<ReferenceLine> {
+    let marked = trial.phases.iter().filter(|span| span.phase != TouchPhase::PreShaping);
+    let mark = |from_s: f64, phase: TouchPhase| ReferenceLine {
+        horizontal: false,
+        at: from_s - origin,
+        text: phase.name().to_owned(),
+    };
+    marked.map(|span| mark(span.from_s, span.phase)).collect()
+}
+
+/// Heat maps of each trial, the left finger beside the right one.
+fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, FigureDataError> {
+    let mut plots = Vec::new();
+    for trial in trials {
+        let simulated = trial.source == TrialSource::Simulated && !trial.frames.is_empty();
+        let what = match kind {
+            HeatKind::Joints => "joint angles",
+            HeatKind::Pads => "taxels",
+        };
+        if !simulated {
+            return Err(FigureDataError::NoHeat { id: trial.id, source_title: trial.source_title(), what });
+        }
+        let gripper = &trial.header.scene.gripper;
+        let maps: [HeatMap; 2] = match kind {
+            HeatKind::Joints => joints_over_time(gripper, &trial.frames, BendUnit::Angle),
+            HeatKind::Pads => pad_rows_over_time(gripper, &trial.frames, LoadUnit::Pressure),
+        };
+        for map in maps {
+            let title = if trials.len() == 1 {
+                map.title.clone()
+            } else {
+                format!("{}, trial {}, {}", trial.title, trial.id, map.title)
+            };
+            plots.push(Plot { title, ..Plot::of_heat_map(map) });
+        }
+    }
+    Ok(plots)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::OpenOptions;
+    use super::*;
+    use crate::datasets::SensorView;
+    use crate::grasping::grasp;
+    use palpate_store::Store;
+
+    fn opened(objects: &[&str]) -> Vec<OpenTrial> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut store = Store::open(&folder.path().join("trials.sqlite")).expect("opens");
+        let options = OpenOptions { scenery: true, sensors: SensorView::default(), ..OpenOptions::default() };
+        let open = |object: &&str| {
+            let mut scene = Scene::default();
+            scene.object.source = (*object).to_owned();
+            let model = scene.load_object().expect("built in");
+            let id = store.insert(&grasp(&scene, model.as_ref(), 7)).expect("stored");
+            OpenTrial::open(&store, id, &options).expect("opens")
+        };
+        objects.iter().map(open).collect()
+    }
+
+    #[test]
+    fn a_figure_of_one_trial_has_its_values_phases_and_origin() -> Result<(), FigureDataError> {
+        let trials = opened(&["lemon"]);
+        let one = &trials[0];
+        let figure = comparison_figure(&[one], &FigureOptions::default())?;
+        let titles: Vec<&str> = figure.plots.iter().map(|plot| plot.y.title.as_str()).collect();
+        assert_eq!(titles, ["curvature (1/m)", "pressure (kPa)", "force (N)"]);
+        let pressure = &figure.plots[1];
+        assert_eq!(pressure.series.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), ["left", "right"]);
+        assert_eq!(pressure.series.iter().map(|s| s.line).collect::<Vec<_>>(), [LineStyle::Thin, LineStyle::Dashed]);
+        let column = one.column("pressure_left").expect("a column");
+        for (point, (t_s, value)) in pressure.series[0].points.iter().zip(one.t_s.iter().zip(&column.values)) {
+            let wanted = 1e-3 * f64::from(*value);
+            assert_eq!(point.at[0], *t_s);
+            assert!(point.at[1] == wanted || (point.at[1].is_nan() && wanted.is_nan()), "{} {wanted}", point.at[1]);
+        }
+        let marks: Vec<&str> = pressure.references.iter().map(|line| line.text.as_str()).collect();
+        assert_eq!(marks, ["contact", "hold", "release"]);
+        let hash = scene_hash(&one.header.scene);
+        for part in ["Lemon: trial 1, simulated, seed 7, scene ", &hash, "Drawn by Palpate ", "sensors C1+F"] {
+            assert!(figure.note.contains(part), "{part} in {}", figure.note);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn trials_are_aligned_at_contact_and_averaged_by_class() -> Result<(), FigureDataError> {
+        let trials = opened(&["lemon", "lemon", "ball"]);
+        let trials: Vec<&OpenTrial> = trials.iter().collect();
+        let options = FigureOptions {
+            channels: vec!["pressure".to_owned()],
+            align: Alignment::Contact,
+            ..FigureOptions::default()
+        };
+        let figure = comparison_figure(&trials, &options)?;
+        let series = &figure.plots[0].series;
+        assert_eq!(series.len(), 6);
+        assert_eq!((series[0].colour, series[1].colour, series[4].colour), (0, 0, 2));
+        let contact = trials[2].phase_from(TouchPhase::Contact).expect("it touched");
+        assert!((series[4].points[0].at[0] - (trials[2].t_s[0] - contact)).abs() < 1e-12);
+        let mean = comparison_figure(&trials, &FigureOptions { mean: true, ..options.clone() })?;
+        let plot = &mean.plots[0];
+        assert_eq!((plot.series.len(), plot.bands.len()), (4, 4));
+        assert_eq!(plot.series[0].name, "Lemon (n = 2)");
+        // Two equal trials have no spread.
+        assert!(plot.bands[0].points.iter().all(|[_, low, high]| high.is_nan() || high - low <= 1e-9));
+        let unknown = FigureOptions { channels: vec!["warmth".to_owned()], ..options };
+        let error = comparison_figure(&trials, &unknown).expect_err("no such channel").to_string();
+        assert!(error.contains("\"warmth\"; it has curvature_left, "), "{error}");
+        assert_eq!(comparison_figure(&[], &FigureOptions::default()), Err(FigureDataError::NoTrials));
+        Ok(())
+    }
+
+    #[test]
+    fn heat_maps_stand_side_by_side() -> Result<(), FigureDataError> {
+        let trials = opened(&["ball"]);
+        for kind in [HeatKind::Joints, HeatKind::Pads] {
+            let options = FigureOptions { heat: Some(kind), ..FigureOptions::default() };
+            let figure = comparison_figure(&[&trials[0]], &options)?;
+            assert_eq!((figure.plots.len(), figure.columns), (2, 2));
+            let heat = figure.plots[1].heat.as_ref().expect("cells");
+            assert_eq!((heat.x.count, heat.title.as_str()), (trials[0].frames.len(), "right"));
+            assert!(heat.values.iter().any(|value| *value > 1.0));
+        }
+        Ok(())
+    }
+}
