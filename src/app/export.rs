@@ -21,7 +21,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 pub enum ExportRequest {
     /// A figure, width and height in points: .svg, or .png with two pixels per point.
     Figure(Figure, Theme, [u32; 2]),
-    /// The 3-D view, width and height in pixels: .png.
+    /// The 3-D view, width and height in points: .png with two pixels per point.
     View3d(Box<DrawList>, [u32; 2]),
     /// Trials of a store: the formats of [`palpate_lab::exchange::FORMATS`].
     Trials(PathBuf, Vec<TrialId>, OpenOptions),
@@ -78,7 +78,7 @@ impl ExportRequest {
             Self::View3d(list, size) if is("png") => {
                 let gpu = Gpu::headless(DriverChoice::Any)?;
                 let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-                Picture::draw(&gpu, &mut renderer, &list, size, 1.0)?.to_png()?
+                Picture::draw(&gpu, &mut renderer, &list, size.map(|side| 2 * side), 2.0)?.to_png()?
             }
             Self::View3d(..) => return Err(unknown("a .png file")),
             Self::Trials(store, ids, options) => {

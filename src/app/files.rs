@@ -1,21 +1,21 @@
 //! File dialogs: the system's, in a thread of their own so that the window keeps drawing, or one inside the window where
 //! the system has none. To ask for another file, add a [`Question`].
 
-use crate::app::notices::UserMessage;
+use crate::app::export::ExportRequest;
 use palpate_sim::scene::Scene;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
 /// File to ask for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) enum Question {
     /// Object or scene to open.
     Object,
     /// Where to save a scene.
     SaveScene(Box<Scene>),
-    /// Where to save a picture.
-    SavePicture,
+    /// Where to export something.
+    Export(Box<ExportRequest>),
 }
 
 /// Answer of a dialog or of a background job.
@@ -25,12 +25,10 @@ pub(super) enum Answer {
     Open(PathBuf),
     /// Save the scene here.
     SaveScene(PathBuf, Box<Scene>),
-    /// Save the picture here.
-    SavePicture(PathBuf),
+    /// Export it here.
+    Export(PathBuf, Box<ExportRequest>),
     /// The system has no file dialog: ask inside the window.
     AskInside(Question),
-    /// Show a message.
-    Tell(UserMessage),
 }
 
 /// Texts of a dialog, and the files it is about.
@@ -58,12 +56,14 @@ impl Question {
                 extensions: &["toml"],
                 name: Some(format!("{}_scene.toml", stem(&scene.object.source))),
             },
-            Self::SavePicture => Wording {
-                title: "Save picture",
-                kind: "PNG",
-                extensions: &["png"],
-                name: Some("palpate.png".to_owned()),
-            },
+            Self::Export(request) => {
+                let (title, kind, extensions) = match &**request {
+                    ExportRequest::Figure(..) => ("Export figure", "SVG, PNG", &["svg", "png"][..]),
+                    ExportRequest::View3d(..) => ("Save picture", "PNG", &["png"][..]),
+                    ExportRequest::Trials(..) => ("Export trials", "MCAP, NPZ", &["mcap", "npz"][..]),
+                };
+                Wording { title, kind, extensions, name: Some(format!("palpate.{}", extensions[0])) }
+            }
         }
     }
 
@@ -74,7 +74,7 @@ impl Question {
         match self {
             Self::Object => Answer::Open(path),
             Self::SaveScene(scene) => Answer::SaveScene(path, scene),
-            Self::SavePicture => Answer::SavePicture(path),
+            Self::Export(request) => Answer::Export(path, request),
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Heat maps in the window: crisp cells, a colour bar with unit, and the value under the pointer. The values are those of
 //! [`HeatMap`], from which figures are drawn as well.
 
+use crate::app::actions::Actions;
+use crate::app::features::view::ViewAction;
 use crate::app::theme::{colour, veil};
 use egui::{
     Align2, Color32, ColorImage, FontId, Pos2, Rect, Response, Sense, Stroke, TextureFilter, TextureHandle,
@@ -10,6 +12,7 @@ use palpate_geometry::drawing::{ColourScale, HeatMap};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::inspection::PhaseSpan;
+use palpate_lab::picture::LoadUnit;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -279,4 +282,14 @@ fn phase_names(
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Switch between kPa and N.
+pub(super) fn load_switch(ui: &mut Ui, unit: LoadUnit, actions: &mut Actions) {
+    ui.spacing_mut().item_spacing.x = 4.0;
+    for (choice, about) in [(LoadUnit::Pressure, "Loads as pressure"), (LoadUnit::Force, "Loads as force")] {
+        if ui.selectable_label(unit == choice, choice.symbol()).on_hover_text(about).clicked() {
+            actions.push(ViewAction::SetLoadUnit(choice));
+        }
+    }
 }

@@ -197,12 +197,19 @@ fn rows(folder: &Path, extensions: &[&str]) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::export::ExportRequest;
+    use palpate_geometry::drawing::Figure;
+    use palpate_geometry::palette::Theme;
+
+    fn picture() -> Question {
+        Question::Export(Box::new(ExportRequest::Figure(Figure::default(), Theme::Light, [1, 1])))
+    }
 
     #[test]
     fn a_path_is_checked_before_it_is_used() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut dialog = PathDialog::new(Question::SavePicture, folder.path());
-        let own = folder.path().join("palpate.png");
+        let mut dialog = PathDialog::new(picture(), folder.path());
+        let own = folder.path().join("palpate.svg");
         assert_eq!(dialog.check(true), Ok(Some(own.clone())));
         // An existing file is replaced only after a second look.
         std::fs::write(&own, "old").expect("writes");

@@ -3,6 +3,7 @@
 use crate::app::actions::{Action, Actions};
 use crate::app::bars;
 use crate::app::context::{ComparedTrials, PanelContext};
+use crate::app::export::ExportRequest;
 use crate::app::features::files::{FileAction, FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
@@ -16,7 +17,7 @@ use crate::app::keys;
 use crate::app::modes;
 use crate::app::notices::{Notices, Remedy};
 use crate::app::palette;
-use crate::app::panels::PanelKind;
+use crate::app::panels::{PanelKind, view3d};
 use crate::app::path_dialog::{Closed, PathDialog};
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
@@ -26,7 +27,9 @@ use crate::app::view_source::ViewSource;
 use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_tiles::Tile;
+use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::Listen;
+use palpate_lab::inspection::{FigureOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
     Inspector, LabelCommand, LabelView, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
@@ -36,6 +39,7 @@ use palpate_learn::{Model, ModelError};
 use palpate_render::{Picture, describe_adapter};
 use palpate_sim::objects::{catalogue, thumbnail};
 use palpate_sim::scene::Scene;
+use palpate_tactile::trial::TrialId;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -84,7 +88,11 @@ pub struct Workbench {
     path_dialog: Option<PathDialog>,
     thumbnails: BTreeMap<String, egui::TextureHandle>,
     driver: Option<String>,
+    store: PathBuf,
 }
+
+/// Size of exported figures (points).
+const FIGURE_SIZE: [u32; 2] = [900, 560];
 
 /// Newest states published by other threads, for one frame.
 struct Published {
@@ -165,6 +173,7 @@ impl Workbench {
             path_dialog: None,
             thumbnails: load_thumbnails(ctx),
             driver,
+            store,
         };
         if workbench.view.ghost {
             workbench.act(ctx, SimulationAction::SetGhost(true));
@@ -342,6 +351,36 @@ impl Workbench {
         }
     }
 
+    /// What an action exports, or why it cannot; none for actions that export nothing.
+    fn export_request(&self, ctx: &egui::Context, action: &FileAction) -> Option<Result<ExportRequest, String>> {
+        match action {
+            FileAction::Open | FileAction::SaveScene | FileAction::SaveSceneAs(_) => None,
+            FileAction::SavePicture => {
+                let published = self.published();
+                let picture = view3d::exported(ctx, &self.context(&published));
+                Some(picture.ok_or_else(|| "There is nothing to draw.".to_owned()))
+            }
+            FileAction::ExportFigure(options) => {
+                let Some(own) = self.inspect.inspected() else {
+                    return Some(Err("Figures are made of stored trials: open one in Inspect mode.".to_owned()));
+                };
+                let others = own.pinned.iter().map(|pinned| &pinned.trial).filter(|trial| trial.id != own.trial.id);
+                let trials: Vec<&OpenTrial> = std::iter::once(own.trial).chain(others).map(Arc::as_ref).collect();
+                let (align, mean) = (self.inspect.alignment(), self.inspect.shows_spread());
+                let figure = comparison_figure(&trials, &FigureOptions { align, mean, ..options.clone() });
+                let request = figure.map(|figure| ExportRequest::Figure(figure, Theme::Light, FIGURE_SIZE));
+                Some(request.map_err(|cause| cause.to_string()))
+            }
+            FileAction::ExportTrials => {
+                let ids: Vec<TrialId> = self.library.selection().selected.iter().copied().collect();
+                if ids.is_empty() {
+                    return Some(Err("Select trials in the library first.".to_owned()));
+                }
+                Some(Ok(ExportRequest::Trials(self.store.clone(), ids, self.inspect.options())))
+            }
+        }
+    }
+
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
         let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
@@ -353,7 +392,7 @@ impl Workbench {
         }
         library.gather(notices);
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
-        files.gather(ctx, simulation, view, notices);
+        files.gather(ctx, simulation, notices);
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
         inspect.gather(grasp, view, notices);
         let published = self.published();
@@ -368,6 +407,15 @@ impl Workbench {
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
         if let Action::View(ViewAction::ShowPanel(name)) = action {
             self.show_panel(name);
+            return ctx.request_repaint();
+        }
+        if let Action::File(action) = &action
+            && let Some(request) = self.export_request(ctx, action)
+        {
+            match request {
+                Ok(request) => self.files.export(request),
+                Err(cause) => self.notices.warning(cause),
+            }
             return ctx.request_repaint();
         }
         let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();

@@ -12,7 +12,7 @@ use labels::LabelCommand;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
-use palpate_store::{Library, Shown, Store, TrialColumn, TrialFormat, TrialOrder, TrialQuery, TrialRow, export_trial};
+use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialQuery, TrialRow, export_trial};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{PressureArea, SensorLayout};
 use selection::{Filters, Numbers, chosen};
@@ -307,7 +307,7 @@ fn export(
         return Err("several trials need a folder: --out FOLDER".into());
     }
     for id in ids {
-        say(export_trial(store, *id, out, TrialFormat::Csv, (layout, area))?.display())?;
+        say(export_trial(store, *id, out, (layout, area))?.display())?;
     }
     Ok(())
 }

@@ -97,5 +97,5 @@ pub use points_csv::{PointsError, read_points_csv};
 pub use store::Store;
 pub use store_error::StoreError;
 pub use tares::{PartTare, StoredTare};
-pub use trial_export::{TrialFormat, export_trial};
+pub use trial_export::export_trial;
 pub use trial_rows::TrialRow;

@@ -1,20 +1,15 @@
 //! Files: opening, dropping and saving, and pictures of the 3-D view.
 
-use crate::app::features::simulation::{SimulationFeature, ghost_frame};
-use crate::app::features::view::ViewState;
+use crate::app::export::{ExportRequest, RunningExport};
+use crate::app::features::simulation::SimulationFeature;
 use crate::app::files::{Answer, Question, ask};
-use crate::app::notices::{Notices, UserMessage};
-use glam::Vec2;
-use palpate_lab::picture::PictureView;
-use palpate_lab::workers::{GhostGrasp, Snapshot, Wake};
-use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use crate::app::notices::Notices;
+use palpate_lab::inspection::FigureOptions;
+use palpate_lab::workers::Wake;
 use palpate_sim::scene::Scene;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-
-/// Pixels per point of saved pictures.
-const PICTURE_SCALE: f32 = 2.0;
 
 /// Action on files. Each opens a file dialog.
 #[derive(Clone, Debug)]
@@ -27,6 +22,10 @@ pub enum FileAction {
     SaveSceneAs(Box<Scene>),
     /// Save a picture of the 3-D view.
     SavePicture,
+    /// Export a figure of the trial that is open and of those compared with it.
+    ExportFigure(FigureOptions),
+    /// Export the trials selected in the library into one file.
+    ExportTrials,
 }
 
 /// State of files in the window.
@@ -39,11 +38,13 @@ pub(in crate::app) struct FileFeature {
     inside: Option<Question>,
     /// Folder of the file chosen last.
     folder: Option<PathBuf>,
+    /// Exports that are being written.
+    running: Vec<RunningExport>,
 }
 
 impl FileFeature {
     pub(in crate::app) fn new(wake: Wake, system_dialogs: bool) -> Self {
-        Self { answers: channel(), wake, system_dialogs, inside: None, folder: None }
+        Self { answers: channel(), wake, system_dialogs, inside: None, folder: None, running: Vec::new() }
     }
 
     /// File that is to be asked for inside the window now.
@@ -68,8 +69,18 @@ impl FileFeature {
             FileAction::Open => Question::Object,
             FileAction::SaveScene => Question::SaveScene(Box::new(simulation.scene().clone())),
             FileAction::SaveSceneAs(scene) => Question::SaveScene(scene),
-            FileAction::SavePicture => Question::SavePicture,
+            // Needs what the window shows: see `export`.
+            FileAction::SavePicture | FileAction::ExportFigure(_) | FileAction::ExportTrials => return,
         };
+        self.ask(question);
+    }
+
+    /// Asks where to write this.
+    pub(in crate::app) fn export(&mut self, request: ExportRequest) {
+        self.ask(Question::Export(Box::new(request)));
+    }
+
+    fn ask(&mut self, question: Question) {
         if !self.system_dialogs {
             self.inside = Some(question);
             return;
@@ -83,54 +94,39 @@ impl FileFeature {
         &mut self,
         ctx: &egui::Context,
         simulation: &mut SimulationFeature,
-        view: &ViewState,
         notices: &mut Notices,
     ) {
         for answer in self.answers.1.try_iter().collect::<Vec<_>>() {
-            if let Answer::Open(path) | Answer::SaveScene(path, _) | Answer::SavePicture(path) = &answer {
+            if let Answer::Open(path) | Answer::SaveScene(path, _) | Answer::Export(path, _) = &answer {
                 self.folder = path.parent().map(Path::to_owned);
             }
             match answer {
                 Answer::Open(path) => simulation.open(&path.to_string_lossy(), notices),
                 Answer::SaveScene(path, scene) => save_scene(&path, &scene, notices),
-                Answer::SavePicture(path) => self.save_picture(path, simulation, view, notices),
+                Answer::Export(path, request) => match RunningExport::start(*request, path, Arc::clone(&self.wake)) {
+                    Ok(running) => self.running.push(running),
+                    Err(error) => notices.error(format!("Cannot export: {error}")),
+                },
                 Answer::AskInside(question) => {
                     self.system_dialogs = false;
                     self.inside = Some(question);
                 }
-                Answer::Tell(message) => notices.tell(message),
             }
             ctx.request_repaint();
         }
+        self.running.retain(|running| match running.outcome() {
+            None => true,
+            Some(Ok(())) => {
+                notices.info(format!("Saved as {}.", running.path().display()));
+                false
+            }
+            Some(Err(cause)) => {
+                notices.error(cause.to_string());
+                false
+            }
+        });
         for file in ctx.input(|i| i.raw.dropped_files.clone()) {
             simulation.open(&file.path().to_string_lossy(), notices);
-        }
-    }
-
-    /// Draws the view once more, off-screen and at twice the resolution, in a thread of its own.
-    fn save_picture(&self, path: PathBuf, simulation: &SimulationFeature, view: &ViewState, notices: &mut Notices) {
-        let Some(snapshot) = simulation.worker().snapshot() else { return };
-        let picture = PictureView {
-            camera: view.camera,
-            theme: view.theme,
-            forces: view.forces,
-            size: Vec2::new(800.0, 560.0),
-            badge: Some("SIMULATED".to_owned()),
-            ..PictureView::default()
-        };
-        let (answers, wake, ghost) = (self.answers.0.clone(), Arc::clone(&self.wake), simulation.ghost(view));
-        let draw = move || {
-            let drawn = draw_picture(&snapshot, ghost.as_deref(), &picture, &path);
-            let message = match drawn {
-                Ok(()) => UserMessage::Info(format!("Picture saved as {}.", path.display())),
-                Err(text) => UserMessage::Error(text),
-            };
-            // The window may have been closed meanwhile.
-            let _heard = answers.send(Answer::Tell(message));
-            wake();
-        };
-        if let Err(error) = std::thread::Builder::new().name("picture".to_owned()).spawn(draw) {
-            notices.error(format!("Cannot draw the picture: {error}"));
         }
     }
 }
@@ -140,23 +136,6 @@ fn save_scene(path: &Path, scene: &Scene, notices: &mut Notices) {
         Ok(()) => notices.info(format!("Scene saved as {}.", path.display())),
         Err(error) => notices.error(format!("Cannot write {}: {error}", path.display())),
     }
-}
-
-fn draw_picture(
-    snapshot: &Snapshot,
-    ghost: Option<&GhostGrasp>,
-    view: &PictureView,
-    path: &Path,
-) -> Result<(), String> {
-    let gpu = Gpu::headless(DriverChoice::Any).map_err(|e| e.to_string())?;
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    let pixels = [view.size.x, view.size.y].map(|side| (side * PICTURE_SCALE) as u32);
-    let mut list = snapshot.stage.draw(&snapshot.frame, view);
-    if let Some(frame) = ghost_frame(Some(snapshot), ghost) {
-        list.ghosts = snapshot.stage.ghosts(frame, view.theme);
-    }
-    let picture = Picture::draw(&gpu, &mut renderer, &list, pixels, PICTURE_SCALE).map_err(|e| e.to_string())?;
-    picture.save(path).map_err(|e| e.to_string())
 }
 
 /// Hint over the window while a file is dragged over it.

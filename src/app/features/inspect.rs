@@ -146,6 +146,12 @@ impl InspectFeature {
         }
     }
 
+    /// How trials are opened, with the models in use.
+    pub(in crate::app) fn options(&self) -> OpenOptions {
+        let [model, board_model] = self.models.clone();
+        OpenOptions { model, board_model, ..self.options.clone() }
+    }
+
     /// True while a trial is being opened.
     pub(in crate::app) fn is_opening(&self) -> bool {
         self.wanted.is_some() && self.open.as_ref().map(|open| open.id) != self.wanted
@@ -283,12 +289,7 @@ impl InspectFeature {
     }
 
     fn ask(&self, id: TrialId, scenery: bool) {
-        let mut options = self.options.clone();
-        options.scenery = scenery;
-        // Which of the two models fits is known once the trial is read.
-        options.model = self.models[0].clone();
-        options.board_model = self.models[1].clone();
-        self.inspector.open(id, options);
+        self.inspector.open(id, OpenOptions { scenery, ..self.options() });
     }
 
     pub(in crate::app) fn apply(

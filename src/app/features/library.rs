@@ -4,7 +4,7 @@ use crate::app::features::inspect::InspectAction;
 use crate::app::notices::Notices;
 use palpate_lab::workers::{LabelOutcome, Librarian, LibraryCommand, LibraryView};
 use palpate_store::labels::TrialEdit;
-use palpate_store::{LibraryTrial, TrialFormat, TrialQuery};
+use palpate_store::{LibraryTrial, TrialQuery};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -39,8 +39,8 @@ pub enum LibraryAction {
     Draw(Vec<TrialId>),
     /// Change the selected trials.
     Edit(TrialEdit),
-    /// Export the selected trials.
-    Export(TrialFormat),
+    /// Export the selected trials as CSV, into a folder beside the store.
+    Export,
     /// Open the trial selected last.
     Open,
     /// Pin the selected trials for comparison.
@@ -173,7 +173,7 @@ impl LibraryFeature {
                     self.librarian.ask(LibraryCommand::Edit(selected, edit));
                 }
             }
-            LibraryAction::Export(format) => self.librarian.ask(LibraryCommand::Export(selected, format)),
+            LibraryAction::Export => self.librarian.ask(LibraryCommand::Export(selected)),
             LibraryAction::Open => return self.selection.cursor.map(InspectAction::Open).into_iter().collect(),
             LibraryAction::Pin => return selected.into_iter().map(InspectAction::Pin).collect(),
         }

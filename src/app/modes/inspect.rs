@@ -2,6 +2,7 @@
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
+use crate::app::features::files::FileAction;
 use crate::app::features::inspect::InspectAction;
 use crate::app::features::library::LibraryAction;
 use crate::app::features::view::ViewAction;
@@ -9,6 +10,7 @@ use crate::app::keys::binding::{Binding, key};
 use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
+use palpate_lab::inspection::FigureOptions;
 use palpate_store::labels::TrialEdit;
 
 pub(super) const KIND: ModeKind = ModeKind {
@@ -37,6 +39,9 @@ const KEYS: &[Binding] = &[
     key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
     key(Modifiers::SHIFT, Key::A, "mark A at the cursor", |_| Some(InspectAction::PutMark(0).into())),
     key(Modifiers::SHIFT, Key::B, "mark B at the cursor", |_| Some(InspectAction::PutMark(1).into())),
+    key(Modifiers::COMMAND, Key::E, "export a figure of the trial and those compared with it", |_| {
+        Some(FileAction::ExportFigure(FigureOptions::default()).into())
+    }),
     key(Modifiers::NONE, Key::L, "repeat, between the marks where both are set", |_| {
         Some(InspectAction::ToggleRepeat.into())
     }),

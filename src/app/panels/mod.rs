@@ -31,7 +31,7 @@ mod small_pads;
 mod training;
 mod trial;
 mod trials;
-mod view3d;
+pub(super) mod view3d;
 mod why;
 
 use crate::app::actions::Actions;

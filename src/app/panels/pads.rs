@@ -2,13 +2,11 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::view::ViewAction;
-use crate::app::heat_map::{colour_bar, pad_ui};
+use crate::app::heat_map::{colour_bar, load_switch, pad_ui};
 use crate::app::shown_grasp::{ShownGrasp, shown_pads};
 use crate::app::theme::colour;
 use egui::{Align2, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
 use palpate_geometry::units::three_digits;
-use palpate_lab::picture::LoadUnit;
 
 /// Least height of a pad, and most width for its height.
 const LOWEST: f32 = 60.0;
@@ -64,15 +62,5 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             _ => format!("{}\u{2009}{}", three_digits(value), axis.unit),
         };
         ui.painter().text(pos2(begin - 6.0, y), align, text, font.clone(), quiet);
-    }
-}
-
-/// Switch between kPa and N.
-pub(super) fn load_switch(ui: &mut Ui, unit: LoadUnit, actions: &mut Actions) {
-    ui.spacing_mut().item_spacing.x = 4.0;
-    for (choice, about) in [(LoadUnit::Pressure, "Loads as pressure"), (LoadUnit::Force, "Loads as force")] {
-        if ui.selectable_label(unit == choice, choice.symbol()).on_hover_text(about).clicked() {
-            actions.push(ViewAction::SetLoadUnit(choice));
-        }
     }
 }

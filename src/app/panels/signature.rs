@@ -1,13 +1,15 @@
 //! Signature of a grasp as two heat maps over time: bending of every joint, and load on every row of taxels, of both
 //! fingers. A click or drag moves the cursor.
 
-use super::pads::load_switch;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::files::FileAction;
 use crate::app::features::view::ViewAction;
-use crate::app::heat_map::{OverTime, cells_width, height_beside, over_time_ui};
+use crate::app::heat_map::{OverTime, cells_width, height_beside, load_switch, over_time_ui};
 use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
+use crate::app::view_source::ViewSource;
 use egui::{RichText, Ui, vec2};
+use palpate_lab::inspection::{FigureOptions, HeatKind};
 use palpate_lab::picture::BendUnit;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -24,6 +26,15 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         {
             if ui.selectable_label(bend_unit == choice, choice.symbol()).on_hover_text(about).clicked() {
                 actions.push(ViewAction::SetBendUnit(choice));
+            }
+        }
+        if context.source == ViewSource::Trial {
+            ui.separator();
+            for (heat, name) in [(HeatKind::Joints, "Export joints"), (HeatKind::Pads, "Export pads")] {
+                if ui.small_button(name).on_hover_text("Export this heat map as SVG or PNG").clicked() {
+                    let options = FigureOptions { heat: Some(heat), ..FigureOptions::default() };
+                    actions.push(FileAction::ExportFigure(options));
+                }
             }
         }
     });

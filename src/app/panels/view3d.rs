@@ -5,6 +5,7 @@ use super::contact_path::{path_colour, path_mesh};
 use super::small_pads::small_pads;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::export::ExportRequest;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::features::view::{PathLayer, ViewAction};
 use crate::app::shown::Moment;
@@ -14,7 +15,7 @@ use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
-use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_geometry::drawing::{Camera, DrawList, StandardView};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_lab::workers::Command;
 use palpate_sim::objects::object_title;
@@ -112,43 +113,68 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
-/// Draws the picture; returns what it was drawn by.
-fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) -> PictureView {
-    let Moment { grasp, stage, frame } = moment;
+/// What is drawn of a moment: everything in `size` points, and the view of it.
+struct Drawn {
+    list: DrawList,
+    view: PictureView,
+    /// Time of the ghost's frame, where one is drawn (s).
+    ghost: Option<f64>,
+    /// Curvature of the real fingers, where they are drawn (1/m).
+    real: Option<[Option<f64>; 2]>,
+}
+
+fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> Drawn {
+    let Moment { stage, frame, .. } = moment;
     // Nothing is known of where a real gripper touched.
     let course = ShownGrasp::of(context).filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
     let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
-    let pixels_per_point = ui.ctx().pixels_per_point();
-    let picture = PictureView {
+    let view = PictureView {
         camera: context.view.camera,
         theme: context.view.theme,
-        size: Vec2::new(rect.width(), rect.height()),
+        size,
         forces: context.view.forces,
         path: grasp_path.as_ref().map(|(_, colour)| *colour),
         ..PictureView::default()
     };
-    let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
     let ghost = context.ghost.filter(|_| context.source != ViewSource::Trial && !context.shown().looks_back());
-    let key = PictureKey {
-        grasp,
-        sample: frame.t,
-        ghost: ghost.map(|ghost| ghost.t),
-        real: real_curvature(context),
-        view: picture.clone(),
-        pixels,
-        pixels_per_point,
-    };
-    let mut list = stage.draw(frame, &picture);
+    let real = real_curvature(context);
+    let mut list = stage.draw(frame, &view);
     if let Some(ghost) = ghost {
         list.ghosts = stage.ghosts(ghost, context.view.theme);
     }
-    if let Some(curvature) = key.real {
+    if let Some(curvature) = real {
         list.ghosts.extend(stage.reconstructed(curvature, context.view.theme));
     }
     if let Some((shown, colour)) = &grasp_path {
-        list.solids.extend(stage.path(&path_mesh(ui.ctx(), stage, shown, *colour), frame));
+        list.solids.extend(stage.path(&path_mesh(ctx, stage, shown, *colour), frame));
         Stage::unveil(&mut list, context.view.theme);
     }
+    Drawn { list, view, ghost: ghost.map(|ghost| ghost.t), real }
+}
+
+/// Size of exported pictures (points).
+const EXPORTED: [u32; 2] = [800, 560];
+
+/// The 3-D view as it stands, to be exported; none where there is nothing to draw.
+pub(in crate::app) fn exported(ctx: &egui::Context, context: &PanelContext<'_>) -> Option<ExportRequest> {
+    let moment = context.shown().moment()?;
+    let badge = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
+        Some(own) => format!("TRIAL {}, {}", own.trial.id, own.trial.source_title().to_uppercase()),
+        None => "SIMULATED".to_owned(),
+    };
+    let Drawn { mut list, view, .. } = drawn(ctx, context, moment, Vec2::from(EXPORTED.map(|side| side as f32)));
+    let badged = PictureView { badge: Some(badge), ..view };
+    list.overlay = moment.stage.draw(moment.frame, &badged).overlay;
+    Some(ExportRequest::View3d(Box::new(list), EXPORTED))
+}
+
+/// Draws the picture; returns what it was drawn by.
+fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) -> PictureView {
+    let Drawn { list, view, ghost, real } = drawn(ui.ctx(), context, moment, Vec2::new(rect.width(), rect.height()));
+    let pixels_per_point = ui.ctx().pixels_per_point();
+    let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
+    let (grasp, sample) = (moment.grasp, moment.frame.t);
+    let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
     let caption = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
         Some(inspected) => inspected.trial.remarks.join(" "),
         None if key.real.is_some() => {
@@ -166,7 +192,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) ->
         ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
         ui.painter().galley(place, galley, ink);
     }
-    picture
+    view
 }
 
 /// Curvature of the real fingers (1/m), while they are shown.

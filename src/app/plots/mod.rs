@@ -7,6 +7,7 @@ mod labels;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::derived::Derivation;
+use crate::app::features::files::FileAction;
 use crate::app::features::inspect::{ComparedTrace, InspectAction};
 use crate::app::features::view::ViewAction;
 use crate::app::playback::Seek;
@@ -21,7 +22,7 @@ use egui_plot::{
 use labels::CurveLabel;
 use palpate_geometry::palette::{Rgb, Theme, Trace, series_colour};
 use palpate_geometry::units::three_digits;
-use palpate_lab::inspection::{PhaseSpan, TouchPhase};
+use palpate_lab::inspection::{FigureOptions, PhaseSpan, TouchPhase};
 use palpate_sim::objects::object_title;
 use palpate_tactile::trial::TrialSource;
 
@@ -193,6 +194,15 @@ fn header_ui(
             );
             if ui.checkbox(&mut shown, text).on_hover_text(hint).changed() {
                 actions.push(ViewAction::ShowClassBands(shown));
+            }
+        }
+        if context.source == ViewSource::Trial {
+            let hint = "Export this plot as SVG or PNG, with the trials compared and a caption (Ctrl+E: all plots)";
+            if ui.small_button("Export").on_hover_text(hint).clicked() {
+                let channel = if id == "line pressure" { "line" } else { id };
+                let raw = id == "counts" || context.view.raw;
+                let channels = if raw { Vec::new() } else { vec![channel.to_owned()] };
+                actions.push(FileAction::ExportFigure(FigureOptions { channels, raw, ..FigureOptions::default() }));
             }
         }
         let playback = context.playback;

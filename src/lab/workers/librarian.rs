@@ -8,8 +8,7 @@ use super::messages::Wake;
 use crate::labelling::stored_sparkline;
 use palpate_store::labels::{Sparkline, TrialEdit};
 use palpate_store::{
-    ExportError, Library, LibraryCounts, LibraryTrial, Store, StoreError, TrialFormat, TrialQuality, TrialQuery,
-    export_trial,
+    ExportError, Library, LibraryCounts, LibraryTrial, Store, StoreError, TrialQuality, TrialQuery, export_trial,
 };
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{PressureArea, SensorLayout};
@@ -29,7 +28,7 @@ pub enum LibraryCommand {
     /// Change trials; one undo takes it back.
     Edit(Vec<TrialId>, TrialEdit),
     /// Export trials into a new folder beside the store, without unsound ones.
-    Export(Vec<TrialId>, TrialFormat),
+    Export(Vec<TrialId>),
 }
 
 /// Trials that were found, for display.
@@ -183,8 +182,8 @@ impl Service {
                 let done = format!("{}{undo}", edited?.sentence(&edit));
                 self.report(LabelOutcome::Done(done));
             }
-            Some(LibraryCommand::Export(ids, format)) => {
-                let done = self.exported(store, &ids, format, stop)?;
+            Some(LibraryCommand::Export(ids)) => {
+                let done = self.exported(store, &ids, stop)?;
                 self.report(LabelOutcome::Done(done));
             }
             None => {
@@ -238,13 +237,7 @@ impl Service {
         true
     }
 
-    fn exported(
-        &self,
-        store: &Store,
-        ids: &[TrialId],
-        format: TrialFormat,
-        stop: &AtomicBool,
-    ) -> Result<String, ExportError> {
+    fn exported(&self, store: &Store, ids: &[TrialId], stop: &AtomicBool) -> Result<String, ExportError> {
         let layout = SensorLayout::named(EXPORT_LAYOUT)?;
         let folder = new_export_folder(store.path());
         let is_sound = |id: &&TrialId| self.library.trial(**id).is_none_or(|t| t.quality() != TrialQuality::Unsound);
@@ -254,7 +247,7 @@ impl Service {
             if stop.load(Ordering::Relaxed) {
                 break;
             }
-            export_trial(store, *id, &folder, format, (&layout, PressureArea::Participation))?;
+            export_trial(store, *id, &folder, (&layout, PressureArea::Participation))?;
             written += 1;
         }
         let unsound = match ids.len() - sound.len() {
@@ -332,7 +325,7 @@ mod tests {
         let view = until(&librarian, &woken, |view| view.sparklines.len() == 99);
         let drawn = |id: TrialId| view.sparklines[&id].iter().all(|finger| finger.iter().any(Option::is_some));
         assert_eq!((1..=99).filter(|id| drawn(*id)).collect::<Vec<_>>(), [1, 2, 4, 5]);
-        librarian.ask(LibraryCommand::Export(vec![1, 2, 4], TrialFormat::Csv));
+        librarian.ask(LibraryCommand::Export(vec![1, 2, 4]));
         let view = until(&librarian, &woken, |view| view.outcomes.len() == 2);
         assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Warning(text)) if text.contains("before-v12")));
         let done = |text: &str| text.starts_with("3 of 3 trials exported");

@@ -2,14 +2,15 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::files::FileAction;
 use crate::app::features::library::LibraryAction;
 use crate::app::widgets::wrapped;
 use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
 use egui::{Button, Key, PopupCloseBehavior, RichText, ScrollArea, TextEdit, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
+use palpate_store::LibraryTrial;
 use palpate_store::labels::TrialEdit;
-use palpate_store::{LibraryTrial, TrialFormat};
 use palpate_tactile::trial::TrialSource;
 use std::sync::Arc;
 
@@ -53,12 +54,13 @@ fn edits_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions
     menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
     menu(ui, "Note", |ui| note_ui(ui, trials, actions));
     menu(ui, "Export", |ui| {
-        for format in TrialFormat::ALL {
-            let text = format!("{} into a folder beside the store", format.name().to_uppercase());
-            if ui.button(text).clicked() {
-                actions.push(LibraryAction::Export(format));
-                ui.close();
-            }
+        if ui.button("CSV into a folder beside the store").clicked() {
+            actions.push(LibraryAction::Export);
+            ui.close();
+        }
+        if ui.button("MCAP or NPZ file ..").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {
+            actions.push(FileAction::ExportTrials);
+            ui.close();
         }
     });
     if ui.button("Discard").on_hover_text("Discard (Del); Ctrl+Z brings them back").clicked() {
