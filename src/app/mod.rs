@@ -24,6 +24,7 @@
 //! | context | `context.rs` | read-only context of panels |
 //! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
+//! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
 //! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` | panels beside each other; command palette; file dialog inside the window |
 //! | workbench | `workbench.rs` | owner of all features |
@@ -39,6 +40,7 @@
 mod actions;
 mod bars;
 mod channel_curves;
+mod contact_path;
 mod context;
 mod derived;
 mod export;
@@ -58,6 +60,7 @@ mod playback;
 mod plots;
 mod shown;
 mod shown_grasp;
+mod small_pads;
 mod startup;
 mod theme;
 mod tiling;

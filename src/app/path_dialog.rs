@@ -221,7 +221,7 @@ mod tests {
         assert!(dialog.check(false).is_err_and(|why| why.contains("is a folder")));
         dialog.path = folder.path().join("none.obj").to_string_lossy().into_owned();
         assert!(dialog.check(false).is_err_and(|why| why.contains("no file")));
-        let names: Vec<String> = rows(folder.path(), &["png"]).into_iter().map(|row| row.name).collect();
-        assert_eq!(names, ["palpate.png"]);
+        let names: Vec<String> = rows(folder.path(), &["svg"]).into_iter().map(|row| row.name).collect();
+        assert_eq!(names, ["palpate.svg"]);
     }
 }

@@ -89,6 +89,8 @@ pub struct Workbench {
     thumbnails: BTreeMap<String, egui::TextureHandle>,
     driver: Option<String>,
     store: PathBuf,
+    /// Labels at the last look.
+    labels_seen: Option<Arc<LabelView>>,
 }
 
 /// Size of exported figures (points).
@@ -174,6 +176,7 @@ impl Workbench {
             thumbnails: load_thumbnails(ctx),
             driver,
             store,
+            labels_seen: None,
         };
         if workbench.view.ghost {
             workbench.act(ctx, SimulationAction::SetGhost(true));
@@ -388,11 +391,17 @@ impl Workbench {
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
         if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
-            inspect.apply(action, &[], view, notices);
+            // Opens or closes a trial; no change of one follows.
+            let _no_edit = inspect.apply(action, &[], view, notices);
         }
         library.gather(notices);
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, notices);
+        let labels = labelling.labeller().view();
+        if labels.as_ref().map(Arc::as_ptr) != self.labels_seen.as_ref().map(Arc::as_ptr) {
+            self.labels_seen = labels;
+            inspect.labels_changed();
+        }
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
         inspect.gather(grasp, view, notices);
         let published = self.published();
@@ -439,7 +448,9 @@ impl Workbench {
                 if matches!(action, InspectAction::Seek(_)) && view.source == ViewSource::Simulation {
                     simulation.send(Command::Pause, notices);
                 }
-                inspect.apply(action, &times, view, notices);
+                if let Some((id, edit)) = inspect.apply(action, &times, view, notices) {
+                    library.edit(id, edit);
+                }
             }
             Action::View(action) => {
                 if let ViewAction::SetSensors(sensors) = &action {

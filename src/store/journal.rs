@@ -8,7 +8,7 @@
 use super::store::{Store, json};
 use super::store_error::StoreError;
 use crate::labels::{Guess, LabelPlan, shown_title};
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{CorrectedPhases, TrialId};
 use rusqlite::{Row, Transaction, params};
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +48,13 @@ pub enum Change {
         /// After.
         to: bool,
     },
+    /// Phases as a person corrected them; none is as measured.
+    Phases {
+        /// Before.
+        from: Option<CorrectedPhases>,
+        /// After.
+        to: Option<CorrectedPhases>,
+    },
     /// The prediction of a model.
     Guess {
         /// The prediction.
@@ -74,6 +81,7 @@ impl Change {
             Self::Note { from, to } => Self::Note { from: to, to: from },
             Self::Tags { from, to } => Self::Tags { from: to, to: from },
             Self::Unsure { from, to } => Self::Unsure { from: to, to: from },
+            Self::Phases { from, to } => Self::Phases { from: to, to: from },
             Self::Guess { .. } | Self::Reviewed | Self::Plan { .. } => return None,
         })
     }
@@ -95,6 +103,8 @@ impl Change {
             Self::Tags { from, to } => format!("tags [{}] -> [{}]", from.join(", "), to.join(", ")),
             Self::Unsure { to: true, .. } => "label marked as unsure".to_owned(),
             Self::Unsure { to: false, .. } => "label no longer unsure".to_owned(),
+            Self::Phases { to: Some(_), .. } => "phases corrected".to_owned(),
+            Self::Phases { to: None, .. } => "phases as measured".to_owned(),
             Self::Guess { guess } => match guess.top() {
                 Some((class, p)) => format!("{} predicted {} ({:.0} %)", guess.model, shown_title(class), 100.0 * p),
                 None => format!("{} predicted nothing", guess.model),
@@ -423,6 +433,7 @@ fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusq
         Change::Note { from, to } => set("note", from, to),
         Change::Tags { from, to } => set("tags", &json(from), &json(to)),
         Change::Unsure { from, to } => set("unsure", from, to),
+        Change::Phases { from, to } => set("phases", &json(from), &json(to)),
         Change::Reviewed => set("reviewed", &false, &true),
         Change::Discarded => {
             let sql = "UPDATE trials SET deleted = strftime('%Y-%m-%dT%H:%M:%fZ', 'now')

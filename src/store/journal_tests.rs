@@ -40,7 +40,7 @@ fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
     drop(store);
     let store = Store::open(&path)?;
     let undone = store.journal().undo()?.ok_or("something was done")?;
-    assert_eq!(undone.sentence(), "trial 1: label lemon -> cube");
+    assert_eq!(undone.sentence(), "trial 1: label Lemon -> Puzzle cube (cube)");
     assert_eq!(labels(&store)?, [Some("lemon".to_owned())]);
     drop(store);
     let store = Store::open(&path)?;
@@ -53,8 +53,8 @@ fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
     assert_eq!((labels(&store)?, store.journal().redo()?), (vec![Some("cube".to_owned())], None));
     let entries: Vec<String> = store.journal().entries(100)?.iter().map(JournalEntry::sentence).collect();
     assert_eq!(entries.len(), 6);
-    assert_eq!(entries[5], "trial 1: label unlabelled -> lemon");
-    assert_eq!(entries[3], "trial 1: label cube -> lemon (undoes 2)");
+    assert_eq!(entries[5], "trial 1: label unlabelled -> Lemon");
+    assert_eq!(entries[3], "trial 1: label Puzzle cube (cube) -> Lemon (undoes 2)");
     assert_eq!(store.journal().entries(2)?.len(), 2);
     Ok(())
 }
@@ -88,7 +88,7 @@ fn the_journal_is_only_added_to() -> Outcome {
     assert_eq!(store.purge()?, 1);
     let entries = store.journal().entries(9)?;
     assert_eq!((entries.len(), entries[1].trial), (2, None));
-    assert!(entries[1].sentence().ends_with("(purged): label unlabelled -> lemon"), "{}", entries[1].sentence());
+    assert!(entries[1].sentence().ends_with("(purged): label unlabelled -> Lemon"), "{}", entries[1].sentence());
     assert_eq!(store.journal().undo()?, None, "there is nothing left to put it back on");
     Ok(())
 }
@@ -119,14 +119,20 @@ fn programs_share_one_history() -> Outcome {
     ours.labels().set_note(2, "first")?;
     ours.labels().set_label(1, "ball")?;
     theirs.labels().set_label(1, "bigball")?;
-    assert_eq!(ours.journal().undo()?.ok_or("theirs")?.sentence(), "trial 1: label ball -> bigball");
+    assert_eq!(
+        ours.journal().undo()?.ok_or("theirs")?.sentence(),
+        "trial 1: label Rubber ball (ball) -> Tennis ball (bigball)"
+    );
     assert_eq!(labels(&theirs)?[0].as_deref(), Some("ball"));
     theirs.journal().redo()?.ok_or("the same")?;
     assert_eq!(labels(&ours)?[0].as_deref(), Some("bigball"));
     // A change past the journal is not overwritten.
     ours.connection.execute("UPDATE trials SET object = 'case' WHERE id = 1", [])?;
     let refused = ours.journal().undo().expect_err("it has changed").to_string();
-    assert!(refused.contains("label ball -> bigball") && refused.contains("changed since"), "{refused}");
+    assert!(
+        refused.contains("label Rubber ball (ball) -> Tennis ball (bigball)") && refused.contains("changed since"),
+        "{refused}"
+    );
     assert_eq!(labels(&ours)?[0].as_deref(), Some("case"));
     ours.delete(&[2])?;
     assert_eq!(theirs.journal().undo()?.ok_or("the deletion")?.sentence(), "trial 2: discarded");
@@ -255,7 +261,7 @@ fn all_that_goes_with_a_trial_is_merged_and_only_once() -> Outcome {
     assert_eq!((ours.merge_from(&there)?.added, ours.journal().entries(99)?.len()), (0, 9));
     assert_eq!(
         ours.journal().undo()?.ok_or("our own")?.sentence(),
-        "trial 1: label box -> case",
+        "trial 1: label Cardboard box (box) -> Earphone case (case)",
         "theirs was done elsewhere"
     );
     assert_eq!(ours.journal().undo()?, None);
@@ -274,7 +280,7 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
          ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
-         ALTER TABLE trials DROP COLUMN earlier;
+         ALTER TABLE trials DROP COLUMN earlier; ALTER TABLE trials DROP COLUMN phases;
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
          PRAGMA user_version = 6;",
     )?;

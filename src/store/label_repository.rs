@@ -5,7 +5,7 @@ use super::journal::{Change, Links, append, change, new_batch};
 use super::store::{Store, json, source_named};
 use super::store_error::StoreError;
 use crate::labels::{ClassNameError, Edited, Guess, LabelPlan, TrialEdit, class_name};
-use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_tactile::trial::{CorrectedPhases, TrialId, TrialSource};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
 /// Most characters of a note.
@@ -46,12 +46,14 @@ struct LabelState {
     tags: Vec<String>,
     unsure: bool,
     reviewed: bool,
+    phases: Option<CorrectedPhases>,
 }
 
 fn state_of(row: &Row<'_>) -> rusqlite::Result<LabelState> {
     let tags = serde_json::from_str(&row.get::<_, String>(3)?).unwrap_or_default();
     let (unsure, reviewed) = (row.get(4)?, row.get(5)?);
-    Ok(LabelState { rig: row.get(0)?, object: row.get(1)?, note: row.get(2)?, tags, unsure, reviewed })
+    let phases = serde_json::from_str(&row.get::<_, String>(6)?).unwrap_or_default();
+    Ok(LabelState { rig: row.get(0)?, object: row.get(1)?, note: row.get(2)?, tags, unsure, reviewed, phases })
 }
 
 impl LabelRepository<'_> {
@@ -85,6 +87,9 @@ impl LabelRepository<'_> {
             }
             TrialEdit::Unsure(unsure) => {
                 self.change_trials(ids, |_, state| Ok(Some(Change::Unsure { from: state.unsure, to: *unsure })))
+            }
+            TrialEdit::Phases(phases) => {
+                self.change_trials(ids, |_, state| Ok(Some(Change::Phases { from: state.phases, to: *phases })))
             }
             TrialEdit::Discard => self.change_deletion(ids, &Change::Discarded),
             TrialEdit::Restore => self.change_deletion(ids, &Change::Restored),
@@ -181,7 +186,8 @@ impl LabelRepository<'_> {
         let batch = new_batch(&transaction, ids.len()).map_err(fault)?;
         let links = Links { undoes: None, batch: batch.as_deref() };
         let mut edited = Edited::default();
-        let sql = "SELECT rig, object, note, tags, unsure, reviewed FROM trials WHERE id = ?1 AND deleted IS NULL";
+        let sql =
+            "SELECT rig, object, note, tags, unsure, reviewed, phases FROM trials WHERE id = ?1 AND deleted IS NULL";
         for id in ids {
             let state =
                 transaction.prepare_cached(sql).and_then(|mut found| found.query_row([id], state_of).optional());

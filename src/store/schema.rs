@@ -146,8 +146,9 @@ pub(super) const MIGRATIONS: [&str; 12] = [
      ALTER TABLE board_chunks ADD COLUMN checksum INTEGER;
      ALTER TABLE board_chunks ADD COLUMN bytes_checksum INTEGER;
      ALTER TABLE journal DROP COLUMN writer;",
-    // JSON of the grasps before it, as the recogniser judged them.
-    "ALTER TABLE trials ADD COLUMN earlier TEXT;",
+    // JSON: the grasps before it, as the recogniser judged them; phases as a person corrected them.
+    "ALTER TABLE trials ADD COLUMN earlier TEXT;
+     ALTER TABLE trials ADD COLUMN phases TEXT NOT NULL DEFAULT 'null';",
     // Names the changes that were made, and are undone, together.
     "ALTER TABLE journal ADD COLUMN batch TEXT;",
 ];

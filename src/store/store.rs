@@ -265,19 +265,20 @@ impl Store {
     /// Header of a trial, with its source and the columns that only simulated trials use.
     fn load_header(&self, id: TrialId) -> Result<StoredHeader, StoreError> {
         let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
-                   collection, plan, earlier FROM trials WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 3], String, String, [Option<String>; 2]);
+                   collection, plan, earlier, phases FROM trials WHERE id = ?1 AND deleted IS NULL";
+        type Columns = (String, String, i64, String, [String; 3], String, String, [Option<String>; 3]);
         let found: Option<Columns> = self
             .connection
             .query_row(sql, [id], |row| {
                 let simulation = [row.get(4)?, row.get(5)?, row.get(9)?];
                 let scene = row.get(3)?;
-                let optional = [row.get(8)?, row.get(10)?];
+                let optional = [row.get(8)?, row.get(10)?, row.get(11)?];
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?, scene, simulation, row.get(6)?, row.get(7)?, optional))
             })
             .optional()
             .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, simulation, warnings, version, [collection, earlier])) = found else {
+        let Some((rig, object, seed, scene, simulation, warnings, version, [collection, earlier, phases])) = found
+        else {
             return Err(self.no_trial(id));
         };
         let header = TrialHeader {
@@ -289,6 +290,7 @@ impl Store {
             warnings: serde_json::from_str(&warnings).map_err(|e| StoreError::BadInfo { id, cause: e.to_string() })?,
             version,
             earlier: earlier.as_deref().and_then(|earlier| serde_json::from_str(earlier).ok()),
+            phases: phases.as_deref().and_then(|phases| serde_json::from_str(phases).ok()).flatten(),
         };
         Ok(StoredHeader { source: source_named(id, &rig)?, header, simulation })
     }

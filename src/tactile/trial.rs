@@ -94,6 +94,22 @@ pub struct TrialHeader {
     pub version: String,
     /// Grasps of the same object before it, where a recogniser has judged them.
     pub earlier: Option<EarlierGrasps>,
+    /// Phases that a person corrected; none where they are as measured.
+    pub phases: Option<CorrectedPhases>,
+}
+
+/// Beginnings of the phases of a grasp as a person set them (s, from the beginning of the trial); a phase without one is as
+/// measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CorrectedPhases {
+    /// The fingers begin to close.
+    pub closing: Option<f64>,
+    /// A finger touches the object.
+    pub contact: Option<f64>,
+    /// The line pressure stays.
+    pub hold: Option<f64>,
+    /// The line pressure falls.
+    pub release: Option<f64>,
 }
 
 /// Grasps of the same object before a trial, as a recogniser judged them: its answers to the trial build on them.
@@ -116,6 +132,7 @@ impl TrialHeader {
             warnings: Vec::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             earlier: None,
+            phases: None,
         }
     }
 }

@@ -7,7 +7,7 @@
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
 //! | `cargo run --release -p palpate-workshop -- signatures --store FILE` | the class signatures of that model; its weights stay |
 //! | `cargo run --release -p palpate-workshop -- scores --store FILE` | the scores of all methods, into `assets/studies/recognition.json`; resumes |
-//! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README, from the stored results in `assets/studies` |
+//! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
 //! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
 //!
 //! Dimensions are real-world ones, chosen to match the names of the paper's objects, whose sizes it does not publish.
@@ -21,8 +21,11 @@ mod thumbnails;
 mod tools;
 
 use clap::{Parser, Subcommand};
+use palpate_geometry::palette::Theme;
 use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
+use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
 use palpate_lab::study::{Measuring, generated_sections, measure_scores};
+use palpate_render::figure_svg;
 use palpate_sim::objects::{ShapeClass, SizeClass};
 use palpate_store::Store;
 use std::fmt::Write as _;
@@ -106,7 +109,7 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
-    /// Write the tables of the manual and the README from the stored results of studies.
+    /// Write the tables of the manual and the README, and the picture of the study of accuracy, from stored results.
     Tables,
     /// Feed random bytes to the protocol decoder and check its events.
     Fuzz {
@@ -152,6 +155,9 @@ fn write_scores(out: &Path, store: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Size of the stored picture, as `palpate study accuracy` draws it (points).
+const FIGURE_SIZE: [u32; 2] = [960, 860];
+
 fn write_tables() -> Result<(), Failure> {
     for section in generated_sections()? {
         let path = Path::new(section.document);
@@ -160,6 +166,9 @@ fn write_tables() -> Result<(), Failure> {
         std::fs::write(path, text)?;
         report(format_args!("{} in {}", section.name, section.document));
     }
+    let picture = "assets/studies/accuracy.svg";
+    std::fs::write(picture, figure_svg(&accuracy_figure(&stored_accuracy()?), Theme::Light, FIGURE_SIZE)?)?;
+    report(format_args!("{picture}"));
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 //! before committing.
 
 use image::RgbaImage;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use std::path::{Path, PathBuf};
 
 /// A pixel counts as different beyond this step in any channel. Software rasterisers of one kind agree to 1 or 2.
@@ -17,6 +18,28 @@ fn differing(a: &RgbaImage, b: &RgbaImage) -> usize {
     a.pixels().zip(b.pixels()).filter(|(p, q)| (0..4).any(|k| p.0[k].abs_diff(q.0[k]) > STEP)).count()
 }
 
+/// Writes a picture as small as PNG can: without its opacity, which is full everywhere.
+fn save(picture: &RgbaImage, path: &Path) {
+    let opaque = image::DynamicImage::ImageRgba8(picture.clone()).into_rgb8();
+    let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
+    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
+    opaque.write_with_encoder(encoder).unwrap();
+}
+
+/// Pictures in columns, row by row; each has the room of the largest.
+pub(crate) fn sheet(pictures: &[RgbaImage], columns: u32) -> RgbaImage {
+    let largest = |side: fn(&RgbaImage) -> u32| pictures.iter().map(side).max().unwrap_or(1);
+    let (width, height) = (largest(RgbaImage::width), largest(RgbaImage::height));
+    let rows = (pictures.len() as u32).div_ceil(columns);
+    let grey = image::Rgba([128, 128, 128, 255]);
+    let mut sheet = RgbaImage::from_pixel(columns * width, rows * height, grey);
+    for (k, picture) in pictures.iter().enumerate() {
+        let (column, row) = (k as u32 % columns, k as u32 / columns);
+        image::imageops::replace(&mut sheet, picture, i64::from(column * width), i64::from(row * height));
+    }
+    sheet
+}
+
 /// Compares a picture with the golden one, or makes that. `drawn_by` is named when they differ.
 pub(crate) fn compare(name: &str, picture: &RgbaImage, drawn_by: &str) {
     let path = folder().join(format!("{name}.png"));
@@ -26,7 +49,7 @@ pub(crate) fn compare(name: &str, picture: &RgbaImage, drawn_by: &str) {
             old.dimensions() == picture.dimensions() && differing(&old, picture) == 0
         });
         if !same {
-            picture.save(&path).unwrap();
+            save(picture, &path);
         }
         return;
     }

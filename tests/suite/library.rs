@@ -57,7 +57,7 @@ fn the_terminal_lists_and_changes_what_matches() {
     assert_eq!(list(&["--sort", "object", "--reverse", "--limit", "2"]), [5, 2]);
     assert_eq!(list(&["--quality", "unsound"]), [0i64; 0]);
     let plain = run(at, &["trials", "list", "--search", "tomato", "--limit", "1"]);
-    assert!(plain.out.contains("tomato") && plain.out.lines().count() == 2, "{plain:?}");
+    assert!(plain.out.contains("Tomato") && plain.out.lines().count() == 2, "{plain:?}");
     assert!(run(at, &["trials", "list", "--search", "zebra"]).out.contains("no trial matches"));
     for (option, value) in [("--since", "soon"), ("--sort", "colour"), ("--flag", "odd"), ("--quality", "fine")] {
         let ran = run(at, &["trials", "list", option, value]);
@@ -80,7 +80,7 @@ fn the_terminal_lists_and_changes_what_matches() {
     let (out, _) = said(&["trials", "label", "1,3-6", "tomato"]);
     assert!(out.contains("3 trials labelled tomato; 2 are simulated or imported and keep their object"), "{out}");
     assert_eq!(list(&["--object", &title("tomato")]), [2, 3, 4, 5]);
-    assert!(said(&["trials", "undo"]).0.contains("trials 3, 4, 5: label -> tomato"));
+    assert!(said(&["trials", "undo"]).0.contains("trials 3, 4, 5: label -> Tomato"));
     assert_eq!((list(&["--unlabelled"]), list(&["--object", "cube"])), (vec![5], vec![4]));
     refused(at, &["trials", "label", "1,6", "ball"], &["only trials of the real gripper"]);
     said(&["trials", "discard", "2-4", "6"]);

@@ -2,11 +2,12 @@
 //! whose software rasteriser is the same everywhere; without any driver these tests fail and name the package.
 
 use crate::bench::{Bench, BenchSetup};
-use crate::golden::compare;
+use crate::golden::{compare, sheet};
+use crate::inspect::three_trials;
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
 use glam::Vec2;
 use image::RgbaImage;
-use palpate::app::ViewAction;
+use palpate::app::{InspectAction, LibraryAction, ViewAction};
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
@@ -14,6 +15,7 @@ use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, wanted_limits, wgpu};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::{Scene, SupportKind};
+use palpate_store::{Store, TrialQuery};
 use std::sync::Arc;
 
 fn driver() -> Gpu {
@@ -38,7 +40,7 @@ const HELD: Shot = Shot {
     at: 2.9,
     view: StandardView::Home,
     theme: Theme::Dark,
-    size: [480, 320],
+    size: [340, 230],
     forces: true,
     annotations: true,
     ghost: false,
@@ -76,49 +78,46 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
 fn held_objects_from_several_sides() {
     let gpu = driver();
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    let mut check = |name: &str, shot: &Shot, scene: &Scene| {
-        compare(name, &take(&gpu, &mut renderer, scene, shot), &gpu.driver);
-    };
+    let mut views = Vec::new();
+    let mut check = |shot: &Shot, scene: &Scene| views.push(take(&gpu, &mut renderer, scene, shot));
     let scene = Scene::default();
-    check("view_lemon_dark", &HELD, &scene);
-    check("view_lemon_light", &Shot { theme: Theme::Light, ..HELD }, &scene);
-    check("view_ball_ghost", &Shot { object: "ball", ghost: true, view: StandardView::Front, ..HELD }, &scene);
-    check("view_box_front", &Shot { object: "box", view: StandardView::Front, ..HELD }, &scene);
-    check(
-        "view_syringe_top",
-        &Shot { object: "syringe", view: StandardView::Top, theme: Theme::Light, ..HELD },
-        &scene,
-    );
-    check("view_empty_open", &Shot { object: EMPTY, at: 0.0, forces: false, ..HELD }, &scene);
+    check(&HELD, &scene);
+    check(&Shot { theme: Theme::Light, ..HELD }, &scene);
+    check(&Shot { object: "ball", ghost: true, view: StandardView::Front, ..HELD }, &scene);
+    check(&Shot { object: "box", view: StandardView::Front, ..HELD }, &scene);
+    check(&Shot { object: "syringe", view: StandardView::Top, theme: Theme::Light, ..HELD }, &scene);
+    check(&Shot { object: EMPTY, at: 0.0, forces: false, ..HELD }, &scene);
     let mut table = Scene::default();
     table.support.kind = SupportKind::Table;
     table.gripper.finger.joints = 40;
-    check("view_metalbrick_bare", &Shot { object: "metalbrick", annotations: false, ..HELD }, &table);
+    check(&Shot { object: "metalbrick", annotations: false, ..HELD }, &table);
+    compare("views", &sheet(&views, 3), &gpu.driver);
 }
 
 #[test]
 fn the_sixteen_look_like_what_they_are() {
     let gpu = driver();
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    let [width, height] = [240, 180];
-    let mut sheet = RgbaImage::new(4 * width, 4 * height);
-    for (k, built_in) in catalogue().iter().enumerate() {
-        let shot = Shot { object: &built_in.name, size: [width, height], forces: false, annotations: false, ..HELD };
-        let picture = take(&gpu, &mut renderer, &Scene::default(), &shot);
-        let (column, row) = (k as u32 % 4, k as u32 / 4);
-        image::imageops::replace(&mut sheet, &picture, i64::from(column * width), i64::from(row * height));
-    }
-    compare("the_sixteen_held", &sheet, &gpu.driver);
+    let mut held = |object: &'static str| {
+        let shot = Shot { object, size: [190, 135], forces: false, annotations: false, ..HELD };
+        take(&gpu, &mut renderer, &Scene::default(), &shot)
+    };
+    let pictures: Vec<RgbaImage> = catalogue().iter().map(|built_in| held(&built_in.name)).collect();
+    compare("the_sixteen_held", &sheet(&pictures, 4), &gpu.driver);
 }
 
 /// The window through the driver that the pictures above are drawn with.
 fn window(theme: Theme, size: [f32; 2]) -> Bench {
+    window_on(theme, size, |_| ())
+}
+
+fn window_on(theme: Theme, size: [f32; 2], fill: fn(&mut Store)) -> Bench {
     let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
     setup.instance_descriptor.backends = wgpu::Backends::GL;
     setup.device_descriptor =
         Arc::new(|adapter| wgpu::DeviceDescriptor { required_limits: wanted_limits(adapter), ..Default::default() });
     let state = create_render_state(setup.into(), egui_wgpu::RendererOptions::PREDICTABLE);
-    let setup = BenchSetup { theme, size, render_state: Some(state.clone()), ..BenchSetup::default() };
+    let setup = BenchSetup { theme, size, render_state: Some(state.clone()), fill, ..BenchSetup::default() };
     Bench::new(setup, WgpuTestRenderer::from_render_state(state))
 }
 
@@ -127,7 +126,7 @@ fn the_window_in_both_themes_and_small() {
     let by = driver().driver;
     for (name, theme, size) in [
         ("window_dark", Theme::Dark, [1280.0, 820.0]),
-        ("window_light", Theme::Light, [1280.0, 820.0]),
+        ("window_light", Theme::Light, [960.0, 600.0]),
         ("window_small", Theme::Dark, [720.0, 480.0]),
     ] {
         let mut bench = window(theme, size);
@@ -138,5 +137,25 @@ fn the_window_in_both_themes_and_small() {
             bench.harness.run_steps(3);
             compare("window_keys", &bench.harness.render().unwrap(), &by);
         }
+    }
+}
+
+#[test]
+fn stored_trials_are_compared_in_both_themes() {
+    let by = driver().driver;
+    for (name, theme, size) in
+        [("inspect_dark", Theme::Dark, [1280.0, 820.0]), ("inspect_light", Theme::Light, [960.0, 600.0])]
+    {
+        let mut bench = window_on(theme, size, three_trials);
+        bench.tell(InspectAction::Open(1));
+        bench.until_shown(true, "TRIAL 1, SIMULATED");
+        bench.tell(InspectAction::Pin(2));
+        bench.until_shown(true, "Tomato, trial 2, simulated");
+        // The list has dates, which differ from day to day.
+        bench.tell(LibraryAction::Find(TrialQuery { search: "in no trial".to_owned(), ..TrialQuery::default() }));
+        bench.until_shown(true, "0 of 3 trials");
+        // What is computed in the background is done.
+        bench.harness.run_steps(3);
+        compare(name, &bench.harness.render().unwrap(), &by);
     }
 }

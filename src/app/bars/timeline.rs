@@ -3,11 +3,14 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
+use crate::app::features::inspect::{InspectAction, Inspected};
 use crate::app::playback::Seek;
 use crate::app::theme::{colour, veil};
+use crate::app::view_source::ViewSource;
 use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Trace;
+use palpate_lab::inspection::PhaseSpan;
+use palpate_tactile::trial::TrialSource;
 
 /// Height of the bar (points).
 const HEIGHT: f32 = 26.0;
@@ -43,6 +46,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             painter.galley(pos2(left + 4.0, rect.top() + 1.0), word, colour(colours.text));
         }
     }
+    if let Some(own) = context.inspected.filter(|own| is_corrected_by_hand(context, own)) {
+        for span in &own.trial.phases {
+            grip_ui(ui, rect, context, span, (first, length), actions);
+        }
+    }
     let playback = context.playback;
     if let Some([from, to]) = playback.repeated {
         let part = Rect::from_x_y_ranges(x_of(from)..=x_of(to), rect.bottom() - 4.0..=rect.bottom());
@@ -65,6 +73,49 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         painter.vline(x_of(t), rect.y_range(), Stroke::new(2.5, colour(colours.accent)));
     }
     response.on_hover_text("Drag to move through time (arrow keys: 0.1 s, with Ctrl a sample)");
+}
+
+/// Marks of a simulated grasp are exact; those of others are measured, and a person may know better.
+fn is_corrected_by_hand(context: &PanelContext<'_>, own: &Inspected<'_>) -> bool {
+    context.source == ViewSource::Trial && own.trial.source != TrialSource::Simulated
+}
+
+/// Grip at the beginning of a phase, by which it is moved.
+fn grip_ui(
+    ui: &mut Ui,
+    rect: Rect,
+    context: &PanelContext<'_>,
+    span: &PhaseSpan,
+    (first, length): (f64, f64),
+    actions: &mut Actions,
+) {
+    let id = ui.scope_id().with(("phase", span.phase));
+    let dragged = ui.data(|data| data.get_temp::<f64>(id));
+    let x_of = |t: f64| rect.left() + rect.width() * ((t - first) / length).clamp(0.0, 1.0) as f32;
+    let x = x_of(dragged.unwrap_or(span.from_s));
+    let place = Rect::from_min_max(pos2(x - 5.0, rect.top()), pos2(x + 5.0, rect.top() + 11.0));
+    let response = ui.interact(place, id, Sense::drag()).on_hover_cursor(egui::CursorIcon::ResizeHorizontal);
+    let name = span.phase.name();
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, format!("Beginning of {name}")));
+    let ink = colour(context.view.theme.colours().accent);
+    let points = vec![place.left_top(), place.right_top(), pos2(x, place.bottom())];
+    ui.painter().add(egui::Shape::convex_polygon(points, ink, Stroke::NONE));
+    if dragged.is_some() {
+        ui.painter().vline(x, rect.y_range(), Stroke::new(1.5, ink));
+    }
+    if response.dragged()
+        && let Some(pointer) = response.interact_pointer_pos()
+    {
+        let share = f64::from((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        ui.data_mut(|data| data.insert_temp(id, first + share * length));
+    }
+    if response.drag_stopped()
+        && let Some(from_s) = dragged
+    {
+        ui.data_mut(|data| data.remove::<f64>(id));
+        actions.push(InspectAction::MovePhase(span.phase, from_s));
+    }
+    response.on_hover_text(format!("Drag to correct where {name} begins; Ctrl+Z takes it back"));
 }
 
 /// Line pressure as a filled curve.

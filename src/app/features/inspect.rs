@@ -9,6 +9,7 @@ use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
 use palpate_lab::workers::Inspector;
 use palpate_learn::Model;
+use palpate_store::labels::TrialEdit;
 use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -43,6 +44,8 @@ pub enum InspectAction {
     ToggleRepeat,
     /// Put mark A (0) or B (1) at the cursor; there already, it is taken away.
     PutMark(usize),
+    /// Correct the beginning of a phase of the open trial (s).
+    MovePhase(TouchPhase, f64),
     /// Origin of time of compared trials.
     Align(Alignment),
     /// Show mean and spread of each class in place of each compared trial.
@@ -253,11 +256,8 @@ impl InspectFeature {
         self.history.clear();
         self.history.show(trace_of(&trial));
         if !again {
-            self.stored = Playback {
-                cursor_s: trial.phases.iter().find(|span| span.phase == TouchPhase::Hold).map(|span| span.to_s),
-                speed: self.stored.speed,
-                ..Playback::default()
-            };
+            self.stored =
+                Playback { cursor_s: trial.last_of(TouchPhase::Hold), speed: self.stored.speed, ..Playback::default() };
         }
         self.open = Some(trial);
         self.revision += 1;
@@ -292,13 +292,14 @@ impl InspectFeature {
         self.inspector.open(id, OpenOptions { scenery, ..self.options() });
     }
 
+    /// Applies an action; returns the change of a stored trial that follows from it.
     pub(in crate::app) fn apply(
         &mut self,
         action: InspectAction,
         times: &[f64],
         view: &mut ViewState,
         notices: &mut Notices,
-    ) {
+    ) -> Option<(TrialId, TrialEdit)> {
         let source = view.source;
         let live = source != ViewSource::Trial;
         let span = [times.first(), times.last()].map(|t| t.copied().unwrap_or(0.0));
@@ -338,8 +339,21 @@ impl InspectFeature {
                     *mark = if *mark == Some(at) { None } else { Some(at) };
                 }
             }
+            InspectAction::MovePhase(phase, from_s) => {
+                if let Some(trial) = &self.open {
+                    return Some((trial.id, TrialEdit::Phases(Some(trial.with_phase_at(phase, from_s)))));
+                }
+            }
             InspectAction::Align(alignment) => self.alignment = alignment,
             InspectAction::ShowSpread(spread) => self.spread = spread,
+        }
+        None
+    }
+
+    /// Labels or phases in the store have changed: those of trials that were not simulated are read again.
+    pub(in crate::app) fn labels_changed(&mut self) {
+        if self.open.as_ref().is_some_and(|open| open.source != TrialSource::Simulated) {
+            self.open_again();
         }
     }
 

@@ -126,6 +126,11 @@ impl LibraryFeature {
         self.librarian.view()
     }
 
+    /// Changes a trial.
+    pub(in crate::app) fn edit(&self, id: TrialId, edit: TrialEdit) {
+        self.librarian.ask(LibraryCommand::Edit(vec![id], edit));
+    }
+
     pub(in crate::app) fn selection(&self) -> &LibrarySelection {
         &self.selection
     }

@@ -1,15 +1,15 @@
 //! 3-D view: drag turns, the right or middle button moves, the wheel zooms, a double click shows everything, Ctrl and drag
 //! pulls at the object.
 
-use super::contact_path::{path_colour, path_mesh};
-use super::small_pads::small_pads;
 use crate::app::actions::Actions;
+use crate::app::contact_path::{path_colour, path_mesh};
 use crate::app::context::PanelContext;
 use crate::app::export::ExportRequest;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::features::view::{PathLayer, ViewAction};
 use crate::app::shown::Moment;
 use crate::app::shown_grasp::ShownGrasp;
+use crate::app::small_pads::small_pads;
 use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};

@@ -12,7 +12,7 @@ use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::board::{Board, Gap};
-use palpate_tactile::trial::{SimulatedData, TrialData, TrialHeader, TrialId, TrialSource};
+use palpate_tactile::trial::{CorrectedPhases, SimulatedData, TrialData, TrialHeader, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Signals, whole_fingers};
 use std::sync::Arc;
 
@@ -183,6 +183,14 @@ impl OpenTrial {
         self.phases.iter().find(|span| span.phase == phase).map(|span| span.from_s)
     }
 
+    /// Time of the last sample of a phase (s), where the grasp has it.
+    pub fn last_of(&self, phase: TouchPhase) -> Option<f64> {
+        let span = self.phases.iter().find(|span| span.phase == phase)?;
+        let ends = self.phases.last().is_some_and(|last| last.phase == phase);
+        let within = |t: &&f64| **t < span.to_s || ends;
+        self.t_s.iter().rev().find(within).copied()
+    }
+
     /// State at a time (s): that of the last sample until then, or of the first one. None without samples.
     pub fn at(&self, t_s: f64) -> Option<Instant<'_>> {
         let sample = last_until(self.t_s.len(), |k| self.t_s[k], t_s)?;
@@ -321,7 +329,18 @@ impl OpenTrial {
         self.columns.iter_mut().for_each(|column| column.values.push(f32::NAN));
     }
 
-    /// Phases of a grasp of a board: as marked, or else from the line pressure; contact from the pads.
+    /// The phases as they are, with the beginning of one moved (s).
+    pub fn with_phase_at(&self, phase: TouchPhase, from_s: f64) -> CorrectedPhases {
+        let from = |own: TouchPhase| if own == phase { Some(from_s) } else { self.phase_from(own) };
+        CorrectedPhases {
+            closing: from(TouchPhase::PreShaping).or_else(|| self.phases.first().map(|span| span.from_s)),
+            contact: from(TouchPhase::Contact),
+            hold: from(TouchPhase::Hold),
+            release: from(TouchPhase::Release),
+        }
+    }
+
+    /// Phases of a grasp of a board: as corrected, as marked, or else from the line pressure; contact from the pads.
     fn find_phases(&mut self, marked: PhaseTimes) {
         let line = PhaseTimes::of_line(&self.t_s, &self.line_bar);
         let closing = marked.closing.or(line.closing);
@@ -331,11 +350,12 @@ impl OpenTrial {
             None => self.source == TrialSource::Imported && column.name.contains("pressure"),
         });
         let contact = loads.filter_map(|column| onset(&self.t_s, &column.values, begin, 0.0)).reduce(f64::min);
+        let corrected = self.header.phases.unwrap_or_default();
         let times = PhaseTimes {
-            closing: Some(begin),
-            contact,
-            hold: marked.hold.or(line.hold),
-            release: marked.release.or(line.release),
+            closing: corrected.closing.or(Some(begin)),
+            contact: corrected.contact.or(contact),
+            hold: corrected.hold.or(marked.hold).or(line.hold),
+            release: corrected.release.or(marked.release).or(line.release),
         };
         let [first_s, last_s] = self.span_s();
         self.phases = times.spans(first_s, last_s);
@@ -417,6 +437,8 @@ mod tests {
     use crate::grasping::grasp;
     use palpate_sim::gripper::Phase;
     use palpate_sim::scene::Scene;
+    use palpate_store::ImportedTrial;
+    use palpate_store::labels::TrialEdit;
     use palpate_tactile::model::SensorModel;
 
     fn stored(object: &str) -> (tempfile::TempDir, Store, TrialId) {
@@ -456,6 +478,30 @@ mod tests {
         assert_eq!(open.at(99.0).map(|now| now.sample), Some(open.t_s.len() - 1));
         // The last answer is the one after the grasp.
         assert!(open.answers.last().is_some_and(|answer| answer.beliefs.len() == 1 && !answer.listening));
+        Ok(())
+    }
+
+    #[test]
+    fn corrected_phases_replace_those_measured_until_they_are_taken_back() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+        let t_s: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+        // At rest for a second, then a pressure that rises.
+        let values = t_s.iter().map(|t| if *t < 1.0 { 0.0 } else { 10.0 * (t - 1.0) } as f32).collect();
+        let signals = Signals { channels: vec!["pressure_left".to_owned()], t_s, values };
+        let (name, label) = ("1".to_owned(), "mug".to_owned());
+        store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+        let open = |store: &Store| OpenTrial::open(store, 1, &OpenOptions::default());
+        let measured = open(&store)?;
+        let contact = measured.phase_from(TouchPhase::Contact).expect("the pressure rises");
+        assert!((1.0..1.2).contains(&contact), "{contact}");
+        let corrected = measured.with_phase_at(TouchPhase::Contact, 1.5);
+        store.labels().edit(&[1], &TrialEdit::Phases(Some(corrected)))?;
+        let moved = open(&store)?;
+        assert_eq!(moved.phase_from(TouchPhase::Contact), Some(1.5));
+        assert_eq!(moved.phase_from(TouchPhase::PreShaping), measured.phase_from(TouchPhase::PreShaping));
+        assert!(store.journal().undo()?.is_some());
+        assert_eq!(open(&store)?.phases, measured.phases);
         Ok(())
     }
 

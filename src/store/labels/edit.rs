@@ -1,7 +1,9 @@
 //! Changes of trials that a person makes, one or many at once.
 
+use palpate_tactile::trial::CorrectedPhases;
+
 /// A change of trials.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum TrialEdit {
     /// Label trials of the real gripper with their object.
     Label(String),
@@ -15,6 +17,8 @@ pub enum TrialEdit {
     Untag(Vec<String>),
     /// Mark the label as unsure, or remove the mark.
     Unsure(bool),
+    /// Correct the phases of the grasp; none takes them as measured.
+    Phases(Option<CorrectedPhases>),
     /// Mark as deleted; can be restored.
     Discard,
     /// Restore deleted trials.
@@ -43,6 +47,8 @@ impl Edited {
             TrialEdit::Untag(tags) => format!("no longer tagged {}", tags.join(", ")),
             TrialEdit::Unsure(true) => "marked as unsure".to_owned(),
             TrialEdit::Unsure(false) => "no longer unsure".to_owned(),
+            TrialEdit::Phases(Some(_)) => "with corrected phases now".to_owned(),
+            TrialEdit::Phases(None) => "with phases as measured now".to_owned(),
             TrialEdit::Discard => "discarded".to_owned(),
             TrialEdit::Restore => "restored".to_owned(),
         };

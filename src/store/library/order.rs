@@ -4,6 +4,8 @@ use super::LibraryTrial;
 use super::quality::TrialQuality;
 use crate::labels::UnknownWord;
 use palpate_tactile::trial::TrialId;
+use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -89,52 +91,46 @@ impl Default for TrialOrder {
     }
 }
 
-/// Value that trials are ordered by. The first letters as a number decide almost every comparison of texts.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct SortKey<'a> {
-    number: u64,
-    text: &'a str,
-    rest: &'a [String],
-    id: TrialId,
+/// Places of trials in the order of a column: those alike have the same.
+fn ranks(trials: &[Arc<LibraryTrial>], column: TrialColumn) -> Vec<u64> {
+    match column {
+        // Told apart by number, or by `sorted` itself.
+        TrialColumn::Id | TrialColumn::Date => vec![0; trials.len()],
+        TrialColumn::Object => ranks_of(trials.iter().map(|trial| trial.lower_title())),
+        TrialColumn::Source => ranks_of(trials.iter().map(|trial| trial.row.source.name())),
+        TrialColumn::Preset => ranks_of(trials.iter().map(|trial| trial.row.preset.unwrap_or_default())),
+        TrialColumn::Sensors => ranks_of(trials.iter().map(|trial| trial.row.sensors.as_str())),
+        TrialColumn::Quality => trials.iter().map(|trial| TrialQuality::of(&trial.row) as u64).collect(),
+        TrialColumn::Tags => ranks_of(trials.iter().map(|trial| trial.row.tags.as_slice())),
+        TrialColumn::Note => ranks_of(trials.iter().map(|trial| trial.row.note.as_str())),
+        TrialColumn::Samples => trials.iter().map(|trial| trial.row.samples.max(0).cast_unsigned()).collect(),
+    }
 }
 
-impl<'a> SortKey<'a> {
-    fn of(trial: &'a LibraryTrial, column: TrialColumn) -> Self {
-        let row = &trial.row;
-        let mut key = Self { number: 0, text: "", rest: &[], id: row.id };
-        match column {
-            TrialColumn::Id => {}
-            TrialColumn::Object => key.set_text(trial.lower_title()),
-            // The first eight letters are a year and a month: not worth a look.
-            TrialColumn::Date => key.text = &row.created,
-            TrialColumn::Source => key.set_text(row.source.name()),
-            TrialColumn::Preset => key.set_text(row.preset.unwrap_or_default()),
-            TrialColumn::Sensors => key.set_text(&row.sensors),
-            TrialColumn::Quality => key.number = TrialQuality::of(row) as u64,
-            TrialColumn::Tags => key.rest = &row.tags,
-            TrialColumn::Note => key.set_text(&row.note),
-            TrialColumn::Samples => key.number = row.samples.max(0).cast_unsigned(),
-        }
-        key
-    }
-
-    fn set_text(&mut self, text: &'a str) {
-        let mut first = [0; 8];
-        first.iter_mut().zip(text.bytes()).for_each(|(to, from)| *to = from);
-        (self.number, self.text) = (u64::from_be_bytes(first), text);
-    }
+/// Ranks of values. Few differ, as a rule: only those are compared with each other.
+fn ranks_of<T: Copy + Ord + Hash>(values: impl Iterator<Item = T> + Clone) -> Vec<u64> {
+    let distinct: HashSet<T> = values.clone().collect();
+    let mut ordered: Vec<T> = distinct.into_iter().collect();
+    ordered.sort_unstable();
+    let rank: HashMap<T, u64> = ordered.into_iter().zip(0..).collect();
+    values.map(|value| rank[&value]).collect()
 }
 
 impl TrialOrder {
     /// Trials in this order.
     pub(super) fn sorted(self, trials: &[Arc<LibraryTrial>]) -> Vec<Arc<LibraryTrial>> {
-        let mut keys: Vec<(SortKey<'_>, usize)> =
-            trials.iter().enumerate().map(|(at, trial)| (SortKey::of(trial, self.column), at)).collect();
-        // Almost in order for numbers and dates: the stable sort finds that.
+        let ranked = ranks(trials, self.column).into_iter().zip(trials).enumerate();
+        let mut keys: Vec<(u64, &str, TrialId, usize)> = ranked
+            .map(|(at, (rank, trial))| {
+                let date = if self.column == TrialColumn::Date { trial.row.created.as_str() } else { "" };
+                (rank, date, trial.row.id, at)
+            })
+            .collect();
+        // Almost in order by date and number, and where most are alike: the stable sort finds that.
         keys.sort();
         if self.descending {
             keys.reverse();
         }
-        keys.iter().map(|(_, at)| Arc::clone(&trials[*at])).collect()
+        keys.iter().map(|(.., at)| Arc::clone(&trials[*at])).collect()
     }
 }
