@@ -48,6 +48,7 @@ topics! {
     gripper
     labelling
     objects
+    inspect
     store
     formats
     keys

@@ -42,8 +42,8 @@ pub(super) struct MapsKey {
     pub(super) count: usize,
     /// Unit of the values.
     pub(super) unit: &'static str,
-    /// Most columns.
-    pub(super) columns: usize,
+    /// Most columns and rows.
+    pub(super) most: [usize; 2],
 }
 
 /// Maps made for `key`, or the same as before where the key is.
@@ -53,7 +53,7 @@ pub(super) fn shown_maps(ui: &Ui, name: &'static str, key: MapsKey, make: impl F
     if let Some((_, shown)) = known {
         return shown;
     }
-    let maps = make().map(|map| map.at_most_columns(key.columns));
+    let maps = make().map(|map| map.at_most(key.most[0], key.most[1]));
     let textures = [0, 1].map(|k| ui.ctx().load_texture(format!("{name} {k}"), image(&maps[k]), CRISP));
     let shown = ShownMaps { maps: Arc::new(maps), textures };
     ui.data_mut(|data| data.insert_temp(id, (key, shown.clone())));

@@ -141,7 +141,7 @@ impl<'a> ShownGrasp<'a> {
     }
 
     /// Identity of frames or rows, from which maps are made.
-    fn key(&self, unit: &'static str, columns: usize) -> MapsKey {
+    fn key(&self, unit: &'static str, most: [usize; 2]) -> MapsKey {
         let frame = |frame: Option<&&Frame>| frame.map_or(0, |frame| std::ptr::from_ref(*frame) as usize);
         let (count, identity) = match (self.frames.as_slice(), self.trace) {
             ([], Some(trace)) => {
@@ -150,7 +150,7 @@ impl<'a> ShownGrasp<'a> {
             }
             (frames, _) => (frames.len(), [frame(frames.first()), frame(frames.last())]),
         };
-        MapsKey { frames: identity, count, unit, columns }
+        MapsKey { frames: identity, count, unit, most }
     }
 
     /// Columns of the trace with a quantity of a finger.
@@ -192,7 +192,7 @@ pub(super) fn shown_pads(ui: &Ui, name: &'static str, grasp: &ShownGrasp<'_>, un
         Some(frame) => [std::ptr::from_ref(frame) as usize, frame.t.to_bits() as usize],
         None => forces.map(|force| force.to_bits() as usize),
     };
-    let key = MapsKey { frames: identity, count: 1, unit: unit.symbol(), columns: MAP_COLUMNS };
+    let key = MapsKey { frames: identity, count: 1, unit: unit.symbol(), most: [usize::MAX; 2] };
     shown_maps(ui, name, key, || match grasp.frame {
         Some(frame) => pads_at(grasp.gripper, frame, unit),
         None => whole_pads(grasp.gripper, forces, ACTIVE_AREA, unit),
@@ -200,18 +200,18 @@ pub(super) fn shown_pads(ui: &Ui, name: &'static str, grasp: &ShownGrasp<'_>, un
 }
 
 /// Bending over time: of every joint, or of a real gripper as its strips read it.
-pub(super) fn shown_joints(ui: &Ui, grasp: &ShownGrasp<'_>, unit: BendUnit, columns: usize) -> ShownMaps {
-    shown_maps(ui, "joints", grasp.key(unit.symbol(), columns), || match grasp.frames.as_slice() {
-        [] => grasp.sensed(Quantity::Curvature, SensorRows::Curvature, columns),
+pub(super) fn shown_joints(ui: &Ui, grasp: &ShownGrasp<'_>, unit: BendUnit, most: [usize; 2]) -> ShownMaps {
+    shown_maps(ui, "joints", grasp.key(unit.symbol(), most), || match grasp.frames.as_slice() {
+        [] => grasp.sensed(Quantity::Curvature, SensorRows::Curvature, most[0]),
         frames => joints_over_time(grasp.gripper, frames, unit),
     })
 }
 
 /// Load over time: of every row of taxels, or of a real gripper as its pads read it.
-pub(super) fn shown_rows(ui: &Ui, grasp: &ShownGrasp<'_>, unit: LoadUnit, columns: usize) -> ShownMaps {
-    shown_maps(ui, "rows", grasp.key(unit.symbol(), columns), || match (grasp.frames.as_slice(), unit) {
-        ([], LoadUnit::Pressure) => grasp.sensed(Quantity::Pressure, SensorRows::Pressure, columns),
-        ([], LoadUnit::Force) => grasp.sensed(Quantity::Force, SensorRows::Force(ACTIVE_AREA), columns),
+pub(super) fn shown_rows(ui: &Ui, grasp: &ShownGrasp<'_>, unit: LoadUnit, most: [usize; 2]) -> ShownMaps {
+    shown_maps(ui, "rows", grasp.key(unit.symbol(), most), || match (grasp.frames.as_slice(), unit) {
+        ([], LoadUnit::Pressure) => grasp.sensed(Quantity::Pressure, SensorRows::Pressure, most[0]),
+        ([], LoadUnit::Force) => grasp.sensed(Quantity::Force, SensorRows::Force(ACTIVE_AREA), most[0]),
         (frames, _) => pad_rows_over_time(grasp.gripper, frames, unit),
     })
 }

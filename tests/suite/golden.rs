@@ -21,9 +21,13 @@ fn differing(a: &RgbaImage, b: &RgbaImage) -> usize {
 /// Writes a picture as small as PNG can: without its opacity, which is full everywhere.
 fn save(picture: &RgbaImage, path: &Path) {
     let opaque = image::DynamicImage::ImageRgba8(picture.clone()).into_rgb8();
-    let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
-    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
-    opaque.write_with_encoder(encoder).unwrap();
+    // Plain colours are smallest without a filter, shaded ones with.
+    let encoded = [FilterType::NoFilter, FilterType::Adaptive].map(|filter| {
+        let mut bytes = Vec::new();
+        opaque.write_with_encoder(PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, filter)).unwrap();
+        bytes
+    });
+    std::fs::write(path, encoded.into_iter().min_by_key(Vec::len).unwrap()).unwrap();
 }
 
 /// Pictures in columns, row by row; each has the room of the largest.

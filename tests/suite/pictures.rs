@@ -40,7 +40,7 @@ const HELD: Shot = Shot {
     at: 2.9,
     view: StandardView::Home,
     theme: Theme::Dark,
-    size: [340, 230],
+    size: [280, 190],
     forces: true,
     annotations: true,
     ghost: false,
@@ -99,7 +99,7 @@ fn the_sixteen_look_like_what_they_are() {
     let gpu = driver();
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
     let mut held = |object: &'static str| {
-        let shot = Shot { object, size: [190, 135], forces: false, annotations: false, ..HELD };
+        let shot = Shot { object, size: [160, 112], forces: false, annotations: false, ..HELD };
         take(&gpu, &mut renderer, &Scene::default(), &shot)
     };
     let pictures: Vec<RgbaImage> = catalogue().iter().map(|built_in| held(&built_in.name)).collect();
@@ -126,17 +126,16 @@ fn the_window_in_both_themes_and_small() {
     let by = driver().driver;
     for (name, theme, size) in [
         ("window_dark", Theme::Dark, [1280.0, 820.0]),
-        ("window_light", Theme::Light, [960.0, 600.0]),
-        ("window_small", Theme::Dark, [720.0, 480.0]),
+        ("window_light", Theme::Light, [760.0, 500.0]),
+        ("window_keys", Theme::Dark, [720.0, 480.0]),
     ] {
         let mut bench = window(theme, size);
         bench.advance_to(2.6);
-        compare(name, &bench.harness.render().unwrap(), &by);
-        if name == "window_small" {
+        if name == "window_keys" {
             bench.tell(ViewAction::ShowKeys(true));
             bench.harness.run_steps(3);
-            compare("window_keys", &bench.harness.render().unwrap(), &by);
         }
+        compare(name, &bench.harness.render().unwrap(), &by);
     }
 }
 
@@ -144,7 +143,7 @@ fn the_window_in_both_themes_and_small() {
 fn stored_trials_are_compared_in_both_themes() {
     let by = driver().driver;
     for (name, theme, size) in
-        [("inspect_dark", Theme::Dark, [1280.0, 820.0]), ("inspect_light", Theme::Light, [960.0, 600.0])]
+        [("inspect_dark", Theme::Dark, [1120.0, 720.0]), ("inspect_light", Theme::Light, [960.0, 600.0])]
     {
         let mut bench = window_on(theme, size, three_trials);
         bench.tell(InspectAction::Open(1));

@@ -228,13 +228,13 @@ fn replay_buttons(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions
         }
     };
     button(Icon::Reset, "To the start", "To the start (Home)", InspectAction::Seek(Seek::Start));
-    button(Icon::StepBack, "Step back", "One sample back (Ctrl+←)", InspectAction::Seek(Seek::Samples(-1)));
+    button(Icon::StepBack, "Step back", "One sample back (Ctrl+Left)", InspectAction::Seek(Seek::Samples(-1)));
     if context.playback.playing {
         button(Icon::Pause, "Pause", "Pause (Space)", InspectAction::TogglePlaying);
     } else {
         button(Icon::Play, "Play", "Play (Space)", InspectAction::TogglePlaying);
     }
-    button(Icon::Step, "Step", "One sample forward (Ctrl+→)", InspectAction::Seek(Seek::Samples(1)));
+    button(Icon::Step, "Step", "One sample forward (Ctrl+Right)", InspectAction::Seek(Seek::Samples(1)));
     let repeated = context.playback.repeated.is_some();
     let hint = "Repeat, between the marks A and B where both are set (L)";
     if ui.selectable_label(repeated, "Loop").on_hover_text(hint).clicked() {
@@ -255,7 +255,7 @@ fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
         let hint = if status.finished { "Grasp again (Space)" } else { "Play (Space)" };
         button(Icon::Play, "Play", hint, Command::Play);
     }
-    button(Icon::Step, "Step", "One sample forward (Ctrl+→)", Command::Step);
+    button(Icon::Step, "Step", "One sample forward (Ctrl+Right)", Command::Step);
 }
 
 /// Speed of the replay or of the simulation.

@@ -190,7 +190,9 @@ mod tests {
         }
         let mouse: String = MOUSE.iter().map(|(how, does)| row(how, does)).collect();
         holds("keys", &format!("| mouse | action |\n|---|---|\n{mouse}"));
-        holds("labelling", &table(&modes::kind(Mode::Label).keys.iter().collect::<Vec<_>>()));
+        for (topic, mode) in [("labelling", Mode::Label), ("inspect", Mode::Inspect)] {
+            holds(topic, &table(&modes::kind(mode).keys.iter().collect::<Vec<_>>()));
+        }
     }
 
     fn key(key: Key, modifiers: Modifiers, repeat: bool) -> egui::Event {

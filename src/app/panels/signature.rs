@@ -44,10 +44,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let share = (time[1] - time[0]) / (grasp.span_s[1] - grasp.span_s[0]).max(1e-9);
     let pixels = f64::from(cells_width(ui.available_width()) * ui.ctx().pixels_per_point());
     let columns = ((pixels / share.max(1e-3)) as usize).clamp(1, MAP_COLUMNS);
-    let maps = [shown_joints(ui, &grasp, bend_unit, columns), shown_rows(ui, &grasp, load_unit, columns)];
     let parts = [(true, false), (false, true)];
     let beside: f32 = parts.iter().map(|(names, seconds)| height_beside(*names, *seconds)).sum();
     let each = 0.5 * (ui.available_height() - beside);
+    // No more rows than pixels either: a contact of one row at the tip is seen in a low panel too.
+    let rows = ((0.5 * each * ui.ctx().pixels_per_point()).floor() as usize).max(1);
+    let most = [columns, rows];
+    let maps = [shown_joints(ui, &grasp, bend_unit, most), shown_rows(ui, &grasp, load_unit, most)];
     for (shown, (names, seconds)) in maps.iter().zip(parts) {
         let over_time = OverTime {
             theme: context.view.theme,

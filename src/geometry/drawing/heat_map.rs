@@ -116,21 +116,22 @@ impl HeatMap {
         format!("{}, {}: {value}", self.y.text(row), self.x.text(column))
     }
 
-    /// The same map with no more columns than `most`. Each column keeps the value farthest from zero of those that it
-    /// replaces, so that short peaks survive.
-    pub fn at_most_columns(self, most: usize) -> Self {
-        let (many, few) = (self.x.count, most.max(1));
-        if many <= few {
+    /// The same map with no more columns and rows than these. Each cell keeps the value farthest from zero of those that it
+    /// replaces, so that short and narrow peaks survive.
+    pub fn at_most(self, columns: usize, rows: usize) -> Self {
+        let (width, height) = (self.x.count, self.y.count);
+        let (columns, rows) = (width.min(columns.max(1)), height.min(rows.max(1)));
+        if (columns, rows) == (width, height) {
             return self;
         }
-        let mut values = vec![f32::NAN; self.y.count * few];
+        let mut values = vec![f32::NAN; rows * columns];
         for (k, value) in self.values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
-            let kept = &mut values[k / many * few + k % many * few / many];
+            let kept = &mut values[k / width * rows / height * columns + k % width * columns / width];
             if kept.is_nan() || value.abs() > kept.abs() {
                 *kept = *value;
             }
         }
-        Self { x: CellAxis { count: few, ..self.x }, values, ..self }
+        Self { x: CellAxis { count: columns, ..self.x }, y: CellAxis { count: rows, ..self.y }, values, ..self }
     }
 }
 
@@ -178,7 +179,7 @@ mod tests {
         values[437] = 9.0;
         values[1000 + 701] = -8.0;
         values[1000..1010].fill(f32::NAN);
-        let few = map(2, 1000, values).at_most_columns(100);
+        let few = map(2, 1000, values).at_most(100, 9);
         assert_eq!((few.x.count, few.values.len(), few.x.range), (100, 200, [0.0, 4.0]));
         for column in 0..100 {
             assert_eq!(few.value(0, column), if column == 43 { 9.0 } else { 0.25 });
@@ -186,9 +187,12 @@ mod tests {
         assert!(few.value(1, 0).is_nan());
         assert_eq!((few.value(1, 1), few.value(1, 70)), (0.25, -8.0));
         // A map that is narrow enough stays.
-        assert_eq!(few.clone().at_most_columns(100).x, few.x);
+        assert_eq!(few.clone().at_most(100, 9).x, few.x);
         // Also where the numbers do not divide: each value goes to the column that holds its middle.
-        let uneven = map(1, 7, (0..7).map(|k| k as f32).collect()).at_most_columns(3);
+        // A single loaded row among forty is seen in ten.
+        let tip = map(40, 1, (0..40).map(|k| if k == 37 { 5.0 } else { 0.0 }).collect()).at_most(1, 10);
+        assert_eq!((tip.y.count, tip.values[9], tip.values.iter().sum::<f32>()), (10, 5.0, 5.0));
+        let uneven = map(1, 7, (0..7).map(|k| k as f32).collect()).at_most(3, 1);
         assert_eq!(uneven.values, [2.0, 4.0, 6.0]);
     }
 
