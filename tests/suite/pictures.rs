@@ -40,7 +40,7 @@ const HELD: Shot = Shot {
     at: 2.9,
     view: StandardView::Home,
     theme: Theme::Dark,
-    size: [280, 190],
+    size: [260, 176],
     forces: true,
     annotations: true,
     ghost: false,
@@ -143,7 +143,7 @@ fn the_window_in_both_themes_and_small() {
 fn stored_trials_are_compared_in_both_themes() {
     let by = driver().driver;
     for (name, theme, size) in
-        [("inspect_dark", Theme::Dark, [1120.0, 720.0]), ("inspect_light", Theme::Light, [960.0, 600.0])]
+        [("inspect_dark", Theme::Dark, [1120.0, 720.0]), ("inspect_light", Theme::Light, [880.0, 560.0])]
     {
         let mut bench = window_on(theme, size, three_trials);
         bench.tell(InspectAction::Open(1));
