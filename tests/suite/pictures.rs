@@ -40,7 +40,7 @@ const HELD: Shot = Shot {
     at: 2.9,
     view: StandardView::Home,
     theme: Theme::Dark,
-    size: [260, 176],
+    size: [250, 170],
     forces: true,
     annotations: true,
     ghost: false,
