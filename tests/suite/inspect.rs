@@ -300,3 +300,32 @@ fn ten_minutes_of_random_clicks_and_keys_break_nothing() {
         shaken(seed, 400);
     }
 }
+
+/// Resident memory of this process (bytes), as Linux reports it.
+#[cfg(target_os = "linux")]
+fn resident() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap();
+    4096 * text.split_whitespace().nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap()
+}
+
+/// `cargo test --test suite -- --ignored hours_of_samples`: one hour of grasps, then three more.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "takes minutes"]
+fn hours_of_samples_take_no_more_memory_than_the_first() {
+    let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
+    for command in [Command::SetRecording(false), Command::SetGrasps(1000), Command::SetSpeed(64.0)] {
+        bench.tell(command);
+    }
+    let mut grasps_until = |many: u64| {
+        while bench.workbench().snapshot().unwrap().grasp < many {
+            bench.tell(Command::Play);
+            bench.wait();
+        }
+        resident()
+    };
+    let first = grasps_until(900);
+    let fourth = grasps_until(3600);
+    let more = fourth.saturating_sub(first) as f64 * 1e-6;
+    assert!(more < 20.0, "{more} MB more than {} MB", first / 1_000_000);
+}

@@ -11,7 +11,7 @@ use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::{Store, StoreError};
-use palpate_tactile::board::{Board, Gap};
+use palpate_tactile::board::{Board, Gap, Sensor};
 use palpate_tactile::trial::{CorrectedPhases, SimulatedData, TrialData, TrialHeader, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Signals, whole_fingers};
 use std::sync::Arc;
@@ -345,11 +345,18 @@ impl OpenTrial {
         let line = PhaseTimes::of_line(&self.t_s, &self.line_bar);
         let closing = marked.closing.or(line.closing);
         let begin = closing.or(self.t_s.first().copied()).unwrap_or(0.0);
-        let loads = self.columns.iter().filter(|column| match &column.channel {
-            Some(channel) => channel.quantity == Quantity::Force,
-            None => self.source == TrialSource::Imported && column.name.contains("pressure"),
+        let onsets = |is_load: &dyn Fn(&Column) -> bool| {
+            let loads = self.columns.iter().filter(|column| is_load(column));
+            loads.filter_map(|column| onset(&self.t_s, &column.values, begin, 0.0)).reduce(f64::min)
+        };
+        // The pads as calibrated, or else as the board counted them, or another program named them.
+        let pads = [Sensor::PadLeft, Sensor::PadRight].map(|pad| {
+            let board = self.board.as_ref()?;
+            board.channels.get(board.channel_of(pad)?)
         });
-        let contact = loads.filter_map(|column| onset(&self.t_s, &column.values, begin, 0.0)).reduce(f64::min);
+        let contact = onsets(&|column| column.channel.as_ref().is_some_and(|own| own.quantity != Quantity::Curvature))
+            .or_else(|| onsets(&|column| pads.contains(&Some(&column.name))))
+            .or_else(|| onsets(&|column| column.name.contains("pressure") || column.name.contains("force")));
         let corrected = self.header.phases.unwrap_or_default();
         let times = PhaseTimes {
             closing: corrected.closing.or(Some(begin)),
