@@ -399,8 +399,10 @@ impl Workbench {
         files.gather(ctx, simulation, notices);
         let labels = labelling.labeller().view();
         if labels.as_ref().map(Arc::as_ptr) != self.labels_seen.as_ref().map(Arc::as_ptr) {
+            if let Some(labels) = &labels {
+                inspect.labels_changed(labels);
+            }
             self.labels_seen = labels;
-            inspect.labels_changed();
         }
         let grasp = simulation.worker().snapshot().map_or(0, |snapshot| snapshot.grasp);
         inspect.gather(grasp, view, notices);

@@ -46,6 +46,8 @@ fn every_panel_in_both_themes() {
                     let search = "in no trial".to_owned();
                     bench.tell(LibraryAction::Find(TrialQuery { search, ..TrialQuery::default() }));
                     bench.until_shown(true, "0 of 1 trials");
+                    // The button beside it has just appeared.
+                    bench.harness.run_steps(8);
                 }
                 _ => {}
             }

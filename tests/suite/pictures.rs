@@ -154,7 +154,7 @@ fn stored_trials_are_compared_in_both_themes() {
         bench.tell(LibraryAction::Find(TrialQuery { search: "in no trial".to_owned(), ..TrialQuery::default() }));
         bench.until_shown(true, "0 of 3 trials");
         // What is computed in the background is done.
-        bench.harness.run_steps(3);
+        bench.harness.run_steps(8);
         compare(name, &bench.harness.render().unwrap(), &by);
     }
 }

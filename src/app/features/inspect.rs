@@ -7,7 +7,7 @@ use crate::app::playback::{Playback, Seek};
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
-use palpate_lab::workers::Inspector;
+use palpate_lab::workers::{Inspector, LabelView};
 use palpate_learn::Model;
 use palpate_store::labels::TrialEdit;
 use palpate_tactile::trial::{TrialId, TrialSource};
@@ -351,8 +351,9 @@ impl InspectFeature {
     }
 
     /// Labels or phases in the store have changed: those of trials that were not simulated are read again.
-    pub(in crate::app) fn labels_changed(&mut self) {
-        if self.open.as_ref().is_some_and(|open| open.source != TrialSource::Simulated) {
+    pub(in crate::app) fn labels_changed(&mut self, labels: &LabelView) {
+        let kept = |id: TrialId| labels.trial(id).is_none_or(|trial| !trial.discarded);
+        if self.open.as_ref().is_some_and(|open| open.source != TrialSource::Simulated && kept(open.id)) {
             self.open_again();
         }
     }
