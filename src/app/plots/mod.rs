@@ -84,7 +84,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
     let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
     let seconds = AxisHints::new_x()
         .formatter(|mark: GridMark, shown| seconds_at(mark.value, shown))
-        .label_spacing(egui::Rangef::new(34.0, 50.0));
+        .label_spacing(egui::Rangef::new(24.0, 40.0));
     let widget = Plot::new(plot.id)
         .width(width)
         .allow_zoom(false)
