@@ -8,7 +8,7 @@ use crate::app::playback::Playback;
 use crate::app::shown::SourceData;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
-use palpate_lab::inspection::Alignment;
+use palpate_lab::inspection::{Alignment, PhaseSpan};
 use palpate_lab::study::accuracy::AccuracyStudy;
 use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{
@@ -67,6 +67,8 @@ pub struct PanelContext<'a> {
     pub comparison: ComparedTrials<'a>,
     /// Cursor on the data that are shown.
     pub(super) playback: &'a Playback,
+    /// Phases of the grasp that is shown, as far as they are known.
+    pub phases: &'a [PhaseSpan],
     /// View state.
     pub view: &'a ViewState,
     /// Pictures of the built-in objects.

@@ -92,10 +92,7 @@ pub use view_source::ViewSource;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
-use palpate_lab::datasets::models_folder;
-use palpate_lab::gripper::listen_to_port;
-use palpate_lab::workers::{GripperCommand, examine_port, explain_scene, fit_trials};
-use palpate_learn::shipped_model;
+use palpate_lab::workers::GripperCommand;
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -136,22 +133,10 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         let mut view: ViewState = creation.storage.and_then(|s| eframe::get_value(s, VIEW_KEY)).unwrap_or_default();
         view.gripper_model = options.model.or(view.gripper_model);
         let wake_context = creation.egui_ctx.clone();
+        let wake = Arc::new(move || wake_context.request_repaint());
         let setup = WorkbenchSetup {
-            scene: options.scene,
-            store: options.store,
-            view,
-            model: shipped_model().map(Arc::new),
-            explain: Arc::new(explain_scene),
-            listen: Arc::new(listen_to_port),
-            tools: GripperToolsSetup {
-                examine: Arc::new(examine_port),
-                fit: Arc::new(fit_trials),
-                models: models_folder(),
-            },
-            system_dialogs: true,
-            playing: true,
-            wake: Arc::new(move || wake_context.request_repaint()),
             render_state: Some(render_state),
+            ..WorkbenchSetup::new(options.scene, options.store, view, wake)
         };
         let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
         if let Some(port) = options.port {

@@ -1,7 +1,6 @@
 //! The whole window as a picture, without a display: the same workbench, drawn into a texture.
 
 use crate::app::features::inspect::InspectAction;
-use crate::app::features::tools::GripperToolsSetup;
 use crate::app::features::view::{ViewAction, ViewState};
 use crate::app::modes::mode::Mode;
 use crate::app::playback::Seek;
@@ -10,10 +9,7 @@ use crate::app::viewport::wgpu_options;
 use crate::app::workbench::{Workbench, WorkbenchSetup};
 use egui_wgpu::{RenderState, RendererOptions, ScreenDescriptor};
 use palpate_geometry::palette::Theme;
-use palpate_lab::datasets::models_folder;
-use palpate_lab::gripper::listen_to_port;
-use palpate_lab::workers::{Command, examine_port, explain_scene, fit_trials};
-use palpate_learn::shipped_model;
+use palpate_lab::workers::Command;
 use palpate_render::{Picture, PictureError, wgpu};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
@@ -78,25 +74,16 @@ pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenErro
     let state = render_state(window.size)?;
     let ctx = egui::Context::default();
     let (wake, woken) = channel();
+    let wake = Arc::new(move || {
+        // Threads may outlive the picture by a moment.
+        let _heard = wake.send(());
+    });
+    let view = ViewState { theme: window.theme, ..ViewState::default() };
     let setup = WorkbenchSetup {
-        scene: window.scene.clone(),
-        store: window.store.clone(),
-        view: ViewState { theme: window.theme, ..ViewState::default() },
-        model: shipped_model().map(Arc::new),
-        explain: Arc::new(explain_scene),
-        listen: Arc::new(listen_to_port),
-        tools: GripperToolsSetup {
-            examine: Arc::new(examine_port),
-            fit: Arc::new(fit_trials),
-            models: models_folder(),
-        },
         playing: false,
         system_dialogs: false,
-        wake: Arc::new(move || {
-            // Threads may outlive the picture by a moment.
-            let _heard = wake.send(());
-        }),
         render_state: Some(&state),
+        ..WorkbenchSetup::new(window.scene.clone(), window.store.clone(), view, wake)
     };
     let workbench = Workbench::new(&ctx, setup)?;
     let mut drawn = Drawn { ctx, state, workbench, size: window.size, time_s: 0.0, shapes: Vec::new(), woken };

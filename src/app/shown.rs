@@ -52,7 +52,7 @@ pub(super) struct Moment<'a> {
     pub(super) frame: &'a Frame,
 }
 
-/// Tells the numbers of stored trials from those of grasps.
+/// Bit in the numbers of stored trials, which those of grasps do not have.
 const STORED: u64 = 1 << 63;
 
 /// Length of a live stream in the plots (s).
@@ -99,19 +99,21 @@ impl<'a> SourceData<'a> {
         self.traces.current()?.answers.get(self.sample()?)?.as_ref()
     }
 
-    /// Phases of the grasp that is shown, as far as they are known.
-    pub(super) fn phases(&self) -> Vec<PhaseSpan> {
-        match self.source {
-            ViewSource::Trial => self.inspected.map(|own| own.trial.phases.clone()).unwrap_or_default(),
-            ViewSource::Simulation => {
-                let (Some(trace), Some(snapshot)) = (self.traces.current(), self.snapshot) else { return Vec::new() };
+    /// Phases of the grasp that is shown: as measured, or else the hold of the programme. They are found once per frame, for
+    /// `PanelContext::phases`.
+    pub(super) fn find_phases(&self) -> Vec<PhaseSpan> {
+        let measured = match (self.source, self.traces.current(), self.snapshot) {
+            (ViewSource::Trial, ..) => return self.inspected.map(|own| own.trial.phases.clone()).unwrap_or_default(),
+            (ViewSource::Simulation, Some(trace), Some(snapshot)) => {
                 phases_of_frames(trace.frames.iter().flatten().map(Arc::as_ref), &snapshot.scene.gripper)
             }
-            ViewSource::Gripper => {
-                let hold = self.hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
-                hold.into_iter().collect()
-            }
+            (ViewSource::Simulation | ViewSource::Gripper, ..) => Vec::new(),
+        };
+        if !measured.is_empty() {
+            return measured;
         }
+        let hold = self.hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
+        hold.into_iter().collect()
     }
 
     /// Board of the real gripper or of a recorded trial, where one is shown.

@@ -85,7 +85,7 @@ impl<'a> ShownGrasp<'a> {
             cursor_s: shown.time_s().or(frame.map(|frame| frame.t)).unwrap_or(span_s[0]),
             span_s,
             window_s: context.view.time_window,
-            phases: shown.phases(),
+            phases: context.phases.to_vec(),
         })
     }
 

@@ -28,14 +28,15 @@ use crate::app::viewport::Viewport;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_tiles::Tile;
 use palpate_geometry::palette::Theme;
-use palpate_lab::gripper::Listen;
-use palpate_lab::inspection::{FigureOptions, OpenTrial, comparison_figure};
+use palpate_lab::datasets::models_folder;
+use palpate_lab::gripper::{Listen, listen_to_port};
+use palpate_lab::inspection::{FigureOptions, OpenTrial, PhaseSpan, comparison_figure};
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
     Inspector, LabelCommand, LabelView, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
-    Snapshot, Wake, start_labeller, start_librarian,
+    Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
-use palpate_learn::{Model, ModelError};
+use palpate_learn::{Model, ModelError, shipped_model};
 use palpate_render::{Picture, describe_adapter};
 use palpate_sim::objects::{catalogue, thumbnail};
 use palpate_sim::scene::Scene;
@@ -70,6 +71,30 @@ pub struct WorkbenchSetup<'a> {
     pub render_state: Option<&'a egui_wgpu::RenderState>,
 }
 
+impl WorkbenchSetup<'_> {
+    /// The parts of the program: the shipped model, real ports, the folder of models. The first grasp starts at once; there is
+    /// no 3-D view.
+    pub fn new(scene: Scene, store: PathBuf, view: ViewState, wake: Wake) -> Self {
+        Self {
+            scene,
+            store,
+            view,
+            model: shipped_model().map(Arc::new),
+            explain: Arc::new(explain_scene),
+            listen: Arc::new(listen_to_port),
+            tools: GripperToolsSetup {
+                examine: Arc::new(examine_port),
+                fit: Arc::new(fit_trials),
+                models: models_folder(),
+            },
+            playing: true,
+            wake,
+            system_dialogs: true,
+            render_state: None,
+        }
+    }
+}
+
 /// Most grasps of an object: the paper's plateau is at three to four.
 const GRASPS: u32 = 4;
 
@@ -91,6 +116,8 @@ pub struct Workbench {
     store: PathBuf,
     /// Labels at the last look.
     labels_seen: Option<Arc<LabelView>>,
+    /// Phases of the grasp that is shown.
+    phases: Vec<PhaseSpan>,
 }
 
 /// Size of exported figures (points).
@@ -177,6 +204,7 @@ impl Workbench {
             driver,
             store,
             labels_seen: None,
+            phases: Vec::new(),
         };
         if workbench.view.ghost {
             workbench.act(ctx, SimulationAction::SetGhost(true));
@@ -312,6 +340,7 @@ impl Workbench {
                 spread: self.inspect.shows_spread(),
             },
             playback: self.inspect.playback(source),
+            phases: &self.phases,
             view: &self.view,
             thumbnails: &self.thumbnails,
             driver: self.driver.as_deref(),
@@ -409,10 +438,11 @@ impl Workbench {
         let published = self.published();
         let context = self.context(&published);
         let shown = context.shown();
-        let (names, phases) = (shown.column_names(), shown.phases());
+        let (names, phases) = (shown.column_names(), shown.find_phases());
         let span = shown.traces.current().map_or([0.0; 2], GraspTrace::span);
         self.inspect.move_cursor(ctx, self.view.source, span);
         self.inspect.compare(names, &phases);
+        self.phases = phases;
     }
 
     fn apply(&mut self, ctx: &egui::Context, action: Action) {
@@ -429,7 +459,10 @@ impl Workbench {
             }
             return ctx.request_repaint();
         }
-        let times = self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default();
+        let times = match &action {
+            Action::Inspect(_) => self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default(),
+            _ => Vec::new(),
+        };
         let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
             self;
         match action {
@@ -446,7 +479,7 @@ impl Workbench {
             }
             Action::Tool(action) => tools.apply(action, notices),
             Action::Inspect(action) => {
-                // Looking back pauses what is being simulated.
+                // Looking back pauses the simulation.
                 if matches!(action, InspectAction::Seek(_)) && view.source == ViewSource::Simulation {
                     simulation.send(Command::Pause, notices);
                 }

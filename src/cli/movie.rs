@@ -10,7 +10,7 @@ use glam::Vec2;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::exchange::{NewFile, unfinished};
-use palpate_lab::inspection::{OpenOptions, OpenTrial};
+use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, MovieFormat, MovieWriter, Picture, Renderer};
 use palpate_tactile::trial::{TrialId, TrialSource};
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
     let target = Target::of(out)?;
     let store = read_store(store)?;
     let id = arguments.trial;
-    let open = OpenTrial::open(&store, id, &OpenOptions { scenery: true, ..OpenOptions::default() })?;
+    let open = OpenTrial::open(&store, id, &OpenOptions { keep: Keep::Scenery, ..OpenOptions::default() })?;
     let Some(stage) = open.stage.clone().filter(|_| !open.frames.is_empty()) else {
         let text = format!(
             "trial {id} ({}) has no poses and no curvature to draw fingers from. Use `palpate plot {id} --out FILE.svg` or \

@@ -8,7 +8,7 @@ use super::terminal::say;
 use crate::app::ExportRequest;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
-use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, OpenOptions, OpenTrial, comparison_figure};
+use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, Keep, OpenOptions, OpenTrial, comparison_figure};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{PressureArea, SensorLayout};
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(),
     let area = if arguments.hull { PressureArea::Hull } else { PressureArea::Participation };
     let options = OpenOptions {
         sensors: SensorView { layout: arguments.layout.clone(), area, ..SensorView::default() },
-        scenery: arguments.heat.is_some(),
+        keep: if arguments.heat.is_some() { Keep::Frames } else { Keep::Channels },
         ..OpenOptions::default()
     };
     let open = |id: &TrialId| OpenTrial::open(&store, *id, &options);

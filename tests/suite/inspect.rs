@@ -7,7 +7,7 @@ use egui_kittest::kittest::Queryable as _;
 use palpate::app::{InspectAction, Mode, Seek, ViewAction, ViewSource};
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::grasp;
-use palpate_lab::inspection::{OpenOptions, OpenTrial, TouchPhase};
+use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial, TouchPhase};
 use palpate_lab::picture::PictureView;
 use palpate_lab::workers::{Command, Notice, SimWorker, SimWorkerSetup, TraceRow};
 use palpate_sim::scene::Scene;
@@ -58,8 +58,12 @@ fn a_stored_grasp_opens_as_it_was_live() {
     let view = PictureView::default();
     for (number, id) in stored.into_iter().enumerate() {
         let live: Vec<&TraceRow> = rows.iter().filter(|row| row.grasp == number as u64 + 1).collect();
-        let options =
-            OpenOptions { model: Some(Arc::clone(&model)), grasps: Some(3), scenery: true, ..OpenOptions::default() };
+        let options = OpenOptions {
+            model: Some(Arc::clone(&model)),
+            grasps: Some(3),
+            keep: Keep::Scenery,
+            ..OpenOptions::default()
+        };
         let open = OpenTrial::open(&store, id, &options).unwrap();
         assert_eq!(open.t_s, live.iter().map(|row| row.t).collect::<Vec<f64>>());
         assert_eq!(open.line_bar, live.iter().map(|row| row.line_bar).collect::<Vec<f64>>());

@@ -54,7 +54,7 @@ fn the_command_says_why_and_names_the_nearest_trials() {
     let alone = run(at, &["recognise", "1", "--why", "--nearest", "0"]).out;
     assert!(!alone.contains("Nearest") && alone.contains("How measured"), "{alone}");
     assert_eq!(run(at, &["recognise", "1", "--nearest", "2"]).code, Some(2), "--nearest needs --why");
-    // A model of an older version is told apart.
+    // An older model is recognised.
     shipped_model().unwrap().with_signatures(None).save(&at.join("old.safetensors")).unwrap();
     assert_eq!(run(at, &["recognise", "1", "--model", "old.safetensors"]).code, Some(0));
     refused(at, &["recognise", "1", "--why", "--model", "old.safetensors"], &["no class signatures", "palpate train"]);

@@ -35,7 +35,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, colour(colours.background));
     line_pressure(&painter, rect, context, x_of);
-    for (place, span) in shown.phases().iter().enumerate() {
+    for (place, span) in context.phases.iter().enumerate() {
         let [left, right] = [x_of(span.from_s), x_of(span.to_s)];
         if place > 0 {
             painter.vline(left, rect.y_range(), Stroke::new(1.0, veil(colours.text, 0.45)));

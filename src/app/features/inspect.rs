@@ -6,7 +6,7 @@ use crate::app::notices::Notices;
 use crate::app::playback::{Playback, Seek};
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
-use palpate_lab::inspection::{Alignment, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
+use palpate_lab::inspection::{Alignment, Keep, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
 use palpate_lab::workers::{Inspector, LabelView};
 use palpate_learn::Model;
 use palpate_store::labels::TrialEdit;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Most trials compared at once: more curves cannot be told apart, and their memory stays bounded.
 pub(in crate::app) const MOST_PINNED: usize = 60;
 
-/// Action on what is inspected.
+/// Action on stored trials in Inspect mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InspectAction {
     /// Open a stored trial in Inspect mode.
@@ -74,7 +74,7 @@ pub struct ComparedTrace {
     pub spread: Vec<Vec<f32>>,
 }
 
-/// What is inspected, for panels.
+/// The open trial, the time shown, and trials compared with it.
 #[derive(Clone, Copy)]
 pub struct Inspected<'a> {
     /// The trial.
@@ -185,7 +185,7 @@ impl InspectFeature {
         }
     }
 
-    /// What is inspected; none without an open trial.
+    /// The open trial with its cursor and the trials compared; none without one.
     pub(in crate::app) fn inspected(&self) -> Option<Inspected<'_>> {
         let trial = self.open.as_ref()?;
         let cursor_s = self.stored.cursor_s.unwrap_or(trial.span_s()[1]);
@@ -279,17 +279,17 @@ impl InspectFeature {
     /// Opens everything once more, after a change of sensors or model.
     fn open_again(&mut self) {
         if let Some(id) = self.wanted {
-            self.ask(id, true);
+            self.ask(id, Keep::Scenery);
         }
         let pinned: Vec<TrialId> = self.pinned.iter().map(|pinned| pinned.trial.id).collect();
         for id in pinned {
             self.awaited.push(id);
-            self.ask(id, false);
+            self.ask(id, Keep::Channels);
         }
     }
 
-    fn ask(&self, id: TrialId, scenery: bool) {
-        self.inspector.open(id, OpenOptions { scenery, ..self.options() });
+    fn ask(&self, id: TrialId, keep: Keep) {
+        self.inspector.open(id, OpenOptions { keep, ..self.options() });
     }
 
     /// Applies an action; returns the change of a stored trial that follows from it.
@@ -382,7 +382,7 @@ impl InspectFeature {
             return;
         }
         self.wanted = Some(id);
-        self.ask(id, true);
+        self.ask(id, Keep::Scenery);
     }
 
     fn pin(&mut self, id: TrialId, notices: &mut Notices) {
@@ -393,7 +393,7 @@ impl InspectFeature {
             return notices.warning(format!("At most {MOST_PINNED} trials are compared at once."));
         }
         self.awaited.push(id);
-        self.ask(id, false);
+        self.ask(id, Keep::Channels);
     }
 
     /// Builds the curves of compared trials again where something has changed. `names` are the columns of the trace that is

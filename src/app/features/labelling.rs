@@ -77,7 +77,7 @@ impl LabellingFeature {
         if std::mem::replace(&mut self.shown, stored) == stored {
             return None;
         }
-        // Inspect mode goes on with the trial that is open.
+        // Inspect mode shows the open trial again.
         let closes = || (view.mode != Mode::Inspect).then_some(InspectAction::Close);
         stored.map(InspectAction::Show).or_else(closes)
     }

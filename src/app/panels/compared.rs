@@ -73,7 +73,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     });
 }
 
-/// Name of what is shown.
+/// Name of the trial or gripper shown.
 fn shown_name(context: &PanelContext<'_>) -> Option<String> {
     match context.source {
         ViewSource::Trial => context.inspected.map(|own| format!("{}, trial {}, shown", own.trial.title, own.trial.id)),

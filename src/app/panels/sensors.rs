@@ -1,4 +1,4 @@
-//! What is read of the simulated gripper and of stored trials: sensor layout, area of pressure, sensor model, and the model
+//! Choice of sensors for the simulated gripper and stored trials: sensor layout, area of pressure, sensor model, and the model
 //! that recognises; and in which poses the simulation grasps.
 
 use crate::app::actions::Actions;
@@ -111,7 +111,7 @@ fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     );
 }
 
-/// What a layout measures, in words.
+/// Quantities and stretches of a layout, in words.
 fn about(layout: &palpate_tactile::SensorLayout) -> String {
     use palpate_tactile::{CurvatureSplit, PressureSplit};
     let curvature = match layout.curvature {

@@ -25,8 +25,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         for remark in trial.remarks.iter().chain(&trial.header.warnings) {
             wrapped(ui, RichText::new(remark).color(colour(colours.warning)));
         }
-        if let Some((quality, _)) = &trial.simulated {
-            let (level, why) = quality.trust();
+        if let Some(facts) = &trial.simulated {
+            let (level, why) = facts.quality.trust();
             let ink = match level {
                 TrustLevel::Green => colours.text,
                 TrustLevel::Amber => colours.warning,
@@ -74,8 +74,8 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
         facts.push(("accuracy", header.scene.solver.accuracy.to_string()));
         facts.push(("peak pressure", format!("{:.2} bar", header.scene.programme.peak_bar)));
     }
-    if let Some((_, plan)) = &trial.simulated {
-        let on: Vec<&str> = plan.effects.iter().filter(|effect| effect.on).map(|e| e.name.as_str()).collect();
+    if let Some(own) = &trial.simulated {
+        let on: Vec<&str> = own.plan.effects.iter().filter(|effect| effect.on).map(|e| e.name.as_str()).collect();
         facts.push(("effects", if on.is_empty() { "none".to_owned() } else { on.join(", ") }));
     }
     if let Some(collection) = &header.collection {

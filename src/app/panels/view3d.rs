@@ -113,7 +113,7 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
-/// What is drawn of a moment: everything in `size` points, and the view of it.
+/// Draw list of a moment, and the view that it was made for.
 struct Drawn {
     list: DrawList,
     view: PictureView,

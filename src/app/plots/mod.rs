@@ -22,7 +22,7 @@ use egui_plot::{
 use labels::CurveLabel;
 use palpate_geometry::palette::{Rgb, Theme, Trace, series_colour};
 use palpate_geometry::units::three_digits;
-use palpate_lab::inspection::{FigureOptions, PhaseSpan, TouchPhase};
+use palpate_lab::inspection::{FigureOptions, TouchPhase};
 use palpate_sim::objects::object_title;
 use palpate_tactile::trial::TrialSource;
 
@@ -160,7 +160,7 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
 const ROOM_FOR_HEADER: f32 = 120.0;
 const ROOM_FOR_LABELS: f32 = 380.0;
 
-/// Choice of what is derived, and the times of cursor and marks.
+/// Choice of derived curves, and the times of cursor and marks.
 fn header_ui(
     ui: &mut Ui,
     context: &PanelContext<'_>,
@@ -221,7 +221,7 @@ fn header_ui(
     });
 }
 
-/// Colour of a curve of what is shown: that of its sensor, or beside trials in colours of their own that of text.
+/// Colour of a curve of the grasp shown: that of its sensor, or the text colour where trials are compared.
 fn own_ink(context: &PanelContext<'_>, curve: &PlotCurve) -> Color32 {
     let theme = context.view.theme;
     colour(if context.comparison.traces.is_empty() { curve.trace.colour(theme) } else { theme.colours().text })
@@ -350,12 +350,7 @@ fn plain(value: f64) -> String {
 fn add_phases(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, [from, to]: [f64; 2], height: f64) {
     let quiet = context.view.theme.colours().quiet_text;
     let width = f64::from(plot_ui.response().rect.width());
-    let mut phases = context.shown().phases();
-    if phases.is_empty() {
-        let hold = context.shown().hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
-        phases.extend(hold);
-    }
-    for span in phases {
+    for span in context.phases {
         if span.phase == TouchPhase::Hold {
             plot_ui.add(Span::new("", span.from_s..=span.to_s).fill(veil(quiet, 0.09)).border_width(0.0));
         } else {

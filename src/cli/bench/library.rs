@@ -89,7 +89,7 @@ pub(super) fn run(trials: u32, runs: u16, json: bool) -> Result<(), Failure> {
     say(format!("{trials} trials; {runs} runs each; {}", memory(bytes, trials)))
 }
 
-/// Memory of the process per trial, where the system tells.
+/// Memory of the process per trial, where the system reports it.
 fn memory(bytes: Option<u64>, trials: u32) -> String {
     bytes.map_or_else(
         || "memory unknown on this system".to_owned(),

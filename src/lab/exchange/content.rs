@@ -1,14 +1,15 @@
 //! What a stored trial gives to other programs: its channels, poses, labels and origin, whatever its source.
 
 use super::ExchangeError;
-use crate::inspection::{OpenOptions, OpenTrial};
+use crate::inspection::{Keep, OpenOptions, OpenTrial, SimulatedFacts};
 use glam::{DMat3, DQuat};
 use palpate_geometry::Pose;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_store::{Store, TrialRow};
-use palpate_tactile::trial::{TrialData, TrialId, TrialSource};
+use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A trial to be written.
 pub(super) struct TrialContent {
@@ -16,10 +17,6 @@ pub(super) struct TrialContent {
     pub(super) open: OpenTrial,
     /// Samples with any number; those left out mark gaps.
     pub(super) samples: Vec<usize>,
-    /// Fingers and object of a simulated trial, in their own samples.
-    pub(super) frames: Vec<Frame>,
-    /// Pose of the gripper in the world in which a simulated trial began.
-    pub(super) world_from_gripper: Option<Pose>,
     /// Note, tags and doubt of the label.
     pub(super) row: Option<TrialRow>,
     /// Calibrations of a real gripper's parts, as JSON.
@@ -40,11 +37,8 @@ impl<'a> Contents<'a> {
     }
 
     pub(super) fn load(&self, id: TrialId) -> Result<TrialContent, ExchangeError> {
-        let open = OpenTrial::open(self.store, id, self.options)?;
-        let (frames, world_from_gripper) = match self.store.load(id)?.data {
-            TrialData::Simulated(data) => (data.frames, Some(data.world_from_gripper)),
-            TrialData::Recorded(_) | TrialData::Imported(_) => (Vec::new(), None),
-        };
+        let options = OpenOptions { keep: Keep::Frames, ..self.options.clone() };
+        let open = OpenTrial::open(self.store, id, &options)?;
         let read =
             |k: usize| open.line_bar[k].is_finite() || open.columns.iter().any(|column| column.values[k].is_finite());
         let samples = (0..open.t_s.len()).filter(|k| read(*k)).collect();
@@ -53,7 +47,7 @@ impl<'a> Contents<'a> {
             TrialSource::Simulated | TrialSource::Imported => None,
         };
         let row = self.rows.get(&id).cloned();
-        Ok(TrialContent { open, samples, frames, world_from_gripper, row, calibrations })
+        Ok(TrialContent { open, samples, row, calibrations })
     }
 
     fn calibrations(&self, id: TrialId) -> Result<String, ExchangeError> {
@@ -65,15 +59,9 @@ impl<'a> Contents<'a> {
 }
 
 impl TrialContent {
-    /// Pose of the gripper in the world at a frame.
-    pub(super) fn gripper_pose(&self, frame: &Frame) -> Pose {
-        frame.world_from_gripper(&self.world_from_gripper.unwrap_or_default())
-    }
-
-    /// The frame at a time (s): the last one until then.
-    pub(super) fn frame_at(&self, t_s: f64) -> Option<&Frame> {
-        let after = self.frames.partition_point(|frame| frame.t <= t_s + 1e-9);
-        self.frames.get(after.saturating_sub(1))
+    /// Facts and frames of a simulated trial; none of others, whose fingers are only reconstructed.
+    pub(super) fn simulated(&self) -> Option<(&SimulatedFacts, &[Arc<Frame>])> {
+        self.open.simulated.as_ref().map(|facts| (facts, self.open.frames.as_slice()))
     }
 }
 
@@ -99,24 +87,14 @@ pub(super) fn segment_name(side: Side, segment: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_sim::gripper::{Phase, Sway};
+    use crate::picture::evenly_bent;
 
     #[test]
     fn joints_turn_about_y_from_one_segment_to_the_next() {
         let gripper = GripperModel::default();
         let joints = gripper.finger.joints;
         let q: Vec<f64> = (0..2 * joints).map(|k| 0.01 * k as f64).collect();
-        let frame = Frame {
-            sample: 0,
-            t: 0.0,
-            line_bar: 0.0,
-            phase: Phase::Close,
-            q,
-            sways: [Sway::NONE; 2],
-            hand: glam::DVec3::ZERO,
-            world_from_object: None,
-            taxels: Vec::new(),
-        };
+        let frame = Frame { q, ..evenly_bent(&gripper, [None; 2]) };
         let lengths: Vec<f64> = gripper.finger.segment_lengths().collect();
         for side in Side::BOTH {
             for joint in 1..=joints {

@@ -6,6 +6,7 @@ use super::content::{Contents, TrialContent};
 use super::{Allow, ExchangeError, NewFile, Request, step};
 use crate::inspection::{TouchPhase, scene_hash};
 use palpate_geometry::Pose;
+use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
 use std::io::{self, Write};
 use std::path::Path;
@@ -25,7 +26,7 @@ pub(super) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Res
     for (done, id) in request.ids.iter().enumerate() {
         step(allow, done, request.ids.len())?;
         let trial = contents.load(*id)?;
-        let joints: usize = trial.frames.first().map_or(0, |frame| frame.q.len());
+        let joints = joints_of(&trial);
         let each = 8 * (trial.open.columns.len() + joints + 2 * POSE + 4) as u64;
         bytes = u64::max(bytes, each * trial.samples.len() as u64);
         let gigabytes = (bytes * request.ids.len() as u64) as f64 / 1e9;
@@ -87,15 +88,22 @@ fn arrays<W: Write + io::Seek>(trials: &[TrialContent], archive: &mut Archive<W>
     answers(trials, samples, archive)
 }
 
+/// Joints of both fingers of a simulated trial; none of others.
+fn joints_of(trial: &TrialContent) -> usize {
+    trial.simulated().and_then(|(_, frames)| frames.first()).map_or(0, |frame| frame.q.len())
+}
+
 /// Joints and poses, where any trial is simulated.
 fn motion<W: Write + io::Seek>(trials: &[TrialContent], samples: usize, archive: &mut Archive<W>) -> io::Result<()> {
-    let joints = trials.iter().filter_map(|trial| trial.frames.first()).map(|frame| frame.q.len() / 2).max();
-    let Some(joints) = joints else { return Ok(()) };
+    let joints = trials.iter().map(joints_of).max().unwrap_or(0) / 2;
+    if joints == 0 {
+        return Ok(());
+    }
     let frames = || {
         trials.iter().flat_map(|trial| {
             (0..samples).map(move |k| {
-                let t_s = trial.samples.get(k).map(|k| trial.open.t_s[*k]);
-                (trial, t_s.and_then(|t_s| trial.frame_at(t_s)))
+                let t_s = trial.simulated().and(trial.samples.get(k)).map(|k| trial.open.t_s[*k]);
+                (trial, t_s.and_then(|t_s| trial.open.at(t_s)?.frame))
             })
         })
     };
@@ -113,7 +121,10 @@ fn motion<W: Write + io::Seek>(trials: &[TrialContent], samples: usize, archive:
         })
     };
     let shape = [trials.len(), samples, POSE];
-    let gripper = frames().flat_map(|(trial, frame)| numbers(frame.map(|frame| trial.gripper_pose(frame))));
+    let pose = |trial: &TrialContent, frame: &Frame| {
+        trial.simulated().map(|(facts, _)| frame.world_from_gripper(&facts.world_from_gripper))
+    };
+    let gripper = frames().flat_map(|(trial, frame)| numbers(frame.and_then(|frame| pose(trial, frame))));
     archive.array("gripper_pose", &shape, gripper)?;
     let object = frames().flat_map(|(_, frame)| numbers(frame.and_then(|frame| frame.world_from_object)));
     archive.array("object_pose", &shape, object)

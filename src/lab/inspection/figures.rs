@@ -369,7 +369,7 @@ fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, Figure
 
 #[cfg(test)]
 mod tests {
-    use super::super::OpenOptions;
+    use super::super::{Keep, OpenOptions};
     use super::*;
     use crate::datasets::SensorView;
     use crate::grasping::grasp;
@@ -378,7 +378,7 @@ mod tests {
     fn opened(objects: &[&str]) -> Vec<OpenTrial> {
         let folder = tempfile::tempdir().expect("a folder");
         let mut store = Store::open(&folder.path().join("trials.sqlite")).expect("opens");
-        let options = OpenOptions { scenery: true, sensors: SensorView::default(), ..OpenOptions::default() };
+        let options = OpenOptions { keep: Keep::Frames, sensors: SensorView::default(), ..OpenOptions::default() };
         let open = |object: &&str| {
             let mut scene = Scene::default();
             scene.object.source = (*object).to_owned();

@@ -10,6 +10,6 @@ pub(crate) mod test_trials;
 
 pub use comparison::{Alignment, MeanColumn, MeanTrial};
 pub use figures::{FigureDataError, FigureOptions, HeatKind, caption, comparison_figure, scene_hash};
-pub use open_trial::{Column, Instant, OpenOptions, OpenTrial, OpenTrialError};
+pub use open_trial::{Column, Instant, Keep, OpenOptions, OpenTrial, OpenTrialError, SimulatedFacts};
 pub(crate) use phases::onset;
 pub use phases::{PhaseSpan, TouchPhase, phases_of_frames};

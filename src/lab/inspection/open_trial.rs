@@ -12,7 +12,7 @@ use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::board::{Board, Gap, Sensor};
-use palpate_tactile::trial::{CorrectedPhases, SimulatedData, TrialData, TrialHeader, TrialId, TrialSource};
+use palpate_tactile::trial::{CorrectedPhases, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Signals, whole_fingers};
 use std::sync::Arc;
 
@@ -27,8 +27,31 @@ pub struct OpenOptions {
     pub board_model: Option<Arc<Model>>,
     /// Most grasps of its stop rule, in place of the model's own.
     pub grasps: Option<u32>,
-    /// Also prepares the 3-D view: the object's meshes, and the fingers at each sample.
-    pub scenery: bool,
+    /// What is kept besides channels and answers.
+    pub keep: Keep,
+}
+
+/// What an open trial keeps besides channels and answers; each includes the one before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Keep {
+    /// Nothing.
+    #[default]
+    Channels,
+    /// Fingers and object at each sample.
+    Frames,
+    /// The meshes of the 3-D view.
+    Scenery,
+}
+
+/// Facts that only simulated trials have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedFacts {
+    /// Numerical quality.
+    pub quality: Quality,
+    /// Effects.
+    pub plan: Plan,
+    /// Pose of the gripper in the world in which the trial began.
+    pub world_from_gripper: Pose,
 }
 
 /// Values of one channel over time.
@@ -69,8 +92,8 @@ pub struct OpenTrial {
     pub board: Option<Board>,
     /// Phases of the grasp.
     pub phases: Vec<PhaseSpan>,
-    /// Numerical quality and effects of a simulated trial.
-    pub simulated: Option<(Quality, Plan)>,
+    /// Facts that only simulated trials have.
+    pub simulated: Option<SimulatedFacts>,
     /// Meshes of the 3-D view.
     pub stage: Option<Arc<Stage>>,
     /// Fingers and object over time, in their own samples. Those of a board are arcs of the curvature that its strips read.
@@ -117,17 +140,41 @@ impl OpenTrial {
     /// Opens a trial of any source. The recogniser answers as it did live, from the samples alone.
     pub fn open(store: &Store, id: TrialId, options: &OpenOptions) -> Result<Self, OpenTrialError> {
         let trial = store.load(id)?;
-        let created = store.created(id)?;
-        let mut open = Self {
+        let mut open = Self::empty(id, store.created(id)?, trial.source(), trial.header.clone());
+        open.sensors = options.sensors.clone();
+        let (marks, began_s, gaps) = match &trial.data {
+            TrialData::Simulated(_) => Default::default(),
+            TrialData::Recorded(log) => {
+                let course = &log.course;
+                open.board = Some(course.board.clone());
+                let marks = course.phases.iter().map(|mark| (mark.from_s - course.began_s, mark.phase));
+                (PhaseTimes::of_samples(marks), course.began_s, log.gaps.clone())
+            }
+            TrialData::Imported(_) => Default::default(),
+        };
+        match trial.data {
+            TrialData::Simulated(data) => open.read_simulated(data, options)?,
+            TrialData::Recorded(_) | TrialData::Imported(_) => {
+                open.read_replayed(store, trial, options, began_s, &gaps)?;
+                open.find_phases(marks);
+                open.reconstruct(options);
+            }
+        }
+        Ok(open)
+    }
+
+    /// A trial without samples.
+    pub(super) fn empty(id: TrialId, created: String, source: TrialSource, header: TrialHeader) -> Self {
+        Self {
             id,
-            source: trial.source(),
+            source,
             created,
-            title: match trial.header.object.as_str() {
+            title: match header.object.as_str() {
                 "" => "unlabelled".to_owned(),
                 name => object_title(name),
             },
-            header: trial.header,
-            sensors: options.sensors.clone(),
+            header,
+            sensors: SensorView::default(),
             t_s: Vec::new(),
             line_bar: Vec::new(),
             columns: Vec::new(),
@@ -139,24 +186,7 @@ impl OpenTrial {
             answers: Vec::new(),
             recognition_off: None,
             remarks: Vec::new(),
-        };
-        match trial.data {
-            TrialData::Simulated(data) => open.read_simulated(data, options)?,
-            TrialData::Recorded(log) => {
-                open.board = Some(log.course.board);
-                let marks = log.course.phases.iter().map(|mark| (mark.from_s - log.course.began_s, mark.phase));
-                let marks = PhaseTimes::of_samples(marks);
-                open.read_replayed(store, options, log.course.began_s, &log.gaps)?;
-                open.find_phases(marks);
-                open.reconstruct(options);
-            }
-            TrialData::Imported(_) => {
-                open.read_replayed(store, options, 0.0, &[])?;
-                open.find_phases(PhaseTimes::default());
-                open.reconstruct(options);
-            }
         }
-        Ok(open)
     }
 
     /// Name of the source, in words.
@@ -193,9 +223,8 @@ impl OpenTrial {
 
     /// State at a time (s): that of the last sample until then, or of the first one. None without samples.
     pub fn at(&self, t_s: f64) -> Option<Instant<'_>> {
-        let sample = last_until(self.t_s.len(), |k| self.t_s[k], t_s)?;
-        let frame = last_until(self.frames.len(), |k| self.frames[k].t, t_s);
-        let frame = frame.and_then(|k| self.frames.get(k));
+        let sample = last_until(&self.t_s, |t| *t, t_s)?;
+        let frame = last_until(&self.frames, |frame| frame.t, t_s).map(|k| &self.frames[k]);
         Some(Instant { sample, frame, answer: self.answers.get(sample) })
     }
 
@@ -223,16 +252,19 @@ impl OpenTrial {
             self.push(row, row.t_s);
         }
         self.phases = phases_of_frames(data.frames.iter(), gripper);
-        if options.scenery {
+        let SimulatedData { world_from_gripper, plan, quality, frames } = data;
+        if options.keep >= Keep::Scenery {
             let object = scene.load_object();
             if let Err(cause) = &object {
                 self.remarks.push(format!("The object is not drawn: {cause}"));
             }
             let object = object.ok().flatten();
-            self.stage = Some(Arc::new(Stage::new(&scene, object.as_ref(), data.world_from_gripper)));
-            self.frames = data.frames.into_iter().map(Arc::new).collect();
+            self.stage = Some(Arc::new(Stage::new(&scene, object.as_ref(), world_from_gripper)));
         }
-        self.simulated = Some((data.quality, data.plan));
+        if options.keep >= Keep::Frames {
+            self.frames = frames.into_iter().map(Arc::new).collect();
+        }
+        self.simulated = Some(SimulatedFacts { quality, plan, world_from_gripper });
         Ok(())
     }
 
@@ -244,7 +276,7 @@ impl OpenTrial {
         let clean = reader.sensors().signals(frames);
         let read: Signals = options.sensors.sensors.apply(&clean, noise_seed(&self.header));
         let row = |(k, t_s): (usize, &f64)| {
-            let frame = last_until(frames.len(), |k| frames[k].t, *t_s).and_then(|k| frames.get(k));
+            let frame = last_until(frames, |frame| frame.t, *t_s).map(|k| &frames[k]);
             let line_bar = frame.map_or(f64::NAN, |frame| frame.line_bar);
             Row { t_s: *t_s, line_bar, phase: frame.map(|frame| frame.phase), values: read.row(k).into() }
         };
@@ -255,6 +287,7 @@ impl OpenTrial {
     fn read_replayed(
         &mut self,
         store: &Store,
+        trial: Trial,
         options: &OpenOptions,
         began_s: f64,
         gaps: &[Gap],
@@ -265,7 +298,7 @@ impl OpenTrial {
             TrialSource::Simulated | TrialSource::Imported => &options.model,
         };
         let failed = |cause: String| OpenTrialError::Replay { id, cause };
-        let mut replay = Replay::of_trial(store, id, model.clone()).map_err(|error| match error {
+        let mut replay = Replay::of_loaded(store, id, trial, model.clone()).map_err(|error| match error {
             ReplayError::Store(error) => OpenTrialError::Store(error),
             ReplayError::Layout(error) => OpenTrialError::Layout(error),
         })?;
@@ -370,7 +403,7 @@ impl OpenTrial {
 
     /// Fingers as arcs of the curvature that was read, where it was.
     fn reconstruct(&mut self, options: &OpenOptions) {
-        if !options.scenery {
+        if options.keep < Keep::Frames {
             return;
         }
         let gripper = GripperModel::default();
@@ -385,7 +418,9 @@ impl OpenTrial {
                 Arc::new(Frame { t: *t_s, sample: k as u32, line_bar, ..evenly_bent(&gripper, read(k)) })
             };
             self.frames = self.t_s.iter().enumerate().map(frame).collect();
-            self.stage = Some(Arc::new(Stage::new(&self.header.scene, None, resting_pose(&self.header))));
+            if options.keep >= Keep::Scenery {
+                self.stage = Some(Arc::new(Stage::new(&self.header.scene, None, resting_pose(&self.header))));
+            }
             self.remarks
                 .push("Fingers are arcs of the curvature that the strips read; the object is not drawn.".to_owned());
         }
@@ -428,14 +463,10 @@ fn answers(identification: Option<Identification>, rows: &[Row]) -> Vec<Arc<Iden
     answers
 }
 
-/// The last of `count` rising times that is not after `t_s`, or the first; none without any.
-fn last_until(count: usize, time: impl Fn(usize) -> f64, t_s: f64) -> Option<usize> {
-    let (mut low, mut high) = (0, count);
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if time(middle) <= t_s + 1e-9 { low = middle + 1 } else { high = middle }
-    }
-    (count > 0).then(|| low.saturating_sub(1))
+/// Place of the last sample that is not after `t_s`, or of the first; none without any.
+fn last_until<T>(samples: &[T], time: impl Fn(&T) -> f64, t_s: f64) -> Option<usize> {
+    let after = samples.partition_point(|sample| time(sample) <= t_s + 1e-9);
+    (!samples.is_empty()).then(|| after.saturating_sub(1))
 }
 
 #[cfg(test)]
@@ -462,7 +493,7 @@ mod tests {
     fn a_simulated_trial_opens_as_it_was() -> Result<(), Box<dyn std::error::Error>> {
         let (_folder, store, id) = stored("lemon");
         let model = Arc::new(palpate_learn::shipped_model()?);
-        let options = OpenOptions { model: Some(model), scenery: true, ..OpenOptions::default() };
+        let options = OpenOptions { model: Some(model), keep: Keep::Scenery, ..OpenOptions::default() };
         let open = OpenTrial::open(&store, id, &options)?;
         let trial = store.load(id)?;
         assert_eq!((open.title.as_str(), open.source_title()), ("Lemon", "simulated"));

@@ -12,7 +12,7 @@ use palpate_sim::scene::Scene;
 use palpate_store::{Serving, Store, StoreError};
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::Readout;
-use palpate_tactile::trial::{Control, PhaseMark, TrialData, TrialId};
+use palpate_tactile::trial::{Control, PhaseMark, Trial, TrialData, TrialId};
 use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, whole_fingers};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -68,7 +68,16 @@ struct BoardReader {
 impl Replay {
     /// Replays a stored trial of any source; without a model nothing is recognised.
     pub fn of_trial(store: &Store, id: TrialId, model: Option<Arc<Model>>) -> Result<Self, ReplayError> {
-        let mut trial = store.load(id)?;
+        Self::of_loaded(store, id, store.load(id)?, model)
+    }
+
+    /// The same of a trial that has been loaded from this store under this number.
+    pub fn of_loaded(
+        store: &Store,
+        id: TrialId,
+        mut trial: Trial,
+        model: Option<Arc<Model>>,
+    ) -> Result<Self, ReplayError> {
         let plan = GraspPlan::simulated(&trial.header.scene);
         Ok(match &mut trial.data {
             TrialData::Recorded(log) => {

@@ -2,7 +2,7 @@
 
 use super::background_job::BackgroundJob;
 use super::messages::Wake;
-use crate::inspection::{OpenOptions, OpenTrial, OpenTrialError};
+use crate::inspection::{Keep, OpenOptions, OpenTrial, OpenTrialError};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ impl Inspector {
             let OpenRequest { id, options } = request;
             let trial = open(&mut reader, &store, id, &options).map(Arc::new);
             // The window may have been closed.
-            let _heard = sender.send(Opened { id, scenery: options.scenery, trial });
+            let _heard = sender.send(Opened { id, scenery: options.keep == Keep::Scenery, trial });
         })?;
         Ok(Self { job, opened })
     }

@@ -94,7 +94,7 @@ impl Default for TrialOrder {
 /// Places of trials in the order of a column: those alike have the same.
 fn ranks(trials: &[Arc<LibraryTrial>], column: TrialColumn) -> Vec<u64> {
     match column {
-        // Told apart by number, or by `sorted` itself.
+        // `sorted` orders them by date and number.
         TrialColumn::Id | TrialColumn::Date => vec![0; trials.len()],
         TrialColumn::Object => ranks_of(trials.iter().map(|trial| trial.lower_title())),
         TrialColumn::Source => ranks_of(trials.iter().map(|trial| trial.row.source.name())),

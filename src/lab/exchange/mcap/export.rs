@@ -79,7 +79,7 @@ impl<W: Write> Bag<W> {
         let first_s = open.span_s()[0];
         let at = |t_s: f64| begin + ((t_s - first_s).max(0.0) * 1e9).round() as u64;
         let end = at(open.span_s()[1]);
-        if content.world_from_gripper.is_some() {
+        if open.simulated.is_some() {
             self.text("/robot_description", begin, &gripper_urdf(&open.header.scene.gripper))?;
         }
         self.text("/label", begin, &label_json(content).to_string())?;
@@ -119,7 +119,7 @@ impl<W: Write> Bag<W> {
             })
         };
         let strips: Vec<_> =
-            if content.frames.is_empty() { Side::BOTH.into_iter().filter_map(bends).collect() } else { Vec::new() };
+            if open.simulated.is_none() { Side::BOTH.into_iter().filter_map(bends).collect() } else { Vec::new() };
         let strip_names: Vec<String> = strips.iter().map(|column| column.name.clone()).collect();
         for k in content.samples.iter().copied() {
             let t_s = open.t_s[k];
@@ -141,18 +141,16 @@ impl<W: Write> Bag<W> {
 
     /// Joints and poses of a simulated trial.
     fn motion(&mut self, content: &TrialContent, at: &dyn Fn(f64) -> u64) -> io::Result<()> {
-        if content.frames.is_empty() {
-            return Ok(());
-        }
+        let Some((facts, frames)) = content.simulated() else { return Ok(()) };
         let gripper = &content.open.header.scene.gripper;
         let joints = gripper.finger.joints;
         let names: Vec<String> = Side::BOTH.iter().flat_map(|s| (1..=joints).map(|j| joint_name(*s, j))).collect();
         let states = self.channel(MessageKind::JointState, "/joint_states", Pairs::new());
         let poses = self.channel(MessageKind::Transforms, "/tf", Pairs::new());
-        for frame in &content.frames {
+        for frame in frames {
             let ns = at(frame.t);
             self.writer.message(states, ns, &messages::joint_state(ns, &names, &frame.q))?;
-            let world_from_gripper = content.gripper_pose(frame);
+            let world_from_gripper = frame.world_from_gripper(&facts.world_from_gripper);
             let mut placed = vec![("palm".to_owned(), world_from_gripper)];
             for side in Side::BOTH {
                 for segment in 0..=joints {

@@ -1,0 +1,150 @@
+//! Beginning of rounds and grasps: object, pose, sensors, recording, and what the recogniser thinks so far.
+
+use super::super::current::Current;
+use super::super::held_object::{LoadedObject, card_of, stamp_of};
+use super::super::listener::Listener;
+use super::super::messages::Notice;
+use super::super::pace::Pace;
+use super::super::refined_run::RefinedRun;
+use super::Session;
+use crate::grasping::{FrameReader, prepare};
+use crate::picture::Stage;
+use palpate_sim::objects::{EMPTY, ObjectError};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::Scene;
+use palpate_tactile::{Channel, SensorLayout};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+impl Session {
+    /// Begins with the scene that was asked for or, where that cannot be had, with an empty hand.
+    pub(super) fn begin_somehow(&mut self) {
+        if let Err(cause) = self.load_object(&self.nominal.clone()) {
+            let refused = self.nominal.clone();
+            EMPTY.clone_into(&mut self.nominal.object.source);
+            self.refuse(refused, &cause);
+        }
+        self.begin_round();
+    }
+
+    /// The first grasp of a round.
+    pub(super) fn begin_round(&mut self) {
+        self.status.grasp_of_round = 0;
+        if let Some(listener) = &mut self.listener {
+            listener.start_over();
+        }
+        self.begin_grasp();
+    }
+
+    pub(super) fn begin_grasp(&mut self) {
+        self.drop_recording();
+        self.next_grasp_at = None;
+        if let Err(cause) = self.load_object(&self.nominal.clone()) {
+            // The file has changed for the worse since; the object as it was will do.
+            self.outlets.notify(Notice::Failed(cause.to_string()));
+        }
+        let model = self.object.as_ref().and_then(|object| object.model.clone());
+        self.status.finished = false;
+        self.status.grasp_of_round += 1;
+        let again = self.own_pose_done;
+        self.own_pose_done = true;
+        // The first grasp is the scene as written; the following ones come from random poses, on the object as it was
+        // released if the scene asks for it.
+        let (scene, seed) = if again {
+            self.poses_drawn += 1;
+            let sampler = self.sampler.get_or_insert_with(|| PoseSampler::new(&self.nominal, model.as_deref()));
+            let before = self.current.as_ref().filter(|current| current.ended && self.status.grasp_of_round > 1);
+            let released = before.map(|current| current.frame.as_ref());
+            (sampler.draw_after(model.as_deref(), self.poses_drawn, released).0, self.poses_drawn)
+        } else {
+            (self.nominal.clone(), 0)
+        };
+        let more = self.listener.as_ref().map(|listener| listener.channels_on(&scene.gripper)).unwrap_or_default();
+        let area = self.sensors.area;
+        let reader = SensorLayout::named(&self.sensors.layout).and_then(|layout| {
+            let plotted = layout.channels(&scene.gripper)?.len();
+            Ok((FrameReader::new(&layout, &scene.gripper, area, &more)?, plotted))
+        });
+        let (reader, plotted) = match reader {
+            Ok(reader) => reader,
+            Err(error) => return self.outlets.notify(Notice::Failed(error.to_string())),
+        };
+        if let Some(accuracy_job) = self.accuracy_job.as_mut().filter(|_| !again) {
+            accuracy_job.measure(&scene, model.clone());
+        }
+        let mut run = prepare(&scene, model.as_deref(), seed);
+        let mut begun = run.begun();
+        begun.header.earlier = self.listener.as_ref().and_then(Listener::earlier);
+        if !again {
+            for warning in &begun.header.warnings {
+                self.outlets.notify(Notice::Warning(warning.clone()));
+            }
+        }
+        if self.status.recording
+            && let Some(recorder) = &self.recorder
+        {
+            recorder.begin(begun.clone());
+            self.recorder_busy = true;
+        }
+        if let Some(warning) = self.listener.as_mut().and_then(|listener| {
+            listener.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), "in this scene")
+        }) {
+            self.outlets.notify(Notice::Warning(warning));
+        }
+        self.grasp += 1;
+        self.status.duration = scene.timing.duration_s;
+        // What the recogniser reads beyond the layout is not plotted.
+        self.channels = reader.channels()[..plotted].into();
+        let stage = Arc::new(Stage::new(&scene, model.as_deref(), begun.data.world_from_gripper));
+        let frame = Arc::new(run.gripper_mut().run_mut().first_look());
+        self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
+        let (warned, scene, plan) = (begun.header.warnings.len(), Arc::new(scene), Arc::new(begun.data.plan));
+        let channels = reader.channels().len();
+        let refined_run = self.status.error_band.then(|| RefinedRun::new(&scene, model.as_deref(), seed, channels));
+        self.current = Some(Current {
+            earlier: begun.header.earlier,
+            run,
+            refined_run,
+            plan,
+            scene,
+            stage,
+            reader,
+            frame,
+            warned,
+            pulled: false,
+            ended: false,
+        });
+        self.pace = Pace::starting_at(0.0);
+        self.begin_ghost();
+        self.publish();
+    }
+
+    /// The other engine computes the same grasp, where a ghost is wanted.
+    pub(super) fn begin_ghost(&mut self) {
+        if let Some(current) = &self.current {
+            let model = self.object.as_ref().and_then(|object| object.model.clone());
+            self.ghost.begin(self.grasp, &current.scene, model);
+        }
+    }
+
+    /// Loads a scene's object, unless it is the present one, which stays on failure.
+    pub(super) fn load_object(&mut self, scene: &Scene) -> Result<(), ObjectError> {
+        let (source, options) = (scene.object.source.clone(), scene.load_options());
+        let stamp = stamp_of(&source);
+        let is_known = |o: &LoadedObject| o.source == source && o.options == options && o.stamp == stamp;
+        if self.object.as_ref().is_some_and(is_known) {
+            return Ok(());
+        }
+        self.status.loading = Some(source.clone());
+        self.publish();
+        self.outlets.loading.store(true, Ordering::Relaxed);
+        let loaded = scene.load_object();
+        self.outlets.loading.store(false, Ordering::Relaxed);
+        self.status.loading = None;
+        self.publish();
+        let model = loaded?.map(Arc::new);
+        self.object = Some(LoadedObject { source, options, stamp, model });
+        self.sampler = None;
+        Ok(())
+    }
+}
