@@ -2,13 +2,13 @@
 
 use palpate_geometry::drawing::{DrawList, Figure};
 use palpate_geometry::palette::Theme;
-use palpate_lab::exchange::{ExchangeError, NewFile, write_trials};
+use palpate_lab::exchange::{ExchangeError, write_trials};
 use palpate_lab::inspection::OpenOptions;
 use palpate_lab::workers::Wake;
 use palpate_render::{
     DriverChoice, FigureError, Gpu, GpuError, Picture, PictureError, Renderer, figure_picture, figure_svg,
 };
-use palpate_store::{Store, StoreError};
+use palpate_store::{NewFile, Store, StoreError};
 use palpate_tactile::trial::TrialId;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -180,6 +180,7 @@ fn quiet_line(ui: &mut Ui, ink: Rgb, last: Option<&String>) {
 mod tests {
     use super::*;
     use palpate_geometry::MeshError;
+    use palpate_sim::scene::Scene;
 
     #[test]
     fn warnings_carry_the_buttons_that_help() {
@@ -188,8 +189,19 @@ mod tests {
         assert_eq!(of(&open.to_string()), [Remedy::UseHull]);
         assert_eq!(of(&MeshError::NotOrientable.to_string()), [Remedy::UseHull]);
         assert_eq!(of("Trial 3 stored."), []);
-        assert_eq!(of("cannot read \"part.obj\": no such file"), [Remedy::LocateFile]);
-        let scale = "as given, \"x\" is 40 m across: millimetres taken for metres? It is used at 40 mm; set object.scale to decide";
+        // The messages are those of the loader, so that a change of its words is noticed here.
+        let folder = tempfile::tempdir().expect("a folder");
+        let load = |name: &str| {
+            let mut scene = Scene::default();
+            scene.object.source = folder.path().join(name).to_string_lossy().into_owned();
+            scene.load_object()
+        };
+        assert_eq!(of(&load("gone.obj").expect_err("no file").to_string()), [Remedy::LocateFile]);
+        let corners = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\n";
+        let cube = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+        std::fs::write(folder.path().join("large.obj"), cube).expect("writes");
+        let large = load("large.obj").expect("loads").expect("an object");
+        let scale = large.warnings.iter().find(|warning| warning.contains("scale")).expect("a warning of its size");
         assert_eq!(of(scale), [Remedy::TreatAsMillimetres, Remedy::TreatAsMetres]);
         assert_eq!(of("trial 7 discarded; Ctrl+Z brings it back"), [Remedy::UndoLabel]);
     }

@@ -1,7 +1,7 @@
 //! Files that commands write: whole or not at all, into folders that exist.
 
 use super::Failure;
-use palpate_lab::exchange::NewFile;
+use palpate_store::NewFile;
 use std::io::Write as _;
 use std::path::Path;
 

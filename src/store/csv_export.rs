@@ -5,12 +5,12 @@
 //! world frame (as the paper stores them, section IV-A), the object's pose, and where fingers leave their planes the
 //! sideways curvature at the palm and the twist of each. Joints are numbered from 1 at the palm.
 
+use super::new_file::NewFile;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, Sway};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, Signals};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Error of writing a CSV file.
@@ -93,28 +93,20 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
     })
 }
 
-/// Writes to a temporary file first, so that a kill leaves either the old file or the whole new one.
+/// Writes a file that appears whole or not at all, and its folder where there is none.
 pub(super) fn write_file(
     path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<std::fs::File>>) -> csv::Result<()>,
+    fill: impl FnOnce(&mut csv::Writer<NewFile>) -> csv::Result<()>,
 ) -> Result<(), CsvError> {
-    let unfinished = path.with_extension("csv.unfinished");
-    let written = (|| -> std::io::Result<()> {
+    let write = || -> std::io::Result<()> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)?;
         }
-        let file = std::io::BufWriter::new(std::fs::File::create(&unfinished)?);
-        let mut out = csv::Writer::from_writer(file);
+        let mut out = csv::Writer::from_writer(NewFile::create(path)?);
         fill(&mut out)?;
-        out.flush()?;
-        out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.flush()?;
-        std::fs::rename(&unfinished, path)
-    })();
-    written.map_err(|cause| {
-        // Nothing to add to the message where the remains cannot be removed either.
-        let _gone = std::fs::remove_file(&unfinished);
-        CsvError::Write { path: path.to_owned(), cause: cause.to_string() }
-    })
+        out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.finish()
+    };
+    write().map_err(|cause| CsvError::Write { path: path.to_owned(), cause: cause.to_string() })
 }
 
 /// Shortest text that reads back as the same number.

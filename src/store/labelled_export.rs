@@ -12,6 +12,7 @@
 
 use super::board_export::write_board_csv;
 use super::csv_export::{CsvError, number};
+use super::new_file::unfinished;
 use super::store::Store;
 use super::store_error::StoreError;
 use crate::labels::LabelledTrial;
@@ -85,7 +86,7 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
     if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
         return Err(ExportError::NotEmpty { folder: folder.to_owned() });
     }
-    let unfinished = beside(folder);
+    let unfinished = unfinished(folder);
     let written = write_all(store, &rows, &unfinished).and_then(|left_out| {
         // Replaces an empty folder, but nothing else that has appeared meanwhile.
         if folder.is_dir() {
@@ -99,12 +100,6 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
         let _gone = std::fs::remove_dir_all(&unfinished);
     })?;
     Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived: rows.len() - left_out.len(), left_out })
-}
-
-/// Name of the unfinished folder, on the same disk.
-fn beside(folder: &Path) -> PathBuf {
-    let name = folder.file_name().map_or_else(|| "export".into(), |name| name.to_string_lossy().into_owned());
-    folder.with_file_name(format!(".{name}.{}.unfinished", std::process::id()))
 }
 
 fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {

@@ -14,7 +14,8 @@
 //! |---|---|---|
 //! | 0 | `checksum`, `frame_blob`, `reading_blob` | checksums; frames and readings as bytes |
 //! | 0 | [`labels`] | class names, flags, plan, labelled trials, sparklines: plain values |
-//! | 0 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
+//! | 0 | `new_file` | files that appear whole or not at all |
+//! | 1 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
 //! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
@@ -63,6 +64,7 @@ mod library;
 #[cfg(test)]
 mod library_tests;
 mod merge;
+mod new_file;
 #[cfg(test)]
 mod old_store_tests;
 mod points_csv;
@@ -93,6 +95,7 @@ pub use library::{
     Counted, Day, Library, LibraryCounts, LibraryTrial, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery,
 };
 pub use merge::Merged;
+pub use new_file::{NewFile, unfinished};
 pub use points_csv::{PointsError, read_points_csv};
 pub use store::Store;
 pub use store_error::StoreError;

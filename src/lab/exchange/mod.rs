@@ -5,14 +5,12 @@
 
 mod content;
 mod mcap;
-mod new_file;
 mod npz;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod urdf;
 
 pub use mcap::{McapImportError, read_mcap};
-pub use new_file::{NewFile, unfinished};
 
 use crate::inspection::{OpenOptions, OpenTrialError};
 use palpate_store::{Store, StoreError};

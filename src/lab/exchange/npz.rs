@@ -3,11 +3,12 @@
 //! NPY is a header of text, padded to 64 bytes, and the numbers in rows. Source: numpy, *numpy.lib.format*, version 1.0.
 
 use super::content::{Contents, TrialContent};
-use super::{Allow, ExchangeError, NewFile, Request, step};
+use super::{Allow, ExchangeError, Request, step};
 use crate::inspection::{TouchPhase, scene_hash};
 use palpate_geometry::Pose;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
+use palpate_store::NewFile;
 use std::io::{self, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;

@@ -4,7 +4,7 @@
 //! stand in the file's key-value metadata under `units`, as JSON.
 
 use super::content::{Contents, TrialContent};
-use super::{Allow, ExchangeError, NewFile, Request, step};
+use super::{Allow, ExchangeError, Request, step};
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
 use ::parquet::errors::ParquetError;
@@ -12,6 +12,7 @@ use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::Type;
+use palpate_store::NewFile;
 use std::path::Path;
 use std::sync::Arc;
 
