@@ -27,7 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
-/// Pause between two grasps of a round.
+/// Pause between two grasps of a round at speed one or slower; played faster, it is shorter too.
 const BETWEEN_GRASPS: Duration = Duration::from_millis(600);
 /// Longest time spent stepping before something is published.
 const BUDGET: Duration = Duration::from_millis(12);
@@ -421,7 +421,8 @@ impl Session {
             if let Some(listener) = &mut self.listener {
                 listener.end_grasp();
             }
-            self.next_grasp_at = Some(Instant::now() + BETWEEN_GRASPS);
+            let pause = BETWEEN_GRASPS.div_f64(self.status.target_speed.max(1.0));
+            self.next_grasp_at = Some(Instant::now() + pause);
             self.reconsider();
         } else {
             self.end_round();
