@@ -41,7 +41,13 @@ pub(crate) fn made_up(of_each: usize, seed: u64) -> Dataset {
                 }
             }
             let id = (number * labels.classes.len() + index) as i64;
-            examples.push(Example { id, class: index, grasp: Arc::new(Sequence { t_s, values }) });
+            examples.push(Example {
+                id,
+                class: index,
+                grasp: Arc::new(Sequence { t_s, values }),
+                content: id.cast_unsigned(),
+                ..Example::default()
+            });
         }
     }
     let channels = words(&["curvature_left", "curvature_right", "force_left", "force_right"]);

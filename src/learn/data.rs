@@ -32,6 +32,13 @@ impl Sequence {
         self.t_s.iter().copied().zip(self.values.chunks_exact(width.max(1)))
     }
 
+    /// Hash (FNV-1a) of times and readings: equal for copies of one grasp.
+    pub fn content(&self) -> u64 {
+        let numbers = self.t_s.iter().chain(&self.values).flat_map(|x| x.to_bits().to_le_bytes());
+        let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        numbers.fold(0xcbf2_9ce4_8422_2325, mix)
+    }
+
     /// Truncates the sequence after a time (s).
     pub fn until(&self, t: f32) -> Self {
         let count = self.t_s.partition_point(|&own| own <= t);
@@ -75,7 +82,7 @@ impl Labels {
 }
 
 /// One labelled grasp.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Example {
     /// Number of the trial in the store.
     pub id: i64,
@@ -83,6 +90,12 @@ pub struct Example {
     pub class: usize,
     /// Readings.
     pub grasp: Arc<Sequence>,
+    /// Hash of the grasp: trials with equal content are the same grasp, stored twice.
+    pub content: u64,
+    /// Number of the trial made just before, if the object has stayed as that one released it.
+    pub after: Option<i64>,
+    /// Group of similar poses, to leave poses out of the training.
+    pub pose: u32,
 }
 
 /// Origin of a data set.

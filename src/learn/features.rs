@@ -159,7 +159,7 @@ mod tests {
         Dataset {
             channels: ["force_left", "force_right"].map(str::to_owned).to_vec(),
             labels: Labels { classes: vec![class], ..Labels::default() },
-            examples: vec![Example { id: 1, class: 0, grasp }],
+            examples: vec![Example { id: 1, class: 0, grasp, ..Example::default() }],
             about: DataCard::default(),
         }
     }

@@ -10,10 +10,11 @@
 //!
 //! | layer | module | holds |
 //! |---|---|---|
-//! | 0 | `data` | sequences, labels, data sets and their splits |
+//! | 0 | `data` | sequences, labels, data sets |
 //! | 0 | `pmf`, `mirror`, `arrays` | probabilities; channels of the mirrored gripper; named parameters of a model |
 //! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
+//! | 1 | `split` | splits into training and test trials |
 //! | 1 | `features` | a grasp as a row of features |
 //! | 1 | `signatures` | mean and spread of each class over time |
 //! | 2 | `recogniser` | the interface of recognisers |
@@ -40,7 +41,9 @@
 //! let data = Dataset {
 //!     channels: vec!["pressure_left".to_owned()],
 //!     labels: Labels { classes: vec![class("ball"), class("cube")], ..Labels::default() },
-//!     examples: (0..20).map(|k| Example { id: k, class: k as usize % 2, grasp: grasp((k % 2) as f32) }).collect(),
+//!     examples: (0..20)
+//!         .map(|k| Example { id: k, class: k as usize % 2, grasp: grasp((k % 2) as f32), ..Example::default() })
+//!         .collect(),
 //!     ..Dataset::default()
 //! };
 //! let (progress, stop) = (|_| {}, AtomicBool::new(false));
@@ -70,6 +73,7 @@ pub mod network;
 mod pmf;
 mod recogniser;
 mod signatures;
+mod split;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
 pub use belief::{Belief, Rejection, StopReason, StopRule};
@@ -81,3 +85,4 @@ pub use model_file::shipped_model;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};
+pub use split::{Split, SplitError, SplitPlan};

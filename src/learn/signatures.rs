@@ -234,8 +234,9 @@ mod tests {
         let labels = Labels { classes: ["x", "y", "none"].map(class).to_vec(), ..Labels::default() };
         let grasps = [(0, grasp(1.0, 5.0, 2.0)), (0, grasp(3.0, 5.0, 2.0)), (1, grasp(6.0, 8.0, 2.0))];
         let examples = grasps.into_iter().enumerate();
-        let examples =
-            examples.map(|(k, (class, grasp))| Example { id: k as i64, class, grasp: Arc::new(grasp) }).collect();
+        let examples = examples
+            .map(|(k, (class, grasp))| Example { id: k as i64, class, grasp: Arc::new(grasp), ..Example::default() })
+            .collect();
         let channels = vec!["a".to_owned(), "b".to_owned()];
         Dataset { channels, labels, examples, ..Dataset::default() }
     }

@@ -48,7 +48,7 @@ pub(crate) fn weighing() -> Arc<Model> {
     };
     let levels = [("lemon", 0.5), ("tomato", 0.1)].into_iter().enumerate();
     let examples = levels.filter_map(|(k, (name, newtons))| {
-        Some(Example { id: k as i64, class: labels.class(name)?, grasp: grasp(newtons) })
+        Some(Example { id: k as i64, class: labels.class(name)?, grasp: grasp(newtons), ..Example::default() })
     });
     let data = Dataset {
         channels: channels.clone(),

@@ -262,7 +262,13 @@ impl DatasetQuery {
         }
         let labels = labels(&named);
         let example = |(id, object, grasp): (TrialId, String, Sequence)| {
-            Some(Example { id, class: labels.class(&object)?, grasp: Arc::new(grasp) })
+            Some(Example {
+                id,
+                class: labels.class(&object)?,
+                content: grasp.content(),
+                grasp: Arc::new(grasp),
+                ..Example::default()
+            })
         };
         if read.is_empty() {
             return Err(DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing });

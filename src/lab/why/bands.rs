@@ -58,8 +58,14 @@ mod tests {
         let grasp = |level: f32| Arc::new(Sequence { t_s: vec![0.0, 1.0], values: vec![level; 2] });
         let levels = [(0, 1.0), (0, 3.0), (1, 5.0), (2, 8.0)];
         let examples = levels.iter().enumerate();
-        let examples =
-            examples.map(|(k, (class, level))| Example { id: k as i64, class: *class, grasp: grasp(*level) }).collect();
+        let examples = examples
+            .map(|(k, (class, level))| Example {
+                id: k as i64,
+                class: *class,
+                grasp: grasp(*level),
+                ..Example::default()
+            })
+            .collect();
         let data =
             Dataset { channels: vec!["grip".to_owned()], labels: labels.clone(), examples, ..Dataset::default() };
         let signatures = Signatures::of(&data).unwrap();

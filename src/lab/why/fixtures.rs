@@ -52,7 +52,8 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
     let labels = Labels { classes: ["lemon", "tomato"].map(class).to_vec(), ..Labels::default() };
     let channels: Vec<String> = ["curvature_left", "grip", "bend"].map(str::to_owned).to_vec();
     let examples = [(0, [0.0, 2.0, 2.0]), (1, [2.0, 2.0, 4.0])];
-    let examples = examples.map(|(class, levels)| Example { id: 0, class, grasp: Arc::new(grasp(levels)) });
+    let examples =
+        examples.map(|(class, levels)| Example { id: 0, class, grasp: Arc::new(grasp(levels)), ..Example::default() });
     let data = Dataset {
         channels: channels.clone(),
         labels: labels.clone(),

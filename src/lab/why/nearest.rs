@@ -160,8 +160,12 @@ mod tests {
         }
         let model = shipped_model().unwrap();
         let examples = grasps.iter().zip([10, 16, 10, 4]).enumerate();
-        let examples =
-            examples.map(|(k, (grasp, class))| Example { id: k as i64, class, grasp: Arc::new(grasp.clone()) });
+        let examples = examples.map(|(k, (grasp, class))| Example {
+            id: k as i64,
+            class,
+            grasp: Arc::new(grasp.clone()),
+            ..Example::default()
+        });
         let data = Dataset {
             channels: model.card.channels.clone(),
             labels: model.card.labels.clone(),

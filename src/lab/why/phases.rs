@@ -88,8 +88,14 @@ mod tests {
         let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
         let labels = Labels { classes: ["a", "b"].map(class).to_vec(), ..Labels::default() };
         let examples = [(0, 4.0), (1, 8.0)];
-        let examples =
-            examples.map(|(class, press)| Example { id: class as i64, class, grasp: Arc::new(grasp(press)) }).to_vec();
+        let examples = examples
+            .map(|(class, press)| Example {
+                id: class as i64,
+                class,
+                grasp: Arc::new(grasp(press)),
+                ..Example::default()
+            })
+            .to_vec();
         let channels = ["curvature_left", "pressure_left"].map(str::to_owned).to_vec();
         let signatures = Signatures::of(&Dataset { channels, labels, examples, ..Dataset::default() }).unwrap();
         let found = phases_of(&grasp(4.0), &signatures, None);

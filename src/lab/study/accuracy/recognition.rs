@@ -155,7 +155,13 @@ impl<'a> RecognitionBench<'a> {
             let signals = view.signals(&trial).map_err(|cause| AccuracyStudyError::Layout { cause })?;
             grasps.channels.clone_from(&signals.channels);
             let grasp = Arc::new(sequence_of(&signals));
-            grasps.examples.push(Example { id: seed as i64, class, grasp });
+            grasps.examples.push(Example {
+                id: seed as i64,
+                class,
+                content: grasp.content(),
+                grasp,
+                ..Example::default()
+            });
         }
         Ok(Some(grasps))
     }

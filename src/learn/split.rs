@@ -1,0 +1,514 @@
+//! Splits of a data set into training and test trials.
+//!
+//! A [`SplitPlan`] is stratified: it divides each class by itself. Trials with equal [`Example::content`] are one grasp,
+//! of which only the first trial takes part, so that no recogniser is tested on a grasp that it has learned.
+//!
+//! ```
+//! use palpate_learn::{Class, Dataset, Example, Labels, SplitPlan};
+//!
+//! let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+//! let grasp = |k: usize| Example { id: k as i64, class: k % 2, content: k as u64, ..Example::default() };
+//! let labels = Labels { classes: vec![class("ball"), class("cube")], ..Labels::default() };
+//! let data = Dataset { labels, examples: (0..20).map(grasp).collect(), ..Dataset::default() };
+//! let splits = "40/40/20".parse::<SplitPlan>()?.splits(&data, 1, 3)?;
+//! assert_eq!(splits.len(), 3);
+//! assert_eq!([splits[0].train.len(), splits[0].second.len(), splits[0].test.len()], [8, 8, 4]);
+//! # Ok::<(), palpate_learn::SplitError>(())
+//! ```
+
+use crate::data::{Dataset, Example};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::str::FromStr;
+
+/// Trials to learn from and to test with, as indices into a data set.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Split {
+    /// Training trials, in the order drawn: the first ones of a class are a random choice.
+    pub train: Vec<usize>,
+    /// Training trials of stage two, as in the paper's 40/40/20; empty otherwise.
+    pub second: Vec<usize>,
+    /// Test trials, ascending.
+    pub test: Vec<usize>,
+}
+
+/// Reason why a data set cannot be split.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SplitError {
+    /// No trials.
+    #[error("no trials to split")]
+    Nothing,
+    /// A class with too few different grasps.
+    #[error(
+        "object \"{class}\" has {grasps} different grasp(s) in {trials} trial(s), {needed} are needed: copies of one \
+         grasp cannot be both learned and tested. Collect more grasps, or leave the object out with --objects"
+    )]
+    TooFew {
+        /// Name of the class.
+        class: String,
+        /// Number of different grasps.
+        grasps: usize,
+        /// Number of trials.
+        trials: usize,
+        /// Number of different grasps needed.
+        needed: usize,
+    },
+    /// A class whose trials all have the same pose.
+    #[error("all trials of \"{class}\" have the same pose; leaving a pose out needs at least two")]
+    OnePose {
+        /// Name of the class.
+        class: String,
+    },
+    /// The same grasp for training and for testing.
+    #[error("trials {first} and {other} are the same grasp; one is for training, the other for testing")]
+    Duplicate {
+        /// Number of the training trial.
+        first: i64,
+        /// Number of the test trial.
+        other: i64,
+    },
+    /// Shares that do not make a split.
+    #[error("shares must sum to 100, with some for training and some for testing; write 40/40/20 or 80/0/20")]
+    Shares,
+    /// Fewer than two folds.
+    #[error("cross-validation needs at least two folds")]
+    Folds,
+    /// A text that names no plan.
+    #[error("unknown split \"{text}\"; write 40/40/20, folds:5, first:50, first:50:100 or leave-a-pose-out")]
+    Unknown {
+        /// The text.
+        text: String,
+    },
+}
+
+/// Way to split a data set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SplitPlan {
+    /// Random shares of each class, 0 to 1: training, training of stage two, test.
+    Shares([f64; 3]),
+    /// Cross-validation: each grasp is tested once, by training on the other folds.
+    Folds {
+        /// Number of folds.
+        folds: usize,
+    },
+    /// The oldest grasps of each class for training, those after them for testing.
+    FirstOfEach {
+        /// Training grasps of each class.
+        train: usize,
+        /// Largest number of test grasps of each class; all others if `None`.
+        test: Option<usize>,
+    },
+    /// Each pose ([`Example::pose`]) is tested once, by training on the other poses.
+    LeavePoseOut,
+}
+
+impl Split {
+    /// Refuses a split with the same grasp for training and for testing.
+    pub fn check(&self, data: &Dataset) -> Result<(), SplitError> {
+        let learned = self.train.iter().chain(&self.second).map(|&k| &data.examples[k]);
+        let learned: BTreeMap<u64, i64> = learned.map(|example| (example.content, example.id)).collect();
+        let shared = |k: &usize| {
+            let test = &data.examples[*k];
+            Some((*learned.get(&test.content)?, test.id))
+        };
+        match self.test.iter().find_map(shared) {
+            Some((first, other)) => Err(SplitError::Duplicate { first, other }),
+            None => Ok(()),
+        }
+    }
+
+    /// The same test with at most this many training trials of each class (in each of both shares), for learning curves:
+    /// smaller choices are contained in larger ones.
+    pub fn limited(&self, data: &Dataset, most: usize) -> Self {
+        let first = |of: &[usize]| {
+            let mut met = vec![0; data.labels.classes.len()];
+            let few_enough = |k: &usize| {
+                let count = &mut met[data.examples[*k].class];
+                *count += 1;
+                *count <= most
+            };
+            of.iter().copied().filter(few_enough).collect()
+        };
+        Self { train: first(&self.train), second: first(&self.second), test: self.test.clone() }
+    }
+
+    /// All training trials, for recognisers with one stage.
+    pub fn all_training(&self) -> Vec<usize> {
+        self.train.iter().chain(&self.second).copied().collect()
+    }
+}
+
+impl SplitPlan {
+    /// Cross-validation with five folds.
+    pub const CROSS_VALIDATION: Self = Self::Folds { folds: 5 };
+
+    /// Makes the splits. Plans that draw at random are repeated with new draws; the others give the same splits whatever
+    /// the seed, once.
+    pub fn splits(&self, data: &Dataset, seed: u64, repeats: usize) -> Result<Vec<Split>, SplitError> {
+        let grasps = different_grasps(data, self.needed())?;
+        let mut draws = (0..repeats.max(1) as u64).map(|repeat| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            random.set_stream(repeat);
+            let mut drawn = grasps.clone();
+            drawn.iter_mut().for_each(|members| members.shuffle(&mut random));
+            drawn
+        });
+        match self {
+            Self::Shares(shares) => draws.map(|drawn| by_shares(&drawn, *shares)).collect(),
+            Self::Folds { folds } => Ok(draws.try_fold(Vec::new(), |mut all, drawn| {
+                all.extend(by_folds(&drawn, *folds)?);
+                Ok(all)
+            })?),
+            Self::FirstOfEach { train, test } => Ok(vec![first_of_each(&grasps, *train, *test)]),
+            Self::LeavePoseOut => by_pose(data, &grasps),
+        }
+    }
+
+    /// Smallest number of different grasps of each class.
+    fn needed(&self) -> usize {
+        match self {
+            Self::Shares(shares) => shares.iter().filter(|share| **share > 0.0).count(),
+            Self::Folds { .. } | Self::LeavePoseOut => 2,
+            Self::FirstOfEach { train, .. } => train + 1,
+        }
+    }
+
+    /// Description for tables: `5 folds`.
+    pub fn described(&self) -> String {
+        match self {
+            Self::Shares(shares) => {
+                let percent = shares.map(|share| format!("{:.0}", 100.0 * share));
+                format!("random shares {}", percent.join("/"))
+            }
+            Self::Folds { folds } => format!("cross-validation with {folds} folds"),
+            Self::FirstOfEach { train, test: None } => format!("first {train} of each object for training"),
+            Self::FirstOfEach { train, test: Some(test) } => {
+                format!("first {train} of each object for training, the next {test} for testing")
+            }
+            Self::LeavePoseOut => "one pose left out at a time".to_owned(),
+        }
+    }
+}
+
+/// Writes it as it is read: `40/40/20`, `folds:5`, `first:50`, `first:50:100`, `leave-a-pose-out`.
+impl std::fmt::Display for SplitPlan {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Shares(shares) => {
+                let [train, second, test] = shares.map(|share| (1e6 * share).round() / 1e4);
+                write!(f, "{train}/{second}/{test}")
+            }
+            Self::Folds { folds } => write!(f, "folds:{folds}"),
+            Self::FirstOfEach { train, test: None } => write!(f, "first:{train}"),
+            Self::FirstOfEach { train, test: Some(test) } => write!(f, "first:{train}:{test}"),
+            Self::LeavePoseOut => write!(f, "leave-a-pose-out"),
+        }
+    }
+}
+
+impl FromStr for SplitPlan {
+    type Err = SplitError;
+
+    fn from_str(text: &str) -> Result<Self, SplitError> {
+        let unknown = || SplitError::Unknown { text: text.to_owned() };
+        let count = |text: &str| text.parse::<usize>().map_err(|_no_number| unknown());
+        if text == "leave-a-pose-out" {
+            return Ok(Self::LeavePoseOut);
+        }
+        match text.split(':').collect::<Vec<_>>()[..] {
+            ["folds", folds] => match count(folds)? {
+                0 | 1 => Err(SplitError::Folds),
+                folds => Ok(Self::Folds { folds }),
+            },
+            ["first", train] => Ok(Self::FirstOfEach { train: count(train)?, test: None }),
+            ["first", train, test] => Ok(Self::FirstOfEach { train: count(train)?, test: Some(count(test)?) }),
+            _ => {
+                let parts: Result<Vec<f64>, _> = text.split('/').map(str::parse::<f64>).collect();
+                let shares = match parts.map_err(|_no_number| unknown())?[..] {
+                    [train, test] => [train, 0.0, test],
+                    [train, second, test] => [train, second, test],
+                    _ => return Err(unknown()),
+                };
+                let shares = shares.map(|percent| percent / 100.0);
+                checked(shares).map(|()| Self::Shares(shares))
+            }
+        }
+    }
+}
+
+/// Indices of the different grasps of each class, oldest first: of trials with equal content, only the first.
+fn different_grasps(data: &Dataset, needed: usize) -> Result<Vec<Vec<usize>>, SplitError> {
+    if data.examples.is_empty() {
+        return Err(SplitError::Nothing);
+    }
+    let mut met = BTreeSet::new();
+    let by_class = data.by_class();
+    let is_first: Vec<bool> = data.examples.iter().map(|example| met.insert(example.content)).collect();
+    let classes = by_class.into_iter().zip(&data.labels.classes).map(|(members, class)| {
+        let trials = members.len();
+        let first: Vec<usize> = members.into_iter().filter(|k| is_first[*k]).collect();
+        // Classes of the labels without trials take no part.
+        if trials > 0 && first.len() < needed {
+            return Err(SplitError::TooFew { class: class.name.clone(), grasps: first.len(), trials, needed });
+        }
+        Ok(first)
+    });
+    classes.collect()
+}
+
+fn checked(shares: [f64; 3]) -> Result<(), SplitError> {
+    let [train, _, test] = shares;
+    let sum: f64 = shares.iter().sum();
+    let valid = shares.iter().all(|share| *share >= 0.0) && (sum - 1.0).abs() < 1e-6 && train > 0.0 && test > 0.0;
+    if valid { Ok(()) } else { Err(SplitError::Shares) }
+}
+
+fn by_shares(drawn: &[Vec<usize>], shares: [f64; 3]) -> Result<Split, SplitError> {
+    checked(shares)?;
+    let mut split = Split::default();
+    for members in drawn.iter().filter(|members| !members.is_empty()) {
+        // Each share that is not empty gets at least one trial.
+        let least = shares.map(|share| usize::from(share > 0.0));
+        let count = members.len();
+        let rounded = |sum: f64| (count as f64 * sum).round() as usize;
+        let first = rounded(shares[0]).clamp(least[0], count - least[1] - least[2]);
+        let second = rounded(shares[0] + shares[1]).clamp(first + least[1], count - least[2]);
+        split.train.extend_from_slice(&members[..first]);
+        split.second.extend_from_slice(&members[first..second]);
+        split.test.extend_from_slice(&members[second..]);
+    }
+    split.test.sort_unstable();
+    Ok(split)
+}
+
+fn by_folds(drawn: &[Vec<usize>], folds: usize) -> Result<Vec<Split>, SplitError> {
+    if folds < 2 {
+        return Err(SplitError::Folds);
+    }
+    let mut splits = vec![Split::default(); folds];
+    // Each class goes on where the one before ended, so that folds have equal size.
+    for (n, k) in drawn.iter().flatten().enumerate() {
+        for (fold, split) in splits.iter_mut().enumerate() {
+            if n % folds == fold { split.test.push(*k) } else { split.train.push(*k) }
+        }
+    }
+    splits.retain(|split| !split.test.is_empty());
+    splits.iter_mut().for_each(|split| split.test.sort_unstable());
+    Ok(splits)
+}
+
+fn first_of_each(grasps: &[Vec<usize>], train: usize, test: Option<usize>) -> Split {
+    let mut split = Split::default();
+    for members in grasps {
+        let (first, rest) = members.split_at(train.min(members.len()));
+        split.train.extend_from_slice(first);
+        split.test.extend(rest.iter().take(test.unwrap_or(usize::MAX)));
+    }
+    split.train.sort_unstable();
+    split.test.sort_unstable();
+    split
+}
+
+fn by_pose(data: &Dataset, grasps: &[Vec<usize>]) -> Result<Vec<Split>, SplitError> {
+    let pose = |k: usize| data.examples[k].pose;
+    let one_pose = |members: &&Vec<usize>| members.windows(2).all(|pair| pose(pair[0]) == pose(pair[1]));
+    if let Some(members) = grasps.iter().filter(|members| !members.is_empty()).find(one_pose) {
+        let class = data.examples[members[0]].class;
+        return Err(SplitError::OnePose { class: data.labels.classes[class].name.clone() });
+    }
+    let poses: BTreeSet<u32> = grasps.iter().flatten().map(|k| pose(*k)).collect();
+    let split_of = |left_out: u32| {
+        let (mut test, train) = grasps.iter().flatten().partition::<Vec<usize>, _>(|k| pose(**k) == left_out);
+        test.sort_unstable();
+        Split { train, second: Vec::new(), test }
+    };
+    Ok(poses.into_iter().map(split_of).collect())
+}
+
+impl Dataset {
+    /// Draws a random number of trials of each class, within a range: the paper's recordings have 40 to 55 of each object.
+    /// A class with fewer keeps all.
+    pub fn imbalanced(&self, counts: std::ops::RangeInclusive<usize>, seed: u64) -> Self {
+        use rand::RngExt;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut kept = Vec::new();
+        for mut members in self.by_class() {
+            let count = random.random_range(counts.clone());
+            members.shuffle(&mut random);
+            members.truncate(count);
+            kept.append(&mut members);
+        }
+        kept.sort_unstable();
+        self.part(&kept)
+    }
+
+    /// Leaves out trials of a grasp that an earlier trial holds already; returns how many.
+    pub fn without_duplicates(&self) -> (Self, usize) {
+        let mut met = BTreeSet::new();
+        let is_new = |example: &Example| met.insert(example.content);
+        let is_new: Vec<bool> = self.examples.iter().map(is_new).collect();
+        let kept: Vec<usize> = (0..is_new.len()).filter(|k| is_new[*k]).collect();
+        (self.part(&kept), is_new.len() - kept.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{Class, Labels};
+
+    /// Different grasps of two classes, in turn, the poses of each in turn too.
+    fn data(of_each: usize) -> Dataset {
+        let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+        let labels = Labels { classes: vec![class("ball"), class("cube"), class("unused")], ..Labels::default() };
+        let example = |k: usize| Example {
+            id: k as i64 + 100,
+            class: k % 2,
+            content: k as u64,
+            pose: (k / 2 % 4) as u32,
+            ..Example::default()
+        };
+        Dataset { labels, examples: (0..2 * of_each).map(example).collect(), ..Dataset::default() }
+    }
+
+    fn counts(split: &Split) -> [usize; 3] {
+        [split.train.len(), split.second.len(), split.test.len()]
+    }
+
+    /// Every plan of the command line.
+    fn plans() -> Vec<SplitPlan> {
+        ["40/40/20", "80/20", "folds:5", "first:6", "first:6:2", "leave-a-pose-out"].map(|t| t.parse().unwrap()).into()
+    }
+
+    #[test]
+    fn shares_are_those_of_each_class() {
+        let data = data(50);
+        let splits = SplitPlan::Shares([0.4, 0.4, 0.2]).splits(&data, 7, 3).unwrap();
+        for split in &splits {
+            assert_eq!(counts(split), [40, 40, 20]);
+            for (part, expected) in [(&split.train, 20), (&split.second, 20), (&split.test, 10)] {
+                assert_eq!(part.iter().filter(|k| data.examples[**k].class == 0).count(), expected);
+            }
+        }
+        assert_eq!(splits.len(), 3);
+        assert_ne!(splits[0].test, splits[1].test, "repeats draw anew");
+        assert_eq!(splits, SplitPlan::Shares([0.4, 0.4, 0.2]).splits(&data, 7, 3).unwrap());
+        assert_ne!(splits, SplitPlan::Shares([0.4, 0.4, 0.2]).splits(&data, 8, 3).unwrap());
+        assert_eq!(counts(&SplitPlan::Shares([0.4, 0.4, 0.2]).splits(&self::data(3), 1, 1).unwrap()[0]), [2, 2, 2]);
+    }
+
+    #[test]
+    fn folds_test_each_grasp_once() {
+        let data = data(22);
+        let splits = SplitPlan::Folds { folds: 5 }.splits(&data, 3, 2).unwrap();
+        assert_eq!(splits.len(), 10);
+        for repeat in splits.chunks(5) {
+            let mut tested: Vec<usize> = repeat.iter().flat_map(|split| split.test.clone()).collect();
+            tested.sort_unstable();
+            assert_eq!(tested, (0..44).collect::<Vec<_>>());
+            assert!(repeat.iter().all(|split| split.train.len() + split.test.len() == 44));
+            assert!(repeat.iter().all(|split| (8..=9).contains(&split.test.len())));
+        }
+    }
+
+    #[test]
+    fn the_first_of_each_are_the_oldest() {
+        let plan = SplitPlan::FirstOfEach { train: 3, test: Some(2) };
+        let splits = plan.splits(&data(10), 1, 4).unwrap();
+        let expected = Split { train: (0..6).collect(), second: vec![], test: (6..10).collect() };
+        assert_eq!(splits, [expected]);
+        let too_many = SplitPlan::FirstOfEach { train: 10, test: None }.splits(&data(10), 1, 1);
+        assert!(matches!(too_many, Err(SplitError::TooFew { needed: 11, grasps: 10, .. })), "{too_many:?}");
+    }
+
+    #[test]
+    fn a_pose_is_never_on_both_sides() {
+        let data = data(10);
+        let splits = SplitPlan::LeavePoseOut.splits(&data, 1, 1).unwrap();
+        assert_eq!(splits.len(), 4);
+        for (pose, split) in splits.iter().enumerate() {
+            assert!(split.test.iter().all(|k| data.examples[*k].pose == pose as u32));
+            assert!(split.train.iter().all(|k| data.examples[*k].pose != pose as u32));
+        }
+        let mut same = data;
+        same.examples.iter_mut().for_each(|example| example.pose = 1);
+        let refused = SplitPlan::LeavePoseOut.splits(&same, 1, 1).unwrap_err();
+        assert_eq!(refused, SplitError::OnePose { class: "ball".to_owned() });
+    }
+
+    #[test]
+    fn copies_of_a_grasp_are_never_on_both_sides() {
+        let mut copied = data(20);
+        // The same forty grasps once more.
+        let again = copied.examples.clone().into_iter().map(|e| Example { id: e.id + 1000, ..e });
+        copied.examples.extend(again);
+        for plan in plans() {
+            for split in plan.splits(&copied, 5, 3).unwrap() {
+                split.check(&copied).unwrap();
+                let mut used: Vec<u64> = split.all_training().iter().map(|k| copied.examples[*k].content).collect();
+                used.extend(split.test.iter().map(|k| copied.examples[*k].content));
+                let count = used.len();
+                used.sort_unstable();
+                used.dedup();
+                assert_eq!(used.len(), count, "{plan}: a grasp is used twice");
+            }
+        }
+        assert_eq!(copied.without_duplicates(), (data(20), 40));
+        let leak = Split { train: vec![0], second: vec![], test: vec![40] };
+        assert_eq!(leak.check(&copied), Err(SplitError::Duplicate { first: 100, other: 1100 }));
+    }
+
+    #[test]
+    fn six_copies_of_one_grasp_are_refused() {
+        let mut copies = data(6);
+        copies.examples.iter_mut().for_each(|example| example.content = example.class as u64);
+        for plan in plans() {
+            let refused = plan.splits(&copies, 1, 1).unwrap_err();
+            assert!(refused.to_string().contains("1 different grasp(s) in 6 trial(s)"), "{plan}: {refused}");
+        }
+    }
+
+    #[test]
+    fn learning_curves_are_nested() {
+        let data = data(30);
+        let split = &SplitPlan::Shares([0.8, 0.0, 0.2]).splits(&data, 2, 1).unwrap()[0];
+        let (few, many) = (split.limited(&data, 5), split.limited(&data, 10));
+        assert_eq!((counts(&few), counts(&many)), ([10, 0, 12], [20, 0, 12]));
+        assert!(few.train.iter().all(|k| many.train.contains(k)) && few.test == split.test);
+        assert_eq!(split.limited(&data, 1000), *split);
+    }
+
+    #[test]
+    fn imbalanced_counts_are_in_their_range() {
+        let data = data(60);
+        let drawn = data.imbalanced(40..=55, 9);
+        let counts: Vec<usize> = drawn.by_class().iter().map(Vec::len).collect();
+        assert!(counts[..2].iter().all(|count| (40..=55).contains(count)) && counts[0] != counts[1], "{counts:?}");
+        assert_eq!(drawn, data.imbalanced(40..=55, 9));
+        assert_eq!(drawn.about.grasps, drawn.examples.len());
+    }
+
+    #[test]
+    fn plans_are_written_as_they_are_read() {
+        for (text, shown) in [
+            ("40/40/20", "random shares 40/40/20"),
+            ("80/0/20", "random shares 80/0/20"),
+            ("folds:5", "cross-validation with 5 folds"),
+            ("first:50", "first 50 of each object for training"),
+            ("first:50:100", "first 50 of each object for training, the next 100 for testing"),
+            ("leave-a-pose-out", "one pose left out at a time"),
+        ] {
+            let plan: SplitPlan = text.parse().unwrap();
+            assert_eq!((plan.to_string(), plan.described()), (text.to_owned(), shown.to_owned()));
+            let json = serde_json::to_string(&plan).unwrap();
+            assert_eq!(serde_json::from_str::<SplitPlan>(&json).unwrap(), plan);
+        }
+        for nonsense in ["", "50", "folds", "folds:1", "first:", "40/40/40", "0/50/50", "-20/100/20", "a/b"] {
+            assert!(nonsense.parse::<SplitPlan>().is_err(), "{nonsense}");
+        }
+    }
+}
