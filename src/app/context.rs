@@ -71,7 +71,7 @@ pub struct PanelContext<'a> {
     pub phases: &'a [PhaseSpan],
     /// View state.
     pub view: &'a ViewState,
-    /// Pictures of the built-in objects.
+    /// Pictures of objects, by the name of a class or the path of a file.
     pub thumbnails: &'a BTreeMap<String, egui::TextureHandle>,
     /// Name of the graphics driver; absent when the 3-D view cannot be drawn.
     pub driver: Option<&'a str>,

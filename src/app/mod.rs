@@ -11,7 +11,7 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` | look, graphics, time shown |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` `thumbnails.rs` | look, graphics, time shown |
 //! | messages | `notices.rs` | messages to the user |
 //! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
@@ -63,6 +63,7 @@ mod shown_grasp;
 mod small_pads;
 mod startup;
 mod theme;
+mod thumbnails;
 mod tiling;
 mod traces;
 mod view_source;

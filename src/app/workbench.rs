@@ -21,6 +21,7 @@ use crate::app::panels::{PanelKind, view3d};
 use crate::app::path_dialog::{Closed, PathDialog};
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::tiling::{Tiling, panel_frame};
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
@@ -37,11 +38,10 @@ use palpate_lab::workers::{
     Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
 use palpate_learn::{Model, ModelError, shipped_model};
-use palpate_render::{Picture, describe_adapter};
-use palpate_sim::objects::{catalogue, thumbnail};
+use palpate_render::describe_adapter;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -111,7 +111,7 @@ pub struct Workbench {
     tools: GripperTools,
     files: FileFeature,
     path_dialog: Option<PathDialog>,
-    thumbnails: BTreeMap<String, egui::TextureHandle>,
+    thumbnails: Thumbnails,
     driver: Option<String>,
     store: PathBuf,
     /// Labels at the last look.
@@ -188,6 +188,8 @@ impl Workbench {
         let mut notices = Notices::default();
         let explainer = Explainer::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("explanations"))?;
         let recognition = RecognitionFeature::new(model.cloned(), explainer, &mut tools, &mut view, &mut notices);
+        let thumbnails =
+            Thumbnails::start(ctx, Arc::clone(&wake)).map_err(ThreadError::of("the pictures of objects"))?;
         let mut workbench = Self {
             view,
             notices,
@@ -200,7 +202,7 @@ impl Workbench {
             tools,
             files: FileFeature::new(wake, setup.system_dialogs),
             path_dialog: None,
-            thumbnails: load_thumbnails(ctx),
+            thumbnails,
             driver,
             store,
             labels_seen: None,
@@ -342,7 +344,7 @@ impl Workbench {
             playback: self.inspect.playback(source),
             phases: &self.phases,
             view: &self.view,
-            thumbnails: &self.thumbnails,
+            thumbnails: self.thumbnails.textures(),
             driver: self.driver.as_deref(),
         }
     }
@@ -415,8 +417,8 @@ impl Workbench {
 
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
-        let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
-            self;
+        let Self { view, notices, simulation, gripper, labelling, library, .. } = self;
+        let Self { recognition, inspect, tools, files, thumbnails, .. } = self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
         if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
@@ -426,6 +428,7 @@ impl Workbench {
         library.gather(notices);
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, notices);
+        thumbnails.gather(ctx, &view.recent);
         let labels = labelling.labeller().view();
         if labels.as_ref().map(Arc::as_ptr) != self.labels_seen.as_ref().map(Arc::as_ptr) {
             if let Some(labels) = &labels {
@@ -518,18 +521,4 @@ fn action_of(remedy: Remedy) -> Action {
         Remedy::Calibrate => ViewAction::ShowPanel("calibration").into(),
         Remedy::UndoLabel => LabelCommand::Undo.into(),
     }
-}
-
-/// Pictures of the built-in objects, as textures.
-fn load_thumbnails(ctx: &egui::Context) -> BTreeMap<String, egui::TextureHandle> {
-    let mut textures = BTreeMap::new();
-    for built_in in catalogue() {
-        if let Some(picture) = thumbnail(&built_in.name).and_then(|bytes| Picture::from_png(bytes).ok()) {
-            let size = [picture.width as usize, picture.height as usize];
-            let image = egui::ColorImage::from_rgba_unmultiplied(size, &picture.rgba);
-            let texture = ctx.load_texture(&built_in.name, image, egui::TextureOptions::LINEAR);
-            textures.insert(built_in.name.clone(), texture);
-        }
-    }
-    textures
 }

@@ -2,8 +2,9 @@
 
 use super::Failure;
 use glam::{Mat4, Vec3};
-use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid, StandardView};
+use palpate_geometry::drawing::{DrawList, Ground, Overlay, Solid};
 use palpate_geometry::palette::Rgb;
+use palpate_lab::picture::{PORTRAIT_BACKDROP, portrait_camera};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::objects::{ObjectModel, catalogue};
 use palpate_sim::scene::Scene;
@@ -12,8 +13,6 @@ use std::sync::Arc;
 
 /// Side of a thumbnail (pixels): shown at 40 points, so that it is sharp on fine screens too.
 const SIDE: u32 = 96;
-/// A backdrop that suits both themes.
-const BACKDROP: [Rgb; 2] = [Rgb(122, 131, 142), Rgb(84, 92, 102)];
 const GROUND: Rgb = Rgb(104, 112, 122);
 
 /// Draws all of them into their folders.
@@ -37,10 +36,9 @@ pub(crate) fn draw_all(folder: &Path) -> Result<usize, Failure> {
 fn portrait(object: &ObjectModel) -> DrawList {
     let (centre, size) = (object.bounds.centre().as_vec3(), object.bounds.size().as_vec3());
     let radius = 0.5 * size.length();
-    let camera = Camera { pitch: 0.45, ..Camera::default().turned_to(StandardView::Home) };
     DrawList {
-        camera: camera.framing(centre, 0.98 * radius),
-        backdrop: BACKDROP,
+        camera: portrait_camera(centre, radius),
+        backdrop: PORTRAIT_BACKDROP,
         shadow_bounds: (centre, 1.4 * radius),
         ground: Some(Ground { height: object.bounds.min.z as f32, colour: GROUND, grid: GROUND, radius: 6.0 * radius }),
         ghosts: Vec::new(),

@@ -257,6 +257,9 @@ fn a_warning_carries_the_button_that_helps() {
     bench.harness.get_by_role_and_label(Role::Button, "Use its hull").click();
     bench.harness.run_steps(2);
     bench.until(|s| s.object.as_ref().is_some_and(|object| object.name == "bin"));
+    // An open mesh has its picture in the list of objects.
+    bench.tell(ViewAction::ShowPanel("objects"));
+    bench.until_shown(true, "Picture of bin.obj");
     // What was refused leaves nothing to undo; the hull does.
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until(|s| s.truth() == "lemon");

@@ -18,7 +18,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for path in &context.view.recent {
             let name = std::path::Path::new(path).file_name().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
-            if row(ui, context, chosen == path, None, name, path).clicked() {
+            let texture = context.thumbnails.get(path);
+            if row(ui, context, chosen == path, texture, name, path).clicked() {
                 actions.push(SimulationAction::OpenObject(path.clone()));
             }
         }
@@ -78,8 +79,8 @@ fn row(
     inside.set_clip_rect(rect.intersect(ui.clip_rect()));
     match texture {
         Some(texture) => {
-            inside
-                .add(egui::Image::new(texture).fit_to_exact_size(egui::vec2(THUMBNAIL, THUMBNAIL)).corner_radius(4.0));
+            let picture = egui::Image::new(texture).alt_text(format!("Picture of {title}"));
+            inside.add(picture.fit_to_exact_size(egui::vec2(THUMBNAIL, THUMBNAIL)).corner_radius(4.0));
         }
         None => {
             let (place, _) = inside.allocate_exact_size(egui::vec2(THUMBNAIL, THUMBNAIL), Sense::hover());

@@ -8,6 +8,7 @@ mod forces;
 mod ghost;
 mod gripper_model;
 mod heat_maps;
+mod portrait;
 mod reconstructed;
 
 pub use annotations::{SCALE_STEPS, legend_room};
@@ -16,6 +17,7 @@ pub use heat_maps::{
     BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, joints_over_time, pad_rows_over_time, pads_at,
     whole_pads,
 };
+pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
 
 use glam::{Mat4, Vec2, Vec3};

@@ -22,6 +22,8 @@
 //! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it.
 //! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
 //!
+//! "portraits" draws small pictures of objects from files.
+//!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
@@ -47,6 +49,7 @@ mod listener_tests;
 mod messages;
 mod object_search;
 mod pace;
+mod portraits;
 mod refined_run;
 mod scene_accuracy;
 mod sim;
@@ -80,6 +83,7 @@ pub use messages::{
     Status, TraceRow, Wake,
 };
 pub use object_search::NUMBERED_OBJECTS;
+pub use portraits::{PORTRAIT_SIDE, Portrait, PortraitJob};
 pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -145,15 +145,10 @@ impl Blueprint {
                 ))
             }
         };
-        let surface = if self.visual.is_empty() {
-            surface_of(&solids)
-        } else {
-            SurfaceMesh::from_parts(&self.visual, DEFAULT_COLOUR)
-        };
         Ok(ObjectModel {
+            surface: Arc::new(self.surface_or(&solids)),
             name: self.name,
             class: None,
-            surface: Arc::new(surface),
             field,
             resting: resting_of(&solids),
             parts: solids.into(),
@@ -163,6 +158,16 @@ impl Blueprint {
             bounds,
             warnings: self.warnings,
         })
+    }
+
+    /// What is seen, as the file declares it: without a repair, a scale or a check.
+    pub(super) fn surface(&self) -> SurfaceMesh {
+        self.surface_or(&self.collision)
+    }
+
+    /// The visual shapes, or these solids where there are none.
+    fn surface_or(&self, solids: &[SolidPart]) -> SurfaceMesh {
+        if self.visual.is_empty() { surface_of(solids) } else { SurfaceMesh::from_parts(&self.visual, DEFAULT_COLOUR) }
     }
 
     fn check_numbers(&self, solids: &[SolidPart]) -> Result<(), ObjectError> {

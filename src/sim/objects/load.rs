@@ -5,7 +5,7 @@ use super::catalogue::{catalogue, read_embedded};
 use super::files::{candidates, read_file, read_referenced};
 use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, urdf};
-use palpate_geometry::{MeshFileError, Pose, read_mesh};
+use palpate_geometry::{MeshFileError, Pose, SurfaceMesh, read_mesh};
 use std::path::Path;
 
 /// The name that stands for an empty hand.
@@ -49,11 +49,21 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
         object.friction = built_in.friction;
         return Ok(Some(object));
     }
+    blueprint(source)?.build(options).map(Some)
+}
+
+/// Surface of the object in a URDF, OBJ or STL file, in the file's own units. It may be open or tangled: it is for looking
+/// at only.
+pub fn load_surface(source: &str) -> Result<SurfaceMesh, ObjectError> {
+    Ok(blueprint(source)?.surface())
+}
+
+fn blueprint(source: &str) -> Result<Blueprint, ObjectError> {
     let path = Path::new(source);
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
-        "urdf" | "xml" => load_urdf(path, options).map(Some),
-        "obj" | "stl" => load_mesh(path, options).map(Some),
+        "urdf" | "xml" => read_urdf(path),
+        "obj" | "stl" => read_mesh_file(path),
         _ => Err(unknown(source, path, &extension)),
     }
 }
@@ -93,7 +103,7 @@ fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, Objec
     urdf::parse(name, &bytes, &mesh)?.build(options)
 }
 
-fn load_urdf(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+fn read_urdf(path: &Path) -> Result<Blueprint, ObjectError> {
     let bytes = read_file(path).map_err(|cause| unreadable(path, &cause))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let read = |path: &str| read_referenced(Path::new(path));
@@ -114,15 +124,15 @@ fn load_urdf(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectEr
             }),
         }
     };
-    urdf::parse(&stem(path), &bytes, &mesh)?.build(options)
+    urdf::parse(&stem(path), &bytes, &mesh)
 }
 
-fn load_mesh(path: &Path, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+fn read_mesh_file(path: &Path) -> Result<Blueprint, ObjectError> {
     let read = |path: &str| read_referenced(Path::new(path));
     let parts = read_mesh(&path.to_string_lossy(), &read).map_err(|cause| ObjectError::Mesh { cause })?;
     let mut blueprint = Blueprint::new(&stem(path));
     blueprint.add_visual(&ShapeSource::Mesh(parts), &Pose::IDENTITY, None);
-    blueprint.build(options)
+    Ok(blueprint)
 }
 
 fn unreadable(path: &Path, cause: &std::io::Error) -> ObjectError {

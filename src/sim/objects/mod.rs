@@ -10,7 +10,7 @@ mod urdf;
 mod xml;
 
 pub use catalogue::{BuiltIn, catalogue, thumbnail};
-pub use load::{EMPTY, anchored, class_of, load, object_title, titled};
+pub use load::{EMPTY, anchored, class_of, load, load_surface, object_title, titled};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
 pub use options::{CollisionShape, LoadOptions};
 
