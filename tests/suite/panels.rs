@@ -353,8 +353,12 @@ fn effects_are_switched_and_both_numbers_move() {
     let row = |bench: &Bench| bench.harness.get_by_label("about creep").rect();
     let place = row(&bench);
     assert!(bench.harness.query_by_label_contains("measuring").is_some());
+    // A line and each bar that stays say that they are of another scene.
+    let old = |bench: &Bench| bench.harness.query_all_by_label_contains("of the scene before").count();
     assert_eq!(bench.harness.query_all_by_label_contains(cost).count(), Effect::ALL.len());
+    assert_eq!(old(&bench), 1 + 2 * Effect::ALL.len());
     bench.until_effects_are_measured();
+    assert_eq!(old(&bench), 0);
     assert_eq!(row(&bench), place, "nothing jumps");
     assert!(bench.harness.query_by_label("finger-contact is off").is_some());
     assert!(bench.harness.query_by_label_contains("onset at").is_some(), "what putting it in would change");
@@ -386,6 +390,35 @@ fn settings_are_adopted_from_the_picture_of_what_accuracy_costs() {
     bench.harness.drop_at(at);
     bench.harness.run_steps(2);
     bench.until(|s| s.scene.solver.engine == palpate_sim::scene::EngineKind::Rapier);
+}
+
+#[test]
+fn what_accuracy_costs_is_never_that_of_an_earlier_scene() {
+    let mut bench = whole_window();
+    bench.tell(ViewAction::ShowPanel("accuracy"));
+    let mut scene = Scene::default();
+    EMPTY.clone_into(&mut scene.object.source);
+    scene.timing.duration_s = 1.0;
+    let of_this = "this scene, one grasp per setting";
+    let change = |bench: &mut Bench, scene: &Scene| {
+        bench.tell(SimulationAction::SetScene(Box::new(scene.clone())));
+        bench.harness.run_steps(2);
+    };
+    change(&mut bench, &scene);
+    bench.tell(SimulationAction::MeasureAccuracy);
+    bench.until_shown(true, of_this);
+    // Another accuracy is another point of the same picture.
+    scene.solver.accuracy = Accuracy::Draft;
+    change(&mut bench, &scene);
+    assert!(bench.harness.query_by_label(of_this).is_some());
+    let [mut object, mut programme] = [scene.clone(), scene];
+    "lemon".clone_into(&mut object.object.source);
+    programme.programme.peak_bar = 0.6;
+    for other in [object, programme] {
+        change(&mut bench, &other);
+        assert!(bench.harness.query_by_label(of_this).is_none());
+        assert!(bench.harness.query_by_label_contains("stored study").is_some());
+    }
 }
 
 /// Moves the pointer over the plot of what accuracy costs until it shows a text there. Rapier and coarse settings stand in its

@@ -1,5 +1,6 @@
 //! Physical effects as a table: setting, and bars of cost and change, which are measured in the background while the
-//! panel is open. Rows keep their place: old values stay, dimmed, until new ones come. A click on a name unfolds it.
+//! panel is open. Rows keep their place: values of the scene before
+//! stay, dimmed and named so, until new ones come. A click on a name unfolds it.
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
@@ -25,6 +26,8 @@ const NAME: f32 = 92.0;
 const GAP: f32 = 4.0;
 /// Opacity of values that a new measurement will replace.
 const DIMMED: f32 = 0.4;
+/// Origin of dimmed values.
+const BEFORE: &str = "of the scene before";
 /// Smallest change that has a bar, as a share of a sensor's range; the bar is logarithmic.
 const LEAST_CHANGE: f64 = 1e-3;
 
@@ -34,8 +37,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     }
     let view = context.effects.view();
     let current = view.as_deref().filter(|view| *view.scene == *context.scene);
-    let fresh = matches!(current.map(|view| &view.state), Some(EffectsState::Ready(_)));
-    let explanation = view.as_deref().and_then(|view| view.last.as_deref());
+    let ready = current.and_then(|view| match &view.state {
+        EffectsState::Ready(explanation) => Some(explanation.as_ref()),
+        EffectsState::Measuring(..) | EffectsState::Failed(_) => None,
+    });
+    let fresh = ready.is_some();
+    let explanation = ready.or_else(|| view.as_deref().and_then(|view| view.last.as_deref()));
     let mut scene = context.scene.clone();
     let unfolded_id = ui.scope_id().with("unfolded");
     let mut unfolded: Option<Effect> = ui.data(|data| data.get_temp(unfolded_id)).flatten();
@@ -75,6 +82,8 @@ fn state_ui(ui: &mut Ui, view: Option<&EffectsView>, explanation: Option<&Explan
         }
         Some(EffectsState::Failed(cause)) => cause.to_string(),
     };
+    let fresh = matches!(view.map(|view| &view.state), Some(EffectsState::Ready(_)));
+    let text = if fresh || explanation.is_none() { text } else { format!("{BEFORE}: {text}") };
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     let line = egui::Label::new(RichText::new(&text).weak()).truncate();
     ui.scope_builder(UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)), |ui| ui.add(line));
@@ -179,9 +188,9 @@ impl Row<'_> {
             let filled = Rect::from_min_size(room.min, vec2(width, room.height()));
             ui.painter().rect_filled(filled, 2.0, ink.gamma_multiply(opacity));
         }
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, words));
-        let state = if self.fresh { "" } else { "\nmeasuring again .." };
-        response.on_hover_text(format!("{}: {words}{state}", self.effect.name()));
+        let words = if self.fresh { words.to_owned() } else { format!("{words} ({BEFORE})") };
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &words));
+        response.on_hover_text(format!("{}: {words}", self.effect.name()));
     }
 
     /// Reason, cost and change in words.
@@ -192,6 +201,9 @@ impl Row<'_> {
         }
         lines.extend(self.planned.map(reason));
         if let (Some(explained), Some(explanation)) = (self.explained, self.explanation) {
+            if !self.fresh {
+                lines.push(format!("The numbers below are {BEFORE}."));
+            }
             lines.push(format!("It {}.", explained.cost_in_words()));
             lines.push(format!("{}.", capitalised(&explained.change_in_words(explanation.contact_onset_s))));
         }
