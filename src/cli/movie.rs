@@ -4,16 +4,16 @@ use super::Failure;
 use super::interrupt::stop_flag;
 use super::output::check_folder;
 use super::setup::{read_store, within};
-use super::snapshot::{parse_size, parse_theme, parse_view};
+use super::snapshot::{OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
 use super::terminal::{note, say};
 use glam::Vec2;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
-use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
-use palpate_lab::picture::{PictureView, Stage};
+use palpate_lab::inspection::OpenTrial;
+use palpate_lab::picture::PictureView;
 use palpate_render::{DriverChoice, Gpu, MovieFormat, MovieWriter, Picture, Renderer};
 use palpate_store::{NewFile, unfinished};
-use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -69,19 +69,10 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
     let target = Target::of(out)?;
     let store = read_store(store)?;
     let id = arguments.trial;
-    let open = OpenTrial::open(&store, id, &OpenOptions { keep: Keep::Scenery, ..OpenOptions::default() })?;
-    let Some(stage) = open.stage.clone().filter(|_| !open.frames.is_empty()) else {
-        let text = format!(
-            "trial {id} ({}) has no poses and no curvature to draw fingers from. Use `palpate plot {id} --out FILE.svg` or \
-             `palpate trials show {id}`",
-            open.source_title()
-        );
-        return Err(text.into());
-    };
-    let times = times(arguments, &open)?;
+    let open = open_drawable(&store, id)?;
+    let times = times(arguments, &open.trial)?;
     let gpu = Gpu::headless(DriverChoice::Any)?;
-    let mut shot =
-        Shot { renderer: Renderer::new(&gpu.device, &gpu.queue), gpu, stage: &stage, open: &open, arguments };
+    let mut shot = Shot { renderer: Renderer::new(&gpu.device, &gpu.queue), gpu, open: &open, arguments };
     let stop = stop_flag()?;
     let mut writer = Writer::begin(&target, out, arguments, times.len())?;
     for (number, t_s) in times.iter().enumerate() {
@@ -122,19 +113,14 @@ fn times(arguments: &MovieArguments, open: &OpenTrial) -> Result<Vec<f64>, Failu
 struct Shot<'a> {
     gpu: Gpu,
     renderer: Renderer,
-    stage: &'a Stage,
-    open: &'a OpenTrial,
+    open: &'a OpenDrawable,
     arguments: &'a MovieArguments,
 }
 
 impl Shot<'_> {
     fn picture(&mut self, t_s: f64) -> Result<Picture, Failure> {
-        let Self { gpu, renderer, stage, open, arguments } = self;
-        let source = match open.source {
-            TrialSource::Simulated => "SIMULATED",
-            TrialSource::Recorded => "REAL GRIPPER, FINGERS AS ARCS",
-            TrialSource::Imported => "IMPORTED, FINGERS AS ARCS",
-        };
+        let Self { gpu, renderer, open, arguments } = self;
+        let OpenDrawable { stage, trial } = open;
         let (centre, radius) = stage.bounds();
         let view = PictureView {
             camera: Camera::default().turned_to(arguments.view).framing(centre, radius),
@@ -142,10 +128,10 @@ impl Shot<'_> {
             size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
             forces: !arguments.no_forces,
             annotations: !arguments.bare,
-            badge: (!arguments.bare).then(|| format!("TRIAL {}, {source}, {t_s:.2} s", open.id)),
+            badge: (!arguments.bare).then(|| format!("{}, {t_s:.2} s", open.badge())),
             ..PictureView::default()
         };
-        let now = open.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
+        let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
         Ok(Picture::draw(gpu, renderer, &stage.draw(now, &view), arguments.size, 1.0)?)
     }
 }

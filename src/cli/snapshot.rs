@@ -3,18 +3,20 @@
 use super::Failure;
 use super::output::{check_folder, write_new};
 use super::setup::{SceneArguments, read_store, store_path};
-use super::terminal::say;
+use super::terminal::{note, say};
 use crate::app::{Mode, OffscreenWindow, window_picture};
 use glam::Vec2;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::prepare;
-use palpate_lab::inspection::{OpenOptions, OpenTrial};
+use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::frame::Frame;
-use palpate_tactile::trial::TrialId;
+use palpate_store::Store;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Arguments of `palpate snapshot`.
 #[derive(Debug, clap::Args)]
@@ -30,7 +32,7 @@ pub(super) struct SnapshotArguments {
     object: Option<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Draw this stored trial instead of simulating.
+    /// Draw this stored trial instead of simulating. Fingers of a real one are arcs of the curvature that was read.
     #[arg(long, value_name = "ID", conflicts_with_all = ["object", "scene"])]
     trial: Option<TrialId>,
     /// Time to draw, from the start (s; default: 2.9 s, or the end of a shorter grasp).
@@ -275,21 +277,48 @@ fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Fr
     Ok((stage, frame, "SIMULATED".to_owned()))
 }
 
+/// A stored trial at the time to draw. The fingers of a trial that was not simulated are arcs.
 fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> Result<(Stage, Frame, String), Failure> {
-    let store = read_store(store)?;
-    let Some(trial) = store.load(id)?.into_simulated() else {
-        let text = format!(
-            "trial {id} was not simulated, so there are no poses to draw. Use `palpate trials show {id}`, `palpate trials \
-             export {id} --out FILE.csv` or `palpate recognise {id}`"
-        );
-        return Err(text.into());
-    };
-    let scene = &trial.header.scene;
-    let object = scene.load_object()?;
-    let stage = Stage::new(scene, object.as_ref(), trial.data.world_from_gripper);
-    let frames = trial.frames();
-    let at_s = chosen_time(arguments.at, frames.last().map_or(0.0, |frame| frame.t), &format!("trial {id}"))?;
-    let frame = frames.iter().rfind(|f| f.t <= at_s + 1e-9).or(frames.first());
-    let frame = frame.cloned().ok_or_else(|| format!("trial {id} has no samples"))?;
-    Ok((stage, frame, format!("TRIAL {id}, SIMULATED")))
+    let open = open_drawable(&read_store(store)?, id)?;
+    let OpenDrawable { stage, trial } = &open;
+    trial.remarks.iter().for_each(|remark| note(remark));
+    let at_s = chosen_time(arguments.at, trial.frames.last().map_or(0.0, |frame| frame.t), &format!("trial {id}"))?;
+    let now = trial.at(at_s).and_then(|now| now.frame);
+    let frame = now.ok_or_else(|| format!("trial {id} has no samples"))?;
+    Ok((stage.as_ref().clone(), frame.as_ref().clone(), open.badge()))
+}
+
+/// A trial whose fingers can be drawn.
+pub(super) struct OpenDrawable {
+    pub(super) stage: Arc<Stage>,
+    pub(super) trial: OpenTrial,
+}
+
+impl OpenDrawable {
+    /// Caption of its pictures: the trial, where it is from, and whether the fingers were reconstructed.
+    pub(super) fn badge(&self) -> String {
+        let source = match self.trial.source {
+            TrialSource::Simulated => "SIMULATED",
+            TrialSource::Recorded => "REAL GRIPPER, FINGERS AS ARCS",
+            TrialSource::Imported => "IMPORTED, FINGERS AS ARCS",
+        };
+        format!("TRIAL {}, {source}", self.trial.id)
+    }
+}
+
+/// Opens a trial to be drawn.
+pub(super) fn open_drawable(store: &Store, id: TrialId) -> Result<OpenDrawable, Failure> {
+    let trial = OpenTrial::open(store, id, &OpenOptions { keep: Keep::Scenery, ..OpenOptions::default() })?;
+    match trial.stage.clone().filter(|_| !trial.frames.is_empty()) {
+        Some(stage) => Ok(OpenDrawable { stage, trial }),
+        None => {
+            let text = format!(
+                "trial {id} ({}) was not simulated, and no calibrated flex strip says how its fingers were bent, so there \
+                 is nothing to draw. Use `palpate plot {id} --out FILE.svg`, `palpate trials show {id}` or `palpate trials \
+                 export {id} --out FILE.csv`",
+                trial.source_title()
+            );
+            Err(text.into())
+        }
+    }
 }
