@@ -1,0 +1,99 @@
+//! Axes of plots: round marks, numbers, seconds.
+
+use crate::app::theme::colour;
+use egui_plot::{AxisHints, GridInput, GridMark, Plot};
+use palpate_geometry::palette::Theme;
+use palpate_geometry::units::three_digits;
+
+/// Time at the axis of a plot so many points wide. Empty near the end of the axis, where it would be cut off, and where it
+/// would crowd its neighbours: then every fifth mark of its kind has a label.
+pub(super) fn seconds_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, width: f64) -> String {
+    let range = shown.end() - shown.start();
+    let text = format!("{}\u{2009}s", plain(mark.value));
+    let spacing = mark.step_size / range * width;
+    let crowded = spacing < LETTER * text.chars().count() as f64 + BETWEEN_LABELS;
+    let fifth = (mark.value / mark.step_size).round() % 5.0 == 0.0;
+    if (shown.end() - mark.value) / range < 0.02 || (crowded && !fifth) { String::new() } else { text }
+}
+
+/// Width of a letter of a label, and least distance between labels (points).
+const LETTER: f64 = 6.5;
+const BETWEEN_LABELS: f64 = 12.0;
+
+/// Plot without interaction, its axes as wide as those of the others.
+pub(in crate::app) fn static_plot(
+    theme: Theme,
+    id: &str,
+    height: f32,
+    y_label: &str,
+    below: AxisHints<'static>,
+    air_beside: f32,
+) -> Plot<'static> {
+    Plot::new(id.to_owned())
+        .height(height)
+        .allow_zoom(false)
+        .allow_drag(false)
+        .allow_scroll(false)
+        .show_background(false)
+        .grid_color(colour(theme.colours().border))
+        .grid_spacing(10.0..=44.0)
+        .y_axis_min_width(44.0)
+        .y_axis_label(y_label.to_owned())
+        .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
+        .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
+        .custom_x_axes(vec![below.label_spacing(egui::Rangef::new(24.0, 40.0))])
+        .set_margin_fraction(egui::vec2(air_beside, 0.12))
+}
+
+/// Number at an axis, without trailing zeros.
+pub(super) fn plain(value: f64) -> String {
+    let text = three_digits(value);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// About four marks at round values.
+pub(super) fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
+    let rough = (high - low) / 4.0;
+    if !(rough.is_finite() && rough > 0.0) {
+        return Vec::new();
+    }
+    let decade = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade).into_iter().find(|s| *s >= rough).unwrap_or(10.0 * decade);
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    // A step of a whole range makes all marks equally strong.
+    (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: high - low }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_few_and_round() {
+        for (low, high, want) in [
+            (-0.5, 9.0, vec![0.0, 5.0]),
+            (-1.3, 23.0, vec![0.0, 10.0, 20.0]),
+            (0.0, 0.4, vec![0.0, 0.1, 0.2, 0.3, 0.4]),
+        ] {
+            let marks: Vec<f64> = value_marks(low, high).iter().map(|m| m.value).collect();
+            assert!(
+                marks.len() == want.len() && marks.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9),
+                "{marks:?}"
+            );
+        }
+        assert!(value_marks(1.0, 1.0).is_empty());
+        assert!(value_marks(f64::NAN, 1.0).is_empty());
+    }
+
+    #[test]
+    fn times_at_the_axis_never_crowd() {
+        let labels = |width: f64| -> Vec<String> {
+            let mark = |k: i32| GridMark { value: 0.1 * f64::from(k), step_size: if k % 10 == 0 { 1.0 } else { 0.1 } };
+            (0..=40).map(|k| seconds_at(mark(k), &(0.0..=4.0), width)).filter(|text| !text.is_empty()).collect()
+        };
+        let seconds = |texts: &[&str]| texts.iter().map(|text| format!("{text}\u{2009}s")).collect::<Vec<_>>();
+        assert_eq!(labels(1200.0), seconds(&["0", "0.5", "1", "1.5", "2", "2.5", "3", "3.5"]));
+        // With room for all of them, all but the last, which would be cut off.
+        assert_eq!(labels(2400.0).len(), 40);
+    }
+}

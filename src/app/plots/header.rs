@@ -1,0 +1,72 @@
+//! Line above a plot: derived curves, raw counts, classes, export, times of cursor and marks.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::derived::Derivation;
+use crate::app::features::files::FileAction;
+use crate::app::features::view::ViewAction;
+use crate::app::view_source::ViewSource;
+use egui::Ui;
+use palpate_lab::inspection::FigureOptions;
+use palpate_sim::objects::object_title;
+
+/// Choice of derived curves, and the times of cursor and marks.
+pub(super) fn ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    actions: &mut Actions,
+    (id, plotted): (&str, &[&str]),
+    derived: Derivation,
+) {
+    ui.horizontal(|ui| {
+        let combo = egui::ComboBox::from_id_salt((id, "derived")).width(96.0);
+        let shown = combo.selected_text(egui::RichText::new(derived.name()).small()).show_ui(ui, |ui| {
+            for choice in Derivation::ALL {
+                if ui.selectable_label(choice == derived, choice.name()).clicked() {
+                    actions.push(ViewAction::Derive(id.to_owned(), choice));
+                }
+            }
+        });
+        shown.response.on_hover_text("Values, sum or difference of both fingers, or change over time");
+        if context.shown().board().is_some() && id != "counts" && id != "line pressure" {
+            let mut raw = context.view.raw;
+            if ui.checkbox(&mut raw, egui::RichText::new("raw counts").small()).changed() {
+                actions.push(ViewAction::ShowRaw(raw));
+            }
+        }
+        if let Some([first, second]) = plotted.first().and_then(|name| context.bands_for(name)) {
+            let mut shown = context.view.class_bands;
+            let text = egui::RichText::new("likeliest classes").small();
+            let hint = format!(
+                "Mean and spread of the two likeliest classes behind the curves: {} blue, {} orange",
+                object_title(&first.class),
+                object_title(&second.class)
+            );
+            if ui.checkbox(&mut shown, text).on_hover_text(hint).changed() {
+                actions.push(ViewAction::ShowClassBands(shown));
+            }
+        }
+        if context.source == ViewSource::Trial {
+            let hint = "Export this plot as SVG or PNG, with the trials compared and a caption (Ctrl+E: all plots)";
+            if ui.small_button("Export").on_hover_text(hint).clicked() {
+                let channel = if id == "line pressure" { "line" } else { id };
+                let raw = id == "counts" || context.view.raw;
+                let channels = if raw { Vec::new() } else { vec![channel.to_owned()] };
+                actions.push(FileAction::ExportFigure(FigureOptions { channels, raw, ..FigureOptions::default() }));
+            }
+        }
+        let playback = context.playback;
+        let time = |name: &str, t: f64| format!("{name} {t:.3} s");
+        let mut times: Vec<String> = Vec::new();
+        if let [Some(a), Some(b)] = playback.marks {
+            times.push(time("B − A", b - a));
+        }
+        times.extend(playback.marks.iter().zip(["A", "B"]).rev().filter_map(|(t, name)| Some(time(name, (*t)?))));
+        times.extend(playback.cursor_s.map(|t| time("cursor", t)));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            times.into_iter().for_each(|time| {
+                ui.label(egui::RichText::new(time).small());
+            });
+        });
+    });
+}
