@@ -7,6 +7,7 @@ use palpate_geometry::units::three_digits;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::accuracy::{AccuracyPlan, AccuracyStudy, SceneGroup, SettingFamily, accuracy_figure};
 use palpate_learn::method;
+use palpate_sim::objects::titled;
 
 /// Arguments of `palpate study accuracy`.
 #[derive(Debug, clap::Args)]
@@ -60,6 +61,7 @@ fn command(arguments: &AccuracyArguments) -> String {
 }
 
 fn print(study: &AccuracyStudy) -> Result<(), Failure> {
+    let objects: Vec<String> = study.objects.iter().map(|name| titled(name)).collect();
     for group in [SceneGroup::Free, SceneGroup::Fixed] {
         let front: Vec<_> = study.front(group).into_iter().map(|(setting, _)| setting).collect();
         let rows: Vec<Vec<String>> = SettingFamily::ALL
@@ -78,7 +80,7 @@ fn print(study: &AccuracyStudy) -> Result<(), Failure> {
                 ]
             })
             .collect();
-        say(format!("{} objects, medians of {} poses of {}", group.title(), study.poses, study.objects.join(", ")))?;
+        say(format!("{} objects, medians of {} poses of {}", group.title(), study.poses, objects.join(", ")))?;
         table(&["family", "setting", "CPU ms", "error 1/km", "error mN", "failed", "front", ""], &rows)?;
         say("")?;
     }
