@@ -68,17 +68,16 @@ fn parse_sensor(text: &str) -> Result<Sensor, String> {
 
 pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Result<(), Failure> {
     if let Some(command) = &arguments.command {
-        return match command.reads() {
-            true => match existing_store(store)? {
-                Some(mut store) => manage::run(command, &mut store),
-                None => say("no calibrations yet: `palpate help gripper` says how to calibrate"),
-            },
-            false => manage::run(command, &mut open_store(store)?),
+        return match existing_store(store)? {
+            Some(mut store) => manage::run(command, &mut store),
+            None if command.adds() => manage::run(command, &mut open_store(store)?),
+            None => manage::without_store(command),
         };
     }
-    let mut store = open_store(store)?;
+    // Made only where there is a calibration to keep.
+    let known = existing_store(store)?;
     let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
-    let part = part_name(arguments, sensor, &store)?;
+    let part = part_name(arguments, sensor, known.as_ref())?;
     if arguments.points.is_some() && arguments.live.empty_close.is_none() {
         arguments.live.refuse_beside_points()?;
     }
@@ -86,14 +85,19 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
         Some(file) => {
             let record = record_of_file(arguments, sensor, &part, file)?;
             match arguments.live.empty_close {
-                Some(seconds) => guided::watch_empty_close(&arguments.live, seconds, sensor, record, &store)?,
+                Some(seconds) => guided::watch_empty_close(&arguments.live, seconds, sensor, record, known.as_ref())?,
                 None => record,
             }
         }
-        None => guided::record(arguments, sensor, &part, &store)?,
+        None => guided::record(arguments, sensor, &part, known.as_ref())?,
     };
     let calibration = Calibration::fit(Record { note: arguments.note.clone(), ..record })?;
-    let stored = if arguments.dry_run { None } else { Some(keep(&mut store, sensor, &calibration)?) };
+    let stored = if arguments.dry_run {
+        None
+    } else {
+        let mut store = known.map_or_else(|| open_store(store), Ok)?;
+        Some(keep(&mut store, sensor, &calibration)?)
+    };
     if arguments.json {
         return say_json(&Report {
             id: stored.as_ref().map(|s| s.id),
@@ -123,9 +127,11 @@ struct Report {
     calibration: Calibration,
 }
 
-fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: &Store) -> Result<String, Failure> {
-    let mounted =
-        || -> Result<Option<String>, Failure> { Ok(store.calibrations().mounted()?[sensor as usize].clone()) };
+fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: Option<&Store>) -> Result<String, Failure> {
+    let mounted = || -> Result<Option<String>, Failure> {
+        let Some(store) = store else { return Ok(None) };
+        Ok(store.calibrations().mounted()?[sensor as usize].clone())
+    };
     let name = match &arguments.part {
         Some(name) => Some(name.trim().to_owned()),
         None => mounted()?,

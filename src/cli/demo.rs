@@ -2,6 +2,7 @@
 //! it. Needs no display.
 
 use super::Failure;
+use super::output::make_folder;
 use super::recognise::{StageOne, load_model, named};
 use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
@@ -14,7 +15,7 @@ use palpate_lab::picture::{PictureView, Stage};
 use palpate_learn::{StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::gripper::Phase;
-use palpate_sim::objects::{EMPTY, ObjectModel, catalogue};
+use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::file_name_of;
@@ -113,8 +114,11 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let model = Arc::new(load_model(arguments.model.as_deref())?);
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
     let mut identification = Identification::new(Arc::clone(&model), rule);
-    let mut store = if arguments.no_store { None } else { Some(open_store(store)?) };
     let mut painter = if arguments.no_pictures { None } else { Painter::find() };
+    if painter.is_some() {
+        make_folder(&arguments.out)?;
+    }
+    let mut store = if arguments.no_store { None } else { Some(open_store(store)?) };
     let truth = object.as_ref().map_or_else(|| EMPTY.to_owned(), |o| o.name.clone());
     if !arguments.json {
         introduce(&nominal.object.source, object.as_ref(), seed)?;
@@ -205,7 +209,8 @@ fn random_object(seed: u64) -> String {
 
 fn introduce(name: &str, object: Option<&ObjectModel>, seed: u64) -> Result<(), Failure> {
     let Some(object) = object else { return say("Object: none, an empty hand.") };
-    let title = catalogue().iter().find(|b| b.name == name).map_or(object.name.as_str(), |b| b.title.as_str());
+    let built_in = catalogue().iter().any(|b| b.name == name);
+    let title = if built_in { titled(name) } else { object.name.clone() };
     let size = object.bounds.size().to_array().map(|side| format!("{:.0}", mm(side)));
     let grams = three_digits(object.mass.mass * 1e3);
     say(format!("Object: {title} ({} mm, {grams} g). Seed {seed}.", size.join(" x ")))?;
@@ -251,7 +256,7 @@ fn print_grasp(number: usize, report: &GraspReport, known: &[String]) -> Result<
         .iter()
         .take(3)
         .filter(|(_, p)| **p >= 0.005)
-        .map(|(name, p)| format!("{name} {:.0} %", 100.0 * **p))
+        .map(|(name, p)| format!("{} {:.0} %", titled(name), 100.0 * **p))
         .collect();
     say(format!("  Most likely: {}.", first.join(", ")))
 }
@@ -260,17 +265,21 @@ fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure>
     let count = report.grasps.len();
     let grasps = if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") };
     let right = if report.decided == report.truth { "Correct" } else { "Wrong" };
-    let (decided, truth) = (&report.decided, &report.truth);
+    let [decided, true_object] = [&report.decided, &report.truth].map(|name| titled(name));
     say("")?;
     match stopped {
-        StopReason::Sure => say(format!("Recognised after {grasps}: {decided}. {right} (true object: {truth})."))?,
+        StopReason::Sure => {
+            say(format!("Recognised after {grasps}: {decided}. {right} (true object: {true_object})."))?;
+        }
         StopReason::GraspLimit => {
-            say(format!("Grasp limit reached ({count}). Best guess: {decided}. {right} (true object: {truth})."))?;
+            say(format!(
+                "Grasp limit reached ({count}). Best guess: {decided}. {right} (true object: {true_object})."
+            ))?;
         }
         StopReason::Unknown => {
-            let known = report.grasps.last().is_some_and(|g| g.pmf.contains_key(truth));
+            let known = report.grasps.last().is_some_and(|g| g.pmf.contains_key(&report.truth));
             let right = if known { "Wrong" } else { "Correct: the model does not know this object" };
-            say(format!("Unknown object after {grasps}. {right} (true object: {truth})."))?;
+            say(format!("Unknown object after {grasps}. {right} (true object: {true_object})."))?;
             say("The grasps match none of the objects the model knows.")?;
         }
     }

@@ -16,6 +16,15 @@ pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write().map_err(|cause: std::io::Error| format!("cannot write \"{}\": {cause}", path.display()).into())
 }
 
+/// Makes a folder that the user named for files, but not the folders above it.
+pub(super) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    match std::fs::create_dir(folder) {
+        Err(_) if folder.is_dir() => Ok(()),
+        Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => check_folder(folder),
+        made => made.map_err(|cause| format!("cannot make the folder \"{}\": {cause}", folder.display()).into()),
+    }
+}
+
 /// Refuses a path in a folder that does not exist, before any work is done for it.
 pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {

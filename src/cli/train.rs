@@ -2,9 +2,10 @@
 
 use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
+use super::output::check_folder;
 use super::setup::read_store;
 use super::terminal::{say, say_json, table};
-use palpate_lab::datasets::models_folder;
+use palpate_lab::datasets::{make_models_folder, models_folder};
 use palpate_lab::study::{SearchRow, search};
 use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model};
 use serde::Serialize;
@@ -75,6 +76,9 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
             None => say("this method has no hyperparameters to set"),
         };
     }
+    if let Some(out) = &arguments.out {
+        check_folder(out)?;
+    }
     let store = read_store(store)?;
     let data = arguments.data.read(&store, false, arguments.trials)?;
     let mut settings = parse_settings(&arguments.settings)?;
@@ -84,6 +88,9 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
         model.card.metrics = serde_json::json!({ "search": rows });
     }
     let out = arguments.out.clone().unwrap_or_else(|| models_folder().join(format!("{}.safetensors", method.key)));
+    if arguments.out.is_none() {
+        make_models_folder(&models_folder())?;
+    }
     model.save(&out)?;
     let report = Report {
         model: &out,

@@ -37,7 +37,7 @@ impl Model {
         safetensors::serialize(&arrays.0, Some(header)).map_err(|e| failed(e.to_string()))
     }
 
-    /// Writes the model and its card. Interrupted writes leave the old file intact.
+    /// Writes the model and its card into a folder that exists. Interrupted writes leave the old file intact.
     pub fn save(&self, path: &Path) -> Result<(), ModelError> {
         let card = serde_json::to_string_pretty(&self.card)
             .map_err(|e| ModelError::Malformed { name: path.display().to_string(), cause: e.to_string() })?;
@@ -135,9 +135,6 @@ fn card_path(path: &Path) -> PathBuf {
 fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ModelError> {
     let unfinished = path.with_extension("unfinished");
     let written = (|| {
-        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder)?;
-        }
         std::fs::write(&unfinished, bytes)?;
         std::fs::rename(&unfinished, path)
     })();

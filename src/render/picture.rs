@@ -37,7 +37,7 @@ pub enum PictureError {
         cause: String,
     },
     /// The file could not be written.
-    #[error("cannot write the picture \"{path}\": {cause}", path = path.display())]
+    #[error("cannot write the picture \"{path}\": {cause}; its folder must exist and be writable", path = path.display())]
     Write {
         /// The file.
         path: PathBuf,
@@ -128,12 +128,9 @@ impl Picture {
         Ok(bytes.into_inner())
     }
 
-    /// Writes a PNG file, making its folder where it does not exist.
+    /// Writes a PNG file into a folder that exists.
     pub fn save(&self, path: &Path) -> Result<(), PictureError> {
         let written = (|| -> Result<(), Box<dyn std::error::Error>> {
-            if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-                std::fs::create_dir_all(folder)?;
-            }
             let format = image::ImageFormat::Png;
             image::save_buffer_with_format(path, &self.rgba, self.width, self.height, image::ColorType::Rgba8, format)?;
             Ok(())

@@ -243,6 +243,9 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
     let (_, calibrations) = calibrated(&hidden, 6);
     write_points(at, "strip.csv", &calibrations[0].1.record);
     write_points(at, "pad.csv", &calibrations[2].1.record);
+    let looked = run(at, &["calibrate", "flexL", "--part", "A7", "--points", "strip.csv", "--dry-run"]);
+    assert!(looked.code == Some(0) && looked.out.contains("not stored"), "{looked:?}");
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 2, "a dry run leaves no store");
     let made = json(at, &["calibrate", "flexL", "--part", "A7", "--points", "strip.csv", "--json"]);
     assert_eq!((&made["id"], &made["version"], &made["part"]), (&1.into(), &1.into(), &"A7".into()));
     assert!(made["curve"]["flex"]["flat_ohm"].as_f64().unwrap() > 17.5e3);

@@ -360,6 +360,17 @@ fn commands_that_read_create_nothing() {
     ] {
         refused(at, arguments, &["there is no store"]);
     }
+    for arguments in [
+        &["calibrate", "show", "1"][..],
+        &["calibrate", "withdraw", "1"][..],
+        &["calibrate", "export", "--out", "c.json"][..],
+        &["calibrate", "tare", "--dry-run"][..],
+    ] {
+        refused(at, arguments, &["no calibrations yet"]);
+    }
+    refused(at, &["calibrate", "flexL", "--part", "A7", "--points", "none.csv"], &["none.csv"]);
+    refused(at, &["calibrate", "flexL", "--points", "none.csv"], &["give it a name"]);
+    assert_eq!(json(at, &["calibrate", "list", "--json"])["calibrations"].as_array().map(Vec::len), Some(0));
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 0, "something was created");
     // A folder that was not asked for is not created either.
     for arguments in [&["trials", "list"][..], &["grasp", "lemon"][..]] {

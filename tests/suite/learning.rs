@@ -4,6 +4,8 @@ use crate::allocations::allocations_in;
 use crate::program::{json, refused, run};
 use palpate_lab::datasets::DatasetQuery;
 use palpate_learn::network::{LiveMacroLayer, MacroLayer, MacroShape};
+use palpate_learn::shipped_model;
+use palpate_render::Picture;
 use palpate_sim::objects::catalogue;
 use palpate_store::Store;
 use rand::SeedableRng;
@@ -227,6 +229,38 @@ fn the_demo_goes_on_until_it_is_sure_and_says_so() {
     );
     assert_eq!(run(at, &["demo", "--threshold", "1.5"]).code, Some(2));
     refused(at, &["demo", "--model", "gone.safetensors"], &["gone.safetensors"]);
+}
+
+#[test]
+fn the_demo_names_objects_as_the_window_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let story = ["demo", "--object", "bigball", "--seed", "1", "--grasps", "1", "--no-pictures", "--no-store"];
+    let told = run(at, &story);
+    assert!(told.out.contains("Object: Tennis ball (bigball) ("), "{told:?}");
+    assert!(told.out.contains("true object: Tennis ball (bigball))"), "{told:?}");
+    let numbers = json(at, &[&story[..], &["--json"]].concat());
+    assert_eq!(numbers["truth"], "bigball");
+}
+
+#[test]
+fn no_folder_is_made_that_nobody_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let model = shipped_model().unwrap();
+    let picture = Picture { width: 1, height: 1, rgba: vec![0; 4] };
+    let below = |name: &str| at.join("not/there").join(name);
+    let refusals = [
+        model.save(&below("m.safetensors")).unwrap_err().to_string(),
+        picture.save(&below("p.png")).unwrap_err().to_string(),
+    ];
+    assert!(
+        refusals.iter().all(|text| text.contains("not/there") && text.contains("folder must exist")),
+        "{refusals:?}"
+    );
+    refused(at, &["train", "macro-layer", "--out", "not/there/m.safetensors"], &["there is no folder", "not/there"]);
+    refused(at, &["demo", "--object", "box", "--grasps", "1", "--out", "not/there"], &["there is no folder", "not"]);
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 0, "something was created");
 }
 
 #[test]

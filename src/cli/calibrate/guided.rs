@@ -73,7 +73,7 @@ pub(super) fn record(
     arguments: &CalibrateArguments,
     sensor: Sensor,
     part: &str,
-    store: &Store,
+    store: Option<&Store>,
 ) -> Result<Record, Failure> {
     let live = &arguments.live;
     let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
@@ -109,7 +109,7 @@ pub(super) fn watch_empty_close(
     seconds: f64,
     sensor: Sensor,
     record: Record,
-    store: &Store,
+    store: Option<&Store>,
 ) -> Result<Record, Failure> {
     let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
     bench.board()?;
@@ -120,12 +120,13 @@ fn with_empty_close(
     bench: &mut Bench,
     record: Record,
     sensor: Sensor,
-    store: &Store,
+    store: Option<&Store>,
     auto: bool,
     seconds: f64,
 ) -> Result<Record, Failure> {
     let pad = Calibration::fit(record.clone())?;
-    let serving = store.calibrations().serving(None, &[])?.calibrations;
+    let serving = store.map(|store| store.calibrations().serving(None, &[])).transpose()?;
+    let serving = serving.map(|serving| serving.calibrations).unwrap_or_default();
     let close = EmptyClose::begin(&bench.link.status().board, (sensor, pad), &serving, seconds)?;
     Ok(Record { bending: Some(bench.empty_close(close, auto)?), ..record })
 }

@@ -67,9 +67,21 @@ pub(super) enum CalibrateCommand {
 }
 
 impl CalibrateCommand {
-    /// True for a command that only lists what is there.
-    pub(super) fn reads(&self) -> bool {
-        matches!(self, Self::List { json: false, .. } | Self::Drift(_))
+    /// True for a command that has something to store where nothing is stored yet.
+    pub(super) fn adds(&self) -> bool {
+        matches!(self, Self::Import { .. } | Self::Mount { .. })
+    }
+}
+
+/// Result of a command that adds nothing, where there is no store.
+pub(super) fn without_store(command: &CalibrateCommand) -> Result<(), Failure> {
+    let none = "no calibrations yet: `palpate help gripper` says how to calibrate";
+    match command {
+        CalibrateCommand::List { json: true, .. } => say_json(&ListReport::default()),
+        CalibrateCommand::Drift(arguments) if arguments.json => say_json(&[(); 0]),
+        CalibrateCommand::List { .. } | CalibrateCommand::Drift(_) => say(none),
+        CalibrateCommand::Tare(_) => Err(format!("no mounted part is calibrated, so there is no zero: {none}").into()),
+        _ => Err(none.into()),
     }
 }
 
@@ -94,7 +106,7 @@ pub(super) fn run(command: &CalibrateCommand, store: &mut Store) -> Result<(), F
 }
 
 /// Output of `list --json`.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct ListReport {
     /// Mounted parts by channel.
     mounted: std::collections::BTreeMap<&'static str, String>,

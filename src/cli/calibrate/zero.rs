@@ -4,6 +4,7 @@ use super::super::Failure;
 use super::super::setup::within;
 use super::super::terminal::{say, say_json, table, warn};
 use super::guided;
+use palpate_store::labels::shown_title;
 use palpate_store::{Store, StoredTare};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout};
@@ -35,7 +36,7 @@ pub(super) struct DriftArguments {
     trials: Vec<TrialId>,
     /// Print JSON instead of a table.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Output of `tare --json`.
@@ -127,7 +128,7 @@ pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Fai
             let cell =
                 |sensor| of(sensor).map_or_else(|| "–".to_owned(), |d| format!("{} {}", d.with_unit(), d.badge()));
             let date = row.created.chars().take(19).collect::<String>().replace('T', " ");
-            let start = [row.trial.to_string(), date, row.object.clone()];
+            let start = [row.trial.to_string(), date, shown_title(&row.object)];
             start.into_iter().chain(Sensor::ALL.map(cell)).collect()
         })
         .collect();

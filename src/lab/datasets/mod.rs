@@ -7,4 +7,4 @@ pub(crate) use query::noise_seed;
 pub use query::{
     DatasetError, DatasetQuery, SensorView, TrialSignals, labels_of_catalogue, sequence_of, trial_signals,
 };
-pub use saved_models::{SavedModel, models_folder, new_model_path, saved_models};
+pub use saved_models::{SavedModel, make_models_folder, models_folder, new_model_path, saved_models};

@@ -1,6 +1,6 @@
 //! Folder of trained models.
 
-use palpate_learn::ModelCard;
+use palpate_learn::{ModelCard, ModelError};
 use palpate_store::Store;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,12 @@ use std::path::{Path, PathBuf};
 pub fn models_folder() -> PathBuf {
     let store = Store::default_path();
     store.parent().map_or_else(|| PathBuf::from("models"), |folder| folder.join("models"))
+}
+
+/// Makes the folder of trained models, which is the program's own, where there is none yet.
+pub fn make_models_folder(folder: &Path) -> Result<(), ModelError> {
+    std::fs::create_dir_all(folder)
+        .map_err(|cause| ModelError::Unwritable { path: folder.to_owned(), cause: cause.to_string() })
 }
 
 /// Model file with its description.
