@@ -101,6 +101,8 @@ struct Service {
     view: LibraryView,
     /// Trials in sight without a sparkline, the last to be made first.
     undrawn: Vec<TrialId>,
+    /// Trials that were still being recorded when their sparkline was made.
+    growing: Vec<TrialId>,
     /// Why the last work failed.
     trouble: Option<String>,
     outcomes: VecDeque<(u64, LabelOutcome)>,
@@ -116,6 +118,7 @@ impl Service {
             version: 0,
             view: LibraryView::default(),
             undrawn: Vec::new(),
+            growing: Vec::new(),
             trouble: None,
             outcomes: VecDeque::new(),
             number: 0,
@@ -209,6 +212,7 @@ impl Service {
         }
         if changed {
             self.view.counts = Arc::new(self.library.counts());
+            self.undrawn.append(&mut self.growing);
         }
         Ok(changed)
     }
@@ -231,6 +235,8 @@ impl Service {
         if made.len() > SPARKLINES {
             made.clear();
         }
+        let grows = |id: &&TrialId| self.library.trial(**id).is_some_and(|trial| trial.row.state == "recording");
+        self.growing.extend(next.iter().filter(grows));
         // Opening a damaged trial says what is wrong with it; the list only leaves its place empty.
         made.extend(next.into_iter().map(|id| (id, stored_sparkline(store, id).unwrap_or_default())));
         self.view.sparklines = Arc::new(made);
@@ -270,6 +276,30 @@ mod tests {
         let id = store.begin_board(&TrialHeader::new(object, Scene::default()), &BoardInfo::default()).expect("begins");
         store.finish_board(id, &BoardInfo::default(), &[]).expect("ends");
         id
+    }
+
+    #[test]
+    fn sparklines_follow_trials_that_are_recorded() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("s.sqlite");
+        let mut theirs = Store::open(&path)?;
+        let scene = Scene::default();
+        let object = scene.load_object()?;
+        let mut trial = crate::grasping::grasp(&scene, object.as_ref(), 1);
+        let frames = std::mem::take(&mut trial.data.frames);
+        let id = theirs.begin(&trial)?;
+        theirs.append(id, &frames[..60])?;
+        let (wake, woken) = waker();
+        let librarian = start_librarian(path, wake)?;
+        librarian.ask(LibraryCommand::Find(TrialQuery::default()));
+        librarian.ask(LibraryCommand::Draw(vec![id]));
+        let begun = until(&librarian, &woken, |view| view.sparklines.contains_key(&id)).sparklines[&id].clone();
+        theirs.append(id, &frames[60..])?;
+        theirs.finish(id, &trial.data.quality, &[])?;
+        let whole = stored_sparkline(&theirs, id)?;
+        assert_ne!(begun, whole);
+        until(&librarian, &woken, |view| view.sparklines[&id] == whole);
+        Ok(())
     }
 
     fn ids(view: &LibraryView) -> Vec<TrialId> {
