@@ -6,9 +6,9 @@ use palpate_geometry::palette::Trace;
 use palpate_lab::grasping::band_half_width;
 use palpate_sim::gripper::Side;
 use palpate_tactile::board::{Board, Sensor};
-use palpate_tactile::{Channel, Quantity, Span};
+use palpate_tactile::{Channel, Quantity, SignalDefinition, Span};
 
-/// Curves of all channels of a quantity, their values multiplied by `factor`, and their unit; or the raw counts of their
+/// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and their unit; or the raw counts of their
 /// sensors, where those are chosen.
 pub(super) fn channel_curves<'a>(
     context: &PanelContext<'_>,
@@ -25,12 +25,12 @@ pub(super) fn channel_curves<'a>(
 fn raw_curves(context: &PanelContext<'_>, board: &Board, quantity: Quantity) -> Vec<PlotCurve> {
     let sensors = match quantity {
         Quantity::Curvature => [Sensor::FlexLeft, Sensor::FlexRight],
-        Quantity::Pressure | Quantity::Force => [Sensor::PadLeft, Sensor::PadRight],
+        Quantity::Pressure | Quantity::ContactPressure | Quantity::Force => [Sensor::PadLeft, Sensor::PadRight],
     };
     let derived = context.shown().channels().iter().filter(|channel| channel.is_some()).count();
     let curve = |(sensor, side): (Sensor, Side)| {
         let column = derived + board.channel_of(sensor)?;
-        let channel = Channel { quantity, side, span: Span::WHOLE };
+        let channel = Channel { quantity, side, span: Span::WHOLE, signals: SignalDefinition::Parts };
         Some(PlotCurve {
             name: label(&channel),
             trace: colour_of(&channel),
@@ -47,7 +47,7 @@ fn physical_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) 
     let channels = context.shown().channels();
     let channels = channels.into_iter().enumerate().filter_map(|(index, channel)| Some((index, channel?)));
     channels
-        .filter(|(_, channel)| channel.quantity == quantity)
+        .filter(|(_, channel)| shows(quantity, channel))
         .map(|(index, channel)| PlotCurve {
             name: label(channel),
             trace: colour_of(channel),
@@ -61,10 +61,16 @@ fn physical_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) 
         .collect()
 }
 
+/// True where a channel measures a quantity; a contact pressure does in place of a pad's.
+pub(super) fn shows(quantity: Quantity, channel: &Channel) -> bool {
+    channel.quantity == quantity || (quantity.is_pressure() && channel.quantity.is_pressure())
+}
+
 /// Finger and span.
 fn label(channel: &Channel) -> String {
     let name = channel.name();
-    name.trim_start_matches(channel.quantity.name()).trim_start_matches('_').replace('_', " ")
+    let place = name.trim_start_matches(channel.quantity.name()).trim_start_matches('_').replace('_', " ");
+    if channel.quantity == Quantity::ContactPressure { format!("contact, {place}") } else { place }
 }
 
 /// Colour by quantity and span.
@@ -73,7 +79,7 @@ pub(super) fn colour_of(channel: &Channel) -> Trace {
     match (channel.quantity, distal) {
         (Quantity::Curvature, false) => Trace::Curvature,
         (Quantity::Curvature, true) => Trace::CurvatureDistal,
-        (Quantity::Pressure | Quantity::Force, false) => Trace::Pressure,
-        (Quantity::Pressure | Quantity::Force, true) => Trace::PressureDistal,
+        (Quantity::Pressure | Quantity::ContactPressure | Quantity::Force, false) => Trace::Pressure,
+        (Quantity::Pressure | Quantity::ContactPressure | Quantity::Force, true) => Trace::PressureDistal,
     }
 }

@@ -15,7 +15,7 @@ use palpate_lab::picture::{
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_tactile::Quantity;
-use palpate_tactile::calibration::ACTIVE_AREA;
+use palpate_tactile::electronics::PadPart;
 
 /// Most columns of a heat map over time.
 pub(super) const MAP_COLUMNS: usize = 600;
@@ -124,7 +124,7 @@ impl<'a> ShownGrasp<'a> {
             let value = f64::from(*trace.channels.get(*column)?.get(trace.sample_at(self.cursor_s)?)?);
             Some(value).filter(|value| value.is_finite())
         };
-        let from_pressure = || read(Quantity::Pressure).map(|pressure| pressure * ACTIVE_AREA);
+        let from_pressure = || read(Quantity::Pressure).map(|pressure| pressure * PadPart::ACTIVE_AREA);
         read(Quantity::Force).or_else(from_pressure).unwrap_or(f64::NAN)
     }
 
@@ -195,7 +195,7 @@ pub(super) fn shown_pads(ui: &Ui, name: &'static str, grasp: &ShownGrasp<'_>, un
     let key = MapsKey { frames: identity, count: 1, unit: unit.symbol(), most: [usize::MAX; 2] };
     shown_maps(ui, name, key, || match grasp.frame {
         Some(frame) => pads_at(grasp.gripper, frame, unit),
-        None => whole_pads(grasp.gripper, forces, ACTIVE_AREA, unit),
+        None => whole_pads(grasp.gripper, forces, PadPart::ACTIVE_AREA, unit),
     })
 }
 
@@ -211,7 +211,7 @@ pub(super) fn shown_joints(ui: &Ui, grasp: &ShownGrasp<'_>, unit: BendUnit, most
 pub(super) fn shown_rows(ui: &Ui, grasp: &ShownGrasp<'_>, unit: LoadUnit, most: [usize; 2]) -> ShownMaps {
     shown_maps(ui, "rows", grasp.key(unit.symbol(), most), || match (grasp.frames.as_slice(), unit) {
         ([], LoadUnit::Pressure) => grasp.sensed(Quantity::Pressure, SensorRows::Pressure, most[0]),
-        ([], LoadUnit::Force) => grasp.sensed(Quantity::Force, SensorRows::Force(ACTIVE_AREA), most[0]),
+        ([], LoadUnit::Force) => grasp.sensed(Quantity::Force, SensorRows::Force(PadPart::ACTIVE_AREA), most[0]),
         (frames, _) => pad_rows_over_time(grasp.gripper, frames, unit),
     })
 }

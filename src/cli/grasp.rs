@@ -1,7 +1,7 @@
 //! `palpate grasp`: simulates one grasp, prints a summary, stores the trial, writes it as CSV.
 
 use super::Failure;
-use super::setup::{RecomputeArguments, SceneArguments, open_store};
+use super::setup::{RecomputeArguments, SceneArguments, SignalArguments, open_store};
 use super::terminal::{say, say_json, warn};
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp_soundly};
@@ -11,7 +11,7 @@ use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_store::{contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::{Sensors, SignalDefinition};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -20,12 +20,12 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   palpate grasp lemon
   palpate grasp my_part.urdf --fixed --json
-  palpate grasp box --seed 7 --out box.csv --layout C6+F
+  palpate grasp box --seed 7 --out box.csv --layout C6
   palpate grasp --scene scene.toml --set gripper.pad.friction=0.4
   palpate grasp ball --accuracy 1e-4 --error-band
   palpate grasp jenga --seed 3 --until-agreement
 
-See also: palpate help scenes")]
+See also: palpate help scenes, palpate help sensors")]
 pub(super) struct GraspArguments {
     /// Built-in name (lemon, ball, cube ..), a URDF, OBJ or STL file, or `empty` (default: that of the scene).
     object: Option<String>,
@@ -37,12 +37,8 @@ pub(super) struct GraspArguments {
     /// CSV file to write; the contacts go to a second file, .contacts.csv.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// Sensor layout of the CSV: C1 to C8, each also as C1+F.
-    #[arg(long, value_name = "NAME", default_value = "C1+F")]
-    layout: String,
-    /// Divide force by the convex hull of the contacts, as the paper does, instead of the participation area.
-    #[arg(long)]
-    hull: bool,
+    #[command(flatten)]
+    signals: SignalArguments,
     #[command(flatten)]
     recompute: RecomputeArguments,
     /// Estimate the numerical error from a second run with finer steps.
@@ -84,9 +80,8 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     if arguments.print_scene {
         return say(nominal.to_toml().trim_end());
     }
-    let layout = SensorLayout::named(&arguments.layout)?;
-    let area = if arguments.hull { PressureArea::Hull } else { PressureArea::Participation };
-    let sensors = Sensors::new(&layout, &nominal.gripper, area)?;
+    let layout = arguments.signals.view().shown()?;
+    let sensors = Sensors::new(&layout, &nominal.gripper, arguments.signals.signals)?;
     let loading = cpu_time::ProcessTime::now();
     let object = nominal.load_object()?;
     let load_cpu_ms = loading.elapsed().as_secs_f64() * 1e3;
@@ -102,7 +97,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     let scene = trial.header.scene.clone();
     let error_band = arguments
         .error_band
-        .then(|| Sensors::whole_fingers(&scene.gripper))
+        .then(|| Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts))
         .map(|sensors| error_band(&trial, &scene, object.as_ref(), &sensors).norms(&trial, &sensors));
     let trial_id = if arguments.no_store { None } else { Some(open_store(store)?.insert(&trial)?) };
     if let Some(path) = &arguments.out {
@@ -143,7 +138,8 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
         };
         pair("hold force", hold.force_n, "N")?;
         pair("curvature", hold.curvature_per_m, "1/m")?;
-        pair("pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa")?;
+        pair("pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa of the pads")?;
+        pair("at contact", hold.contact_pressure_pa.map(|p| p * 1e-3), "kPa")?;
         if let Some(shape) = &hold.out_of_plane {
             pair("tips sideways", shape.tip_m.map(mm), "mm")?;
             pair("tips twisted", shape.twist_rad.map(f64::to_degrees), "degrees")?;

@@ -1,6 +1,7 @@
 //! Arguments and helpers shared by `train` and `evaluate`.
 
 use super::Failure;
+use super::setup::SignalArguments;
 use super::terminal::warn;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
@@ -21,9 +22,8 @@ pub(super) struct DataArguments {
     /// Only these objects, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     pub(super) objects: Vec<String>,
-    /// Sensor layout for simulated trials: C1 to C8, each also with force, as C1+F.
-    #[arg(long, value_name = "NAME", default_value = "C1+F")]
-    pub(super) layout: String,
+    #[command(flatten)]
+    pub(super) signals: SignalArguments,
     /// Sensor model for simulated trials: virtual (perfect) or physical-like (as on the real gripper).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
@@ -41,7 +41,7 @@ fn parse_sensors(text: &str) -> Result<SensorModel, String> {
 
 impl DataArguments {
     pub(super) fn view(&self) -> SensorView {
-        SensorView { layout: self.layout.clone(), sensors: self.sensors, ..SensorView::default() }
+        SensorView { sensors: self.sensors, ..self.signals.view() }
     }
 
     /// Reads the grasps from the store.

@@ -2,15 +2,13 @@
 
 use super::Failure;
 use super::output::check_folder;
-use super::setup::read_store;
+use super::setup::{SignalArguments, read_store};
 use super::snapshot::{parse_size, parse_theme};
 use super::terminal::say;
 use crate::app::ExportRequest;
 use palpate_geometry::palette::Theme;
-use palpate_lab::datasets::SensorView;
 use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, Keep, OpenOptions, OpenTrial, comparison_figure};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{PressureArea, SensorLayout};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -43,12 +41,8 @@ pub(super) struct PlotArguments {
     /// Heat maps over time: joints (angle of each) or pads (pressure on each row of taxels).
     #[arg(long, value_name = "NAME", value_parser = parse_heat)]
     heat: Option<HeatKind>,
-    /// Sensor layout through which simulated trials are read: C1 to C8, each also with force, as C1+F.
-    #[arg(long, value_name = "NAME", default_value = "C1+F")]
-    layout: String,
-    /// Divide force by the convex hull of the contacts, as the paper does.
-    #[arg(long)]
-    hull: bool,
+    #[command(flatten)]
+    signals: SignalArguments,
     /// Theme: dark or light.
     #[arg(long, value_name = "NAME", default_value = "light", value_parser = parse_theme)]
     theme: Theme,
@@ -79,11 +73,11 @@ pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(),
         return Err(format!("cannot write \"{}\": choose an .svg or a .png file", out.display()).into());
     }
     check_folder(out)?;
-    SensorLayout::named(&arguments.layout)?;
+    let sensors = arguments.signals.view();
+    sensors.learnt()?;
     let store = read_store(store)?;
-    let area = if arguments.hull { PressureArea::Hull } else { PressureArea::Participation };
     let options = OpenOptions {
-        sensors: SensorView { layout: arguments.layout.clone(), area, ..SensorView::default() },
+        sensors,
         keep: if arguments.heat.is_some() { Keep::Frames } else { Keep::Channels },
         ..OpenOptions::default()
     };

@@ -1,10 +1,12 @@
-//! Scene arguments shared by all commands that simulate, and opening the store.
+//! Arguments shared by commands, of scenes and of sensors, and opening the store.
 
 use super::Failure;
+use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use palpate_store::Store;
+use palpate_tactile::SignalDefinition;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -30,6 +32,29 @@ pub(super) struct SceneArguments {
     /// Set a key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<String>,
+}
+
+/// Channels through which simulated trials are read.
+#[derive(Debug, clap::Args)]
+pub(super) struct SignalArguments {
+    /// Sensor layout of simulated trials: C1 to C8; with --signals contact or hull each also with force, as C1+F.
+    #[arg(long, value_name = "NAME", default_value = "C1")]
+    pub(super) layout: String,
+    /// Signals of simulated trials: parts (what strips and pads measure, as on a real gripper), contact (circle through
+    /// all joints, force over participation area) or hull (force over the convex hull of the contacts, as in the paper).
+    #[arg(long, value_name = "NAME", default_value = "parts", value_parser = parse_signals)]
+    pub(super) signals: SignalDefinition,
+}
+
+impl SignalArguments {
+    /// The view through perfect sensors.
+    pub(super) fn view(&self) -> SensorView {
+        SensorView { layout: self.layout.clone(), signals: self.signals, ..SensorView::default() }
+    }
+}
+
+fn parse_signals(text: &str) -> Result<SignalDefinition, String> {
+    SignalDefinition::named(text).ok_or_else(|| "choose parts, contact or hull".to_owned())
 }
 
 /// When a grasp is computed again at a finer accuracy.

@@ -6,15 +6,14 @@ mod selection;
 mod show;
 
 use super::Failure;
-use super::setup::{existing_store, open_store, read_store};
+use super::setup::{SignalArguments, existing_store, open_store, read_store};
 use super::terminal::{note, say, say_json, table, warn};
 use labels::LabelCommand;
-use palpate_lab::datasets::SensorView;
 use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
 use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialQuery, TrialRow, export_trial};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{PressureArea, SensorLayout};
+use palpate_tactile::{SensorLayout, SignalDefinition};
 use selection::{Filters, Numbers, chosen};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -84,17 +83,13 @@ enum TrialsCommand {
         filters: Filters,
         /// Export all labelled trials of the real gripper to a new folder: trials.csv (list), signals.csv (for `palpate trials
         /// import`) and raw/ (counts and bytes).
-        #[arg(long, conflicts_with_all = ["ids", "layout", "hull", "unsound"])]
+        #[arg(long, conflicts_with_all = ["ids", "layout", "signals", "unsound"])]
         labelled: bool,
         /// Folder, CSV file for a single trial, or a file of another format for any number.
         #[arg(long, value_name = "PATH")]
         out: PathBuf,
-        /// Sensor layout: C1 to C8, each also with force, as C1+F.
-        #[arg(long, value_name = "NAME", default_value = "C1+F")]
-        layout: String,
-        /// Divide force by the convex hull of the contacts, as the paper does.
-        #[arg(long)]
-        hull: bool,
+        #[command(flatten)]
+        signals: SignalArguments,
         /// Include trials that diverged, did not converge or did not come to rest.
         #[arg(long)]
         unsound: bool,
@@ -165,15 +160,13 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
         TrialsCommand::Export { labelled: true, out, .. } => labels::export(&store, out),
-        TrialsCommand::Export { ids, filters, out, layout, hull, unsound, model, .. } => {
+        TrialsCommand::Export { ids, filters, out, signals, unsound, model, .. } => {
             let ids = &chosen(&store, ids, filters, Shown::Kept)?;
-            let area = if *hull { PressureArea::Hull } else { PressureArea::Participation };
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
             if let Some(format) = ExchangeFormat::of(out) {
-                let sensors = SensorView { layout: layout.clone(), area, ..SensorView::default() };
-                return exchange::export(&store, (&ids, format), (out, model.as_deref()), sensors);
+                return exchange::export(&store, (&ids, format), (out, model.as_deref()), signals.view());
             }
-            export(&store, &ids, out, &SensorLayout::named(layout)?, area)
+            export(&store, &ids, out, (&signals.view().shown()?, signals.signals))
         }
         TrialsCommand::Import { files, label } => {
             for file in files {
@@ -299,15 +292,14 @@ fn export(
     store: &Store,
     ids: &[TrialId],
     out: &Path,
-    layout: &SensorLayout,
-    area: PressureArea,
+    channels: (&SensorLayout, SignalDefinition),
 ) -> Result<(), Failure> {
     let as_file = out.extension().is_some_and(|e| e == "csv");
     if as_file && ids.len() > 1 {
         return Err("several trials need a folder: --out FOLDER".into());
     }
     for id in ids {
-        say(export_trial(store, *id, out, (layout, area))?.display())?;
+        say(export_trial(store, *id, out, channels)?.display())?;
     }
     Ok(())
 }

@@ -113,6 +113,10 @@ pub struct DataCard {
     pub layout: Option<String>,
     /// Sensor model of simulated grasps.
     pub sensors: Option<String>,
+    /// Definition of the signals of simulated grasps: `parts`, as on a real gripper, or `contact` or `hull`, which only
+    /// simulations have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub signals: Option<String>,
     /// Number of grasps left out: diverged, not converged, or not calibrated.
     #[serde(default)]
     pub left_out: usize,
@@ -130,6 +134,7 @@ impl DataCard {
         });
         parts.extend(self.sensors.as_ref().map(|sensors| format!("{sensors} sensors")));
         parts.extend(self.layout.clone());
+        parts.extend(self.signals.as_ref().filter(|own| *own != "parts").map(|own| format!("{own} pressure")));
         parts.extend((self.left_out > 0).then(|| format!("{} left out as not sound", self.left_out)));
         parts.join(", ")
     }

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Beginning of the names of channels with the contact pressure, which only simulations have.
+const CONTACT_PRESSURE: &str = "contact_pressure_";
+
 /// Description of a model: everything except its learned parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelCard {
@@ -98,7 +101,34 @@ impl Model {
         if parts.is_empty() {
             parts.push(format!("the order differs; it reads {}", own.join(", ")));
         }
-        Err(ModelError::Channels { difference: parts.join(", and ") })
+        let mut difference = parts.join(", and ");
+        if missing.iter().any(|channel| channel.starts_with(CONTACT_PRESSURE)) {
+            difference += ". Contact pressure exists only in simulations: no real gripper can run this model. Train one \
+                           on the pads' pressure (--signals parts)";
+        }
+        Err(ModelError::Channels { difference })
+    }
+}
+
+impl ModelCard {
+    /// Reads a card. Cards of versions without [`DataCard::signals`] called the contact pressure of simulated grasps
+    /// `pressure`, which now is what pads measure.
+    pub(crate) fn parse(text: &str) -> serde_json::Result<Self> {
+        let mut card: Self = serde_json::from_str(text)?;
+        if card.data.signals.is_none() && card.data.sensors.is_some() {
+            card.data.signals = Some("contact".to_owned());
+            for channel in &mut card.channels {
+                if let Some(place) = channel.strip_prefix("pressure_") {
+                    *channel = format!("{CONTACT_PRESSURE}{place}");
+                }
+            }
+        }
+        Ok(card)
+    }
+
+    /// True where it reads channels that only simulations have.
+    pub fn only_simulated(&self) -> bool {
+        self.channels.iter().any(|channel| channel.starts_with(CONTACT_PRESSURE))
     }
 }
 

@@ -66,7 +66,7 @@ impl Model {
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| malformed(e.to_string()))?;
         let card = header.metadata().as_ref().and_then(|m| m.get(CARD_KEY));
         let card = card.ok_or_else(|| malformed("its header has no card".to_owned()))?;
-        let card: ModelCard = serde_json::from_str(card).map_err(|e| malformed(format!("invalid card: {e}")))?;
+        let card = ModelCard::parse(card).map_err(|e| malformed(format!("invalid card: {e}")))?;
         let file = SafeTensors::deserialize(bytes).map_err(|e| malformed(e.to_string()))?;
         let Some(method) = method(&card.method) else {
             return Err(ModelError::UnknownMethod { name: name.to_owned(), method: card.method });
@@ -110,7 +110,7 @@ impl ModelCard {
         let path = card_path(model);
         let text = std::fs::read_to_string(&path)
             .map_err(|error| ModelError::Unreadable { path: path.clone(), cause: error.to_string() })?;
-        serde_json::from_str(&text)
+        Self::parse(&text)
             .map_err(|error| ModelError::Malformed { name: path.display().to_string(), cause: error.to_string() })
     }
 
@@ -123,6 +123,7 @@ impl ModelCard {
             format!("{} grasps", self.data.grasps),
         ];
         parts.extend(self.metrics["f1_macro"].as_f64().map(|f1| format!("macro F1 {f1:.2}")));
+        parts.extend(self.only_simulated().then(|| "contact pressure: simulation only".to_owned()));
         parts.join(", ")
     }
 }

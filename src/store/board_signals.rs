@@ -12,7 +12,7 @@ use palpate_tactile::trial::TrialId;
 /// Signals of a trial of a real gripper.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardSignals {
-    /// Signals with the channels of layout C1+F; time counts from the beginning of the trial (s).
+    /// Curvature, pressure and force of each finger; time counts from the beginning of the trial (s).
     pub derived: Derived,
     /// The calibrations.
     pub serving: Serving,

@@ -164,7 +164,7 @@ mod tests {
     use crate::test_trials::grasp;
     use palpate_geometry::Primitive;
     use palpate_sim::objects::ObjectModel;
-    use palpate_tactile::{PressureArea, SensorLayout};
+    use palpate_tactile::{SensorLayout, SignalDefinition};
 
     #[test]
     fn rows_match_their_header_and_joints_lie_in_the_world() {
@@ -175,7 +175,7 @@ mod tests {
         let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
         let trial = grasp(&scene, Some(&ball), 0);
         let layout = SensorLayout::named("C5+F").expect("known");
-        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
+        let sensors = Sensors::new(&layout, &scene.gripper, SignalDefinition::Parts).expect("fits");
         write_trial_csv(&path, &trial, &scene, &sensors).expect("writes");
         write_contacts_csv(&contacts_path(&path), &trial, &scene).expect("writes");
 
@@ -205,7 +205,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.timing.duration_s = 1.0;
         let layout = SensorLayout::named("C1").expect("known");
-        let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
+        let sensors = Sensors::new(&layout, &scene.gripper, SignalDefinition::Parts).expect("fits");
         let planar = grasp(&scene, None, 0);
         let mut swayed = planar.clone();
         swayed.data.frames[50].sways[1] = Sway { curvature: 1.5, twist: -0.25 };

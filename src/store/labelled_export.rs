@@ -16,10 +16,9 @@ use super::new_file::unfinished;
 use super::store::Store;
 use super::store_error::StoreError;
 use crate::labels::LabelledTrial;
-use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::catalogue;
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{Channel, LayoutError, SensorLayout, Signals};
+use palpate_tactile::{Channel, LayoutError, SignalDefinition, Signals, whole_fingers};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufWriter;
@@ -105,8 +104,7 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
 fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
     let raw = folder.join("raw");
     std::fs::create_dir_all(&raw).map_err(|e| cannot(&raw, &e))?;
-    let layout = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&GripperModel::default()));
-    let channels: Vec<Channel> = layout.unwrap_or_default();
+    let channels = whole_fingers(SignalDefinition::Parts);
     let (list, signals) = (folder.join("trials.csv"), folder.join("signals.csv"));
     let mut list_out = create(&list)?;
     let mut signals_out = create(&signals)?;

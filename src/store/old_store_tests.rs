@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::labels::Flag;
-use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};
 use std::path::{Path, PathBuf};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -117,7 +117,7 @@ fn it_is_exported_with_the_same_numbers() -> Outcome {
     let trial = store.load(1)?.into_simulated().ok_or("simulated")?;
     let scene = &trial.header.scene;
     let layout = SensorLayout::named("C1+F")?;
-    let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation)?;
+    let sensors = Sensors::new(&layout, &scene.gripper, SignalDefinition::Contact)?;
     let path = folder.path().join("trial_1.csv");
     write_trial_csv(&path, &trial, scene, &sensors)?;
     let mut reader = csv::Reader::from_path(&path)?;

@@ -5,22 +5,22 @@ use super::labelled_export::{ExportError, export_board_trial, file_name_of};
 use super::store::Store;
 use crate::labels::shown_name;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
-use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};
 use std::path::{Path, PathBuf};
 
 /// Exports a trial as CSV: to a file with that extension, or else into a folder under its own name; returns the path.
-/// `layout` and `area` choose the channels of a simulated trial.
+/// `layout` and `signals` choose the channels of a simulated trial.
 pub fn export_trial(
     store: &Store,
     id: TrialId,
     out: &Path,
-    (layout, area): (&SensorLayout, PressureArea),
+    (layout, signals): (&SensorLayout, SignalDefinition),
 ) -> Result<PathBuf, ExportError> {
     let trial = store.load(id)?;
     let name = format!("trial_{id}_{}.csv", file_name_of(shown_name(&trial.header.object)));
     let is_file = out.extension().is_some_and(|extension| extension == "csv");
     let path = if is_file { out.to_owned() } else { out.join(name) };
-    write_csv(store, id, trial, &path, (layout, area))?;
+    write_csv(store, id, trial, &path, (layout, signals))?;
     Ok(path)
 }
 
@@ -29,7 +29,7 @@ fn write_csv(
     id: TrialId,
     Trial { header, data }: Trial,
     path: &Path,
-    (layout, area): (&SensorLayout, PressureArea),
+    (layout, signals): (&SensorLayout, SignalDefinition),
 ) -> Result<(), ExportError> {
     match data {
         TrialData::Recorded(_) => drop(export_board_trial(store, id, path)?),
@@ -37,7 +37,7 @@ fn write_csv(
         TrialData::Simulated(data) => {
             let trial = SimulatedTrial { header, data };
             let scene = &trial.header.scene;
-            let sensors = Sensors::new(layout, &scene.gripper, area)?;
+            let sensors = Sensors::new(layout, &scene.gripper, signals)?;
             write_trial_csv(path, &trial, scene, &sensors)?;
             write_contacts_csv(&contacts_path(path), &trial, scene)?;
         }

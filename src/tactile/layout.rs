@@ -1,12 +1,46 @@
-//! Sensor layouts: which stretches of each finger carry a curvature and which a pressure sensor.
+//! Sensor layouts: which stretches of each finger carry a curvature and which a pressure sensor, and what their signals are.
 //!
 //! The paper varies both (section IV-A1) and numbers its patterns C1 to C6 without saying which is which, but for C1,
 //! the simplest. Our numbering: C1 to C4 read whole-finger curvature with pressure over the whole finger, over halves,
 //! over pairs of joints, at every joint; C5 to C8 the same with the curvature of both halves. `+F` adds force as a
-//! channel of its own beside each pressure.
+//! channel of its own beside each contact pressure; a pad's pressure is its force already.
 
 use palpate_sim::gripper::{GripperModel, Side};
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+
+/// Definition of the signals of a layout's channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SignalDefinition {
+    /// What the parts of a real gripper measure: a strip the bend of the length it covers, a pad its normal force, as a
+    /// pressure over its sensing area.
+    #[default]
+    Parts,
+    /// Quantities of the simulation: the circle through all joints, and force over participation area.
+    Contact,
+    /// The same, but force over the convex hull of the contacts, as in the paper; undefined for points and rows.
+    Hull,
+}
+
+impl SignalDefinition {
+    /// All definitions, that of real grippers first.
+    pub const ALL: [Self; 3] = [Self::Parts, Self::Contact, Self::Hull];
+
+    /// The name used in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Parts => "parts",
+            Self::Contact => "contact",
+            Self::Hull => "hull",
+        }
+    }
+
+    /// A definition by its name, in either case.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|own| own.name().eq_ignore_ascii_case(name.trim()))
+    }
+}
 
 /// A stretch of a finger, as shares of its length from the palm.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,8 +137,10 @@ pub const CATALOGUE: [SensorLayout; 8] = [
 pub enum Quantity {
     /// Curvature (1/m).
     Curvature,
-    /// Pressure (Pa).
+    /// Normal force of a pad over its sensing area (Pa).
     Pressure,
+    /// Normal force over the area of the contact (Pa), which only simulations know.
+    ContactPressure,
     /// Normal force (N).
     Force,
 }
@@ -115,15 +151,28 @@ impl Quantity {
         match self {
             Self::Curvature => "curvature",
             Self::Pressure => "pressure",
+            Self::ContactPressure => "contact_pressure",
             Self::Force => "force",
         }
+    }
+
+    /// Quantity and place of a channel's name: `left_distal` of `pressure_left_distal`; none of other names.
+    pub fn of_name(name: &str) -> Option<(Self, &str)> {
+        [Self::Curvature, Self::Pressure, Self::ContactPressure, Self::Force]
+            .into_iter()
+            .find_map(|quantity| Some((quantity, name.strip_prefix(quantity.name())?.strip_prefix('_')?)))
+    }
+
+    /// True for a pressure of either kind.
+    pub fn is_pressure(self) -> bool {
+        matches!(self, Self::Pressure | Self::ContactPressure)
     }
 
     /// The unit of its values.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Curvature => "1/m",
-            Self::Pressure => "Pa",
+            Self::Pressure | Self::ContactPressure => "Pa",
             Self::Force => "N",
         }
     }
@@ -138,9 +187,23 @@ pub struct Channel {
     pub side: Side,
     /// Over which stretch of it.
     pub span: Span,
+    /// Definition of the signal. That of a force is always [`SignalDefinition::Parts`]: all definitions have the same.
+    pub signals: SignalDefinition,
 }
 
 impl Channel {
+    /// A channel of a layout; [`Quantity::Pressure`] becomes the pressure of the definition.
+    fn new(quantity: Quantity, side: Side, span: Span, signals: SignalDefinition) -> Self {
+        let (quantity, signals) = match (quantity, signals) {
+            (Quantity::Pressure, SignalDefinition::Contact | SignalDefinition::Hull) => {
+                (Quantity::ContactPressure, signals)
+            }
+            (Quantity::Force, _) => (quantity, SignalDefinition::Parts),
+            _ => (quantity, signals),
+        };
+        Self { quantity, side, span, signals }
+    }
+
     /// Its name in files: `pressure_left_distal`.
     pub fn name(&self) -> String {
         let (quantity, side) = (self.quantity.name(), self.side.name());
@@ -161,6 +224,21 @@ pub enum LayoutError {
         /// The name given.
         name: String,
     },
+    /// Force beside a pad's pressure.
+    #[error(
+        "{layout}+F would hold each pad twice, for its pressure is its force over its area: choose {layout}, or \
+         --signals contact for force beside the contact pressure of simulations"
+    )]
+    ForceTwice {
+        /// The layout, without force.
+        layout: &'static str,
+    },
+    /// Parts of a real gripper do not measure contact pressure.
+    #[error(
+        "physical-like sensors are the parts of a real gripper, which do not measure contact pressure: choose --signals \
+         parts, or --sensors virtual"
+    )]
+    NoSuchPart,
     /// A pressure sensor would cover no taxel.
     #[error(
         "layout {layout} has {sensors} pressure sensors per finger, but the pad has only {rows} rows of taxels: \
@@ -176,9 +254,9 @@ pub enum LayoutError {
     },
 }
 
-/// The channels of layout C1+F, which are the same on any gripper.
-pub fn whole_fingers() -> Vec<Channel> {
-    let pair = |quantity| Side::BOTH.map(|side| Channel { quantity, side, span: Span::WHOLE });
+/// Curvature, pressure and force of each finger, which any gripper has.
+pub fn whole_fingers(signals: SignalDefinition) -> Vec<Channel> {
+    let pair = |quantity| Side::BOTH.map(|side| Channel::new(quantity, side, Span::WHOLE, signals));
     [Quantity::Curvature, Quantity::Pressure, Quantity::Force].map(pair).concat()
 }
 
@@ -196,13 +274,28 @@ impl SensorLayout {
         }
     }
 
+    /// The same for channels that are learnt: refuses a pad's force beside its pressure.
+    pub fn learnt(name: &str, signals: SignalDefinition) -> Result<Self, LayoutError> {
+        let layout = Self::named(name)?;
+        match signals {
+            SignalDefinition::Parts if layout.force => Err(LayoutError::ForceTwice { layout: layout.name }),
+            _ => Ok(layout),
+        }
+    }
+
+    /// The layout that is shown and exported: of pads also the force, which is the same reading in newtons.
+    #[must_use]
+    pub fn shown(self, signals: SignalDefinition) -> Self {
+        Self { force: self.force || signals == SignalDefinition::Parts, ..self }
+    }
+
     /// The name with which [`SensorLayout::named`] finds it again.
     pub fn full_name(&self) -> String {
         format!("{}{}", self.name, if self.force { "+F" } else { "" })
     }
 
     /// The channels on a gripper: curvature left and right, then pressure, then force, each from palm to tip.
-    pub fn channels(&self, gripper: &GripperModel) -> Result<Vec<Channel>, LayoutError> {
+    pub fn channels(&self, gripper: &GripperModel, signals: SignalDefinition) -> Result<Vec<Channel>, LayoutError> {
         let pressure = self.pressure_spans(gripper.finger.joints);
         let grid = gripper.taxels();
         let covered = |span: &Span| (0..grid.rows).any(|r| span.holds((r as f64 + 0.5) / grid.rows as f64));
@@ -212,7 +305,7 @@ impl SensorLayout {
         let mut channels = Vec::new();
         let mut add = |quantity: Quantity, spans: &[Span]| {
             for side in Side::BOTH {
-                channels.extend(spans.iter().map(|span| Channel { quantity, side, span: span.clone() }));
+                channels.extend(spans.iter().map(|span| Channel::new(quantity, side, span.clone(), signals)));
             }
         };
         add(Quantity::Curvature, &self.curvature_spans());
@@ -260,7 +353,32 @@ mod tests {
     #[test]
     fn whole_fingers_are_the_layout_of_that_name() {
         let named = SensorLayout::named("C1+F").expect("in the catalogue");
-        assert_eq!(named.channels(&GripperModel::default()).expect("fits"), whole_fingers());
+        for signals in SignalDefinition::ALL {
+            assert_eq!(named.channels(&GripperModel::default(), signals).expect("fits"), whole_fingers(signals));
+            assert_eq!(SignalDefinition::named(signals.name()), Some(signals));
+        }
+    }
+
+    #[test]
+    fn contact_pressure_has_a_name_that_no_board_has_and_names_lead_back_to_quantities() {
+        let names = |signals| whole_fingers(signals).iter().map(Channel::name).collect::<Vec<_>>();
+        let [parts, contact, hull] = SignalDefinition::ALL.map(names);
+        assert_eq!(parts[2..], ["pressure_left", "pressure_right", "force_left", "force_right"]);
+        assert_eq!(contact[2..4], ["contact_pressure_left", "contact_pressure_right"]);
+        assert_eq!((&contact, &contact[4..]), (&hull, &parts[4..]));
+        assert_eq!(Quantity::of_name("contact_pressure_left"), Some((Quantity::ContactPressure, "left")));
+        assert_eq!(Quantity::of_name("pressure_right_joint_3"), Some((Quantity::Pressure, "right_joint_3")));
+        assert_eq!((Quantity::of_name("grip"), Quantity::of_name("force")), (None, None));
+    }
+
+    #[test]
+    fn a_pads_force_is_shown_beside_its_pressure_and_not_learnt_twice() {
+        let (parts, contact) = (SignalDefinition::Parts, SignalDefinition::Contact);
+        let refused = SensorLayout::learnt("c6+f", parts).expect_err("the same signal twice");
+        assert!(refused.to_string().contains("choose C6,"), "{refused}");
+        assert!(SensorLayout::learnt("C6+F", contact).is_ok_and(|layout| layout.force));
+        let shown = |signals| SensorLayout::learnt("C6", signals).expect("known").shown(signals).force;
+        assert!(shown(parts) && !shown(contact));
     }
 
     #[test]
@@ -268,11 +386,12 @@ mod tests {
         let gripper = GripperModel::default();
         let per_finger = [2, 3, 6, 11, 3, 4, 7, 12];
         for (layout, want) in CATALOGUE.iter().zip(per_finger) {
-            let channels = layout.channels(&gripper).expect("fits");
+            let channels = layout.channels(&gripper, SignalDefinition::Parts).expect("fits");
             assert_eq!(channels.len(), 2 * want, "{}", layout.name);
             let with_force = SensorLayout { force: true, ..layout.clone() };
             let forces = channels.iter().filter(|c| c.quantity == Quantity::Pressure).count();
-            assert_eq!(with_force.channels(&gripper).expect("fits").len(), 2 * want + forces);
+            let with = with_force.channels(&gripper, SignalDefinition::Contact).expect("fits");
+            assert_eq!(with.len(), 2 * want + forces);
             let mut names: Vec<String> = channels.iter().map(Channel::name).collect();
             names.sort();
             names.dedup();
@@ -298,7 +417,10 @@ mod tests {
     fn too_fine_and_unknown_layouts_are_refused() {
         let mut gripper = GripperModel::default();
         gripper.finger.joints = 80;
-        assert!(matches!(CATALOGUE[3].channels(&gripper), Err(LayoutError::EmptySpan { sensors: 80, .. })));
+        assert!(matches!(
+            CATALOGUE[3].channels(&gripper, SignalDefinition::Parts),
+            Err(LayoutError::EmptySpan { sensors: 80, .. })
+        ));
         assert!(SensorLayout::named("C9").is_err());
         assert!(SensorLayout::named("c1+f").is_ok_and(|layout| layout.force));
     }

@@ -2,8 +2,9 @@
 //!
 //! # Terms
 //!
-//! A **layout** (C1 .. C8) places curvature and pressure sensors on the fingers; each gives a **channel**. Channels
-//! over time are [`Signals`]. A real **board** sends **readings**: counts of its converter. A **calibration** of each
+//! A **layout** (C1 .. C8) places curvature and pressure sensors on the fingers; each gives a **channel**, whose
+//! **signal** is what a part of a real gripper measures, or a quantity that only simulations have
+//! ([`SignalDefinition`]). Channels over time are [`Signals`]. A real **board** sends **readings**: counts of its converter. A **calibration** of each
 //! part turns counts into angle, curvature, force and pressure; a **zero** (tare) removes drift. Trials keep raw data,
 //! so that any layout and calibration can be applied later.
 //!
@@ -16,10 +17,10 @@
 //! | 0 | [`board`] | sensors, readings and gaps of a board |
 //! | 0 | [`cadence`], [`capture`] | timing statistics of a stream, file format of captured bytes |
 //! | 0 | [`electronics`] | strip, pad, divider and converter |
-//! | 0 | `layout` | sensor layouts and their channels |
+//! | 0 | `layout` | sensor layouts, their channels and the definition of their signals |
 //! | 0 | `signals` | channels over time |
 //! | 1 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
-//! | 1 | `curvature`, `pressure` | circle fit along a finger, contact patch of a pad |
+//! | 1 | `curvature`, `pressure` | bend under a strip, circle fit along a finger; load and contact patch of a pad |
 //! | 1 | [`model`] | sensor models: clean signals to those of real sensors |
 //! | 1 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |
 //!
@@ -27,11 +28,11 @@
 //!
 //! ```
 //! use palpate_sim::{run::SimRun, scene::Scene};
-//! use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+//! use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};
 //!
 //! let scene = Scene::default();
 //! let frame = SimRun::new(&scene, None).0.first_look();
-//! let sensors = Sensors::new(&SensorLayout::named("C6+F")?, &scene.gripper, PressureArea::Participation)?;
+//! let sensors = Sensors::new(&SensorLayout::named("C6")?, &scene.gripper, SignalDefinition::Parts)?;
 //! let values = sensors.read(&frame);
 //! assert_eq!(sensors.channels()[0].name(), "curvature_left_proximal");
 //! assert_eq!(values[0], Some(0.0)); // a straight finger
@@ -50,11 +51,12 @@ mod pressure;
 mod signals;
 pub mod trial;
 
-pub use curvature::curvature;
+pub use curvature::{curvature, strip_curvature};
 pub use layout::{
-    CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, Span, whole_fingers,
+    CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, SignalDefinition, Span,
+    whole_fingers,
 };
-pub use pressure::{ContactPatch, PressureArea};
+pub use pressure::ContactPatch;
 pub use signals::Signals;
 
 use palpate_sim::frame::Frame;
@@ -65,25 +67,26 @@ use palpate_sim::gripper::{BentFinger, GripperModel, Side, TaxelGrid};
 pub struct Sensors {
     channels: Vec<Channel>,
     finger: palpate_sim::gripper::Finger,
+    /// Beginning and end of the strips, from the palm (m).
+    strip: [f64; 2],
     grid: TaxelGrid,
-    area: PressureArea,
 }
 
 impl Sensors {
-    /// Places a layout on a gripper. `area` selects the area of pressure.
-    pub fn new(layout: &SensorLayout, gripper: &GripperModel, area: PressureArea) -> Result<Self, LayoutError> {
-        Ok(Self::of(layout.channels(gripper)?, gripper, area))
+    /// Places a layout on a gripper.
+    pub fn new(layout: &SensorLayout, gripper: &GripperModel, signals: SignalDefinition) -> Result<Self, LayoutError> {
+        Ok(Self::of(layout.channels(gripper, signals)?, gripper))
     }
 
     /// Reads these channels of a gripper.
-    pub fn of(channels: Vec<Channel>, gripper: &GripperModel, area: PressureArea) -> Self {
-        Self { channels, finger: gripper.finger.clone(), grid: gripper.taxels(), area }
+    pub fn of(channels: Vec<Channel>, gripper: &GripperModel) -> Self {
+        let (finger, strip) = (gripper.finger.clone(), gripper.strip.reach(&gripper.finger));
+        Self { channels, finger, strip, grid: gripper.taxels() }
     }
 
-    /// Layout C1+F, which suits any gripper.
-    pub fn whole_fingers(gripper: &GripperModel) -> Self {
-        let (finger, grid) = (gripper.finger.clone(), gripper.taxels());
-        Self { channels: whole_fingers(), finger, grid, area: PressureArea::Participation }
+    /// Curvature, pressure and force of each finger, which suits any gripper.
+    pub fn whole_fingers(gripper: &GripperModel, signals: SignalDefinition) -> Self {
+        Self::of(whole_fingers(signals), gripper)
     }
 
     /// Adds channels that it lacks, after those it has.
@@ -101,19 +104,32 @@ impl Sensors {
     }
 
     /// One value per channel, in the channel's unit; `None` where a pressure is undefined because the contact spans
-    /// no area (only with [`PressureArea::Hull`]).
+    /// no area (only with [`SignalDefinition::Hull`]).
     pub fn read(&self, frame: &Frame) -> Vec<Option<f64>> {
         let bent = Side::BOTH.map(|side| BentFinger::new(&self.finger, frame.joints(side)));
         self.channels
             .iter()
-            .map(|channel| match channel.quantity {
-                Quantity::Curvature => {
+            .map(|channel| match (channel.quantity, channel.signals) {
+                (Quantity::Curvature, SignalDefinition::Parts) => Some(strip_curvature(
+                    frame.joints(channel.side),
+                    self.finger.length,
+                    self.strip_over(&channel.span),
+                )),
+                (Quantity::Curvature, _) => {
                     Some(curvature(&bent[channel.side.index()], frame.joints(channel.side), &channel.span))
                 }
-                Quantity::Pressure => self.patch(frame, channel).pressure(self.area),
-                Quantity::Force => Some(self.patch(frame, channel).force()),
+                (Quantity::Pressure | Quantity::ContactPressure, signals) => {
+                    self.patch(frame, channel).pressure(signals)
+                }
+                (Quantity::Force, _) => Some(self.patch(frame, channel).force()),
             })
             .collect()
+    }
+
+    /// Reach of the strip of a stretch, from the palm (m): the gripper's own on a whole finger, else all of the stretch.
+    fn strip_over(&self, span: &Span) -> [f64; 2] {
+        let (from, to) = span.ends();
+        if *span == Span::WHOLE { self.strip } else { [from, to].map(|share| share * self.finger.length) }
     }
 
     /// Reads the frames of a trial. Where a pressure is undefined it counts as none.
@@ -135,37 +151,64 @@ impl Sensors {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::electronics::PadPart;
     use palpate_sim::frame::TaxelLoad;
-    use palpate_sim::gripper::Phase;
+    use palpate_sim::gripper::{Auto, Phase, Strip};
+
+    fn frame(q: Vec<f64>, taxels: Vec<TaxelLoad>) -> Frame {
+        Frame {
+            sample: 0,
+            t: 0.0,
+            line_bar: 0.5,
+            phase: Phase::Close,
+            q,
+            sways: [palpate_sim::gripper::Sway::NONE; 2],
+            hand: glam::DVec3::ZERO,
+            world_from_object: None,
+            taxels,
+        }
+    }
 
     #[test]
     fn a_frame_is_read_channel_by_channel() {
         let gripper = GripperModel::default();
         let layout = SensorLayout::named("C6+F").expect("in the catalogue");
-        let sensors = Sensors::new(&layout, &gripper, PressureArea::Participation).expect("fits");
-        let frame = Frame {
-            sample: 0,
-            t: 0.0,
-            line_bar: 0.5,
-            phase: Phase::Close,
-            q: [vec![0.05; 10], vec![0.0; 10]].concat(),
-            sways: [palpate_sim::gripper::Sway::NONE; 2],
-            hand: glam::DVec3::ZERO,
-            world_from_object: None,
-            // One taxel on the distal half of the right pad.
-            taxels: vec![TaxelLoad { taxel: 160 + 150, normal: 0.2, along: 0.0, across: 0.0 }],
-        };
-        let values = sensors.read(&frame);
-        let value = |name: &str| {
+        let sensors = Sensors::new(&layout, &gripper, SignalDefinition::Contact).expect("fits");
+        let parts = Sensors::new(&layout, &gripper, SignalDefinition::Parts).expect("fits");
+        // One taxel on the distal half of the right pad.
+        let load = TaxelLoad { taxel: 160 + 150, normal: 0.2, along: 0.0, across: 0.0 };
+        let frame = frame([vec![0.05; 10], vec![0.0; 10]].concat(), vec![load]);
+        let value = |sensors: &Sensors, name: &str| {
             let at = sensors.channels().iter().position(|c| c.name() == name).expect(name);
-            values[at].expect("defined")
+            sensors.read(&frame)[at].expect("defined")
         };
-        assert!((value("curvature_left_proximal") - 5.0).abs() < 1e-2);
-        assert_eq!(value("curvature_right_distal"), 0.0);
-        assert_eq!(value("pressure_right_proximal"), 0.0);
         let area = gripper.taxels().area();
-        assert!((value("pressure_right_distal") - f64::from(0.2f32) / area).abs() < 1e-6);
-        assert!((value("force_right_distal") - 0.2).abs() < 1e-6);
-        assert_eq!(value("force_left_distal"), 0.0);
+        assert!((value(&sensors, "curvature_left_proximal") - 5.0).abs() < 1e-2);
+        assert_eq!(value(&sensors, "contact_pressure_right_proximal"), 0.0);
+        assert!((value(&sensors, "contact_pressure_right_distal") - f64::from(0.2f32) / area).abs() < 1e-6);
+        assert!((value(&parts, "curvature_left_proximal") - 5.0).abs() < 1e-12);
+        assert_eq!(value(&parts, "pressure_right_proximal"), 0.0);
+        assert!((value(&parts, "pressure_right_distal") * PadPart::ACTIVE_AREA - f64::from(0.2f32)).abs() < 1e-12);
+        for sensors in [&sensors, &parts] {
+            assert_eq!(value(sensors, "curvature_right_distal"), 0.0);
+            assert!((value(sensors, "force_right_distal") - 0.2).abs() < 1e-6);
+            assert_eq!(value(sensors, "force_left_distal"), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_strip_reads_where_the_scene_has_it() {
+        let mut gripper = GripperModel::default();
+        let q = [0.0, 0.0, 0.0, 0.0, 0.1, 0.1, 0.1, 0.2, 0.2, 0.2];
+        let read = |gripper: &GripperModel| {
+            let sensors = Sensors::whole_fingers(gripper, SignalDefinition::Parts);
+            sensors.read(&frame([q; 2].concat(), Vec::new()))[0].expect("always defined")
+        };
+        // 22.23 to 77.6 mm: three segments of 0.1 rad and 7.6 mm of one of 0.2 rad.
+        assert!((read(&gripper) - (0.3 + 0.2 * 0.76) / Strip::ACTIVE_LENGTH).abs() < 1e-9);
+        gripper.strip.from_m = Auto::Value(0.04);
+        assert!((read(&gripper) - (0.3 + 0.2 * 2.537) / Strip::ACTIVE_LENGTH).abs() < 1e-9);
+        gripper.strip = Strip { from_m: Auto::Auto, length_m: Auto::Value(0.1) };
+        assert!((read(&gripper) - 9.0).abs() < 1e-9);
     }
 }

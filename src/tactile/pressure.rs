@@ -1,4 +1,7 @@
-//! Pressure over a stretch of a pad: P = F / A (paper, section IV-A1).
+//! Load on a stretch of a pad, and its pressure P = F / A.
+//!
+//! A pad of the real gripper measures its force; its pressure is that over its sensing area, whatever touches it. The
+//! contact pressure of simulations (paper, section IV-A1) is force over the area of the contact.
 //!
 //! The paper takes for A the convex hull of the contact points. That area jumps by half when one more row of taxels
 //! touches, and is zero, the pressure undefined, while a single row or point touches. The participation area
@@ -8,23 +11,12 @@
 //! is defined whenever there is a force: it is the area of n equally loaded taxels, and grows smoothly as load
 //! spreads. Sum of taxel pressure times area is the force exactly.
 
-use super::Span;
+use super::electronics::PadPart;
+use super::{SignalDefinition, Span};
 use glam::DVec2;
 use palpate_geometry::convex_hull_area;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, TaxelGrid};
-use serde::{Deserialize, Serialize};
-
-/// Area that force is divided by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PressureArea {
-    /// Always defined.
-    #[default]
-    Participation,
-    /// As in the paper; undefined for points and rows.
-    Hull,
-}
 
 /// The loaded part of a stretch of one pad.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,13 +59,14 @@ impl ContactPatch {
     }
 
     /// Pressure (Pa): zero without load, `None` where load spans no area.
-    pub fn pressure(&self, area: PressureArea) -> Option<f64> {
+    pub fn pressure(&self, signals: SignalDefinition) -> Option<f64> {
         if self.force == 0.0 {
             return Some(0.0);
         }
-        let area = match area {
-            PressureArea::Participation => self.participation_area(),
-            PressureArea::Hull => self.hull_area(),
+        let area = match signals {
+            SignalDefinition::Parts => PadPart::ACTIVE_AREA,
+            SignalDefinition::Contact => self.participation_area(),
+            SignalDefinition::Hull => self.hull_area(),
         };
         (area > 0.0).then(|| self.force / area)
     }
@@ -111,24 +104,26 @@ mod tests {
         let (patch, grid) = patch(&loads);
         assert!((patch.force() - 6.0).abs() < 1e-12);
         assert!((patch.participation_area() - 24.0 * grid.area()).abs() < 1e-15);
-        let pressure = patch.pressure(PressureArea::Participation).expect("loaded");
+        let pressure = patch.pressure(SignalDefinition::Contact).expect("loaded");
         assert!((pressure - 0.25 / grid.area()).abs() < 1e-9);
         // The hull runs through taxel middles: five row pitches by three column pitches.
         let hull = 15.0 * grid.area();
-        assert!((patch.pressure(PressureArea::Hull).expect("has an area") - 6.0 / hull).abs() < 1e-9);
+        let pad = patch.pressure(SignalDefinition::Parts).expect("always defined");
+        assert!((pad * 169.717e-6 - 6.0).abs() < 1e-4, "{pad}");
+        assert!((patch.pressure(SignalDefinition::Hull).expect("has an area") - 6.0 / hull).abs() < 1e-9);
     }
 
     #[test]
     fn a_single_row_has_no_hull_but_a_pressure() {
         let (patch, _) = patch(&[(80, 0.1), (81, 0.2), (82, 0.2), (83, 0.1)]);
-        assert_eq!(patch.pressure(PressureArea::Hull), None);
-        assert!(patch.pressure(PressureArea::Participation).is_some_and(|p| p > 0.0));
+        assert_eq!(patch.pressure(SignalDefinition::Hull), None);
+        assert!(patch.pressure(SignalDefinition::Contact).is_some_and(|p| p > 0.0));
     }
 
     #[test]
     fn no_load_is_no_pressure() {
         let (patch, _) = patch(&[(5, -0.1)]);
-        assert_eq!(patch.pressure(PressureArea::Hull), Some(0.0));
-        assert_eq!(patch.pressure(PressureArea::Participation), Some(0.0));
+        assert_eq!(patch.pressure(SignalDefinition::Hull), Some(0.0));
+        assert_eq!(patch.pressure(SignalDefinition::Contact), Some(0.0));
     }
 }

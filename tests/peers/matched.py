@@ -68,7 +68,7 @@ def palpate(program, scene, settings=(), accuracy="draft"):
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "trial.csv"
         command = [program, "grasp", "--scene", str(HERE / "scenes" / f"{scene}.toml"), "--accuracy", accuracy]
-        command += ["--no-store", "--json", "--out", str(out), "--layout", "C1+F"]
+        command += ["--no-store", "--json", "--out", str(out), "--layout", "C1+F", "--signals", "contact"]
         for setting in settings:
             command += ["--set", setting]
         report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

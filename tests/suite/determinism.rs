@@ -7,7 +7,7 @@ use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_store::{Store, encode_frames, write_contacts_csv, write_trial_csv};
 use palpate_tactile::trial::{SimulatedData, SimulatedTrial};
-use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};
 use std::path::Path;
 
 /// A mesh that is baked in parallel, a union of primitives, and a primitive.
@@ -37,7 +37,7 @@ fn bytes_of(name: &str, seed: u64) -> Bytes {
     let folder = tempfile::tempdir().unwrap();
     let (csv, contacts) = (folder.path().join("a.csv"), folder.path().join("a.contacts.csv"));
     let layout = SensorLayout::named("C6+F").unwrap();
-    let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).unwrap();
+    let sensors = Sensors::new(&layout, &scene.gripper, SignalDefinition::Contact).unwrap();
     write_trial_csv(&csv, &trial, &scene, &sensors).unwrap();
     write_contacts_csv(&contacts, &trial, &scene).unwrap();
     Bytes {

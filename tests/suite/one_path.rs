@@ -20,7 +20,7 @@ use palpate_store::labels::Flag;
 use palpate_store::{ImportedTrial, Store};
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{Control, TrialId};
-use palpate_tactile::{Channel, PressureArea, SensorLayout, Signals};
+use palpate_tactile::{Channel, SensorLayout, Signals};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -199,8 +199,7 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     let mut live = Identification::new(Arc::clone(&model), StopRule::default());
     let more = live.channels_on(&scene.gripper).unwrap();
     let reader =
-        FrameReader::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, PressureArea::default(), &more)
-            .unwrap();
+        FrameReader::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, more[0].signals, &more).unwrap();
     live.begin_grasp(reader.channels().iter().map(Channel::name).enumerate()).unwrap();
     let rows: Vec<_> = trial.frames().iter().map(|frame| reader.row(frame)).collect();
     for row in &rows {

@@ -1,6 +1,7 @@
 //! This grasp in numbers: object, present readings, and result of the last grasp.
 
 use crate::app::actions::Actions;
+use crate::app::channel_curves::shows;
 use crate::app::context::PanelContext;
 use crate::app::theme::colour;
 use crate::app::widgets::wrapped;
@@ -55,7 +56,7 @@ fn object_ui(ui: &mut Ui, object: &ObjectCard) {
 fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
     let newest = |quantity: Quantity, side: Side| -> Option<f64> {
         let trace = context.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
-        let index = snapshot.channels.iter().position(|c| c.quantity == quantity && c.side == side)?;
+        let index = snapshot.channels.iter().position(|c| shows(quantity, c) && c.side == side)?;
         trace.channels.get(index)?.last().map(|value| f64::from(*value))
     };
     ui.spacing_mut().interact_size.y = 18.0;

@@ -2,7 +2,7 @@
 //! finger or the object gives way.
 
 use crate::app::actions::Actions;
-use crate::app::channel_curves::colour_of;
+use crate::app::channel_curves::{colour_of, shows};
 use crate::app::context::PanelContext;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
@@ -24,7 +24,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
     let theme = context.view.theme;
     let channels = context.shown().channels();
     let find = |quantity: Quantity, side: Side| {
-        let wanted = |channel: &Channel| channel.quantity == quantity && channel.side == side;
+        let wanted = |channel: &Channel| shows(quantity, channel) && channel.side == side;
         channels.iter().position(|channel| channel.is_some_and(wanted))
     };
     let finger = |side: Side| {

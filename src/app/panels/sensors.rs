@@ -1,4 +1,4 @@
-//! Choice of sensors for the simulated gripper and stored trials: sensor layout, area of pressure, sensor model, and the model
+//! Choice of sensors for the simulated gripper and stored trials: sensor layout, signals, sensor model, and the model
 //! that recognises; and in which poses the simulation grasps.
 
 use crate::app::actions::Actions;
@@ -9,11 +9,11 @@ use crate::app::features::tools::ToolAction;
 use crate::app::features::view::ViewAction;
 
 use crate::app::widgets::{just_opened, wrapped};
-use egui::{ComboBox, RichText, ScrollArea, Ui};
+use egui::{Checkbox, ComboBox, RichText, ScrollArea, Ui};
 use palpate_lab::workers::TrainCommand;
 use palpate_sim::scene::{Between, PRESETS, PoseSpread};
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::{CATALOGUE, PressureArea};
+use palpate_tactile::{CATALOGUE, SignalDefinition};
 use std::path::Path;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -39,16 +39,30 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             });
             shown.response.on_hover_text("Sensor layout: stretches of a finger with a sensor of their own");
             let mut with_force = force;
-            ui.checkbox(&mut with_force, "force (+F)").on_hover_text("Force as a channel beside each pressure");
+            ui.add_enabled(now.signals != SignalDefinition::Parts, Checkbox::new(&mut with_force, "force (+F)"))
+                .on_hover_text("Force as a channel beside each contact pressure")
+                .on_disabled_hover_text("A pad gives one signal: its pressure is its force over its area");
             sensors.layout = if with_force { format!("{chosen}+F") } else { chosen };
         });
         ui.horizontal_wrapped(|ui| {
-            ui.label("Pressure over");
-            for (area, name, hint) in [
-                (PressureArea::Participation, "participation area", "Area of equally loaded taxels; always defined"),
-                (PressureArea::Hull, "convex hull", "Area of the paper (section IV-A1); undefined for points and rows"),
+            ui.label("Signals");
+            for (signals, name, hint) in [
+                (SignalDefinition::Parts, "parts", "What strips and pads measure, as on a real gripper"),
+                (
+                    SignalDefinition::Contact,
+                    "contact",
+                    "Simulation only: circle through all joints, force over the participation area of the contact",
+                ),
+                (
+                    SignalDefinition::Hull,
+                    "hull",
+                    "Simulation only: force over the convex hull of the contacts, as in the paper (section IV-A1); \
+                     undefined for points and rows",
+                ),
             ] {
-                ui.selectable_value(&mut sensors.area, area, name).on_hover_text(hint);
+                if ui.selectable_label(sensors.signals == signals, name).on_hover_text(hint).clicked() {
+                    sensors = sensors.clone().with_signals(signals);
+                }
             }
         });
         ui.horizontal_wrapped(|ui| {
@@ -58,8 +72,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                     SensorModel::Virtual => "Ideal sensors, as in the paper's simulation",
                     SensorModel::PhysicalLike => "Strips, pads and clock of a real gripper, with their noise and drift",
                 };
-                ui.selectable_value(&mut sensors.sensors, model, format!("{} sensors", model.name()))
-                    .on_hover_text(hint);
+                let label = format!("{} sensors", model.name());
+                if ui.selectable_label(sensors.sensors == model, label).on_hover_text(hint).clicked() {
+                    sensors.sensors = model;
+                    if sensors.is_physical() {
+                        sensors = sensors.clone().with_signals(SignalDefinition::Parts);
+                    }
+                }
             }
         });
         if sensors != *now {

@@ -9,8 +9,8 @@ use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::Scene;
-use palpate_tactile::Sensors;
 use palpate_tactile::electronics::StripPart;
+use palpate_tactile::{Quantity, Sensors, SignalDefinition};
 use std::collections::VecDeque;
 
 /// Length of a simulation that a host drives (s): a day, after which the fingers stop.
@@ -279,7 +279,7 @@ impl LiveGrasp {
         if programme.is_none() {
             (endless.timing.sample_hz, endless.timing.actuation_hz) = (DRIVEN_HZ, DRIVEN_HZ);
         }
-        let sensors = Sensors::whole_fingers(&scene.gripper);
+        let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts);
         let rig = SimRun::new(&endless, object).0;
         Self { rig, sensors, start_s, ends_s, programme, line_bar: 0.0, frames: Default::default(), failed: None }
     }
@@ -316,9 +316,9 @@ impl LiveGrasp {
         for (channel, value) in self.sensors.channels().iter().zip(values) {
             let (side, value) = (channel.side.index(), value.unwrap_or_default());
             match channel.quantity {
-                palpate_tactile::Quantity::Curvature => stimulus.kappa[side] = value,
-                palpate_tactile::Quantity::Force => stimulus.force[side] = value,
-                palpate_tactile::Quantity::Pressure => {}
+                Quantity::Curvature => stimulus.kappa[side] = value,
+                Quantity::Force => stimulus.force[side] = value,
+                Quantity::Pressure | Quantity::ContactPressure => {}
             }
         }
         stimulus

@@ -139,7 +139,7 @@ const MOST_BENDING_LOAD: [f64; 2] = [0.005, 0.02];
 /// Curvature and force on the sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Stimulus {
-    /// Mean curvature, left and right (1/m).
+    /// Curvature under the strip, left and right (1/m).
     pub kappa: [f64; 2],
     /// Normal force on the pad, left and right (N).
     pub force: [f64; 2],

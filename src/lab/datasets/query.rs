@@ -7,26 +7,45 @@ use palpate_sim::scene::{Between, PRESETS, PoseSpread};
 use palpate_store::{Store, StoreError, TrialRow};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
-use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors, Signals};
+use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Sensors, SignalDefinition, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Sensors through which simulated trials are read. Imported trials have their own channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "StoredView")]
 pub struct SensorView {
-    /// Name of the sensor layout: `C1+F`.
+    /// Name of the sensor layout: `C1`.
     pub layout: String,
     /// Sensor model: ideal, or like those of the real gripper.
     pub sensors: SensorModel,
-    /// Area that force is divided by.
-    #[serde(default)]
-    pub area: PressureArea,
+    /// Definition of the signals.
+    pub signals: SignalDefinition,
 }
 
 impl Default for SensorView {
     fn default() -> Self {
-        Self { layout: "C1+F".to_owned(), sensors: SensorModel::Virtual, area: PressureArea::Participation }
+        Self { layout: "C1".to_owned(), sensors: SensorModel::Virtual, signals: SignalDefinition::Parts }
+    }
+}
+
+/// A view as this version or an earlier one stored it. Earlier ones divided force by an area, and had force as a channel
+/// of its own by default.
+#[derive(Deserialize)]
+struct StoredView {
+    layout: String,
+    sensors: SensorModel,
+    signals: Option<SignalDefinition>,
+    area: Option<String>,
+}
+
+impl From<StoredView> for SensorView {
+    fn from(stored: StoredView) -> Self {
+        let by_hull = stored.area.is_some_and(|area| area == "hull");
+        let earlier = if by_hull { SignalDefinition::Hull } else { SignalDefinition::Parts };
+        Self { layout: stored.layout, sensors: stored.sensors, signals: earlier }
+            .with_signals(stored.signals.unwrap_or(earlier))
     }
 }
 
@@ -91,6 +110,15 @@ pub enum DatasetError {
         other: TrialId,
         /// Its channels.
         other_channels: String,
+    },
+    /// A trial of a real gripper, asked for channels of the simulation.
+    #[error(
+        "trial {id} is of a real gripper, whose pads do not measure contact pressure: choose --signals parts, or --rig \
+         sim for simulated trials alone"
+    )]
+    OnlySimulated {
+        /// The trial.
+        id: TrialId,
     },
     /// A trial of the real gripper whose channels cannot be derived.
     #[error("trial {id} of the real gripper does not give the channels of layout {layout}: {why}")]
@@ -186,6 +214,7 @@ impl DatasetQuery {
         view: &SensorView,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
+        view.learnt().map_err(|cause| DatasetError::Layout { cause })?;
         let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
         // Unlabelled trials.
         rows.retain(|row| !row.object.is_empty());
@@ -312,6 +341,7 @@ fn card(origins: &BTreeSet<Origin>, view: &SensorView, collections: Vec<String>,
         grasps,
         layout: seen.then(|| view.layout.to_ascii_uppercase()),
         sensors: seen.then(|| view.sensors.name().to_owned()),
+        signals: seen.then(|| view.signals.name().to_owned()),
         left_out: 0,
     }
 }
@@ -369,10 +399,14 @@ fn signals_of(
 
 /// Reads the signals of a real gripper, calibrated, in the channels of the layout.
 fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<TrialSignals, DatasetError> {
+    if view.signals != SignalDefinition::Parts {
+        return Err(DatasetError::OnlySimulated { id });
+    }
     let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
     let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
-    let channels = layout.channels(&GripperModel::default()).map_err(|cause| DatasetError::Layout { cause })?;
+    let channels =
+        layout.channels(&GripperModel::default(), view.signals).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
     let signals = read.grasp(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
         id,
@@ -386,20 +420,57 @@ fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<TrialS
 impl SensorView {
     /// Sensors that a recogniser expects of simulated trials.
     pub fn of_model(card: &ModelCard) -> Self {
-        let usual = Self::default();
         let data = &card.data;
+        // Earlier versions learnt the force of a board's pads beside their pressure.
+        let forces =
+            card.channels.iter().filter_map(|name| Quantity::of_name(name)).any(|own| own.0 == Quantity::Force);
         Self {
-            layout: data.layout.clone().unwrap_or(usual.layout),
+            layout: data.layout.clone().unwrap_or_else(|| if forces { "C1+F" } else { "C1" }.to_owned()),
             sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
-            area: usual.area,
+            signals: data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default(),
         }
+    }
+
+    /// The same with another definition of the signals, and without what that definition does not have.
+    #[must_use]
+    pub fn with_signals(mut self, signals: SignalDefinition) -> Self {
+        match signals {
+            SignalDefinition::Parts => {
+                let plain = SensorLayout::named(&self.layout).map(|layout| layout.name.to_owned());
+                self.layout = plain.unwrap_or(self.layout);
+            }
+            SignalDefinition::Contact | SignalDefinition::Hull => self.sensors = SensorModel::Virtual,
+        }
+        Self { signals, ..self }
+    }
+
+    /// True for the sensors of a real gripper.
+    pub fn is_physical(&self) -> bool {
+        self.sensors == SensorModel::PhysicalLike
+    }
+
+    /// The layout, as recognisers learn it.
+    pub fn learnt(&self) -> Result<SensorLayout, LayoutError> {
+        self.check_parts()?;
+        SensorLayout::learnt(&self.layout, self.signals)
+    }
+
+    /// The layout, as it is shown and exported.
+    pub fn shown(&self) -> Result<SensorLayout, LayoutError> {
+        Ok(self.learnt()?.shown(self.signals))
+    }
+
+    fn check_parts(&self) -> Result<(), LayoutError> {
+        let none = self.is_physical() && self.signals != SignalDefinition::Parts;
+        if none { Err(LayoutError::NoSuchPart) } else { Ok(()) }
     }
 
     /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it
     /// differs between classes only by residues of integrators and dampers.
     pub fn signals(&self, trial: &SimulatedTrial) -> Result<Signals, LayoutError> {
+        self.check_parts()?;
         let layout = SensorLayout::named(&self.layout)?;
-        let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.area)?;
+        let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.signals)?;
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         Ok(self.sensors.apply(&clean, noise_seed(&trial.header)).until(end))
@@ -426,5 +497,26 @@ mod tests {
     fn the_shipped_model_knows_all_objects_and_the_empty_hand() {
         let model = palpate_learn::shipped_model().expect("valid");
         assert_eq!(model.card.labels, labels_of_catalogue());
+    }
+
+    #[test]
+    fn stored_views_of_earlier_versions_show_what_pads_measure() -> serde_json::Result<()> {
+        let view = |text: &str| serde_json::from_str::<SensorView>(text);
+        let earlier = view(r#"{ "layout": "C6+F", "sensors": "physical-like", "area": "participation" }"#)?;
+        let wanted =
+            SensorView { layout: "C6".to_owned(), sensors: SensorModel::PhysicalLike, ..SensorView::default() };
+        assert_eq!(
+            (&earlier, view(r#"{ "layout": "C1+F", "sensors": "virtual" }"#)?),
+            (&wanted, SensorView::default())
+        );
+        let hull = view(r#"{ "layout": "C1+F", "sensors": "virtual", "area": "hull" }"#)?;
+        assert_eq!((hull.layout.as_str(), hull.signals), ("C1+F", SignalDefinition::Hull));
+        for own in [&wanted, &hull] {
+            assert_eq!(&view(&serde_json::to_string(own)?)?, own);
+            assert!(own.learnt().is_ok());
+        }
+        let impossible = SensorView { signals: SignalDefinition::Contact, ..wanted };
+        assert_eq!(impossible.learnt(), Err(LayoutError::NoSuchPart));
+        Ok(())
     }
 }

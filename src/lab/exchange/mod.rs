@@ -212,7 +212,7 @@ mod tests {
             let wanted = crate::grasping::FrameReader::new(
                 &palpate_tactile::SensorLayout::named("C1+F")?,
                 &stored.header.scene.gripper,
-                palpate_tactile::PressureArea::Participation,
+                palpate_tactile::SignalDefinition::Parts,
                 &[],
             )?;
             // Where a pressure is undefined, recognisers take none: so do imported trials.

@@ -17,7 +17,7 @@ use super::run::prepare_refined;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, IntegrationMethod, Scene};
 use palpate_tactile::trial::SimulatedTrial;
-use palpate_tactile::{Channel, Quantity, Sensors};
+use palpate_tactile::{Channel, Quantity, Sensors, SignalDefinition};
 use serde::{Deserialize, Serialize};
 
 /// Estimated errors of several channels, sample by sample.
@@ -101,8 +101,8 @@ impl ErrorNorms {
         readings: &[Vec<Option<f64>>],
         error: impl Fn(usize, usize) -> Option<f64>,
     ) -> Self {
-        let of = |quantity: Quantity| {
-            let own = || channels.iter().enumerate().filter(move |(_, c)| c.quantity == quantity).map(|(i, _)| i);
+        let of = |wanted: fn(Quantity) -> bool| {
+            let own = || channels.iter().enumerate().filter(move |(_, c)| wanted(c.quantity)).map(|(i, _)| i);
             let errors = own().flat_map(|i| (0..readings.len()).map(move |k| (i, k))).filter_map(|(i, k)| error(i, k));
             let (sum, count) = errors.fold((0.0, 0u32), |(sum, count), e| (sum + e * e, count + 1));
             let values = || own().flat_map(|i| readings.iter().filter_map(move |row| row.get(i).copied().flatten()));
@@ -110,9 +110,9 @@ impl ErrorNorms {
             let rms = (sum / f64::from(count.max(1))).sqrt();
             (rms, if range > 0.0 { rms / range } else { 0.0 })
         };
-        let (curvature_per_m, curvature_share) = of(Quantity::Curvature);
-        let (pressure_pa, pressure_share) = of(Quantity::Pressure);
-        let (force_n, force_share) = of(Quantity::Force);
+        let (curvature_per_m, curvature_share) = of(|own| own == Quantity::Curvature);
+        let (pressure_pa, pressure_share) = of(Quantity::is_pressure);
+        let (force_n, force_share) = of(|own| own == Quantity::Force);
         Self { curvature_per_m, curvature_share, pressure_pa, pressure_share, force_n, force_share }
     }
 
@@ -121,9 +121,10 @@ impl ErrorNorms {
         Self::between_sensed([(trial, sensors), (other, sensors)])
     }
 
-    /// The same for the sensors of whole fingers, where the trials may differ in joints and taxels.
+    /// The same for circles and contact pressure of whole fingers, where the trials may differ in joints and taxels.
     pub fn of_whole_fingers(trial: &SimulatedTrial, other: &SimulatedTrial) -> Self {
-        let [own, others] = [trial, other].map(|trial| Sensors::whole_fingers(&trial.header.scene.gripper));
+        let [own, others] =
+            [trial, other].map(|trial| Sensors::whole_fingers(&trial.header.scene.gripper, SignalDefinition::Contact));
         Self::between_sensed([(trial, &own), (other, &others)])
     }
 
@@ -172,12 +173,10 @@ mod tests {
     use glam::DVec3;
     use palpate_geometry::Primitive;
     use palpate_sim::scene::{Accuracy, Integrator};
-    use palpate_tactile::{PressureArea, SensorLayout};
     use rayon::prelude::*;
 
     fn sensors(scene: &Scene) -> Sensors {
-        let layout = SensorLayout::named("C1+F").expect("in the catalogue");
-        Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits")
+        Sensors::whole_fingers(&scene.gripper, SignalDefinition::Contact)
     }
 
     #[test]

@@ -7,7 +7,7 @@ use palpate_learn::{
 };
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::trial::EarlierGrasps;
-use palpate_tactile::{Channel, LayoutError, SensorLayout};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, SignalDefinition};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -187,11 +187,12 @@ impl Identification {
         }
     }
 
-    /// The channels that the model reads, on this gripper.
+    /// Channels on this gripper, among them those that the model reads.
     pub fn channels_on(&self, gripper: &GripperModel) -> Result<Vec<Channel>, IdentifyError> {
-        let layout = self.model.card.data.layout.as_deref().unwrap_or("C1+F");
-        SensorLayout::named(layout)
-            .and_then(|layout| layout.channels(gripper))
+        let data = &self.model.card.data;
+        let signals = data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default();
+        SensorLayout::named(data.layout.as_deref().unwrap_or("C1"))
+            .and_then(|layout| layout.shown(signals).channels(gripper, signals))
             .map_err(|cause| IdentifyError::Layout { cause })
     }
 

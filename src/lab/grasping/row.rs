@@ -5,7 +5,7 @@ use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::SensorEstimate;
-use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, Sensors};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors, SignalDefinition};
 
 /// One sample: a value per channel, in the channel's unit; NaN where it is undefined.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,21 +37,21 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Reads the channels of a layout, followed by those of `more` that it lacks; force is divided by `area`.
+    /// Reads the channels of a layout, followed by those of `more` that it lacks.
     pub fn new(
         layout: &SensorLayout,
         gripper: &GripperModel,
-        area: PressureArea,
+        signals: SignalDefinition,
         more: &[Channel],
     ) -> Result<Self, LayoutError> {
-        let mut sensors = Sensors::new(layout, gripper, area)?;
+        let mut sensors = Sensors::new(layout, gripper, signals)?;
         sensors.add(more);
         Ok(Self { sensors })
     }
 
     /// Reads these channels.
     pub fn of(channels: Vec<Channel>, gripper: &GripperModel) -> Self {
-        Self { sensors: Sensors::of(channels, gripper, PressureArea::Participation) }
+        Self { sensors: Sensors::of(channels, gripper) }
     }
 
     /// The channels of its rows.

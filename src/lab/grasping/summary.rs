@@ -4,7 +4,7 @@ use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, Side, Sway};
 use palpate_sim::scene::{Effect, Scene};
 use palpate_tactile::trial::SimulatedTrial;
-use palpate_tactile::{ContactPatch, PressureArea, Span, curvature};
+use palpate_tactile::{Quantity, Sensors, SignalDefinition, whole_fingers};
 use serde::Serialize;
 
 /// Normal force on a pad that counts as contact (N): below the 0.15 N at which the real force sensor wakes, well above
@@ -48,10 +48,12 @@ pub struct ShakenSummary {
 pub struct HoldSummary {
     /// Normal force on each pad (N).
     pub force_n: [f64; 2],
-    /// Curvature of each whole finger (1/m).
+    /// Curvature that each strip measures (1/m).
     pub curvature_per_m: [f64; 2],
-    /// Pressure over the participation area of each pad (Pa).
+    /// Pressure that each pad measures: force over its sensing area (Pa).
     pub pressure_pa: [f64; 2],
+    /// Force over the participation area of the contact (Pa).
+    pub contact_pressure_pa: [f64; 2],
     /// Shape out of their planes; null for fingers that stay in them.
     pub out_of_plane: Option<OutOfPlaneSummary>,
 }
@@ -107,11 +109,14 @@ impl HoldSummary {
             return None;
         }
         let gripper = &scene.gripper;
-        let grid = gripper.taxels();
         let mean = |value: &dyn Fn(&Frame, Side) -> f64| {
             Side::BOTH.map(|side| frames.iter().map(|f| value(f, side)).sum::<f64>() / frames.len() as f64)
         };
-        let patch = |frame: &Frame, side: Side| ContactPatch::new(frame, side, &grid, &Span::WHOLE);
+        let read = |signals: SignalDefinition, wanted: Quantity| {
+            let channels = whole_fingers(signals).into_iter().filter(|channel| channel.quantity == wanted);
+            let sensors = Sensors::of(channels.collect(), gripper);
+            mean(&|frame, side| sensors.read(frame)[side.index()].unwrap_or_default())
+        };
         let tip = |frame: &Frame, side: Side| {
             let placed = frame.placed(gripper, side);
             let last = placed.lengths.len() - 1;
@@ -123,14 +128,10 @@ impl HoldSummary {
                 tip_m: mean(&tip),
                 twist_rad: mean(&|frame, side| frame.sways[side.index()].twist * gripper.finger.length),
             }),
-            force_n: mean(&|frame, side| patch(frame, side).force()),
-            curvature_per_m: mean(&|frame, side| {
-                let q = frame.joints(side);
-                curvature(&palpate_sim::gripper::BentFinger::new(&gripper.finger, q), q, &Span::WHOLE)
-            }),
-            pressure_pa: mean(&|frame, side| {
-                patch(frame, side).pressure(PressureArea::Participation).unwrap_or_default()
-            }),
+            force_n: read(SignalDefinition::Parts, Quantity::Force),
+            curvature_per_m: read(SignalDefinition::Parts, Quantity::Curvature),
+            pressure_pa: read(SignalDefinition::Parts, Quantity::Pressure),
+            contact_pressure_pa: read(SignalDefinition::Contact, Quantity::ContactPressure),
         })
     }
 }

@@ -13,7 +13,7 @@ use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::board::{Board, Gap, Sensor};
 use palpate_tactile::trial::{CorrectedPhases, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource};
-use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Signals, whole_fingers};
+use palpate_tactile::{Channel, LayoutError, Quantity, SignalDefinition, Signals, whole_fingers};
 use std::sync::Arc;
 
 /// How a trial is opened.
@@ -233,17 +233,19 @@ impl OpenTrial {
         let gripper = &scene.gripper;
         let mut identification = options.model.clone().map(|model| identification(model, options));
         let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
-        let layout = SensorLayout::named(&options.sensors.layout)?;
-        let shown = layout.channels(gripper)?.len();
-        let reader = FrameReader::new(&layout, gripper, options.sensors.area, &more)?;
+        let (layout, signals) = (options.sensors.shown()?, options.sensors.signals);
+        let shown = layout.channels(gripper, signals)?.len();
+        let reader = FrameReader::new(&layout, gripper, signals, &more)?;
         let rows = self.rows_of(&data.frames, &reader, options);
         if let Some(identification) = &mut identification {
             if let Some(earlier) = &self.header.earlier {
                 identification.resume(earlier);
             }
             let names = reader.channels().iter().map(Channel::name).enumerate();
-            let off = identification.begin_grasp(names).err();
-            self.recognition_off = off.map(|cause| cause.to_string());
+            let off = identification.begin_grasp(names).err().map(|cause| cause.to_string());
+            // Sensors of a real gripper have no part for it.
+            let no_part = identification.model().card.only_simulated() && options.sensors.is_physical();
+            self.recognition_off = off.or_else(|| no_part.then(|| LayoutError::NoSuchPart.to_string()));
         }
         let identification = identification.filter(|_| self.recognition_off.is_none());
         self.answers = answers(identification, &rows);
@@ -307,7 +309,8 @@ impl OpenTrial {
         while let Some(row) = replay.next_row().map_err(|error| failed(error.to_string()))? {
             while self.columns.len() < replay.channels().len() {
                 let name = &replay.channels()[self.columns.len()];
-                let channel = whole_fingers().into_iter().find(|channel| channel.name() == *name);
+                let channel =
+                    whole_fingers(SignalDefinition::Parts).into_iter().find(|channel| channel.name() == *name);
                 let unit = match (&channel, self.source) {
                     (Some(channel), _) => channel.quantity.unit(),
                     (None, TrialSource::Recorded) => "counts",
@@ -551,10 +554,10 @@ mod tests {
             OpenTrial::open(&store, id, &OpenOptions { sensors, ..OpenOptions::default() })
         };
         let halves = open("C6", SensorModel::Virtual)?;
-        assert!(halves.column("pressure_left_distal").is_some() && halves.column("force_left").is_none());
+        assert!(halves.column("pressure_left_distal").is_some() && halves.column("force_left_distal").is_some());
         assert!(halves.answers.is_empty() && halves.frames.is_empty() && halves.stage.is_none());
-        let real = open("C1+F", SensorModel::PhysicalLike)?;
-        let clean = open("C1+F", SensorModel::Virtual)?;
+        let real = open("C1", SensorModel::PhysicalLike)?;
+        let clean = open("C1", SensorModel::Virtual)?;
         assert_ne!(real.t_s.len(), clean.t_s.len(), "a board has a clock of its own");
         assert_eq!(real.phases, clean.phases, "the phases belong to the grasp, not to its sensors");
         assert!(matches!(open("C99", SensorModel::Virtual), Err(OpenTrialError::Layout(_))));

@@ -24,17 +24,15 @@ pub(crate) fn evenly_bent(gripper: &GripperModel, curvature: [Option<f64>; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_tactile::{PressureArea, SensorLayout, Sensors};
+    use palpate_tactile::{Sensors, SignalDefinition};
 
     #[test]
     fn a_reconstructed_finger_has_the_curvature_of_its_strip() {
         let gripper = GripperModel::default();
-        let layout = SensorLayout::named("C1").expect("a layout");
-        let sensors = Sensors::new(&layout, &gripper, PressureArea::Participation).expect("fits");
+        let sensors = Sensors::whole_fingers(&gripper, SignalDefinition::Parts);
         for curvature in [[0.0, 5.0], [-3.0, 12.0]] {
             let read = sensors.read(&evenly_bent(&gripper, curvature.map(Some)));
             for (read, wanted) in read.iter().zip(curvature) {
-                // The chord of each segment is shorter than its arc by 0.1 % at most.
                 assert!(
                     (read.expect("a number") - wanted).abs() <= 1e-3 * wanted.abs(),
                     "{read:?} instead of {wanted}"

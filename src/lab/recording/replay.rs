@@ -13,7 +13,7 @@ use palpate_store::{Serving, Store, StoreError};
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::Readout;
 use palpate_tactile::trial::{Control, PhaseMark, Trial, TrialData, TrialId};
-use palpate_tactile::{Channel, LayoutError, PressureArea, SensorLayout, whole_fingers};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, SignalDefinition, whole_fingers};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -92,7 +92,9 @@ impl Replay {
             TrialData::Simulated(_) => {
                 let (gripper, identification) = (&trial.header.scene.gripper, identification(model));
                 let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
-                let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, PressureArea::default(), &more)?;
+                // One channel to a name: those that the model reads are shown, too.
+                let signals = more.first().map(|channel| channel.signals).unwrap_or_default();
+                let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, signals, &more)?;
                 let names = reader.channels().iter().map(Channel::name).collect();
                 Self::of_rows(
                     ReplayedGripper::new(trial),
@@ -128,7 +130,7 @@ impl Replay {
             controller: untimed(gripper.now_s()),
             gripper,
             reader: RowReader::Board(Box::new(reader)),
-            channels: whole_fingers().iter().map(Channel::name).collect(),
+            channels: whole_fingers(SignalDefinition::Parts).iter().map(Channel::name).collect(),
             identification: identification(model),
             off: None,
         }
@@ -206,7 +208,7 @@ impl Replay {
         match event {
             LinkEvent::Decoded(DecodedEvent::Board(board)) => {
                 reader.set_board(board);
-                self.channels.truncate(whole_fingers().len());
+                self.channels.truncate(whole_fingers(SignalDefinition::Parts).len());
                 self.channels.extend(board.channels.iter().cloned());
                 None
             }
@@ -270,7 +272,12 @@ impl BoardReader {
     }
 
     fn row(&self, reading: &Reading) -> Row {
-        let row = Row::of_reading(reading, &self.readout.estimate(reading), &whole_fingers(), reading.counts.len());
+        let row = Row::of_reading(
+            reading,
+            &self.readout.estimate(reading),
+            &whole_fingers(SignalDefinition::Parts),
+            reading.counts.len(),
+        );
         Row { line_bar: reading.line_bar.or(self.line_bar).unwrap_or(f64::NAN), ..row }
     }
 }

@@ -4,8 +4,8 @@ use super::timed_grasp::timed_grasp;
 use crate::grasping::{ErrorBand, ErrorNorms, prepare_refined};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, Scene};
-use palpate_tactile::Sensors;
 use palpate_tactile::trial::SimulatedTrial;
+use palpate_tactile::{Sensors, SignalDefinition};
 use serde::Serialize;
 
 /// CPU time and remaining error of a scene's accuracy.
@@ -27,7 +27,7 @@ pub fn accuracy_cost(
     object: Option<&ObjectModel>,
     cancelled: &dyn Fn() -> bool,
 ) -> Option<AccuracyCost> {
-    let sensors = Sensors::whole_fingers(&scene.gripper);
+    let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts);
     let (trial, cpu) = timed_grasp(scene, object, cancelled)?;
     let refined = refined_trial(scene, object, cancelled)?;
     let mut band = ErrorBand::new(scene, sensors.channels().len());

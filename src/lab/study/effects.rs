@@ -11,8 +11,8 @@ use palpate_sim::frame::{Plan, PlannedEffect};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::effects::rule_of;
 use palpate_sim::scene::{Effect, Scene, Setting};
-use palpate_tactile::Sensors;
 use palpate_tactile::trial::SimulatedTrial;
+use palpate_tactile::{Sensors, SignalDefinition};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -92,7 +92,7 @@ impl ExplainedEffect {
             (None, None) => "no contact either way".to_owned(),
         };
         let curvature = part("curvature", change.norms.curvature_per_m, "1/m", change.norms.curvature_share);
-        let pressure = part("pressure", change.norms.pressure_pa * 1e-3, "kPa", change.norms.pressure_share);
+        let pressure = part("contact pressure", change.norms.pressure_pa * 1e-3, "kPa", change.norms.pressure_share);
         let force = part("force", change.norms.force_n, "N", change.norms.force_share);
         format!("{how}: {curvature}, {pressure}, {force}, {onset}")
     }
@@ -208,7 +208,7 @@ impl GraspOutcome {
 
     /// Change from this trial to another, both read by the sensors of `scene`.
     fn change_to(&self, other: &Self, scene: &Scene) -> EffectChange {
-        let sensors = Sensors::whole_fingers(&scene.gripper);
+        let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Contact);
         let both = self.onset_s.zip(other.onset_s);
         EffectChange {
             norms: ErrorNorms::between(&other.trial, &self.trial, &sensors),

@@ -10,8 +10,8 @@ use glam::DVec3;
 use palpate_geometry::Primitive;
 use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::scene::{Accuracy, Scene};
-use palpate_tactile::Sensors;
 use palpate_tactile::trial::SimulatedTrial;
+use palpate_tactile::{Sensors, SignalDefinition};
 use serde::Serialize;
 
 /// Timed scene.
@@ -102,7 +102,7 @@ pub fn physics_cost(bench: &BenchScene, accuracy: Accuracy, runs: usize, truth: 
     times.sort_by(f64::total_cmp);
     let median = times[times.len() / 2];
     let quality = last.as_ref().map(|trial| trial.data.quality.clone()).unwrap_or_default();
-    let sensors = Sensors::whole_fingers(&scene.gripper);
+    let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Contact);
     let error = last.zip(truth).map(|(trial, truth)| ErrorNorms::between(&trial, truth, &sensors));
     let steps = quality.steps.max(1) as f64;
     CostRow {

@@ -10,6 +10,7 @@ use palpate_learn::metrics::Interval;
 use palpate_learn::{Dataset, Method, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
+use palpate_tactile::SignalDefinition;
 use palpate_tactile::model::SensorModel;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -39,6 +40,7 @@ struct Kind {
     fixed: bool,
     layout: &'static str,
     sensors: SensorModel,
+    signals: SignalDefinition,
     /// Keys of the methods; all where there are none.
     methods: &'static [&'static str],
 }
@@ -50,13 +52,16 @@ const MAIN: Kind = Kind {
     fixed: false,
     layout: "C1+F",
     sensors: SensorModel::Virtual,
+    signals: SignalDefinition::Contact,
     methods: &[],
 };
 /// Grasps in other poses, through sensors like those of the real gripper.
 const PHYSICAL: Kind = Kind {
     about: "preset A, physical-like sensors, objects free",
     preset: "A",
+    layout: "C1",
     sensors: SensorModel::PhysicalLike,
+    signals: SignalDefinition::Parts,
     methods: &[EXAMPLE],
     ..MAIN
 };
@@ -225,7 +230,7 @@ fn data_set(kind: &Kind, store: &mut Store, threads: usize) -> Result<Dataset, S
     let plan = CollectionPlan::of_all_objects(scene, (TRAIN + TEST) as u32, POSES);
     let collection = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?.collection;
     let query = DatasetQuery { collection: Some(collection), without_empty: true, ..DatasetQuery::default() };
-    let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors, ..SensorView::default() };
+    let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors, signals: kind.signals };
     Ok(query.read(store, &view, &mut |_, _| ())?)
 }
 

@@ -40,9 +40,10 @@ pub(super) fn phase_at(spans: &[PhaseSpan], t_s: f64) -> Option<usize> {
 
 /// First time at which a pad feels something (s).
 fn contact_s(grasp: &Sequence, signatures: &Signatures) -> Option<f64> {
-    let felt = [Quantity::Pressure, Quantity::Force].map(Quantity::name);
     let channels = signatures.channels().iter().enumerate();
-    let pads = channels.filter(|(_, name)| felt.iter().any(|quantity| name.starts_with(quantity)));
+    let pads = channels.filter(|(_, name)| {
+        Quantity::of_name(name).is_some_and(|(quantity, _)| quantity.is_pressure() || quantity == Quantity::Force)
+    });
     let t_s: Vec<f64> = grasp.t_s.iter().map(|t| f64::from(*t)).collect();
     let onsets = pads.filter_map(|(channel, _)| {
         let classes = (0..signatures.grasps().len()).filter_map(|class| signatures.of_class(class, channel));

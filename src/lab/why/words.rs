@@ -105,17 +105,16 @@ fn phase_words(span: &PhaseSpan) -> &'static str {
 
 /// A channel in words: `left pad pressure, distal` for `pressure_left_distal`.
 pub fn channel_words(name: &str) -> String {
-    let parts: Vec<&str> = name.splitn(3, '_').collect();
-    let quantity = match parts.first() {
-        Some(own) if *own == Quantity::Curvature.name() => "curvature",
-        Some(own) if *own == Quantity::Pressure.name() => "pad pressure",
-        Some(own) if *own == Quantity::Force.name() => "pad force",
-        _ => return name.replace('_', " "),
+    let Some((quantity, place)) = Quantity::of_name(name) else { return name.replace('_', " ") };
+    let quantity = match quantity {
+        Quantity::Curvature => "curvature",
+        Quantity::Pressure => "pad pressure",
+        Quantity::ContactPressure => "contact pressure",
+        Quantity::Force => "pad force",
     };
-    match parts[1..] {
-        [side] => format!("{side} {quantity}"),
-        [side, span] => format!("{side} {quantity}, {}", span.replace('_', " ")),
-        _ => name.replace('_', " "),
+    match place.split_once('_') {
+        None => format!("{place} {quantity}"),
+        Some((side, span)) => format!("{side} {quantity}, {}", span.replace('_', " ")),
     }
 }
 
@@ -185,8 +184,9 @@ mod tests {
 
     #[test]
     fn channels_and_points_are_in_words() {
-        let names = ["force_right", "pressure_left_pair_1", "grip", "my_own_sensor"].map(channel_words);
-        assert_eq!(names, ["right pad force", "left pad pressure, pair 1", "grip", "my own sensor"]);
+        let names = ["force_right", "pressure_left_pair_1", "contact_pressure_left", "grip", "my_own_sensor"];
+        let words = ["right pad force", "left pad pressure, pair 1", "left contact pressure", "grip", "my own sensor"];
+        assert_eq!(names.map(channel_words), words);
         assert_eq!([0.01, 0.31, -0.4, 12.4, -7.6].map(points_words), ["0", "+0.3", "-0.4", "+12", "-8"]);
     }
 }

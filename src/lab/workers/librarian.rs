@@ -11,7 +11,7 @@ use palpate_store::{
     ExportError, Library, LibraryCounts, LibraryTrial, Store, StoreError, TrialQuality, TrialQuery, export_trial,
 };
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{PressureArea, SensorLayout};
+use palpate_tactile::{SensorLayout, SignalDefinition};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -59,7 +59,7 @@ const AT_ONCE: usize = 4;
 /// Outcomes kept for a slow window.
 const OUTCOMES: usize = 16;
 /// Channels of exported simulated trials, as on the command line.
-const EXPORT_LAYOUT: &str = "C1+F";
+const EXPORT_LAYOUT: &str = "C1";
 
 /// The handle.
 pub type Librarian = BackgroundJob<LibraryCommand, LibraryView>;
@@ -244,7 +244,8 @@ impl Service {
     }
 
     fn exported(&self, store: &Store, ids: &[TrialId], stop: &AtomicBool) -> Result<String, ExportError> {
-        let layout = SensorLayout::named(EXPORT_LAYOUT)?;
+        let signals = SignalDefinition::Parts;
+        let layout = SensorLayout::named(EXPORT_LAYOUT)?.shown(signals);
         let folder = new_export_folder(store.path());
         let is_sound = |id: &&TrialId| self.library.trial(**id).is_none_or(|t| t.quality() != TrialQuality::Unsound);
         let sound: Vec<TrialId> = ids.iter().filter(is_sound).copied().collect();
@@ -253,7 +254,7 @@ impl Service {
             if stop.load(Ordering::Relaxed) {
                 break;
             }
-            export_trial(store, *id, &folder, (&layout, PressureArea::Participation))?;
+            export_trial(store, *id, &folder, (&layout, signals))?;
             written += 1;
         }
         let unsound = match ids.len() - sound.len() {

@@ -8,9 +8,8 @@ use crate::study::{
     JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage, labelled_classes,
 };
 use palpate_learn::{Model, ModelError, method};
-use palpate_sim::gripper::GripperModel;
 use palpate_store::{Store, StoreError};
-use palpate_tactile::{Channel, SensorLayout};
+use palpate_tactile::{Channel, SignalDefinition, whole_fingers};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -149,8 +148,7 @@ fn loaded(path: &Path) -> Result<TrainedModel, ModelError> {
 
 /// Refuses a model that needs channels the real gripper does not have.
 fn check_listens(model: &Model) -> Result<(), ModelError> {
-    let channels = SensorLayout::named("C1+F").and_then(|layout| layout.channels(&GripperModel::default()));
-    let names: Vec<String> = channels.unwrap_or_default().iter().map(Channel::name).collect();
+    let names: Vec<String> = whole_fingers(SignalDefinition::Parts).iter().map(Channel::name).collect();
     if model.card.channels.iter().all(|channel| names.contains(channel)) {
         Ok(())
     } else {

@@ -8,6 +8,7 @@ mod finger;
 mod pad;
 mod programme;
 mod space;
+mod strip;
 mod taxels;
 
 pub use actuation::{Actuation, TorquePoint};
@@ -17,6 +18,7 @@ pub use finger::{Finger, Sideways};
 pub use pad::{Pad, PadLaw};
 pub use programme::{Phase, Programme};
 pub use space::{JointAxes, PlacedFinger, SegmentFrame, Sway, bend_in_space, sway_shares};
+pub use strip::Strip;
 pub use taxels::TaxelGrid;
 
 use serde::{Deserialize, Serialize};
@@ -73,6 +75,8 @@ pub struct GripperModel {
     pub finger: Finger,
     /// The compliant inner side of each finger.
     pub pad: Pad,
+    /// The flex strip on the back of each finger.
+    pub strip: Strip,
     /// Line pressure to joint torque.
     pub actuation: Actuation,
 }

@@ -154,6 +154,16 @@ impl Scene {
         ranges.number("gripper.pad.friction", pad.friction, 0.0..=100.0);
         ranges.count("gripper.pad.rows", small_count(pad.rows), 2..=400);
         ranges.count("gripper.pad.columns", small_count(pad.columns), 1..=64);
+        self.check_strip(ranges);
+    }
+
+    fn check_strip(&self, ranges: &mut Ranges) {
+        let (strip, finger) = (&self.gripper.strip, &self.gripper.finger);
+        ranges.auto("gripper.strip.length_m", strip.length_m, 1e-3..=finger.length);
+        let [from, to] = strip.reach(finger);
+        // Rounded, so that a strip may end at the tip.
+        let most = ((finger.length - (to - from)) * 1e7).round() * 1e-7;
+        ranges.auto("gripper.strip.from_m", strip.from_m, 0.0..=most);
     }
 
     fn check_programme(&self, ranges: &mut Ranges) {
@@ -232,6 +242,9 @@ mod tests {
         assert!(refused(|s| s.gripper.finger.joints = 81).contains("between 2 and 80"));
         let half = |s: &mut Scene| s.gripper.finger.sideways.torsional_stiffness = Auto::Value(1e-3);
         assert!(refused(half).contains("gripper.finger.sideways.bending_stiffness"));
+        // 55.37 mm from 50 mm on end beyond a finger of 100 mm.
+        assert!(refused(|s| s.gripper.strip.from_m = Auto::Value(0.05)).contains("gripper.strip.from_m"));
+        assert!(refused(|s| s.gripper.strip.length_m = Auto::Value(0.11)).contains("gripper.strip.length_m"));
         let both = |bending| {
             move |s: &mut Scene| {
                 half(s);

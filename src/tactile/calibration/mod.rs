@@ -33,7 +33,7 @@ pub use empty_close::EmptyClose;
 pub use fault::CalibrationFault;
 pub use flex_curve::FlexCurve;
 pub use input::{Input, RangeEnd};
-pub use pad_curve::{ACTIVE_AREA, BendingZero, PadCurve};
+pub use pad_curve::{BendingZero, PadCurve};
 pub use point::{Point, SensorKind};
 pub use procedure::{Procedure, Unsettled, plan};
 pub use readout::{Derived, Readout, SensorEstimate};

@@ -15,9 +15,6 @@ use crate::electronics::PadPart;
 use palpate_geometry::units::{STANDARD_GRAVITY, three_digits};
 use serde::{Deserialize, Serialize};
 
-/// Area of the pad, a disc of 14.70 mm (m²) (data sheet).
-pub const ACTIVE_AREA: f64 = std::f64::consts::FRAC_PI_4 * 0.0147 * 0.0147;
-
 /// Error of a pad that is pressed again with the same force, as a share of its conductance (data sheet).
 const REPEATABILITY: f64 = 0.02;
 

@@ -2,12 +2,11 @@
 
 use super::CalibrationFault;
 use super::input::{Input, RangeEnd, stated_resistor};
-use super::pad_curve::ACTIVE_AREA;
 use super::record::{Calibration, Curve};
 use super::zero::{Drift, DriftLevel, Unrest, Zero};
 use crate::board::{Board, Reading, Sensor};
-use crate::electronics::StripPart;
-use crate::{Channel, Quantity, Signals, whole_fingers};
+use crate::electronics::{PadPart, StripPart};
+use crate::{Channel, Quantity, SignalDefinition, Signals, whole_fingers};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::Side;
 
@@ -26,13 +25,14 @@ pub struct SensorEstimate {
 }
 
 impl SensorEstimate {
-    /// The value of a channel of the layout C1+F, in its unit.
+    /// The value of a channel of whole fingers, in its unit; none of what only simulations have.
     pub fn of(&self, channel: &Channel) -> Option<f64> {
         let side = channel.side.index();
         match channel.quantity {
             Quantity::Curvature => self.curvature[side],
             Quantity::Pressure => self.pressure[side],
             Quantity::Force => self.force[side],
+            Quantity::ContactPressure => None,
         }
     }
 }
@@ -40,7 +40,7 @@ impl SensorEstimate {
 /// A whole trial as derived.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Derived {
-    /// The channels of layout C1+F that could be derived. Readings in which one of them is missing are left out.
+    /// Curvature, pressure and force of each finger, as far as they could be derived. Readings in which one of them is missing are left out.
     pub signals: Signals,
     /// Drift of the zeros before the closing.
     pub drift: Vec<Drift>,
@@ -195,7 +195,7 @@ impl Readout {
             estimate.curvature[side] = curvature;
             let force = self.raw(reading, 2 + side).and_then(|siemens| self.force(2 + side, siemens, curvature));
             estimate.force[side] = force;
-            estimate.pressure[side] = force.map(|force| force / ACTIVE_AREA);
+            estimate.pressure[side] = force.map(|force| force / PadPart::ACTIVE_AREA);
         }
         estimate
     }
@@ -304,9 +304,9 @@ impl Readout {
         .collect()
     }
 
-    /// The channels of layout C1+F that can be read.
+    /// Curvature, pressure and force of each finger, as far as they can be read.
     pub fn channels(&self) -> Vec<Channel> {
-        whole_fingers().into_iter().filter(|channel| self.has(channel)).collect()
+        whole_fingers(SignalDefinition::Parts).into_iter().filter(|channel| self.has(channel)).collect()
     }
 
     /// True when the sensor that a channel needs is there.

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::board::{Board, Reading, Sensor};
-use crate::electronics::StripPart;
-use crate::{SensorLayout, Sensors};
+use crate::electronics::{PadPart, StripPart};
+use crate::{SensorLayout, Sensors, SignalDefinition};
 use palpate_sim::gripper::Side;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -94,7 +94,8 @@ fn a_calibration_recovers_angle_within_a_degree_and_force_within_5_per_cent() {
                     mean[side] += estimate.angle[side].unwrap().to_degrees() / 25.0;
                     mean[2 + side] += estimate.force[side].unwrap() / 25.0;
                     assert!(
-                        (estimate.pressure[side].unwrap() * ACTIVE_AREA / estimate.force[side].unwrap() - 1.0).abs()
+                        (estimate.pressure[side].unwrap() * PadPart::ACTIVE_AREA / estimate.force[side].unwrap() - 1.0)
+                            .abs()
                             < 1e-12
                     );
                     // Each reading for itself, too.
@@ -157,7 +158,7 @@ fn a_trial_has_the_channels_of_the_layout_and_its_own_zero() {
     let gripper = palpate_sim::gripper::GripperModel::default();
     let layout = SensorLayout::named("C1+F").unwrap();
     let names: Vec<String> =
-        Sensors::new(&layout, &gripper, Default::default()).unwrap().channels().iter().map(|c| c.name()).collect();
+        Sensors::new(&layout, &gripper, SignalDefinition::Parts).unwrap().channels().iter().map(|c| c.name()).collect();
     assert_eq!(derived.signals.channels, names, "what recognisers take");
     assert_eq!((derived.signals.len(), derived.left_out), (150, 0));
     let last = derived.signals.row(149);
@@ -165,7 +166,8 @@ fn a_trial_has_the_channels_of_the_layout_and_its_own_zero() {
         let kappa = (20.0 * 2.48f64).to_radians() / StripPart::ACTIVE_LENGTH;
         assert!((f64::from(last[side]) - kappa).abs() < 0.3, "{} of {kappa}", last[side]);
         assert!(
-            (last[2 + side] / 2.0 * ACTIVE_AREA as f32 - 1.0).abs() < 0.05 && (last[4 + side] / 2.0 - 1.0).abs() < 0.05
+            (last[2 + side] / 2.0 * PadPart::ACTIVE_AREA as f32 - 1.0).abs() < 0.05
+                && (last[4 + side] / 2.0 - 1.0).abs() < 0.05
         );
     }
     let levels: Vec<DriftLevel> = derived.drift.iter().map(|drift| drift.level).collect();

@@ -3,6 +3,7 @@
 //! A strip of active length L on a finger of curvature kappa bends by theta = kappa L. Its resistance is linear in the
 //! angle (paper), R = R0 (1 + s theta).
 
+use palpate_sim::gripper::Strip;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -20,8 +21,8 @@ pub struct StripPart {
 }
 
 impl StripPart {
-    /// Active length, L (m): code 0055 of the order number.
-    pub const ACTIVE_LENGTH: f64 = 0.055_37;
+    /// Active length, L (m).
+    pub const ACTIVE_LENGTH: f64 = Strip::ACTIVE_LENGTH;
 
     /// Resistance of a nominal flat part (ohm): code 253.
     pub const NOMINAL_OHM: f64 = 25e3;

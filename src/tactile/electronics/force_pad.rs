@@ -1,20 +1,20 @@
 //! A force-sensing pad, Ohmite FSR07CE (paper, section IV-B): from the load on it to its conductance.
 //!
-//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b. The load may be a
-//! force or a pressure, in any unit: a is the conductance at one [`PadPart::full`] of it.
+//! Below a threshold it does not conduct. Above, its conductance follows a power law, G = a F^b; a is the conductance at
+//! one [`PadPart::full`] of force. It gives one signal, its normal force; a pressure is that over its area.
 
 use serde::{Deserialize, Serialize};
 
 /// One part, glued to its finger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PadPart {
-    /// Load at which the law's base is 1, in the unit of the load.
+    /// Force at which the law's base is 1 (N).
     pub full: f64,
     /// Conductance there, a.
     pub gain: f64,
     /// Exponent, b.
     pub exponent: f64,
-    /// Threshold load; none where it responds to any load.
+    /// Threshold (N); none where it responds to any load.
     pub threshold: Option<f64>,
     /// Share of the load that reaches it.
     pub reaching: f64,
@@ -24,8 +24,8 @@ impl PadPart {
     /// Threshold force of a pad (N). Data sheet: less than 15 g, 0.15 N, actuates.
     pub const LEAST_FORCE: f64 = 0.15;
 
-    /// Threshold pressure of a pad (Pa): 15 g on the 170 mm² of the pad are 0.9 kPa.
-    pub const LEAST_PRESSURE: f64 = 0.9e3;
+    /// Sensing area, a disc of 14.70 mm (m²) (data sheet): a pad's pressure is its force over this.
+    pub const ACTIVE_AREA: f64 = std::f64::consts::FRAC_PI_4 * 0.0147 * 0.0147;
 
     /// Conductance at 1 N (S): 6 kOhm (Interlink 402, the table of Adafruit; there is none for the FSR07).
     pub const NOMINAL_SIEMENS: f64 = 1.0 / 6e3;

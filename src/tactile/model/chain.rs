@@ -1,32 +1,83 @@
-//! The sensor chain of one trial, channel by channel.
+//! The sensor chain of one trial, part by part.
 
 use super::flex::ReadStrip;
-use super::force_pad::{PadRange, ReadPad};
+use super::force_pad::ReadPad;
 use super::physical_like::PhysicalLike;
 use super::sampling::{Trace, instants};
 use super::stepping::stepped;
 use super::streams::Streams;
-use crate::Signals;
+use crate::electronics::PadPart;
+use crate::{Quantity, Signals};
 
 impl PhysicalLike {
     /// Readings of a grasp from its clean signals, at 50 Hz and always finite. `seed` identifies the
-    /// grasp. Channels are identified by their names; one that is neither curvature, pressure nor force is read
-    /// without a sensor.
+    /// grasp. Channels are identified by their names: force and pressure of one place are two units of one pad's reading;
+    /// one that no part measures is read without a sensor.
     pub fn apply(&self, clean: &Signals, seed: u64) -> Signals {
         let instants = instants(clean, self.jitter, seed);
         let width = clean.channels.len();
         let mut values = vec![0.0; instants.len() * width];
-        for (column, channel) in clean.channels.iter().enumerate() {
-            let trace = Trace::new(clean, column);
-            let mut sensor = Sensor::new(self, Streams { gripper: self.gripper, trial: seed, channel });
+        for mut part in self.parts_of(&clean.channels, seed) {
+            let trace = Trace::new(clean, part.from);
             for (instant, row) in instants.iter().zip(values.chunks_exact_mut(width)) {
                 let stimulus =
                     if self.stepping { stepped(trace, instants[0].t, instant.taken) } else { trace.at(instant.taken) };
-                row[column] = finite(sensor.read(stimulus));
+                let reading = part.sensor.read(stimulus * part.scale);
+                for (column, unit) in &part.into {
+                    row[*column] = finite(reading / unit);
+                }
             }
         }
         Signals { channels: clean.channels.clone(), t_s: instants.iter().map(|i| i.t).collect(), values }
     }
+
+    fn streams<'a>(&self, trial: u64, channel: &'a str) -> Streams<'a> {
+        Streams { gripper: self.gripper, trial, channel }
+    }
+
+    /// The parts that measure these channels, each once.
+    fn parts_of(&self, channels: &[String], seed: u64) -> Vec<Part> {
+        let alone =
+            |column: usize, sensor: Sensor| Part { sensor, from: column, scale: 1.0, into: vec![(column, 1.0)] };
+        let mut parts = Vec::new();
+        for (column, channel) in channels.iter().enumerate() {
+            let side = |place: &str| usize::from(place.starts_with("right"));
+            parts.push(match Quantity::of_name(channel) {
+                Some((Quantity::Curvature, place)) => {
+                    alone(column, Sensor::Strip(ReadStrip::new(self, side(place), self.streams(seed, channel))))
+                }
+                Some((quantity @ (Quantity::Force | Quantity::Pressure), place)) => {
+                    let [force, pressure] =
+                        [Quantity::Force, Quantity::Pressure].map(|own| format!("{}_{place}", own.name()));
+                    let at = |name: &String| channels.iter().position(|own| own == name);
+                    let (force_at, pressure_at) = (at(&force), at(&pressure));
+                    if quantity == Quantity::Pressure && force_at.is_some() {
+                        continue; // the pad of the force column
+                    }
+                    let units = [(force_at, 1.0), (pressure_at, PadPart::ACTIVE_AREA)];
+                    Part {
+                        sensor: Sensor::Pad(ReadPad::new(self, side(place), self.streams(seed, &force))),
+                        from: column,
+                        scale: if quantity == Quantity::Pressure { PadPart::ACTIVE_AREA } else { 1.0 },
+                        into: units.into_iter().filter_map(|(column, unit)| Some((column?, unit))).collect(),
+                    }
+                }
+                Some((Quantity::ContactPressure, _)) | None => alone(column, Sensor::None),
+            });
+        }
+        parts
+    }
+}
+
+/// A part at work: it reads one column and fills one or two.
+struct Part {
+    sensor: Sensor,
+    /// Column of its stimulus.
+    from: usize,
+    /// Stimulus per value of that column.
+    scale: f64,
+    /// Columns of its reading, each with the reading's size of one of its units.
+    into: Vec<(usize, f64)>,
 }
 
 /// A sensor of either kind, or none.
@@ -37,19 +88,6 @@ enum Sensor {
 }
 
 impl Sensor {
-    /// The sensor for a channel's name, as in `curvature_left_distal`.
-    fn new(settings: &PhysicalLike, streams: Streams<'_>) -> Self {
-        let mut words = streams.channel.split('_');
-        let quantity = words.next();
-        let side = usize::from(words.next() == Some("right"));
-        match quantity {
-            Some("curvature") => Self::Strip(ReadStrip::new(settings, side, streams)),
-            Some("force") => Self::Pad(ReadPad::new(settings, PadRange::force(settings), side, streams)),
-            Some("pressure") => Self::Pad(ReadPad::new(settings, PadRange::pressure(settings), side, streams)),
-            _ => Self::None,
-        }
-    }
-
     fn read(&mut self, stimulus: f64) -> f64 {
         match self {
             Self::Strip(strip) => strip.read(stimulus),

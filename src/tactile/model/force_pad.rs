@@ -1,12 +1,11 @@
-//! The force-sensing pad that reads force or pressure: Ohmite FSR07CE (paper, section IV-B).
+//! The force-sensing pad, whose one reading is force, or pressure over its area: Ohmite FSR07CE (paper, section IV-B).
 //!
 //! Its law stands in [`crate::electronics`]; here it saturates at last, and the divider is amplified so that the
 //! converter reaches full scale where the pad saturates. Loads are counted here as shares u of the load that saturates the
 //! nominal pad: G = G_full u^b.
 //!
 //! Recordings of the real gripper know three levels: idle, touched, and saturated soon after the touch. No circuit or
-//! curve of it is published, so the load that saturates is assumed, and a setting: [`PhysicalLike::full_force`] and
-//! [`PhysicalLike::full_pressure`]. Pads of this kind saturate by pressure, small contacts first (Interlink's guide).
+//! curve of it is published, so the load that saturates is assumed, and a setting: [`PhysicalLike::full_force`].
 //! The calibration knows the nominal a and b: two points of a straight line in logarithms.
 
 use super::input::Input;
@@ -17,28 +16,6 @@ use crate::electronics::{Divider, ForcePad, PadPart};
 
 /// Threshold force of a pad, left and right (N). The right is assumed a third less sensitive.
 const LEAST_FORCE: [f64; 2] = [PadPart::LEAST_FORCE, 0.20];
-
-/// Threshold pressure of a pad, left and right (Pa).
-const LEAST_PRESSURE: [f64; 2] = [PadPart::LEAST_PRESSURE, 1.2e3];
-
-/// Range of a pad from threshold to saturation, in the unit of its channel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PadRange {
-    least: [f64; 2],
-    full: f64,
-}
-
-impl PadRange {
-    /// Of a pad that is read as force (N).
-    pub(super) fn force(settings: &PhysicalLike) -> Self {
-        Self { least: LEAST_FORCE, full: settings.full_force }
-    }
-
-    /// Of a pad that is read as pressure (Pa).
-    pub(super) fn pressure(settings: &PhysicalLike) -> Self {
-        Self { least: LEAST_PRESSURE, full: settings.full_pressure }
-    }
-}
 
 /// Share of the load that reaches the pad, left and right. Assumed: the right pad is mounted as poorly as its strip.
 const REACHING: [f64; 2] = [1.0, 0.7];
@@ -64,7 +41,7 @@ pub(super) struct ReadPad {
 
 impl ReadPad {
     /// The pad of a channel.
-    pub(super) fn new(settings: &PhysicalLike, range: PadRange, side: usize, streams: Streams<'_>) -> Self {
+    pub(super) fn new(settings: &PhysicalLike, side: usize, streams: Streams<'_>) -> Self {
         let mounted = if settings.asymmetry { side } else { 0 };
         let slip = if settings.slip { 1.0 + SLIP * streams.of_trial("slip").normal() } else { 1.0 };
         let (gain, exponent) = if settings.parts {
@@ -74,10 +51,10 @@ impl ReadPad {
             (1.0, PadPart::NOMINAL_EXPONENT)
         };
         let part = PadPart {
-            full: range.full,
+            full: settings.full_force,
             gain: gain * slip,
             exponent,
-            threshold: settings.threshold.then_some(range.least[mounted]),
+            threshold: settings.threshold.then_some(LEAST_FORCE[mounted]),
             reaching: REACHING[mounted],
         };
         let mut pad = ForcePad::new(part, SAMPLE_HZ);
@@ -88,9 +65,9 @@ impl ReadPad {
         Self { pad, divider: Divider { gain, ..Divider::of_pad(FULL_RATIO) }, input: Input::new(settings, streams) }
     }
 
-    /// The load that is reported of a true one at the next sample, in the channel's unit. A pull counts as no load.
-    pub(super) fn read(&mut self, load: f64) -> f64 {
-        let conductance = self.pad.conductance(load);
+    /// The force (N) that is reported of a true one at the next sample. A pull counts as no force.
+    pub(super) fn read(&mut self, force: f64) -> f64 {
+        let conductance = self.pad.conductance(force);
         self.pad.part.full * self.convert(conductance).powf(1.0 / PadPart::NOMINAL_EXPONENT)
     }
 
@@ -107,46 +84,41 @@ impl ReadPad {
 mod tests {
     use super::*;
 
-    fn ranges() -> [PadRange; 2] {
-        [PadRange::force(&PhysicalLike::OFF), PadRange::pressure(&PhysicalLike::OFF)]
-    }
+    /// Force at which the nominal pad saturates (N).
+    const FULL: f64 = PhysicalLike::OFF.full_force;
 
-    fn pad(settings: &PhysicalLike, range: PadRange, side: usize) -> ReadPad {
-        ReadPad::new(settings, range, side, Streams { gripper: 1, trial: 1, channel: "force_left" })
+    fn pad(settings: &PhysicalLike, side: usize) -> ReadPad {
+        ReadPad::new(settings, side, Streams { gripper: 1, trial: 1, channel: "force_left" })
     }
 
     #[test]
     fn its_characteristic_is_silent_then_rises_then_saturates() {
         let still = PhysicalLike { noise: false, hysteresis: false, drift: false, ..PhysicalLike::default() };
-        for range in ranges() {
-            for side in 0..2 {
-                let mut pad = pad(&still, range, side);
-                let reads: Vec<f64> = (0..300).map(|i| pad.read(0.01 * f64::from(i) * range.full)).collect();
-                assert!(reads.windows(2).all(|w| w[0] <= w[1]));
-                let least = (100.0 * range.least[side] / range.full).ceil() as usize;
-                assert!(reads[..least].iter().all(|&r| r == 0.0) && reads[least + 1] > 0.02 * range.full);
-                let most = reads[299];
-                assert!((most / range.full - 1.0).abs() < 1e-3, "saturated, {most}");
-                let saturated = reads.iter().position(|&r| r == most).unwrap();
-                assert!(saturated < [120, 170][side], "{saturated}");
-            }
+        for side in 0..2 {
+            let mut pad = pad(&still, side);
+            let reads: Vec<f64> = (0..300).map(|i| pad.read(0.01 * f64::from(i) * FULL)).collect();
+            assert!(reads.windows(2).all(|w| w[0] <= w[1]));
+            let least = (100.0 * LEAST_FORCE[side] / FULL).ceil() as usize;
+            assert!(reads[..least].iter().all(|&r| r == 0.0) && reads[least + 1] > 0.02 * FULL);
+            let most = reads[299];
+            assert!((most / FULL - 1.0).abs() < 1e-3, "saturated, {most}");
+            let saturated = reads.iter().position(|&r| r == most).unwrap();
+            assert!(saturated < [120, 170][side], "{saturated}");
         }
     }
 
     #[test]
     fn an_ideal_pad_is_exact() {
-        for range in ranges() {
-            let mut ideal = pad(&PhysicalLike::OFF, range, 1);
-            for load in [0.0, 1e-3, 0.2, 1.0, 30.0] {
-                assert!((ideal.read(load * range.full) - load * range.full).abs() <= 1e-12 * range.full * load);
-            }
-            assert_eq!(ideal.read(-1.0), 0.0);
+        let mut ideal = pad(&PhysicalLike::OFF, 1);
+        for load in [0.0, 1e-3, 0.2, 1.0, 30.0] {
+            assert!((ideal.read(load * FULL) - load * FULL).abs() <= 1e-12 * FULL * load);
         }
+        assert_eq!(ideal.read(-1.0), 0.0);
     }
 
     #[test]
     fn unloading_reads_up_to_5_per_cent_more() {
-        let mut pad = pad(&PhysicalLike { hysteresis: true, ..PhysicalLike::OFF }, ranges()[0], 0);
+        let mut pad = pad(&PhysicalLike { hysteresis: true, ..PhysicalLike::OFF }, 0);
         for load in [0.1, 0.2, 0.4] {
             assert!((pad.read(load) - load).abs() < 1e-12);
         }
@@ -157,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_held_load_creeps_up_by_1_per_cent_a_decade_until_released() {
-        let mut pad = pad(&PhysicalLike { drift: true, ..PhysicalLike::OFF }, ranges()[0], 0);
+        let mut pad = pad(&PhysicalLike { drift: true, ..PhysicalLike::OFF }, 0);
         let held: Vec<f64> = (0..=45).map(|_| pad.read(0.5)).collect();
         assert!((held[0] - 0.5).abs() < 1e-12);
         // 45 samples are 0.9 s: 1 + 0.9 / 0.1 is one decade.

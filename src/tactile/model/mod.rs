@@ -4,7 +4,7 @@
 //!
 //! The chain of the real gripper, first to last; each link is a switch of [`PhysicalLike`]:
 //!
-//! | link | flex strip (curvature) | pad (force, pressure) |
+//! | link | flex strip (curvature) | pad (force, or that over its area) |
 //! |---|---|---|
 //! | stepped closing | signals held on a grid of steps, sampled once settled | the same |
 //! | clock | 50 Hz, late start, jitter | the same |

@@ -28,7 +28,7 @@ pub struct PhysicalLike {
     pub drift: bool,
     /// Pads do not respond to a light touch, strips not to bending backwards.
     pub threshold: bool,
-    /// Pads saturate at full force or pressure, strips cannot be bent beyond a fold.
+    /// Pads saturate at full force, strips cannot be bent beyond a fold.
     pub saturation: bool,
     /// Voltages are noisy.
     pub noise: bool,
@@ -38,9 +38,6 @@ pub struct PhysicalLike {
     /// idle, touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as
     /// well.
     pub full_force: f64,
-    /// Pressure at which the nominal pad saturates (Pa). Assumed: 12 kPa, what 0.3 N makes on a usual contact of 25
-    /// mm².
-    pub full_pressure: f64,
 }
 
 impl Default for PhysicalLike {
@@ -79,6 +76,5 @@ impl PhysicalLike {
         noise: false,
         counts: false,
         full_force: 0.3,
-        full_pressure: 12e3,
     };
 }

@@ -2,6 +2,7 @@
 
 use super::{PhysicalLike, SAMPLE_HZ, SensorModel};
 use crate::Signals;
+use crate::electronics::PadPart;
 use proptest::prelude::*;
 
 const NAMES: [&str; 6] =
@@ -31,7 +32,8 @@ fn grasp() -> Signals {
         let bend = (t / 2.0).min(1.0).min(4.0 - t) as f32;
         let press = (t - 1.0).min(1.0).min((3.5 - t) / 0.5).max(0.0) as f32;
         let (kappa, force) = (14.0 * bend, 4.0 * press);
-        clean.push(t, &[kappa, kappa, 6e4 * press, 6e4 * press, force, force]);
+        let pressure = force / PadPart::ACTIVE_AREA as f32;
+        clean.push(t, &[kappa, kappa, pressure, pressure, force, force]);
     }
     clean
 }
@@ -136,7 +138,8 @@ fn switches_take_away_no_more_than_their_own() {
 #[test]
 fn a_pressed_pad_knows_three_levels() {
     let read = SensorModel::PhysicalLike.apply(&grasp(), 7);
-    let (force, pressure) = (PhysicalLike::OFF.full_force as f32, PhysicalLike::OFF.full_pressure as f32);
+    let force = PhysicalLike::OFF.full_force as f32;
+    let pressure = force / PadPart::ACTIVE_AREA as f32;
     let channels =
         [("force_left", force), ("force_right", force), ("pressure_left", pressure), ("pressure_right", pressure)];
     for (name, full) in channels {
@@ -148,6 +151,27 @@ fn a_pressed_pad_knows_three_levels() {
         // A step or two on the way in and out, of eleven.
         assert!(between < values.len() / 3, "{name}: {between} between");
     }
+}
+
+#[test]
+fn a_pad_is_read_once_whatever_its_columns() {
+    let clean = grasp();
+    let both = SensorModel::PhysicalLike.apply(&clean, 7);
+    let mut felt = 0;
+    for side in ["left", "right"] {
+        let [force, pressure] = ["force", "pressure"].map(|quantity| format!("{quantity}_{side}"));
+        let alone = SensorModel::PhysicalLike.apply(&only(&clean, &[&pressure]), 7).values;
+        for ((force, pressure), alone) in column(&both, &force).iter().zip(column(&both, &pressure)).zip(alone) {
+            assert!((pressure * PadPart::ACTIVE_AREA as f32 - force).abs() <= 1e-6 * force);
+            assert!((alone - pressure).abs() <= 1e-3 * pressure.abs() + 1.0, "{alone} {pressure}");
+            felt += u32::from(*force > 0.0);
+        }
+    }
+    assert!(felt > 100, "{felt} readings of a load");
+    // What no part measures stays as it is.
+    let contact = Signals { channels: vec!["contact_pressure_left".to_owned()], ..only(&clean, &["pressure_left"]) };
+    let read = PhysicalLike { stepping: false, jitter: false, ..PhysicalLike::default() }.apply(&contact, 7);
+    assert_eq!(read, PhysicalLike::OFF.apply(&contact, 7));
 }
 
 #[test]

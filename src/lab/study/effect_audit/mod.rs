@@ -19,8 +19,8 @@ use crate::grasping::ErrorNorms;
 use palpate_sim::frame::Plan;
 use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::scene::{Effect, Scene, Setting};
-use palpate_tactile::Sensors;
 use palpate_tactile::trial::SimulatedTrial;
+use palpate_tactile::{Sensors, SignalDefinition};
 use scenes::{Drawn, ObjectShelf};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
@@ -130,7 +130,7 @@ pub enum AuditError {
 fn audit_one(drawn: &Drawn, cancelled: &AtomicBool) -> Option<AuditedScene> {
     let Drawn { scene, object, settings } = drawn;
     let object = object.as_ref();
-    let sensors = Sensors::whole_fingers(&scene.gripper);
+    let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Contact);
     let (base, cpu_s) = run(scene, object, cancelled)?;
     let change = |other: &Scene, object: Option<&ObjectModel>| {
         let (trial, cpu_s) = run(other, object, cancelled)?;

@@ -6,7 +6,7 @@ use super::observation::{Observation, Track};
 use palpate_sim::gripper::{GripperModel, Phase, TorquePoint};
 use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::{Accuracy, Effect, Scene, Setting, Timing};
-use palpate_tactile::{Sensors, Signals};
+use palpate_tactile::{Sensors, SignalDefinition, Signals};
 
 /// Actuation rate of the fitted model (Hz). At 50 Hz, commands of a control box would be 10 ms late on average, which
 /// biases lag and damping.
@@ -150,7 +150,7 @@ fn shown(seen: &Observation, gripper: GripperModel) -> Result<Signals, FingerFit
     scene.solver.accuracy = Accuracy::Reference;
     // A small lag stays in: `auto` would switch it off and make the residuals jump.
     scene.effects.set(Effect::PneumaticLag, if lag { Setting::On } else { Setting::Off });
-    let sensors = Sensors::whole_fingers(&scene.gripper);
+    let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts);
     let (mut rig, _) = SimRun::new(&scene, seen.object.as_ref());
     let channels = sensors.channels().iter().map(palpate_tactile::Channel::name).collect();
     let mut signals = Signals { channels, ..Signals::default() };

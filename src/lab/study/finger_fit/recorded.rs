@@ -5,8 +5,8 @@ use super::{Observation, Trust};
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_store::{CalibrationId, Serving, Store, StoreError};
-use palpate_tactile::Sensors;
 use palpate_tactile::trial::{TrialData, TrialId};
+use palpate_tactile::{Sensors, SignalDefinition};
 
 /// Repeatability of a calibrated strip's gain, as a share. Assumed: half a degree in 90.
 const STRIP_REPEATS: f64 = 0.005;
@@ -76,7 +76,7 @@ impl RecordedGrasps {
             }
             TrialData::Imported(signals) => (signals, programme.clone()),
             TrialData::Simulated(data) => {
-                (Sensors::whole_fingers(&own.gripper).signals(&data.frames), programme.clone())
+                (Sensors::whole_fingers(&own.gripper, SignalDefinition::Parts).signals(&data.frames), programme.clone())
             }
         };
         let line = if line.is_empty() { programme } else { line };

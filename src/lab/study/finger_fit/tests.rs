@@ -8,7 +8,7 @@ use palpate_sim::scene::{Accuracy, Scene};
 use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::calibration::{Calibration, Input, Point, Readout, Record, SensorKind, plan};
 use palpate_tactile::electronics::{Converter, FlexStrip, ForcePad, PadPart, StripPart};
-use palpate_tactile::{PressureArea, SensorLayout, Sensors, Signals};
+use palpate_tactile::{Sensors, SignalDefinition, Signals};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::cell::Cell;
@@ -44,8 +44,7 @@ fn block() -> ObjectModel {
 }
 
 fn clean(scene: &Scene, object: Option<&ObjectModel>) -> Signals {
-    let layout = SensorLayout::named("C1+F").expect("in the catalogue");
-    let sensors = Sensors::new(&layout, &scene.gripper, PressureArea::Participation).expect("fits");
+    let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts);
     // A real gripper makes no numerical errors.
     let mut exact = scene.clone();
     exact.solver.accuracy = Accuracy::Reference;

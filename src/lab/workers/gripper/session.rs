@@ -24,7 +24,7 @@ use palpate_tactile::Channel;
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::{Drift, Readout};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::whole_fingers;
+use palpate_tactile::{SignalDefinition, whole_fingers};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -155,7 +155,7 @@ impl GripperSession {
             crossing: None,
             crossed: CrosstalkView::default(),
             stretch: (0, 0.0),
-            channels: whole_fingers().into(),
+            channels: whole_fingers(SignalDefinition::Parts).into(),
             revision: 0,
             handled: 0,
             published: Instant::now(),

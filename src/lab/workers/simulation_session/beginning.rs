@@ -12,7 +12,7 @@ use crate::picture::Stage;
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
-use palpate_tactile::{Channel, SensorLayout};
+use palpate_tactile::Channel;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -60,10 +60,10 @@ impl Session {
             (self.nominal.clone(), 0)
         };
         let more = self.listener.as_ref().map(|listener| listener.channels_on(&scene.gripper)).unwrap_or_default();
-        let area = self.sensors.area;
-        let reader = SensorLayout::named(&self.sensors.layout).and_then(|layout| {
-            let plotted = layout.channels(&scene.gripper)?.len();
-            Ok((FrameReader::new(&layout, &scene.gripper, area, &more)?, plotted))
+        let signals = self.sensors.signals;
+        let reader = self.sensors.shown().and_then(|layout| {
+            let plotted = layout.channels(&scene.gripper, signals)?.len();
+            Ok((FrameReader::new(&layout, &scene.gripper, signals, &more)?, plotted))
         });
         let (reader, plotted) = match reader {
             Ok(reader) => reader,
