@@ -57,7 +57,7 @@ fn from_nothing_to_a_table_and_a_model() {
 
     let trained =
         json(at, &["train", "ids-lstm", "--quick", "--trials", "8", "--out", "models/own.safetensors", "--json"]);
-    assert_eq!(trained["channels"].as_array().unwrap().len(), 6);
+    assert_eq!(trained["channels"].as_array().unwrap().len(), 4);
     assert!(at.join("models/own.json").is_file(), "the card stands beside it");
     let said = json(at, &["recognise", "1", "2", "--model", "models/own.safetensors", "--together", "--json"]);
     assert_eq!(said["trials"][0]["truth"], "ball");

@@ -21,6 +21,7 @@
 //! - `training`: training on labelled trials of the board, in the window.
 //! - `desk`: a labelling afternoon in the window, by keys alone.
 //! - `one_path`: the same fault recorded from the command line and from the window.
+//! - `one_signal`: pads and strips measure the same in simulated, physical-like, emulated and recorded grasps.
 //! - `studies`: stored results of studies, and what is made from them.
 //! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
@@ -55,6 +56,7 @@ mod labelling;
 mod learning;
 mod library;
 mod one_path;
+mod one_signal;
 mod panels;
 mod peers;
 mod physics;

@@ -40,7 +40,7 @@ fn the_command_says_why_and_names_the_nearest_trials() {
     for part in [
         "trial 1: ",
         ", then ",
-        "left pad pressure",
+        "left contact pressure",
         "in the hold",
         "whole grasp",
         "all channels",

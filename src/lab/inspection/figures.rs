@@ -4,12 +4,14 @@
 use super::comparison::{Alignment, MeanTrial};
 use super::open_trial::{Column, OpenTrial};
 use super::phases::TouchPhase;
+use crate::datasets::SensorView;
 use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time};
 use palpate_geometry::drawing::{
     DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
 };
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
+use palpate_tactile::SignalDefinition;
 use palpate_tactile::trial::{TrialId, TrialSource};
 
 /// What a heat map shows over time.
@@ -101,7 +103,13 @@ pub fn caption(trials: &[&OpenTrial]) -> String {
         lines.push(format!("and {} more: {}{more}", trials.len() - NAMED, ids.join(", ")));
     }
     let read = trials.iter().find(|trial| trial.source == TrialSource::Simulated);
-    let sensors = read.map(|trial| format!(", sensors {}", trial.sensors.layout)).unwrap_or_default();
+    let signals = |view: &SensorView| match view.signals {
+        SignalDefinition::Parts => "",
+        SignalDefinition::Contact => ", contact pressure",
+        SignalDefinition::Hull => ", contact pressure over the hull",
+    };
+    let sensors = read.map(|trial| format!(", sensors {}{}", trial.sensors.layout, signals(&trial.sensors)));
+    let sensors = sensors.unwrap_or_default();
     lines.push(format!("Drawn by Palpate {}{sensors}", env!("CARGO_PKG_VERSION")));
     lines.join("\n")
 }
@@ -371,7 +379,6 @@ fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, Figure
 mod tests {
     use super::super::{Keep, OpenOptions};
     use super::*;
-    use crate::datasets::SensorView;
     use crate::grasping::grasp;
     use palpate_store::Store;
 
@@ -408,7 +415,7 @@ mod tests {
         let marks: Vec<&str> = pressure.references.iter().map(|line| line.text.as_str()).collect();
         assert_eq!(marks, ["contact", "hold", "release"]);
         let hash = scene_hash(&one.header.scene);
-        for part in ["Lemon: trial 1, simulated, seed 7, scene ", &hash, "Drawn by Palpate ", "sensors C1+F"] {
+        for part in ["Lemon: trial 1, simulated, seed 7, scene ", &hash, "Drawn by Palpate ", "sensors C1"] {
             assert!(figure.note.contains(part), "{part} in {}", figure.note);
         }
         Ok(())
