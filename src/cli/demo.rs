@@ -18,7 +18,7 @@ use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
-use palpate_store::file_name_of;
+use palpate_store::{Stored, file_name_of};
 use palpate_tactile::Channel;
 use palpate_tactile::trial::{SimulatedTrial, TrialId};
 use rand::{RngExt, SeedableRng};
@@ -141,7 +141,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
             pmf: identification.belief().now().map(|pmf| named(&model, pmf)).unwrap_or_default(),
             ..motion_report(&trial, &scene, pose_seed)
         };
-        let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?;
+        let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?.map(Stored::id);
         let picture = match &mut painter {
             Some(painter) => {
                 let number = grasps.len() + 1;

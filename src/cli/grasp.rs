@@ -9,7 +9,7 @@ use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
-use palpate_store::{contacts_path, write_contacts_csv, write_trial_csv};
+use palpate_store::{Stored, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Sensors, SignalDefinition};
 use serde::Serialize;
@@ -73,6 +73,8 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     error_band: Option<ErrorNorms>,
     trial_id: Option<TrialId>,
+    /// False where that trial held the same grasp already.
+    newly_stored: bool,
 }
 
 pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -99,7 +101,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         .error_band
         .then(|| Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts))
         .map(|sensors| error_band(&trial, &scene, object.as_ref(), &sensors).norms(&trial, &sensors));
-    let trial_id = if arguments.no_store { None } else { Some(open_store(store)?.insert(&trial)?) };
+    let stored = if arguments.no_store { None } else { Some(open_store(store)?.insert(&trial)?) };
     if let Some(path) = &arguments.out {
         write_trial_csv(path, &trial, &scene, &sensors)?;
         write_contacts_csv(&contacts_path(path), &trial, &scene)?;
@@ -107,7 +109,19 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     let accuracy = scene.solver.accuracy.to_string();
     let summary = GraspSummary::new(&trial, &scene);
     let (trust, trust_reason) = summary.quality.trust();
-    let report = Report { summary, seed, accuracy, cpu_ms, load_cpu_ms, trust, trust_reason, error_band, trial_id };
+    let (trial_id, newly_stored) = (stored.map(Stored::id), stored.is_some_and(Stored::is_new));
+    let report = Report {
+        summary,
+        seed,
+        accuracy,
+        cpu_ms,
+        load_cpu_ms,
+        trust,
+        trust_reason,
+        error_band,
+        trial_id,
+        newly_stored,
+    };
     if arguments.json {
         say_json(&report)?;
     } else {
@@ -174,7 +188,8 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
     say(format!("trust         {}: {}", report.trust.name(), report.trust_reason))?;
     say(format!("cost          {:.1} ms CPU for {duration} s at accuracy {}", report.cpu_ms, report.accuracy))?;
     match report.trial_id {
-        Some(id) => say(format!("stored        trial {id}")),
+        Some(id) if report.newly_stored => say(format!("stored        trial {id}")),
+        Some(id) => say(format!("stored        not again: trial {id} is the same grasp")),
         None => Ok(()),
     }
 }

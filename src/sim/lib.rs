@@ -13,6 +13,7 @@
 //!
 //! | layer | module | holds |
 //! |---|---|---|
+//! | 0 | `version` | version of the physics, hashes of grasps |
 //! | 0 | [`gripper`] | description of finger, pad, taxels, actuation and programme; kinematics of a bent finger |
 //! | 0 | [`objects`] | URDF, OBJ and STL files, the sixteen built-in objects |
 //! | 1 | [`scene`] | scene files: every setting, with its range and default |
@@ -56,3 +57,6 @@ pub mod physics;
 pub mod poses;
 pub mod run;
 pub mod scene;
+mod version;
+
+pub use version::{PHYSICS_VERSION, fingerprint};

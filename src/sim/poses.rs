@@ -54,6 +54,11 @@ impl PoseSampler {
         lying.draw(object, seed)
     }
 
+    /// True for a scene of [`PoseSampler::draw_after`] in which the object stayed as it was left.
+    pub fn is_left(&self, drawn: &Scene) -> bool {
+        self.scene.pose.between == Between::AsReleased && drawn.object.shift != self.scene.object.shift
+    }
+
     /// The object's setup in the pose in which it was left; `None` where it is to be put down anew.
     fn left_behind(&self, object: &ObjectModel, frame: &Frame) -> Option<ObjectSetup> {
         let pose = frame.world_from_object?;
@@ -190,6 +195,7 @@ mod tests {
         assert!((placed.position - left.position).length() < 3e-4, "{placed:?} instead of {left:?}");
         assert!(placed.rotation.dot(left.rotation).abs() > 0.999_999);
         assert_ne!(next.gripper.mount, first.gripper.mount, "the gripper comes from elsewhere");
+        assert!(sampler.is_left(&next) && !sampler.is_left(&first));
 
         let again = sampler.draw(Some(&brick()), 4);
         released.world_from_object = Some(palpate_geometry::Pose { position: DVec3::Z * 0.005, ..left });

@@ -47,7 +47,7 @@ fn a_flipped_byte_is_found_in_frames_readings_bytes_and_channels() -> Outcome {
     let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
     let mut scene = Scene::default();
     scene.timing.duration_s = 0.5;
-    let simulated = store.insert(&grasp(&scene, None, 0))?;
+    let simulated = store.insert(&grasp(&scene, None, 0))?.id();
     every_flip_is_found(&store, ["chunks", "frames"], simulated, |store| store.load(simulated))?;
 
     let reading = |k: u32| {

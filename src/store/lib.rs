@@ -17,6 +17,7 @@
 //! | 0 | `new_file` | files that appear whole or not at all |
 //! | 1 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
+//! | 1 | `identity` | which trials are the same grasp |
 //! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
 //! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
 //! | 4 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
@@ -52,6 +53,7 @@ mod csv_import;
 mod damage_tests;
 mod frame_blob;
 mod free_space;
+mod identity;
 mod imported_trials;
 mod journal;
 #[cfg(test)]
@@ -88,6 +90,7 @@ pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
+pub use identity::Stored;
 pub use journal::{Change, JournalEntry, JournalRepository};
 pub use label_repository::{LabelRepository, LabelRevision};
 pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};

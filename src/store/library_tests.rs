@@ -23,7 +23,7 @@ fn record(store: &mut Store, object: &str) -> Result<TrialId, StoreError> {
 fn simulate(store: &mut Store, object: &str, preset: &str) -> Result<TrialId, StoreError> {
     let mut trial = without_frames(object);
     trial.header.scene.pose = PosePreset::named(preset).expect("a preset").poses();
-    store.insert(&trial)
+    store.insert(&trial).map(Stored::id)
 }
 
 fn import(store: &mut Store, label: &str) -> Result<u32, StoreError> {
@@ -61,7 +61,7 @@ fn words_and_filters_find_trials() -> Outcome {
     let mut store = filled(&folder)?;
     let damaged = palpate_sim::frame::Quality { finite: false, ..Default::default() };
     let unsound = store.begin(&without_frames("cube"))?;
-    store.finish(unsound, &damaged, &[])?;
+    store.finish(unsound, &damaged, &without_frames("cube").header)?;
     let library = Library::read(&store)?;
     let found = |change: &dyn Fn(&mut TrialQuery)| {
         let mut query = by_number();

@@ -21,7 +21,18 @@ const CHOOSE_INCOMING: &str = "
     CREATE TEMP TABLE incoming AS SELECT theirs.id, theirs.uid FROM other.trials AS theirs
     WHERE NOT EXISTS (
         SELECT 1 FROM main.trials AS ours WHERE ours.uid = theirs.uid OR (
-            ours.collection = theirs.collection AND ours.object = theirs.object AND ours.seed = theirs.seed));
+            ours.collection = theirs.collection AND ours.object = theirs.object AND ours.seed = theirs.seed) OR (
+            ours.identity = theirs.identity AND ours.state = 'complete' AND ours.deleted IS NULL));
+";
+
+/// Grasps that this store has already belong to the other's collections too.
+const ADD_MEMBERSHIPS: &str = "
+    INSERT OR IGNORE INTO main.memberships (trial, collection)
+    SELECT ours.id, theirs.collection FROM other.trials AS theirs
+    JOIN main.trials AS ours ON ours.identity = theirs.identity AND ours.uid <> theirs.uid
+    WHERE theirs.collection IS NOT NULL AND theirs.collection IS NOT ours.collection
+        AND ours.deleted IS NULL AND theirs.deleted IS NULL
+        AND theirs.uid NOT IN (SELECT uid FROM temp.incoming);
 ";
 
 /// Calibrations come along, so that signals can be derived here too. Mountings and the plan stay with each store.
@@ -57,6 +68,7 @@ fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<u64> {
         );
         transaction.execute(&sql, [])?;
     }
+    transaction.execute_batch(ADD_MEMBERSHIPS)?;
     transaction.execute_batch(COPY_CALIBRATIONS)?;
     transaction.execute_batch(COPY_JOURNAL)?;
     transaction.execute_batch("DROP TABLE temp.incoming")?;

@@ -12,11 +12,13 @@
 //! tares        zeros of parts, each taken through one calibration
 //! guesses      prediction of a model for a trial, made when its label was given
 //! label_plan   how many trials of each object are wanted: one row, or none for the default plan
+//! memberships  further collections of a trial, whose grasp they share
 //! journal      every change of a label, note, tag, deletion or plan; only ever added to
 //! ```
 //!
 //! Blobs carry a CRC-32 in a column beside them; rows from before version 10 have none.
 
+use super::identity::identify_old;
 use super::store_error::StoreError;
 use rusqlite::{Connection, OpenFlags, Transaction};
 use std::path::{Path, PathBuf};
@@ -28,7 +30,7 @@ pub(super) const APPLICATION_ID: i32 = 0x5061_6c70;
 pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
 
 /// Each makes the next version out of the one before; the first makes the tables.
-pub(super) const MIGRATIONS: [&str; 12] = [
+pub(super) const MIGRATIONS: [&str; 13] = [
     "CREATE TABLE trials (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
@@ -151,11 +153,24 @@ pub(super) const MIGRATIONS: [&str; 12] = [
      ALTER TABLE trials ADD COLUMN phases TEXT NOT NULL DEFAULT 'null';",
     // Names the changes that were made, and are undone, together.
     "ALTER TABLE journal ADD COLUMN batch TEXT;",
+    // `origin` is JSON; `identity` is equal for equal grasps. Those of older trials follow in `identity`.
+    "ALTER TABLE trials ADD COLUMN origin TEXT;
+     ALTER TABLE trials ADD COLUMN identity TEXT;
+     CREATE INDEX trials_by_identity ON trials (identity) WHERE identity IS NOT NULL;
+     CREATE TABLE memberships (
+        trial INTEGER NOT NULL REFERENCES trials (id) ON DELETE CASCADE,
+        collection TEXT NOT NULL,
+        PRIMARY KEY (trial, collection)
+     ) WITHOUT ROWID;
+     CREATE INDEX memberships_by_collection ON memberships (collection);",
 ];
 
+/// The first version with identities of grasps.
+const IDENTITIES: i32 = 13;
+
 /// Tables whose rows belong to a trial by their column `trial`; merging copies them with it.
-pub(super) const TABLES_OF_A_TRIAL: [&str; 6] =
-    ["chunks", "readings", "board_trials", "board_chunks", "parts", "guesses"];
+pub(super) const TABLES_OF_A_TRIAL: [&str; 7] =
+    ["chunks", "readings", "board_trials", "board_chunks", "parts", "guesses", "memberships"];
 
 /// Updates the tables to this program's version, inside a transaction that holds the write lock. Copies the file first
 /// where it has tables of an older version, and returns the copy.
@@ -173,13 +188,16 @@ pub(super) fn migrate(transaction: &Transaction<'_>, store: &Path) -> Result<Opt
     for migration in MIGRATIONS.iter().skip(usize::try_from(version).unwrap_or(0)) {
         transaction.execute_batch(migration).map_err(fault)?;
     }
+    if (1..IDENTITIES).contains(&version) {
+        identify_old(transaction).map_err(fault)?;
+    }
     if version < SCHEMA_VERSION {
         transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
     }
     Ok(copy)
 }
 
-/// `trials.before-v12.sqlite` beside the store, or with a number where such a file exists.
+/// `trials.before-v13.sqlite` beside the store, or with a number where such a file exists.
 fn free_name(store: &Path) -> PathBuf {
     let name = |suffix: String| store.with_extension(format!("before-v{SCHEMA_VERSION}{suffix}.sqlite"));
     let numbered = (2..).map(|number| name(format!("-{number}")));

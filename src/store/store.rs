@@ -8,6 +8,7 @@
 
 use super::checksum::{checksum, is_intact};
 use super::frame_blob::{decode_frames, encode_frames};
+use super::identity::{Stored, add_to, known};
 use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
 use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain};
 use palpate_geometry::Pose;
@@ -190,24 +191,31 @@ impl Store {
         transaction.commit().map_err(|e| fault(&path, &e))
     }
 
-    /// Ends a trial: its quality and warnings are now known.
-    pub fn finish(&mut self, id: TrialId, quality: &Quality, warnings: &[String]) -> Result<(), StoreError> {
+    /// Ends a trial, whose quality, warnings and pulls are now known. It is removed where another trial holds the same
+    /// grasp.
+    pub fn finish(&mut self, id: TrialId, quality: &Quality, header: &TrialHeader) -> Result<Stored, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
-        set_complete(&transaction, id, quality, warnings).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))
-    }
-
-    /// Stores a whole simulated trial, all or nothing.
-    pub fn insert(&mut self, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        let id = insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
+        let stored = end(&transaction, id, quality, header).map_err(|e| fault(&path, &e))?;
         transaction.commit().map_err(|e| fault(&path, &e))?;
-        Ok(id)
+        Ok(stored)
     }
 
-    /// Stores the trials of a collection that are not in the store yet, all or nothing; returns how many.
+    /// Stores a whole simulated trial, all or nothing, unless another trial holds the same grasp.
+    pub fn insert(&mut self, trial: &SimulatedTrial) -> Result<Stored, StoreError> {
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        let known = known(&transaction, &trial.header, 0).map_err(|e| fault(&path, &e))?;
+        let stored = match known {
+            Some(id) => Stored::Known(id),
+            None => Stored::New(insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?),
+        };
+        transaction.commit().map_err(|e| fault(&path, &e))?;
+        Ok(stored)
+    }
+
+    /// Stores the trials of a collection that are not in the store yet, all or nothing; returns how many. A grasp that another
+    /// trial holds is added to the collection instead.
     pub fn insert_collected<'a>(
         &mut self,
         trials: impl Iterator<Item = &'a SimulatedTrial>,
@@ -216,9 +224,18 @@ impl Store {
         let transaction = self.write()?;
         let mut stored = 0;
         for trial in trials {
-            if !is_collected(&transaction, &trial.header).map_err(|e| fault(&path, &e))? {
-                insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
-                stored += 1;
+            let header = &trial.header;
+            if is_collected(&transaction, header).map_err(|e| fault(&path, &e))? {
+                continue;
+            }
+            match known(&transaction, header, 0).map_err(|e| fault(&path, &e))? {
+                Some(id) => {
+                    add_to(&transaction, id, header.collection.as_deref()).map_err(|e| fault(&path, &e))?;
+                }
+                None => {
+                    insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
+                    stored += 1;
+                }
             }
         }
         transaction.commit().map_err(|e| fault(&path, &e))?;
@@ -227,7 +244,8 @@ impl Store {
 
     /// Object and seed of every trial of a collection; deleted ones too, so that they are not made again.
     pub fn collected(&self, collection: &str) -> Result<BTreeSet<(String, u64)>, StoreError> {
-        let sql = "SELECT object, seed FROM trials WHERE collection = ?1";
+        let sql = "SELECT object, seed FROM trials WHERE collection = ?1 UNION SELECT object, seed FROM trials
+            JOIN memberships ON memberships.trial = trials.id WHERE memberships.collection = ?1";
         let rows = self.connection.prepare(sql).and_then(|mut statement| {
             statement.query_map([collection], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?.cast_unsigned())))?.collect()
         });
@@ -265,19 +283,20 @@ impl Store {
     /// Header of a trial, with its source and the columns that only simulated trials use.
     fn load_header(&self, id: TrialId) -> Result<StoredHeader, StoreError> {
         let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
-                   collection, plan, earlier, phases FROM trials WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 3], String, String, [Option<String>; 3]);
+                   collection, plan, earlier, phases, origin FROM trials WHERE id = ?1 AND deleted IS NULL";
+        type Columns = (String, String, i64, String, [String; 3], String, String, [Option<String>; 4]);
         let found: Option<Columns> = self
             .connection
             .query_row(sql, [id], |row| {
                 let simulation = [row.get(4)?, row.get(5)?, row.get(9)?];
                 let scene = row.get(3)?;
-                let optional = [row.get(8)?, row.get(10)?, row.get(11)?];
+                let optional = [row.get(8)?, row.get(10)?, row.get(11)?, row.get(12)?];
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?, scene, simulation, row.get(6)?, row.get(7)?, optional))
             })
             .optional()
             .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, simulation, warnings, version, [collection, earlier, phases])) = found
+        let Some((rig, object, seed, scene, simulation, warnings, version, [collection, earlier, phases, origin])) =
+            found
         else {
             return Err(self.no_trial(id));
         };
@@ -291,6 +310,7 @@ impl Store {
             version,
             earlier: earlier.as_deref().and_then(|earlier| serde_json::from_str(earlier).ok()),
             phases: phases.as_deref().and_then(|phases| serde_json::from_str(phases).ok()).flatten(),
+            origin: origin.as_deref().and_then(|origin| serde_json::from_str(origin).ok()),
         };
         Ok(StoredHeader { source: source_named(id, &rig)?, header, simulation })
     }
@@ -343,7 +363,9 @@ fn insert_whole(transaction: &Transaction<'_>, trial: &SimulatedTrial) -> rusqli
 
 /// True when another program has collected this trial in the meantime.
 fn is_collected(transaction: &Transaction<'_>, header: &TrialHeader) -> rusqlite::Result<bool> {
-    let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE collection = ?1 AND object = ?2 AND seed = ?3)";
+    let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE collection = ?1 AND object = ?2 AND seed = ?3)
+        OR EXISTS (SELECT 1 FROM trials JOIN memberships ON memberships.trial = trials.id
+            WHERE memberships.collection = ?1 AND object = ?2 AND seed = ?3)";
     transaction.query_row(sql, params![header.collection, header.object, header.seed.cast_signed()], |row| row.get(0))
 }
 
@@ -379,7 +401,7 @@ fn insert_header(
 ) -> rusqlite::Result<TrialId> {
     transaction.execute(
         "INSERT INTO trials (rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection, \
-         plan, earlier) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+         plan, earlier, origin, identity) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
         params![
             source.name(),
             header.object,
@@ -392,6 +414,8 @@ fn insert_header(
             header.collection,
             json(plan),
             header.earlier.as_ref().map(json),
+            header.origin.as_ref().map(json),
+            header.identity(),
         ],
     )?;
     Ok(transaction.last_insert_rowid())
@@ -411,6 +435,25 @@ fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) ->
     )?;
     transaction.execute("UPDATE trials SET samples = samples + ?2 WHERE id = ?1", params![id, frames.len() as i64])?;
     Ok(())
+}
+
+/// Completes a simulated trial, or removes it where another trial holds the same grasp.
+fn end(
+    transaction: &Transaction<'_>,
+    id: TrialId,
+    quality: &Quality,
+    header: &TrialHeader,
+) -> rusqlite::Result<Stored> {
+    if let Some(other) = known(transaction, header, id)? {
+        transaction.execute("DELETE FROM trials WHERE id = ?1", [id])?;
+        return Ok(Stored::Known(other));
+    }
+    set_complete(transaction, id, quality, &header.warnings)?;
+    transaction.execute(
+        "UPDATE trials SET origin = ?2, identity = ?3 WHERE id = ?1",
+        params![id, header.origin.as_ref().map(json), header.identity()],
+    )?;
+    Ok(Stored::New(id))
 }
 
 pub(super) fn set_complete(

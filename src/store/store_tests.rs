@@ -25,7 +25,7 @@ fn a_trial_survives_storing() -> Result<(), StoreError> {
     let folder = folder();
     let mut store = Store::open(&folder.path().join("new/trials.sqlite"))?;
     let trial = trial(u64::MAX);
-    let id = store.insert(&trial)?;
+    let id = store.insert(&trial)?.id();
     assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
     let rows = store.list(false)?;
     assert_eq!((rows.len(), rows[0].samples, rows[0].state.as_str()), (1, 90, "complete"));
@@ -42,7 +42,7 @@ fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
         store.append(id, frames)?;
     }
     assert_eq!(store.list(false)?[0].state, "recording");
-    store.finish(id, &trial.data.quality, &trial.header.warnings)?;
+    store.finish(id, &trial.data.quality, &trial.header)?;
     assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
     Ok(())
 }
@@ -72,7 +72,7 @@ fn two_programs_share_a_store() -> Result<(), StoreError> {
 fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
     let folder = folder();
     let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
-    let (a, b) = (store.insert(&trial(3))?, store.insert(&trial(4))?);
+    let (a, b) = (store.insert(&trial(3))?.id(), store.insert(&trial(4))?.id());
     assert!(matches!(store.delete(&[a, 99]), Err(StoreError::NoTrial { id: 99, .. })));
     assert_eq!(store.list(false)?.len(), 2, "all or none");
     store.delete(&[a])?;
@@ -104,7 +104,7 @@ fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::erro
     assert!(matches!(Store::open(&newer), Err(StoreError::Newer { found: 99, .. })));
 
     let damaged = folder.path().join("damaged.sqlite");
-    let id = Store::open(&damaged)?.insert(&trial(5))?;
+    let id = Store::open(&damaged)?.insert(&trial(5))?.id();
     Connection::open(&damaged)?.execute("UPDATE chunks SET frames = x'00', checksum = NULL WHERE number = 1", [])?;
     let error = Store::open(&damaged)?.load(id).expect_err("damaged");
     assert!(matches!(error, StoreError::Damaged { chunk: 1, .. }), "also in an old row without a checksum");
@@ -116,8 +116,8 @@ fn sources_and_scenes_of_newer_programs_are_named_only_when_they_are_needed() ->
     let folder = folder();
     let path = folder.path().join("trials.sqlite");
     let mut store = Store::open(&path)?;
-    let scene = store.insert(&trial(6))?;
-    let source = store.insert(&trial(7))?;
+    let scene = store.insert(&trial(6))?.id();
+    let source = store.insert(&trial(7))?.id();
     let write = |sql: &str| Connection::open(&path).and_then(|connection| connection.execute(sql, [])).expect("writes");
     write("UPDATE trials SET scene = '[gripper]\ntentacles = 8\n' WHERE id = 1");
     assert_eq!(store.list(false)?.len(), 2, "a list needs no scene");

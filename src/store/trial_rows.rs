@@ -2,10 +2,10 @@
 
 use super::store::{Store, source_named};
 use super::store_error::StoreError;
-use crate::labels::{FlagRemark, flaws};
+use crate::labels::{Flag, FlagRemark, flaws};
 use palpate_sim::frame::Quality;
 use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
-use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_tactile::trial::{GraspOrigin, TrialId, TrialSource};
 use rusqlite::{Params, Row};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,6 +30,16 @@ pub struct TrialRow {
     pub seed: u64,
     /// Data set that it belongs to.
     pub collection: Option<String>,
+    /// Further collections that hold the same grasp.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub also_in: Vec<String>,
+    /// Version of the physics of a simulated trial; unknown for those of early versions.
+    pub physics: Option<u32>,
+    /// Identity of a simulated grasp.
+    #[serde(skip)]
+    pub identity: Option<String>,
+    /// The object of a simulated trial was pulled by hand, which its scene does not repeat.
+    pub pulled: bool,
     /// Preset of poses that a simulated trial was drawn from.
     pub preset: Option<&'static str>,
     /// Parts or channels of a real gripper, channels of an imported trial; empty for a simulated one.
@@ -48,10 +58,20 @@ pub struct TrialRow {
     pub tags: Vec<String>,
     /// The label is marked as unsure.
     pub unsure: bool,
-    /// Flags, for a trial of the real gripper.
+    /// Flags: faults of a trial of the real gripper, and copies of other trials.
     pub flags: Vec<FlagRemark>,
     /// Time of deletion, UTC.
     pub deleted: Option<String>,
+}
+
+/// In the warning of a trial whose object was pulled; early versions store nothing else of it.
+const PULLED: &str = "pulled by hand";
+
+impl TrialRow {
+    /// All collections that it belongs to.
+    pub fn collections(&self) -> impl Iterator<Item = &String> {
+        self.collection.iter().chain(&self.also_in)
+    }
 }
 
 /// Columns that [`RowReader`] reads. Sensors: the parts of a board, else its channels; or the imported channels.
@@ -64,7 +84,12 @@ const ROWS: &str =
         WHEN 'serial' THEN coalesce((SELECT group_concat(part, ' ') FROM parts WHERE parts.trial = trials.id),
             CASE WHEN json_valid(about) THEN about ->> '$.board.channels' END)
         WHEN 'import' THEN (SELECT channels FROM readings WHERE readings.trial = trials.id)
-    END
+    END,
+    (SELECT json_group_array(collection) FROM memberships WHERE memberships.trial = trials.id),
+    origin, identity,
+    CASE WHEN identity IS NOT NULL AND state = 'complete' THEN (SELECT min(first.id) FROM trials AS first
+        WHERE first.identity = trials.identity AND first.state = 'complete' AND first.deleted IS NULL
+        AND first.id < trials.id) END
     FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id";
 
 /// Reads rows; presets are looked up once per text.
@@ -83,7 +108,15 @@ impl RowReader {
         let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
         let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
         let object: String = row.get(4)?;
-        let flags = json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default());
+        let mut flags = flaws(json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default()), Some(&object));
+        flags.extend(row.get::<_, Option<TrialId>>(23)?.map(|first| FlagRemark {
+            flag: Flag::Duplicate,
+            remark: format!("the same grasp as trial {first}; data sets use that one"),
+        }));
+        let origin: Option<GraspOrigin> =
+            row.get::<_, Option<String>>(21)?.and_then(|origin| serde_json::from_str(&origin).ok());
+        let pulled = origin.as_ref().is_some_and(|origin| origin.pulls != 0)
+            || source == TrialSource::Simulated && warnings.iter().any(|warning| warning.contains(PULLED));
         Ok(Ok(TrialRow {
             id: row.get(0)?,
             created: row.get(1)?,
@@ -101,7 +134,11 @@ impl RowReader {
             note: row.get(13)?,
             tags: json_or_default(&row.get::<_, String>(14)?),
             unsure: row.get(15)?,
-            flags: flaws(flags, Some(&object)),
+            flags,
+            also_in: json_or_default(&row.get::<_, String>(20)?),
+            physics: origin.map(|origin| origin.physics),
+            identity: row.get(22)?,
+            pulled,
             deleted: row.get(9)?,
             object,
         }))

@@ -96,6 +96,8 @@ pub struct TrialHeader {
     pub earlier: Option<EarlierGrasps>,
     /// Phases that a person corrected; none where they are as measured.
     pub phases: Option<CorrectedPhases>,
+    /// What a simulated grasp was computed from; none for other trials and those of early versions.
+    pub origin: Option<GraspOrigin>,
 }
 
 /// Beginnings of the phases of a grasp as a person set them (s, from the beginning of the trial); a phase without one is as
@@ -110,6 +112,21 @@ pub struct CorrectedPhases {
     pub hold: Option<f64>,
     /// The line pressure falls.
     pub release: Option<f64>,
+}
+
+/// What a simulated grasp was computed from, beside its scene and seed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GraspOrigin {
+    /// Version of the physics.
+    pub physics: u32,
+    /// Hash of the object's files; 0 for an empty hand.
+    pub object: u64,
+    /// Hash of the pulls at the object; 0 without any.
+    #[serde(default)]
+    pub pulls: u64,
+    /// Identity of the grasp before, if the object has stayed as that one released it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<String>,
 }
 
 /// Grasps of the same object before a trial, as a recogniser judged them: its answers to the trial build on them.
@@ -133,7 +150,19 @@ impl TrialHeader {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             earlier: None,
             phases: None,
+            origin: None,
         }
+    }
+
+    /// Identity of a simulated grasp: equal for grasps of equal objects in equal scenes and poses, with equal seeds and
+    /// pulls, by the same version of the physics, wherever the object's files lie. None where the origin is unknown.
+    pub fn identity(&self) -> Option<String> {
+        let GraspOrigin { physics, object, pulls, after: _ } = self.origin.as_ref()?;
+        let numbers = [u64::from(*physics), *object, *pulls, self.seed].map(u64::to_le_bytes);
+        let texts = [self.object.clone(), self.scene.differences()];
+        let texts = texts.iter().map(String::as_bytes);
+        let parts = texts.chain(numbers.iter().map(<[u8; 8]>::as_slice));
+        Some(format!("{:016x}", palpate_sim::fingerprint(parts)))
     }
 }
 

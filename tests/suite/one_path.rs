@@ -207,7 +207,7 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     }
     live.end_grasp();
     let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
-    let id = store.insert(&trial).unwrap();
+    let id = store.insert(&trial).unwrap().id();
     let (replayed, verdict) = played(Replay::of_trial(&store, id, Some(model)).unwrap());
     assert!(verdict.is_some() && verdict.as_ref() == live.verdict());
     assert_eq!(replayed, rows.iter().map(|row| format!("{row:?}")).collect::<Vec<_>>());

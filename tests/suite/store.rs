@@ -60,7 +60,7 @@ fn a_kill_at_any_moment_leaves_whole_trials() {
         }
         // The store goes on working for the next program.
         let more = grasp(&scene, ball.as_ref(), 0);
-        assert_eq!(store.insert(&more).unwrap(), rows.len() as i64 + 1);
+        assert_eq!(store.insert(&more).unwrap().id(), rows.len() as i64 + 1);
     }
 }
 
@@ -149,7 +149,7 @@ fn a_store_of_version_0_1_0_is_copied_updated_listed_and_exported() {
     let list = run(folder.path(), &["trials", "list"]);
     assert_eq!(list.code, Some(0), "{list:?}");
     assert!(
-        list.err.contains("trials.before-v") && folder.path().join("trials.before-v12.sqlite").is_file(),
+        list.err.contains("trials.before-v") && folder.path().join("trials.before-v13.sqlite").is_file(),
         "{list:?}"
     );
     for row in ["Lemon", "mug", "Rubber ball (ball)", "slipped a little", "[wet, late]", "unsure"] {

@@ -320,6 +320,7 @@ pub(in crate::app) fn show_notice(notice: Notice, notices: &mut Notices) {
         Notice::Failed(text) => notices.error(text),
         Notice::SceneRefused(refusal) => notices.error(refusal.cause),
         Notice::Stored(id) => notices.info(format!("Trial {id} stored.")),
+        Notice::Known(id) => notices.info(format!("Not stored again: trial {id} is the same grasp.")),
     }
 }
 

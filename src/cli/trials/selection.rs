@@ -28,7 +28,7 @@ pub(super) struct Filters {
     /// With this tag.
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
-    /// With this flag: no-contact, saturated, interrupted or cadence.
+    /// With this flag: no-contact, saturated, interrupted, cadence or duplicate.
     #[arg(long, value_name = "FLAG")]
     flag: Option<Flag>,
     /// Quality: sound, warned or unsound.

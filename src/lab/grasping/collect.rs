@@ -5,7 +5,6 @@
 //! are stored in the order of the plan.
 
 use super::agreement::{Recompute, grasp_soundly};
-use palpate_sim::frame::Frame;
 use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
@@ -243,7 +242,7 @@ fn store_in_order(
     progress: &mut dyn FnMut(u32, String) -> ControlFlow<()>,
 ) -> Result<(), CollectionError> {
     let mut waiting: BTreeMap<usize, Made> = BTreeMap::new();
-    let mut due = 0;
+    let (known, mut due) = (report.known, 0);
     for (k, outcome) in made {
         waiting.insert(k, outcome);
         let mut ready = Vec::new();
@@ -263,14 +262,16 @@ fn store_in_order(
             }
         };
         let object = newest.header.object.clone();
-        report.stored += store.insert_collected(ready.iter().map(|(trial, _)| trial))?;
+        let stored = store.insert_collected(ready.iter().map(|(trial, _)| trial))?;
+        report.stored += stored;
+        report.known += ready.len() as u32 - stored;
         report.redrawn += ready.iter().map(|(_, redrawn)| redrawn).sum::<u32>();
         let unsound = |(trial, _): &&(SimulatedTrial, u32)| !trial.data.quality.is_sound();
         report.unsound += ready.iter().filter(unsound).count() as u32;
         let recomputed = |(trial, _): &&(SimulatedTrial, u32)| trial.data.quality.recomputed.is_some();
         report.recomputed += ready.iter().filter(recomputed).count() as u32;
         line.stored.store(due, Ordering::Relaxed);
-        let go_on = progress(report.known + due as u32, object);
+        let go_on = progress(known + due as u32, object);
         if let Some(failure) = failure {
             return Err(failure);
         }
@@ -324,15 +325,20 @@ impl<'a> Bench<'a> {
             Between::Reposed => task.number,
             Between::AsReleased => task.number - task.number % SUCCESSION,
         };
-        let mut released: Option<Frame> = None;
+        let mut before: Option<SimulatedTrial> = None;
         for number in first..task.number {
             let seed = self.plan.seed_of(&self.plan.objects[task.object], number);
-            let (scene, _) = on_bench.sampler.draw_after(model, seed, released.as_ref());
-            released = grasp_soundly(&scene, model, seed, self.plan.recompute).data.frames.pop();
+            let released = before.as_ref().and_then(|trial| trial.frames().last());
+            let (scene, _) = on_bench.sampler.draw_after(model, seed, released);
+            before = Some(grasp_soundly(&scene, model, seed, self.plan.recompute));
         }
-        let (scene, redrawn) = on_bench.sampler.draw_after(model, task.seed, released.as_ref());
+        let released = before.as_ref().and_then(|trial| trial.frames().last());
+        let (scene, redrawn) = on_bench.sampler.draw_after(model, task.seed, released);
         let mut trial = grasp_soundly(&scene, model, task.seed, self.plan.recompute);
         trial.header.collection = Some(self.collection.to_owned());
+        if let Some(origin) = trial.header.origin.as_mut().filter(|_| on_bench.sampler.is_left(&scene)) {
+            origin.after = before.and_then(|trial| trial.header.identity());
+        }
         Ok((trial, redrawn))
     }
 }

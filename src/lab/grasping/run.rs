@@ -2,13 +2,15 @@
 
 use super::controller::{GraspController, GraspPlan, PressureCommand};
 use crate::gripper::{Gripper, GripperError, GripperEvent, SimulatedGripper};
+use glam::DVec3;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, Side};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::physics::Refinement;
 use palpate_sim::run::SimRun;
 use palpate_sim::scene::{Effect, Scene, Setting};
-use palpate_tactile::trial::{SimulatedData, SimulatedTrial, Trial, TrialHeader};
+use palpate_sim::{PHYSICS_VERSION, fingerprint};
+use palpate_tactile::trial::{GraspOrigin, SimulatedData, SimulatedTrial, Trial, TrialHeader};
 use std::time::Duration;
 
 /// A simulated grasp in progress, sample by sample.
@@ -39,7 +41,17 @@ fn prepare_with(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refineme
     warnings.extend(placement.warnings);
     warnings.extend(programme_warnings(scene));
     warnings.extend(overlap_warning(&mut simulation));
-    let header = TrialHeader { seed, warnings, ..TrialHeader::new(object.map_or("empty", |o| &o.name), scene.clone()) };
+    let origin = GraspOrigin {
+        physics: PHYSICS_VERSION,
+        object: object.map_or(0, |object| object.content),
+        ..GraspOrigin::default()
+    };
+    let header = TrialHeader {
+        seed,
+        warnings,
+        origin: Some(origin),
+        ..TrialHeader::new(object.map_or("empty", |o| &o.name), scene.clone())
+    };
     let actuation_hz = f64::from(scene.timing.actuation_hz);
     let gripper = SimulatedGripper::new(simulation, placement.world_from_gripper, actuation_hz);
     let controller = GraspController::new(GraspPlan::simulated(scene), gripper.now_s());
@@ -87,9 +99,28 @@ impl GraspRun {
         &mut self.gripper
     }
 
+    /// Records that the object has stayed as the grasp of this identity released it.
+    pub fn set_after(&mut self, identity: Option<String>) {
+        if let Some(origin) = &mut self.header.origin {
+            origin.after = identity;
+        }
+    }
+
     /// Adds a warning to the trial.
     pub fn warn(&mut self, text: String) {
         self.header.warnings.push(text);
+    }
+
+    /// Pulls at the object (N, world axes) from now on. The grasp is then another than the scene alone gives.
+    pub fn pull_object(&mut self, force: DVec3) {
+        if let Some(origin) = &mut self.header.origin {
+            let samples = self.frames.len() as f64;
+            let numbers = [samples, force.x, force.y, force.z].map(f64::to_le_bytes);
+            let before = origin.pulls.to_le_bytes();
+            origin.pulls =
+                fingerprint(std::iter::once(before.as_slice()).chain(numbers.iter().map(<[u8; 8]>::as_slice)));
+        }
+        self.gripper.run_mut().pull_object(force);
     }
 
     /// Samples so far.

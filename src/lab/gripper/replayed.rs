@@ -90,7 +90,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.timing.duration_s = 0.5;
         let simulated = grasp(&scene, None, 0);
-        let id = store.insert(&simulated)?;
+        let id = store.insert(&simulated)?.id();
         let stored = store.load(id)?;
         let frames: Vec<_> = simulated.frames().iter().cloned().map(|f| (f.t, GripperEvent::Sampled(f))).collect();
         assert!(events(stored) == frames && !frames.is_empty());

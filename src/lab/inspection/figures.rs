@@ -390,7 +390,7 @@ mod tests {
             let mut scene = Scene::default();
             scene.object.source = (*object).to_owned();
             let model = scene.load_object().expect("built in");
-            let id = store.insert(&grasp(&scene, model.as_ref(), 7)).expect("stored");
+            let id = store.insert(&grasp(&scene, model.as_ref(), 7)).expect("stored").id();
             OpenTrial::open(&store, id, &options).expect("opens")
         };
         objects.iter().map(open).collect()

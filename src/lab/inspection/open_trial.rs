@@ -488,7 +488,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.object.source = object.to_owned();
         let model = scene.load_object().expect("built in");
-        let id = store.insert(&grasp(&scene, model.as_ref(), 0)).expect("stored");
+        let id = store.insert(&grasp(&scene, model.as_ref(), 0)).expect("stored").id();
         (folder, store, id)
     }
 

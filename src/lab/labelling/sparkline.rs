@@ -133,7 +133,7 @@ mod tests {
         let frames = run.run_programme(&scene.programme)?;
         let (plan, quality) = (run.plan().clone(), run.quality());
         let data = SimulatedData { world_from_gripper: placement.world_from_gripper, plan, quality, frames };
-        let simulated = store.insert(&Trial { header: TrialHeader::new("lemon", scene), data })?;
+        let simulated = store.insert(&Trial { header: TrialHeader::new("lemon", scene), data })?.id();
         for finger in stored_sparkline(&store, simulated)? {
             let force: Vec<f32> = finger.into_iter().flatten().collect();
             assert_eq!((force.len(), force[0]), (SPARKLINE_BINS, 0.0), "no force before the contact");

@@ -5,8 +5,8 @@
 use super::board_writer::{BoardTrialPlan, BoardWriter, RecordedTrial};
 use palpate_device::serial::{LinkEvent, LinkStatus};
 use palpate_sim::frame::{Frame, Quality};
-use palpate_store::{Store, StoreError};
-use palpate_tactile::trial::{PhaseMark, SimulatedTrial, TrialId};
+use palpate_store::{Store, StoreError, Stored};
+use palpate_tactile::trial::{PhaseMark, SimulatedTrial, TrialHeader, TrialId};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -26,6 +26,8 @@ pub enum RecorderNotice {
     Begun(TrialId),
     /// A simulated trial is complete in the store.
     Stored(TrialId),
+    /// A simulated grasp was not stored again: this trial holds it.
+    Known(TrialId),
     /// A trial of the real gripper is complete in the store.
     Recorded(Box<RecordedTrial>),
     /// A trial was discarded.
@@ -52,7 +54,7 @@ pub struct BoardTrialEnd {
 enum Message {
     Begin(Box<SimulatedTrial>),
     Frame(Box<Frame>),
-    Finish(Box<Quality>, Vec<String>),
+    Finish(Box<Quality>, Box<TrialHeader>),
     Discard,
     Replace(Box<SimulatedTrial>),
     BeginBoard(Box<BoardTrialPlan>),
@@ -99,8 +101,8 @@ impl Recorder {
     }
 
     /// Ends a simulated trial.
-    pub fn finish(&self, quality: &Quality, warnings: &[String]) {
-        self.send(Message::Finish(Box::new(quality.clone()), warnings.to_vec()));
+    pub fn finish(&self, quality: &Quality, header: &TrialHeader) {
+        self.send(Message::Finish(Box::new(quality.clone()), Box::new(header.clone())));
     }
 
     /// Gives a simulated trial up: it is marked as deleted.
@@ -193,12 +195,12 @@ impl Writer {
                     }
                 }
             }
-            Message::Finish(quality, warnings) => {
+            Message::Finish(quality, header) => {
                 if let Some(id) = self.write_frames()? {
                     self.trial = OpenTrial::None;
-                    self.with_store(|store| store.finish(id, &quality, &warnings))?;
-                    self.last = Some(id);
-                    (self.notify)(RecorderNotice::Stored(id));
+                    let stored = self.with_store(|store| store.finish(id, &quality, &header))?;
+                    self.last = Some(id).filter(|_| stored.is_new());
+                    self.report(stored);
                 }
             }
             Message::Discard => {
@@ -207,11 +209,11 @@ impl Writer {
                 }
             }
             Message::Replace(trial) => {
-                let id = self.with_store(|store| store.insert(&trial))?;
-                if let Some(old) = self.last.replace(id) {
+                let stored = self.with_store(|store| store.insert(&trial))?;
+                if let Some(old) = std::mem::replace(&mut self.last, Some(stored.id()).filter(|_| stored.is_new())) {
                     self.with_store(|store| store.delete(&[old]))?;
                 }
-                (self.notify)(RecorderNotice::Stored(id));
+                self.report(stored);
             }
             Message::BeginBoard(plan) => {
                 let writer = self.with_store(|store| BoardWriter::begin(store, &plan))?;
@@ -224,6 +226,13 @@ impl Writer {
             Message::FinishBoard(end) => self.finish_board(&end)?,
         }
         Ok(())
+    }
+
+    fn report(&self, stored: Stored) {
+        (self.notify)(match stored {
+            Stored::New(id) => RecorderNotice::Stored(id),
+            Stored::Known(id) => RecorderNotice::Known(id),
+        });
     }
 
     fn with_board(&mut self, change: impl FnOnce(&mut BoardWriter)) {
@@ -319,7 +328,7 @@ mod tests {
             recorder.begin(trial.clone());
             trial.frames().iter().for_each(|frame| recorder.frame(frame));
             if keep {
-                recorder.finish(&trial.data.quality, &trial.header.warnings);
+                recorder.finish(&trial.data.quality, &trial.header);
             } else {
                 recorder.discard();
             }
@@ -340,7 +349,7 @@ mod tests {
         for trial in &trials {
             recorder.begin(trial.clone());
             trial.frames().iter().for_each(|frame| recorder.frame(frame));
-            recorder.finish(&trial.data.quality, &trial.header.warnings);
+            recorder.finish(&trial.data.quality, &trial.header);
         }
         let again = grasp(&Scene::default(), None, 5);
         recorder.replace(again);
@@ -348,6 +357,32 @@ mod tests {
         let store = Store::open(&path).expect("opens");
         let seeds = |all: bool| store.list(all).expect("lists").iter().map(|row| row.seed).collect::<Vec<_>>();
         assert_eq!((seeds(false), seeds(true)), (vec![3, 5], vec![3, 4, 5]));
+    }
+
+    #[test]
+    fn the_same_grasp_is_stored_once_and_the_notice_names_its_trial() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("trials.sqlite");
+        let (sender, notices) = channel();
+        let recorder =
+            Recorder::start(path.clone(), move |notice| sender.send(notice).expect("heard")).expect("starts");
+        let same = grasp(&Scene::default(), None, 3);
+        let mut pulled = same.clone();
+        pulled.header.origin.as_mut().expect("simulated").pulls = 7;
+        for trial in [&same, &same, &pulled] {
+            recorder.begin(same.clone());
+            trial.frames().iter().for_each(|frame| recorder.frame(frame));
+            recorder.finish(&trial.data.quality, &trial.header);
+        }
+        drop(recorder);
+        let all: Vec<RecorderNotice> = notices.try_iter().collect();
+        assert!(
+            matches!(all[..], [RecorderNotice::Stored(1), RecorderNotice::Known(1), RecorderNotice::Stored(_)]),
+            "{all:?}"
+        );
+        let store = Store::open(&path).expect("opens");
+        let rows = store.list(true).expect("lists");
+        assert_eq!(rows.iter().map(|row| row.pulled).collect::<Vec<_>>(), [false, true]);
     }
 
     #[test]
@@ -360,7 +395,7 @@ mod tests {
         let trial = grasp(&Scene::default(), None, 0);
         recorder.begin(trial.clone());
         trial.frames().iter().for_each(|frame| recorder.frame(frame));
-        recorder.finish(&trial.data.quality, &[]);
+        recorder.finish(&trial.data.quality, &trial.header);
         drop(recorder);
         let all: Vec<RecorderNotice> = notices.try_iter().collect();
         assert!(matches!(&all[..], [RecorderNotice::Failed(text)] if text.contains("not a store")), "{all:?}");

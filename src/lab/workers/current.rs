@@ -37,7 +37,9 @@ impl Current {
             self.run
                 .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
         }
-        self.run.gripper_mut().run_mut().pull_object(force);
+        if self.pulled {
+            self.run.pull_object(force);
+        }
         if let Some(refined_run) = &mut self.refined_run {
             refined_run.pull(force);
         }

@@ -141,7 +141,7 @@ mod tests {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("trials.sqlite");
         let mut store = Store::open(&path)?;
-        let simulated = store.insert(&grasp(&close(), None, 0))?;
+        let simulated = store.insert(&grasp(&close(), None, 0))?.id();
         for object in ["lemon", "empty", "ball"] {
             let id = store.begin_board(&TrialHeader::new(object, close()), &BoardInfo::default())?;
             if object != "ball" {

@@ -69,6 +69,8 @@ pub enum Notice {
     SceneRefused(Box<Refusal>),
     /// A trial is in the store.
     Stored(TrialId),
+    /// A grasp was not stored again: this trial holds it.
+    Known(TrialId),
 }
 
 /// A scene that could not be set up.

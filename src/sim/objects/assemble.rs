@@ -157,6 +157,7 @@ impl Blueprint {
             modulus: self.modulus,
             bounds,
             warnings: self.warnings,
+            content: 0,
         })
     }
 

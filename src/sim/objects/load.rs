@@ -6,6 +6,7 @@ use super::files::{candidates, read_file, read_referenced};
 use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, urdf};
 use palpate_geometry::{MeshFileError, Pose, SurfaceMesh, read_mesh};
+use std::cell::Cell;
 use std::path::Path;
 
 /// The name that stands for an empty hand.
@@ -38,6 +39,22 @@ pub fn anchored(source: &str) -> String {
     whole.and_then(|path| path.to_str().map(str::to_owned)).unwrap_or_else(|| source.to_owned())
 }
 
+/// Hash of files, in the order in which they are read.
+#[derive(Default)]
+struct Content(Cell<u64>);
+
+impl Content {
+    /// Adds the bytes of a file that could be read.
+    fn of(&self, read: std::io::Result<Vec<u8>>) -> std::io::Result<Vec<u8>> {
+        read.inspect(|bytes| self.0.set(crate::fingerprint([self.0.get().to_le_bytes().as_slice(), bytes])))
+    }
+
+    /// The object that the files make.
+    fn names(self, object: ObjectModel) -> ObjectModel {
+        ObjectModel { content: self.0.get(), ..object }
+    }
+}
+
 /// Loads a built-in object by name, or a URDF, OBJ or STL file by path; `None` for an empty hand.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, ObjectError> {
     if source == EMPTY {
@@ -49,21 +66,23 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
         object.friction = built_in.friction;
         return Ok(Some(object));
     }
-    blueprint(source)?.build(options).map(Some)
+    let content = Content::default();
+    let object = blueprint(source, &content)?.build(options)?;
+    Ok(Some(content.names(object)))
 }
 
 /// Surface of the object in a URDF, OBJ or STL file, in the file's own units. It may be open or tangled: it is for looking
 /// at only.
 pub fn load_surface(source: &str) -> Result<SurfaceMesh, ObjectError> {
-    Ok(blueprint(source)?.surface())
+    Ok(blueprint(source, &Content::default())?.surface())
 }
 
-fn blueprint(source: &str) -> Result<Blueprint, ObjectError> {
+fn blueprint(source: &str, content: &Content) -> Result<Blueprint, ObjectError> {
     let path = Path::new(source);
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
-        "urdf" | "xml" => read_urdf(path),
-        "obj" | "stl" => read_mesh_file(path),
+        "urdf" | "xml" => read_urdf(path, content),
+        "obj" | "stl" => read_mesh_file(path, content),
         _ => Err(unknown(source, path, &extension)),
     }
 }
@@ -97,16 +116,18 @@ fn stem(path: &Path) -> String {
 fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
     let folder = Path::new(name);
     let file = folder.join(format!("{name}.urdf"));
-    let bytes = read_embedded(&file).map_err(|cause| unreadable(&file, &cause))?;
-    let read = |path: &str| read_embedded(Path::new(path));
+    let content = Content::default();
+    let bytes = content.of(read_embedded(&file)).map_err(|cause| unreadable(&file, &cause))?;
+    let read = |path: &str| content.of(read_embedded(Path::new(path)));
     let mesh = |reference: &str| read_mesh(&folder.join(reference).to_string_lossy(), &read);
-    urdf::parse(name, &bytes, &mesh)?.build(options)
+    let object = urdf::parse(name, &bytes, &mesh)?.build(options)?;
+    Ok(content.names(object))
 }
 
-fn read_urdf(path: &Path) -> Result<Blueprint, ObjectError> {
-    let bytes = read_file(path).map_err(|cause| unreadable(path, &cause))?;
+fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
+    let bytes = content.of(read_file(path)).map_err(|cause| unreadable(path, &cause))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let read = |path: &str| read_referenced(Path::new(path));
+    let read = |path: &str| content.of(read_referenced(Path::new(path)));
     let mesh = |reference: &str| {
         let places = candidates(reference, folder);
         match places.iter().find(|place| place.is_file()) {
@@ -127,8 +148,8 @@ fn read_urdf(path: &Path) -> Result<Blueprint, ObjectError> {
     urdf::parse(&stem(path), &bytes, &mesh)
 }
 
-fn read_mesh_file(path: &Path) -> Result<Blueprint, ObjectError> {
-    let read = |path: &str| read_referenced(Path::new(path));
+fn read_mesh_file(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
+    let read = |path: &str| content.of(read_referenced(Path::new(path)));
     let parts = read_mesh(&path.to_string_lossy(), &read).map_err(|cause| ObjectError::Mesh { cause })?;
     let mut blueprint = Blueprint::new(&stem(path));
     blueprint.add_visual(&ShapeSource::Mesh(parts), &Pose::IDENTITY, None);

@@ -144,6 +144,8 @@ pub struct ObjectModel {
     pub bounds: Bounds,
     /// Warnings: values guessed and meshes repaired while loading.
     pub warnings: Vec<String>,
+    /// Hash of its files: equal for equal objects, wherever they lie.
+    pub content: u64,
 }
 
 impl ObjectModel {
@@ -164,6 +166,7 @@ impl ObjectModel {
             modulus: None,
             bounds: shape.bounds(),
             warnings: Vec::new(),
+            content: crate::fingerprint([format!("{shape:?} {density} {friction}").as_bytes()]),
         }
     }
 }

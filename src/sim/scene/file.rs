@@ -127,6 +127,20 @@ impl Scene {
         keys
     }
 
+    /// Settings that differ from the defaults, one a line, without the object's name or path: equal for equal scenes, also
+    /// for a later version that has more settings.
+    pub fn differences(&self) -> String {
+        let values = |table: &toml::Table| {
+            let mut values = Vec::new();
+            collect_values(table, "", &mut values);
+            values
+        };
+        let usual = values(&known_keys());
+        let own = toml::Table::try_from(self).expect("a scene is a table");
+        let own = values(&own).into_iter().filter(|key| key.name != "object.source" && !usual.contains(key));
+        own.map(|SceneKey { name, default: value }| format!("{name}={value}\n")).collect()
+    }
+
     /// The whole scene as TOML, every key written out.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a scene holds only tables, numbers and text, which TOML can write")
@@ -244,6 +258,16 @@ fn collect_values(table: &toml::Table, prefix: &str, into: &mut Vec<SceneKey>) {
 mod tests {
     use super::*;
     use crate::scene::{Accuracy, Auto};
+
+    #[test]
+    fn differences_are_those_from_the_defaults() {
+        let mut scene = Scene::default();
+        scene.object.source = "lemon".to_owned();
+        assert_eq!(scene.differences(), "");
+        scene.object.mass = Auto::Value(0.25);
+        scene.gripper.mount.yaw_deg = 12.5;
+        assert_eq!(scene.differences(), "gripper.mount.yaw_deg=12.5\nobject.mass=0.25\n");
+    }
 
     #[test]
     fn a_scene_survives_a_round_trip() {

@@ -18,11 +18,13 @@ pub enum Flag {
     Interrupted,
     /// The board's sample times are irregular.
     Cadence,
+    /// Another trial holds the same grasp.
+    Duplicate,
 }
 
 impl Flag {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::NoContact, Self::Saturated, Self::Interrupted, Self::Cadence];
+    pub const ALL: [Self; 5] = [Self::NoContact, Self::Saturated, Self::Interrupted, Self::Cadence, Self::Duplicate];
 
     /// Name on screen.
     pub fn label(self) -> &'static str {
@@ -31,6 +33,7 @@ impl Flag {
             Self::Saturated => "saturated",
             Self::Interrupted => "interrupted",
             Self::Cadence => "cadence",
+            Self::Duplicate => "duplicate",
         }
     }
 }

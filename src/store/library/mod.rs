@@ -44,9 +44,9 @@ impl LibraryTrial {
                 title
             }
         };
-        let collection = row.collection.as_deref().unwrap_or_default();
+        let collection = row.collections().map(String::as_str).collect::<Vec<_>>().join(" ");
         let (id, tags) = (row.id.to_string(), row.tags.join(" "));
-        let words = [&*title, &row.object, &id, &row.note, &tags, collection, &row.sensors].join("\n");
+        let words = [&*title, &row.object, &id, &row.note, &tags, &collection, &row.sensors].join("\n");
         Self { words: words.to_lowercase().into(), title, row }
     }
 

@@ -160,7 +160,7 @@ impl Matcher<'_> {
             && query.flag.is_none_or(|flag| row.flags.iter().any(|found| found.flag == flag))
             && query.tag.as_ref().is_none_or(|tag| row.tags.contains(tag))
             && query.preset.as_ref().is_none_or(|name| row.preset.is_some_and(|own| own.eq_ignore_ascii_case(name)))
-            && query.collection.as_ref().is_none_or(|name| row.collection.as_ref() == Some(name))
+            && query.collection.as_ref().is_none_or(|name| row.collections().any(|own| own == name))
             && self.since.as_ref().is_none_or(|since| day >= since.as_str())
             && self.until.as_ref().is_none_or(|until| day <= until.as_str())
             && self.object.as_ref().is_none_or(|name| is_named(trial, name))

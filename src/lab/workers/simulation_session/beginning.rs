@@ -50,12 +50,15 @@ impl Session {
         self.own_pose_done = true;
         // The first grasp is the scene as written; the following ones come from random poses, on the object as it was
         // released if the scene asks for it.
+        let mut after = None;
         let (scene, seed) = if again {
             self.poses_drawn += 1;
             let sampler = self.sampler.get_or_insert_with(|| PoseSampler::new(&self.nominal, model.as_deref()));
             let before = self.current.as_ref().filter(|current| current.ended && self.status.grasp_of_round > 1);
             let released = before.map(|current| current.frame.as_ref());
-            (sampler.draw_after(model.as_deref(), self.poses_drawn, released).0, self.poses_drawn)
+            let scene = sampler.draw_after(model.as_deref(), self.poses_drawn, released).0;
+            after = before.filter(|_| sampler.is_left(&scene)).and_then(|current| current.run.header().identity());
+            (scene, self.poses_drawn)
         } else {
             (self.nominal.clone(), 0)
         };
@@ -73,6 +76,7 @@ impl Session {
             accuracy_job.measure(&scene, model.clone());
         }
         let mut run = prepare(&scene, model.as_deref(), seed);
+        run.set_after(after);
         let mut begun = run.begun();
         begun.header.earlier = self.listener.as_ref().and_then(Listener::earlier);
         if !again {

@@ -107,6 +107,7 @@ impl Session {
         let recorder = Recorder::start(setup.store, move |notice| {
             let notice = match notice {
                 RecorderNotice::Stored(id) => Notice::Stored(id),
+                RecorderNotice::Known(id) => Notice::Known(id),
                 RecorderNotice::Warning(text) => Notice::Warning(text),
                 RecorderNotice::Failed(text) => Notice::Failed(text),
                 // Only the real gripper's trials say so.
@@ -400,7 +401,7 @@ impl Session {
         }
         let recorded = self.recorder_busy;
         if recorded && let Some(recorder) = &self.recorder {
-            recorder.finish(&trial.data.quality, &trial.header.warnings);
+            recorder.finish(&trial.data.quality, &trial.header);
             self.recorder_busy = false;
         }
         let subject = Subject {

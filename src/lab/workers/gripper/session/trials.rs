@@ -160,7 +160,7 @@ impl GripperSession {
                 }
                 RecorderNotice::Warning(text) => self.outlets.notify(Notice::Warning(text)),
                 RecorderNotice::Failed(cause) => self.stop_recording(&cause),
-                RecorderNotice::Stored(_) | RecorderNotice::Discarded(_) => {}
+                RecorderNotice::Stored(_) | RecorderNotice::Known(_) | RecorderNotice::Discarded(_) => {}
             }
         }
     }
