@@ -140,6 +140,7 @@ fn fitted(
         seed: arguments.data.seed,
         quick: arguments.data.quick,
         settings,
+        second: None,
         progress: &|share| bar.set_position((share * 1000.0) as u64),
         stop: &stop,
     };

@@ -1,5 +1,5 @@
-//! A grasp as a row of features, for classifiers without a notion of time: means over windows of time, or a few
-//! hand-crafted measures of each channel.
+//! A grasp as a row of features, for classifiers without a notion of time: means over windows of time, the same extended by
+//! events and by sums and differences of both fingers, or a few hand-crafted measures of each channel.
 
 use crate::data::{Dataset, Sequence};
 use crate::mirror::mirror;
@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 pub(crate) enum FeatureKind {
     /// Means of each channel over 30 equal windows of time.
     Course,
+    /// Means of each channel over 30 equal windows of time on a compressed scale; half sum and absolute half difference of
+    /// both fingers in each window; maximum, its time, last value and onsets of each channel.
+    ExtendedCourse,
     /// Hand-crafted measures of each channel: onset, height, slope, end value, difference between fingers.
     Measures,
 }
@@ -27,10 +30,46 @@ pub(crate) struct Features {
     risen: Vec<f32>,
     /// Counterpart of each channel on the other finger.
     mirror: Option<Vec<usize>>,
+    /// Fixed levels of each channel; only for the extended course.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    levels: Vec<Levels>,
 }
+
+/// Fixed levels of a channel, in its unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Levels {
+    /// Start of the logarithmic range of asinh(x / knee); zero for a linear scale.
+    knee: f32,
+    /// Levels whose first crossing is an onset.
+    onsets: Vec<f32>,
+}
+
+impl Levels {
+    /// Levels of a channel, by the quantity in its name. A pressure is a force over the area of a pad, 170 mm², a contact
+    /// pressure one over the smaller area of contact. Others keep their scale; their onset is at `risen`.
+    fn of(channel: &str, risen: f32) -> Self {
+        let starts = |quantity: &str| channel.starts_with(quantity);
+        match () {
+            () if starts("force") => Self { knee: 0.08, onsets: vec![0.02, 0.1] },
+            () if starts("pressure") => Self { knee: 470.0, onsets: vec![120.0, 590.0] },
+            () if starts("contact_pressure") => Self { knee: 3000.0, onsets: vec![500.0, 3000.0] },
+            () if starts("curvature") => Self { knee: 0.0, onsets: Vec::new() },
+            () => Self { knee: 0.0, onsets: vec![risen] },
+        }
+    }
+
+    fn compressed(&self, x: f32) -> f32 {
+        if self.knee > 0.0 { (x / self.knee).asinh() } else { x }
+    }
+}
+
+/// Version of the features, part of the fingerprint of methods that use them.
+pub(crate) const REVISION: u32 = 1;
 
 /// Number of windows: three per tenth of a grasp.
 const WINDOWS: usize = 30;
+/// Largest number of onsets of a channel.
+const MOST_ONSETS: usize = 8;
 /// Number of measures of each channel.
 const MEASURES: usize = 9;
 
@@ -46,14 +85,23 @@ impl Features {
                 (*low, *high) = (low.min(*x), high.max(*x));
             }
         }
-        let risen = range.iter().map(|(low, high)| if high > low { low + 0.1 * (high - low) } else { 0.0 }).collect();
-        Self { kind, channels, duration_s, risen, mirror: mirror(&data.channels) }
+        let risen: Vec<f32> =
+            range.iter().map(|(low, high)| if high > low { low + 0.1 * (high - low) } else { 0.0 }).collect();
+        let levels = match kind {
+            FeatureKind::Course | FeatureKind::Measures => Vec::new(),
+            FeatureKind::ExtendedCourse => data.channels.iter().zip(&risen).map(|(c, r)| Levels::of(c, *r)).collect(),
+        };
+        Self { kind, channels, duration_s, risen, mirror: mirror(&data.channels), levels }
     }
 
     /// Number of features.
     pub(crate) fn width(&self) -> usize {
         match self.kind {
             FeatureKind::Course => self.channels * WINDOWS,
+            FeatureKind::ExtendedCourse => {
+                let onsets: usize = self.levels.iter().map(|levels| levels.onsets.len()).sum();
+                (self.channels + 2 * self.pairs().count()) * WINDOWS + 3 * self.channels + onsets
+            }
             FeatureKind::Measures => self.channels * (MEASURES + 1),
         }
     }
@@ -66,12 +114,32 @@ impl Features {
             && self.duration_s > 0.0
             && self.risen.len() == channels
             && self.mirror.as_ref().is_none_or(|m| m.len() == channels && m.iter().all(|to| *to < channels))
+            && match self.kind {
+                FeatureKind::Course | FeatureKind::Measures => self.levels.is_empty(),
+                FeatureKind::ExtendedCourse => {
+                    let sound = |l: &Levels| {
+                        l.knee.is_finite() && l.onsets.len() <= MOST_ONSETS && l.onsets.iter().all(|x| x.is_finite())
+                    };
+                    self.levels.len() == channels && self.levels.iter().all(sound)
+                }
+            }
+    }
+
+    /// True if grasps can be mirrored.
+    pub(crate) fn has_mirror(&self) -> bool {
+        self.mirror.is_some()
+    }
+
+    /// Channels of the same sensor on both fingers.
+    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.mirror.iter().flatten().copied().enumerate().filter(|(own, other)| own < other)
     }
 
     /// Features of a grasp.
     pub(crate) fn row(&self, grasp: &Sequence) -> Vec<f32> {
         match self.kind {
             FeatureKind::Course => self.course(grasp),
+            FeatureKind::ExtendedCourse => self.extended_course(grasp),
             FeatureKind::Measures => self.measures(grasp),
         }
     }
@@ -83,8 +151,38 @@ impl Features {
         Some(self.row(&Sequence { t_s: grasp.t_s.clone(), values: exchanged.collect() }))
     }
 
+    fn extended_course(&self, grasp: &Sequence) -> Vec<f32> {
+        let mut row = self.course(grasp);
+        row.reserve_exact(self.width() - row.len());
+        for window in row.chunks_exact_mut(self.channels) {
+            window.iter_mut().zip(&self.levels).for_each(|(x, levels)| *x = levels.compressed(*x));
+        }
+        for start in (0..self.channels * WINDOWS).step_by(self.channels) {
+            for (own, other) in self.pairs() {
+                let (a, b) = (row[start + own], row[start + other]);
+                row.extend([0.5 * (a + b), 0.5 * (a - b).abs()]);
+            }
+        }
+        for (channel, levels) in self.levels.iter().enumerate() {
+            let values = || grasp.rows().map(|(t, row)| (t, row[channel]));
+            let (mut highest, mut at, mut last) = (0.0, 0.0, 0.0);
+            for (number, (t, x)) in values().enumerate() {
+                if number == 0 || x > highest {
+                    (highest, at) = (x, t);
+                }
+                last = x;
+            }
+            row.extend([levels.compressed(highest), at, levels.compressed(last)]);
+            for level in &levels.onsets {
+                row.push(values().find(|(_, x)| x > level).map_or(self.duration_s, |(t, _)| t));
+            }
+        }
+        row.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        row
+    }
+
     fn course(&self, grasp: &Sequence) -> Vec<f32> {
-        let mut sums = vec![0.0; self.width()];
+        let mut sums = vec![0.0; self.channels * WINDOWS];
         let mut counts = [0u32; WINDOWS];
         for (t, row) in grasp.rows() {
             let window = ((t / self.duration_s * WINDOWS as f32 - 1e-3) as usize).min(WINDOWS - 1);
@@ -176,6 +274,36 @@ mod tests {
         assert_eq!(row[2 * MEASURES..], [-2.0, 2.0]);
         let mirrored = features.mirrored(&data.examples[0].grasp).expect("has two sides");
         assert_eq!(mirrored[3], 4.0);
+    }
+
+    #[test]
+    fn the_extended_course_adds_both_fingers_and_events() {
+        let data = data();
+        let features = Features::fit(FeatureKind::ExtendedCourse, &data);
+        assert!(features.is_sound(2));
+        let row = features.row(&data.examples[0].grasp);
+        assert_eq!((row.len(), features.width()), (130, 130));
+        let [low, high] = [2.0_f32, 4.0].map(|force| (force / 0.08).asinh());
+        assert_eq!(row[58..60], [low, high]);
+        assert_eq!((row[60], row[61]), (0.0, 0.0));
+        assert_eq!(row[118..120], [0.5 * (low + high), 0.5 * (high - low)]);
+        assert_eq!(row[120..], [low, 0.51, low, 0.51, 0.51, high, 0.51, high, 0.51, 0.51]);
+        let mirrored = features.mirrored(&data.examples[0].grasp).expect("has two sides");
+        assert_eq!((mirrored[58..60].to_vec(), &mirrored[60..120]), (vec![high, low], &row[60..120]));
+        assert!(features.row(&Sequence::default()).iter().all(|x| x.is_finite()));
+    }
+
+    #[test]
+    fn levels_follow_the_quantity_and_mirrors_need_two_fingers() {
+        let mut data = data();
+        data.channels = ["contact_pressure_left_distal", "grip"].map(str::to_owned).to_vec();
+        let features = Features::fit(FeatureKind::ExtendedCourse, &data);
+        assert_eq!(features.levels[0], Levels { knee: 3000.0, onsets: vec![500.0, 3000.0] });
+        assert_eq!(features.levels[1], Levels { knee: 0.0, onsets: vec![0.4] });
+        assert_eq!((features.width(), features.has_mirror()), (2 * WINDOWS + 6 + 3, false));
+        assert_eq!(features.row(&data.examples[0].grasp).len(), features.width());
+        let damaged = Features { levels: Vec::new(), ..features };
+        assert!(!damaged.is_sound(2));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Options and errors of fitting a recogniser.
 
-use crate::data::Dataset;
+use crate::data::{DataCard, Dataset};
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Options of a fit, its progress callback and its stop flag.
@@ -11,6 +12,10 @@ pub struct Fitting<'a> {
     pub quick: bool,
     /// Settings that replace the method's defaults, by name.
     pub settings: serde_json::Map<String, serde_json::Value>,
+    /// Further training grasps: stage two of a dual-stage network learns from these, with outputs of a stage one that has not
+    /// seen them, as in the paper (40/40/20, section V-C). Other methods learn from both sets. With `None`, a dual-stage
+    /// network divides its data in halves.
+    pub second: Option<&'a Dataset>,
     /// Called with the share of work done, 0 to 1.
     pub progress: &'a (dyn Fn(f64) + Sync),
     /// Set by the caller to stop the fit.
@@ -21,6 +26,18 @@ impl Fitting<'_> {
     /// Returns an error once the stop flag is set.
     pub fn check(&self) -> Result<(), LearnError> {
         if self.stop.load(Ordering::Relaxed) { Err(LearnError::Stopped) } else { Ok(()) }
+    }
+
+    /// The data of a fit together with the further training grasps.
+    pub(crate) fn joined<'d>(&self, data: &'d Dataset) -> Result<Cow<'d, Dataset>, LearnError> {
+        let Some(second) = self.second else { return Ok(Cow::Borrowed(data)) };
+        if second.channels != data.channels || second.labels != data.labels {
+            return Err(LearnError::SecondDiffers);
+        }
+        let mut both = data.clone();
+        both.examples.extend_from_slice(&second.examples);
+        both.about = DataCard { grasps: both.examples.len(), ..both.about };
+        Ok(Cow::Owned(both))
     }
 
     /// Returns an error if settings are given to a method without settings.
@@ -64,6 +81,9 @@ pub enum LearnError {
         /// Title of the method.
         method: &'static str,
     },
+    /// Grasps for stage two with other channels or labels.
+    #[error("the grasps for stage two have other channels or labels than those for stage one")]
+    SecondDiffers,
     /// A feature that is NaN or infinite.
     #[error("feature {feature} of training row {row} is not a finite number; remove the trial with gaps")]
     NotFinite {

@@ -12,6 +12,7 @@
 //! |---|---|---|
 //! | 0 | `data` | sequences, labels, data sets |
 //! | 0 | `pmf`, `mirror`, `arrays` | probabilities; channels of the mirrored gripper; named parameters of a model |
+//! | 0 | `temperature` | temperature that calibrates probabilities |
 //! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
 //! | 1 | `split` | splits into training and test trials |
@@ -47,7 +48,7 @@
 //!     ..Dataset::default()
 //! };
 //! let (progress, stop) = (|_| {}, AtomicBool::new(false));
-//! let fitting = Fitting { seed: 1, quick: true, settings: Default::default(), progress: &progress, stop: &stop };
+//! let fitting = Fitting { seed: 1, quick: true, settings: Default::default(), second: None, progress: &progress, stop: &stop };
 //! let model = method("decision-tree").expect("in METHODS").train(&data, &fitting)?;
 //! let verdict = model.recogniser.recognise(&grasp(1.0), None);
 //! assert_eq!(verdict.pmf.top().0, 1);
@@ -74,6 +75,7 @@ mod pmf;
 mod recogniser;
 mod signatures;
 mod split;
+mod temperature;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
 pub use belief::{Belief, Rejection, StopReason, StopRule};

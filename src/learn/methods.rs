@@ -1,12 +1,12 @@
 //! Table of recognition methods. To add one, add a line to [`METHODS`].
 
 use crate::arrays::Arrays;
-use crate::baselines::{Convolution, Tabular, TabularKind, Warping};
+use crate::baselines::{Candle, Convolution, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
 use crate::data::Dataset;
 use crate::fitting::{Fitting, LearnError};
 use crate::model::{LoadError, Model, ModelCard};
-use crate::network::{Recipe, TactileNetwork};
+use crate::network::{self, Recipe};
 use crate::recogniser::Recogniser;
 use crate::signatures::Signatures;
 use std::sync::Arc;
@@ -38,12 +38,16 @@ pub struct Method {
     pub kind: MethodKind,
     /// One-line description.
     pub about: &'static str,
+    /// True if it learns sizes and shapes, so that data without them are refused.
+    pub needs_properties: bool,
     /// Default settings; networks only.
     pub recipe: Option<fn() -> Recipe>,
     /// Fits a recogniser to data.
     pub fit: Fit,
     /// Restores a recogniser from the card and arrays of a model file.
     pub load: Load,
+    /// Everything that decides a fit, besides the data, the seed and the options of the fit.
+    decided_by: fn() -> serde_json::Value,
 }
 
 macro_rules! network {
@@ -53,23 +57,27 @@ macro_rules! network {
             title: $title,
             kind: MethodKind::$kind,
             about: $about,
+            needs_properties: $recipe.two_stages,
             recipe: Some(|| $recipe),
-            fit: |data, fitting| Ok(Box::new(TactileNetwork::fit(data, $recipe.adjusted(fitting)?, $title, fitting)?)),
-            load: |card, arrays| Ok(Box::new(TactileNetwork::load(card, arrays)?)),
+            fit: |data, fitting| network::fit(data, $recipe.adjusted(fitting)?, $title, fitting),
+            load: network::load,
+            decided_by: || network::decided_by(&$recipe),
         }
     };
 }
 
 macro_rules! baseline {
-    ($key:literal, $title:literal, $kind:ident, $about:literal, $fit:expr, $type:ident) => {
+    ($key:literal, $title:literal, $kind:ident, $about:literal, $fit:expr, $type:ident, $decided_by:expr) => {
         Method {
             key: $key,
             title: $title,
             kind: MethodKind::$kind,
             about: $about,
+            needs_properties: false,
             recipe: None,
-            fit: |data, fitting| Ok(Box::new($fit(data, fitting)?)),
+            fit: |data, fitting| Ok(Box::new($fit(&*fitting.joined(data)?, fitting)?)),
             load: |card, arrays| Ok(Box::new($type::load(card, arrays)?)),
+            decided_by: $decided_by,
         }
     };
 }
@@ -82,8 +90,25 @@ macro_rules! tabular {
             $kind,
             $about,
             |data, fitting| Tabular::fit(data, TabularKind::$tabular, fitting),
-            Tabular
+            Tabular,
+            || TabularKind::$tabular.decided_by()
         )
+    };
+}
+
+macro_rules! candle {
+    ($key:literal, $title:literal, $kind:ident, $about:literal, $network:ident) => {
+        Method {
+            key: $key,
+            title: $title,
+            kind: MethodKind::$kind,
+            about: $about,
+            needs_properties: false,
+            recipe: None,
+            fit: |data, fitting| Ok(Box::new(Candle::<$network>::fit(&*fitting.joined(data)?, fitting)?)),
+            load: |card, arrays| Ok(Box::new(Candle::<$network>::load(card, arrays)?)),
+            decided_by: Candle::<$network>::decided_by,
+        }
     };
 }
 
@@ -96,12 +121,16 @@ impl Method {
             let start = cpu_time::ThreadTime::now();
             (self.fit)(data, fitting).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
         })?;
+        let data = fitting.joined(data)?;
+        let recipe = self.recipe.map(|recipe| recipe().adjusted(fitting)).transpose()?;
         let card = ModelCard {
             method: self.key.to_owned(),
             channels: data.channels.clone(),
             labels: data.labels.clone(),
             data: data.about.clone(),
             settings: recogniser.settings(),
+            fingerprint: Some(self.fingerprint()),
+            deviations: recipe.map(|recipe| recipe.deviations()).unwrap_or_default(),
             stop: StopRule::default(),
             rejection: recogniser.rejection().cloned(),
             seed: fitting.seed,
@@ -113,12 +142,28 @@ impl Method {
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         let model = Model { card, recogniser: Arc::from(recogniser), signatures: None };
-        Ok(model.with_signatures(Signatures::of(data)))
+        Ok(model.with_signatures(Signatures::of(&data)))
+    }
+
+    /// Fingerprint of everything that decides a fit besides the data, the seed and the options of the fit: settings, features,
+    /// and the versions of their code. Results with another one are of another method.
+    pub fn fingerprint(&self) -> String {
+        let decided_by = (self.decided_by)().to_string();
+        // Fowler-Noll-Vo hash.
+        let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+        let hash = self.key.bytes().chain(decided_by.bytes()).fold(0xcbf2_9ce4_8422_2325, mix);
+        format!("{:08x}", hash as u32 ^ (hash >> 32) as u32)
+    }
+
+    /// Differences from the network of the paper that it stands for; empty for strict recipes and for methods that the paper
+    /// does not define.
+    pub fn deviations(&self) -> Vec<String> {
+        self.recipe.map(|recipe| recipe().deviations()).unwrap_or_default()
     }
 }
 
 /// All methods: the paper's networks first, then its baselines, then further ones.
-pub const METHODS: [Method; 20] = [
+pub const METHODS: [Method; 24] = [
     network!(
         "ds-lstm",
         "DS-LSTM",
@@ -164,10 +209,31 @@ pub const METHODS: [Method; 20] = [
         Recipe::committee()
     ),
     network!(
+        "paper-macro-layer",
+        "Macro-layer, strict",
+        Network,
+        "The macro-layer as the paper has it: 75 Hz, channels as they are, one output at the end, nothing else",
+        Recipe::paper_macro_layer()
+    ),
+    network!(
+        "paper-ds-lstm",
+        "DS-LSTM, strict",
+        Network,
+        "The dual-stage LSTM as the paper has it: stage two reads the size and shape that stage one decides",
+        Recipe::paper_dual_stage()
+    ),
+    network!(
+        "paper-ids-lstm",
+        "iDS-LSTM, strict",
+        Network,
+        "The iterated DS-LSTM as the paper has it: trained on pairs of grasps, the PMF of the earlier one by a mock network",
+        Recipe::paper_iterated()
+    ),
+    network!(
         "zuo",
         "Zuo et al.",
         Network,
-        "The four-layer network that the paper builds on: LSTM, dropout, fully connected",
+        "The four-layer network that the paper builds on, as strict as the three before: LSTM, dropout, fully connected",
         Recipe::zuo()
     ),
     tabular!("decision-tree", "Decision tree", Single, "One tree on windowed means of all channels", DecisionTree),
@@ -205,13 +271,27 @@ pub const METHODS: [Method; 20] = [
     ),
     tabular!("measures-svm", "Measures + SVM", Further, "Support vector machine on hand-crafted features", MeasuresSvm),
     tabular!("measures-forest", "Measures + forest", Further, "Random forest on hand-crafted features", MeasuresForest),
-    baseline!("dtw-knn", "DTW-kNN", Further, "Five nearest neighbours by dynamic time warping", Warping::fit, Warping),
+    tabular!(
+        "extra-trees",
+        "Extra-trees",
+        Further,
+        "250 extremely randomised trees on windowed means, sums and differences of both fingers, and events",
+        ExtraTrees
+    ),
     baseline!(
+        "dtw-knn",
+        "DTW-kNN",
+        Further,
+        "Five nearest neighbours by dynamic time warping",
+        Warping::fit,
+        Warping,
+        Warping::decided_by
+    ),
+    candle!(
         "convolution",
         "Convolutional",
         Further,
-        "Small convolutional network over time, in plain candle",
-        Convolution::fit,
+        "Three convolutions over time and a dense layer, in plain candle",
         Convolution
     ),
 ];

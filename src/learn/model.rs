@@ -27,6 +27,12 @@ pub struct ModelCard {
     pub data: DataCard,
     /// Settings chosen or found while fitting.
     pub settings: serde_json::Value,
+    /// Fingerprint of the method that made it, [`crate::Method::fingerprint`]; absent in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingerprint: Option<String>,
+    /// Differences from the network of the paper that the method stands for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub deviations: Vec<String>,
     /// Stop rule for successive grasps.
     pub stop: StopRule,
     /// Threshold that separates known from unknown objects.

@@ -66,7 +66,7 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
     let settings = serde_json::json!({ "epochs": EPOCHS }).as_object().cloned().unwrap_or_default();
     let interrupted = AtomicBool::new(false);
     let progress = |_share: f64| ();
-    let fitting = Fitting { seed: 1, quick: false, settings, progress: &progress, stop: &interrupted };
+    let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &progress, stop: &interrupted };
     let mut model = method.train(&train, &fitting)?;
     let objects: Vec<usize> =
         (0..test.examples.len()).filter(|k| test.labels.classes[test.examples[*k].class].size.is_some()).collect();

@@ -11,8 +11,8 @@ const PACKAGES: [&str; 9] = ["geometry", "sim", "tactile", "learn", "device", "s
 const HOMES: &[(&str, &[&str])] = &[
     ("ab_glyph", &["src/render/text.rs"]),
     ("bytemuck", &["src/render", "src/geometry"]),
-    ("candle_core", &["src/learn/baselines/convolution.rs", "src/lab/study/network_cost.rs"]),
-    ("candle_nn", &["src/learn/baselines/convolution.rs", "src/lab/study/network_cost.rs"]),
+    ("candle_core", &["src/learn/baselines", "src/lab/study/network_cost.rs"]),
+    ("candle_nn", &["src/learn/baselines", "src/lab/study/network_cost.rs"]),
     ("cc", &["src/device/build.rs"]),
     ("clap", &["src/cli", "src/workshop"]),
     ("cpu_time", &["src/cli", "src/lab/study", "src/learn/evaluation.rs", "src/learn/methods.rs", "src/sim/bench"]),

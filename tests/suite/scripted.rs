@@ -18,6 +18,8 @@ pub(crate) fn model() -> Arc<Model> {
         labels: labels_of_catalogue(),
         data: DataCard { layout: Some("C1+F".to_owned()), ..DataCard::default() },
         settings: serde_json::Value::Null,
+        fingerprint: None,
+        deviations: Vec::new(),
         stop: StopRule::default(),
         rejection: None,
         seed: 0,

@@ -28,6 +28,8 @@ pub struct ComparisonRow {
     pub gain_over_independent: Vec<Interval>,
     /// Origin of the grasps.
     pub data: DataCard,
+    /// Fingerprint of the method; null for models of older versions.
+    pub fingerprint: Option<String>,
     /// True for a quick fit.
     pub quick: bool,
     /// Comparison with the first row.
@@ -127,6 +129,7 @@ impl Comparison<'_> {
             seed: self.seed,
             quick: self.quick,
             settings: serde_json::Map::new(),
+            second: None,
             progress: &|_| (),
             stop: self.interrupted,
         }
@@ -175,6 +178,7 @@ impl Comparison<'_> {
             f1_by_grasps_independent: palpate_learn::evaluation::f1_by_grasps(classes, &independent),
             gain_over_independent: fed_back_against_independent(classes, &followed, &independent),
             data: self.test.about.clone(),
+            fingerprint: model.card.fingerprint.clone(),
             quick: model.card.quick,
             against_first: None,
         };

@@ -167,6 +167,7 @@ impl LabelledTraining<'_> {
             seed: self.seed,
             quick: self.quick,
             settings: serde_json::Map::new(),
+            second: None,
             progress: &|share| (self.progress)(TrainingStage::Fitting(share)),
             stop: self.stop,
         };

@@ -57,7 +57,8 @@ pub fn search(
                 (0..fold_of.len()).filter(|k| (fold_of[*k] == fold) == inside).collect()
             };
             let (train, left_out) = (data.part(&of(false)), data.part(&of(true)));
-            let fitting = Fitting { seed, quick, settings: settings.clone(), progress: &|_| (), stop: &stop };
+            let fitting =
+                Fitting { seed, quick, settings: settings.clone(), second: None, progress: &|_| (), stop: &stop };
             let recogniser = (method.fit)(&train, &fitting)?;
             let answers = answer(recogniser.as_ref(), &left_out);
             pairs.extend(answers.truth.iter().zip(&answers.verdicts).map(|(t, v)| (*t, Some(v.pmf.top().0))));

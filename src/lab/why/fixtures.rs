@@ -66,6 +66,8 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
         labels,
         data: DataCard::default(),
         settings: serde_json::Value::Null,
+        fingerprint: None,
+        deviations: Vec::new(),
         stop: StopRule::default(),
         rejection: None,
         seed: 0,

@@ -1,6 +1,7 @@
 //! Baselines for the paper's networks: those of the paper (section III-A) and later ones. Trees and their ensembles,
 //! nearest neighbours and support vector machines on features, dynamic time warping, and a convolutional network.
 
+mod candle_network;
 mod convolution;
 mod neighbours;
 mod row_model;
@@ -8,6 +9,7 @@ mod svm;
 mod tabular;
 mod warping;
 
+pub(super) use candle_network::Candle;
 pub(super) use convolution::Convolution;
 pub(super) use tabular::{Tabular, TabularKind};
 pub(super) use warping::Warping;

@@ -1,20 +1,25 @@
 //! Recognisers that turn a grasp into a row of features and classify the row.
+//!
+//! Probabilities are calibrated by a temperature, fitted to the answers on grasps that were held out: forests and boosted
+//! trees order the classes well, but are far too unsure or too sure of them.
 
 use super::neighbours::Neighbours;
 use super::row_model::{RowModel, Rows};
 use super::svm::Svm;
 use crate::arrays::Arrays;
 use crate::data::{Dataset, Sequence};
-use crate::features::{FeatureKind, Features};
+use crate::features::{self, FeatureKind, Features};
 use crate::fitting::{Fitting, LearnError, check_enough};
 use crate::forest::{
-    Examples, FeatureSampling, Forest, ForestSettings, GradientBoosting, GradientBoostingSettings, RusBoost,
+    self, Examples, FeatureSampling, Forest, ForestSettings, GradientBoosting, GradientBoostingSettings, RusBoost,
     RusBoostForm, RusBoostSettings, Table, TreeSettings,
 };
 use crate::model::{LoadError, ModelCard};
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
+use crate::temperature::{Temperatures, best_temperature};
 use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
 
 /// Kind of features and classifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +28,7 @@ pub(crate) enum TabularKind {
     DecisionTree,
     RandomForest,
     BaggedTrees,
+    ExtraTrees,
     GradientBoosting,
     RusBoostM2,
     RusBoostSamme,
@@ -47,12 +53,47 @@ struct Learned {
     scaling: Vec<(f32, f32)>,
     /// Settings of the classifier, for people.
     model: String,
+    /// Temperature of the probabilities; absent in files of versions that did not calibrate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    temperature: Option<f64>,
+    /// True if the answers on a grasp and on its mirror image are averaged.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    both_views: bool,
 }
+
+/// Use of mirrored grasps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Mirroring {
+    /// Mirrored grasps are training examples too.
+    rows: bool,
+    /// The answers on a grasp and on its mirror image are averaged.
+    views: bool,
+}
+
+/// Classifier with its settings.
+#[derive(Clone, Copy, Debug)]
+enum Classifier {
+    Forest(ForestSettings),
+    GradientBoosting(GradientBoostingSettings),
+    RusBoost(RusBoostSettings),
+    Neighbours,
+    Svm,
+}
+
+/// Largest number of trees or rounds in a quick fit.
+const QUICK: usize = 20;
+/// Number of parts of the grasps, each of which is held out once for calibration.
+const PARTS: usize = 3;
+/// Temperatures tried; votes of many trees on many classes are nearly equal and need the lowest.
+const TEMPERATURES: Temperatures = Temperatures { range: 0.005..=10.0, count: 160 };
+/// Version of the fit, part of the fingerprint.
+const REVISION: u32 = 2;
 
 impl TabularKind {
     fn features(self) -> FeatureKind {
         match self {
             Self::MeasuresSvm | Self::MeasuresForest => FeatureKind::Measures,
+            Self::ExtraTrees => FeatureKind::ExtendedCourse,
             Self::DecisionTree
             | Self::RandomForest
             | Self::BaggedTrees
@@ -67,35 +108,201 @@ impl TabularKind {
     fn wants_scaling(self) -> bool {
         matches!(self, Self::Neighbours | Self::Svm | Self::MeasuresSvm)
     }
+
+    /// Uses of mirrored grasps that are tried; the one with the best answers on held-out grasps is kept.
+    fn mirrorings(self) -> &'static [Mirroring] {
+        const ROWS: Mirroring = Mirroring { rows: true, views: false };
+        match self {
+            // The fingers of a real gripper differ, and then a mirrored grasp is no example.
+            Self::ExtraTrees => &[Mirroring { rows: true, views: true }, Mirroring { rows: false, views: false }],
+            _ => &[ROWS],
+        }
+    }
+
+    fn classifier(self) -> Classifier {
+        let rus = |form: RusBoostForm, max_depth: Option<usize>| {
+            let base = RusBoostSettings::default();
+            let tree = TreeSettings { max_depth, ..base.tree };
+            Classifier::RusBoost(RusBoostSettings { form, tree, ..base })
+        };
+        match self {
+            Self::DecisionTree => Classifier::Forest(ForestSettings::decision_tree()),
+            Self::RandomForest | Self::MeasuresForest => Classifier::Forest(ForestSettings::random_forest()),
+            Self::BaggedTrees => Classifier::Forest(ForestSettings::bagged_trees()),
+            Self::ExtraTrees => Classifier::Forest(ForestSettings::extra_trees()),
+            Self::GradientBoosting => {
+                let base = GradientBoostingSettings::default();
+                let tree = TreeSettings { min_leaf: 10, features: FeatureSampling::Sqrt, ..base.tree };
+                Classifier::GradientBoosting(GradientBoostingSettings { tree, ..base })
+            }
+            Self::RusBoostM2 => rus(RusBoostForm::M2, None),
+            Self::RusBoostSamme => rus(RusBoostForm::Samme, Some(4)),
+            Self::Neighbours => Classifier::Neighbours,
+            Self::Svm | Self::MeasuresSvm => Classifier::Svm,
+        }
+    }
+
+    /// Everything that decides a fit, besides the data, the seed and the options of the fit.
+    pub(crate) fn decided_by(self) -> serde_json::Value {
+        let classifier = match self.classifier() {
+            Classifier::Neighbours => Neighbours::DESCRIPTION.to_owned(),
+            Classifier::Svm => Svm::decided_by(),
+            trees => format!("{trees:?}, revision {}", forest::REVISION),
+        };
+        serde_json::json!({
+            "features": self.features(),
+            "revisions": [REVISION, features::REVISION],
+            "mirroring": format!("{:?}", self.mirrorings()),
+            "classifier": classifier,
+        })
+    }
+}
+
+impl Classifier {
+    /// The classifier with the seed of a fit, smaller if quick.
+    fn of(kind: TabularKind, fitting: &Fitting<'_>) -> Self {
+        let seed = fitting.seed;
+        let count = |full: usize| if fitting.quick { full.min(QUICK) } else { full };
+        match kind.classifier() {
+            Self::Forest(own) => Self::Forest(ForestSettings { seed, trees: count(own.trees), ..own }),
+            Self::GradientBoosting(own) => {
+                Self::GradientBoosting(GradientBoostingSettings { seed, rounds: count(own.rounds), ..own })
+            }
+            Self::RusBoost(own) => Self::RusBoost(RusBoostSettings { seed, rounds: count(own.rounds), ..own }),
+            Self::Neighbours => Self::Neighbours,
+            Self::Svm => Self::Svm,
+        }
+    }
+
+    /// Fits to rows; returns also a description of the settings.
+    fn fit(&self, rows: &Rows, fitting: &Fitting<'_>) -> Result<(Box<dyn RowModel>, String), LearnError> {
+        let table = Table { values: &rows.values, columns: rows.columns };
+        let examples = Examples { table, labels: &rows.labels, classes: rows.classes, weights: None };
+        Ok(match self {
+            Self::Forest(settings) => (Box::new(Forest::fit(&examples, settings)?), format!("{settings:?}")),
+            Self::GradientBoosting(settings) => {
+                (Box::new(GradientBoosting::fit(&examples, settings)?), format!("{settings:?}"))
+            }
+            Self::RusBoost(settings) => (Box::new(RusBoost::fit(&examples, settings)?), format!("{settings:?}")),
+            Self::Neighbours => (Box::new(Neighbours::fit(rows)?), Neighbours::DESCRIPTION.to_owned()),
+            Self::Svm => {
+                let model = Svm::fit(rows, fitting)?;
+                let description = model.described();
+                (Box::new(model), description)
+            }
+        })
+    }
+}
+
+/// Scaled features of all grasps.
+struct Ground<'a> {
+    data: &'a Dataset,
+    columns: usize,
+    own: Vec<Vec<f32>>,
+    /// Of the mirror images; `None` if grasps cannot be mirrored.
+    mirrored: Option<Vec<Vec<f32>>>,
+}
+
+impl Ground<'_> {
+    fn rows(&self, grasps: impl Iterator<Item = usize>, mirroring: Mirroring) -> Rows {
+        let classes = self.data.labels.classes.len();
+        let mut rows = Rows { values: Vec::new(), columns: self.columns, labels: Vec::new(), classes };
+        for k in grasps {
+            let mirrored = self.mirrored.as_ref().filter(|_| mirroring.rows).map(|rows| &rows[k]);
+            for row in [Some(&self.own[k]), mirrored].into_iter().flatten() {
+                rows.values.extend_from_slice(row);
+                rows.labels.push(self.data.examples[k].class);
+            }
+        }
+        rows
+    }
+
+    /// Mean weights of the classes, over both views if wanted.
+    fn answer(&self, model: &dyn RowModel, k: usize, mirroring: Mirroring) -> Pmf {
+        let mirrored = self.mirrored.as_ref().filter(|_| mirroring.views).map(|rows| rows[k].as_slice());
+        answer(model, &self.own[k], mirrored)
+    }
+
+    /// Fits without each part of the grasps and answers that part; returns the best temperature and the negative
+    /// log-likelihood at it.
+    fn calibrated(
+        &self,
+        classifier: &Classifier,
+        mirroring: Mirroring,
+        fitting: &Fitting<'_>,
+        progress: &dyn Fn(f64),
+    ) -> Result<(f64, f64), LearnError> {
+        let part_of = &self.data.folds(PARTS, fitting.seed ^ 0xca11b)[..];
+        let mut answers: Vec<(Vec<f32>, usize)> = Vec::new();
+        for part in 0..PARTS {
+            let of = |inside: bool| (0..part_of.len()).filter(move |k| (part_of[*k] == part) == inside);
+            if of(true).next().is_none() {
+                continue;
+            }
+            fitting.check()?;
+            let within = Fitting { progress: &|_| (), settings: fitting.settings.clone(), ..*fitting };
+            let (model, _) = classifier.fit(&self.rows(of(false), mirroring), &within)?;
+            for k in of(true) {
+                let pmf = self.answer(model.as_ref(), k, mirroring);
+                answers.push((pmf.logarithms().map(|log| log as f32).collect(), self.data.examples[k].class));
+            }
+            progress((part + 1) as f64 / PARTS as f64);
+        }
+        let answers: Vec<(&[f32], usize)> = answers.iter().map(|(scores, class)| (&scores[..], *class)).collect();
+        Ok(best_temperature(&answers, &TEMPERATURES))
+    }
+}
+
+fn answer(model: &dyn RowModel, row: &[f32], mirrored: Option<&[f32]>) -> Pmf {
+    let own = Pmf::from_weights(model.predict(row));
+    let other = mirrored.map(|row| Pmf::from_weights(model.predict(row)));
+    match &other {
+        Some(other) => Pmf::mean([&own, other]).unwrap_or_else(|| own.clone()),
+        None => own,
+    }
 }
 
 impl Tabular {
-    /// Fits features and classifier. Mirrored grasps are added as examples.
+    /// Fits features, classifier and temperature.
     pub(crate) fn fit(data: &Dataset, kind: TabularKind, fitting: &Fitting<'_>) -> Result<Self, LearnError> {
         check_enough(data, 2)?;
         fitting.refuse_settings()?;
         let features = Features::fit(kind.features(), data);
-        let mut rows = Rows {
-            values: Vec::new(),
-            columns: features.width(),
-            labels: Vec::new(),
-            classes: data.labels.classes.len(),
-        };
-        for example in &data.examples {
-            for row in [Some(features.row(&example.grasp)), features.mirrored(&example.grasp)].into_iter().flatten() {
-                rows.values.extend(row);
-                rows.labels.push(example.class);
-            }
-        }
-        let scaling = if kind.wants_scaling() { scaling(&rows) } else { Vec::new() };
-        for row in rows.values.chunks_exact_mut(rows.columns.max(1)) {
-            scale(row, &scaling);
-        }
+        let own = data.examples.iter().map(|e| features.row(&e.grasp)).collect();
+        let mirrored = features.has_mirror().then(|| {
+            let rows = data.examples.iter().filter_map(|e| features.mirrored(&e.grasp));
+            rows.collect()
+        });
+        let mut ground = Ground { data, columns: features.width(), own, mirrored };
+        let all = || 0..data.examples.len();
+        let with_both = Mirroring { rows: true, views: true };
+        let scaling = if kind.wants_scaling() { scaling(&ground.rows(all(), with_both)) } else { Vec::new() };
+        ground.own.iter_mut().chain(ground.mirrored.iter_mut().flatten()).for_each(|row| scale(row, &scaling));
         (fitting.progress)(0.1);
         fitting.check()?;
-        let (model, description) = fit_model(&rows, kind, fitting)?;
+        let classifier = Classifier::of(kind, fitting);
+        let tried = if ground.mirrored.is_some() { kind.mirrorings() } else { &kind.mirrorings()[..1] };
+        let mut best: Option<(Mirroring, (f64, f64))> = None;
+        for (number, &mirroring) in tried.iter().enumerate() {
+            let progress = |share: f64| (fitting.progress)(0.1 + 0.6 * (number as f64 + share) / tried.len() as f64);
+            let found = ground.calibrated(&classifier, mirroring, fitting, &progress)?;
+            if best.is_none_or(|(_, (_, least))| found.1 < least) {
+                best = Some((mirroring, found));
+            }
+        }
+        let (mirroring, (temperature, _)) = best.unwrap_or((with_both, (1.0, 0.0)));
+        fitting.check()?;
+        let last = Fitting {
+            progress: &|share| (fitting.progress)(0.7 + 0.3 * share),
+            settings: fitting.settings.clone(),
+            ..*fitting
+        };
+        let (model, description) = classifier.fit(&ground.rows(all(), mirroring), &last)?;
         (fitting.progress)(1.0);
-        Ok(Self { learned: Learned { kind, features, scaling, model: description }, model })
+        let both_views = mirroring.views && features.has_mirror();
+        let learned =
+            Learned { kind, features, scaling, model: description, temperature: Some(temperature), both_views };
+        Ok(Self { learned, model })
     }
 
     /// Restores a recogniser from a model file.
@@ -106,15 +313,15 @@ impl Tabular {
         if !learned.features.is_sound(card.channels.len()) || !scaled {
             return Err(LoadError::Card { part: "the feature definition" });
         }
-        let model: Box<dyn RowModel> = match learned.kind {
-            TabularKind::DecisionTree
-            | TabularKind::RandomForest
-            | TabularKind::BaggedTrees
-            | TabularKind::MeasuresForest => Box::new(Forest::load(arrays, columns, classes)?),
-            TabularKind::GradientBoosting => Box::new(GradientBoosting::load(arrays, columns, classes)?),
-            TabularKind::RusBoostM2 | TabularKind::RusBoostSamme => Box::new(RusBoost::load(arrays, columns, classes)?),
-            TabularKind::Neighbours => Box::new(Neighbours::load(arrays, columns, classes)?),
-            TabularKind::Svm | TabularKind::MeasuresSvm => Box::new(Svm::load(arrays, columns, classes)?),
+        if learned.temperature.is_some_and(|own| !TEMPERATURES.range.contains(&own)) {
+            return Err(LoadError::Card { part: "the temperature" });
+        }
+        let model: Box<dyn RowModel> = match learned.kind.classifier() {
+            Classifier::Forest(_) => Box::new(Forest::load(arrays, columns, classes)?),
+            Classifier::GradientBoosting(_) => Box::new(GradientBoosting::load(arrays, columns, classes)?),
+            Classifier::RusBoost(_) => Box::new(RusBoost::load(arrays, columns, classes)?),
+            Classifier::Neighbours => Box::new(Neighbours::load(arrays, columns, classes)?),
+            Classifier::Svm => Box::new(Svm::load(arrays, columns, classes)?),
         };
         Ok(Self { learned, model })
     }
@@ -136,46 +343,6 @@ macro_rules! row_models {
 }
 
 row_models!(Forest, GradientBoosting, RusBoost);
-
-/// Largest number of trees or rounds in a quick fit.
-const QUICK: usize = 20;
-
-/// Fits the classifier of a kind; returns it with a description of its settings.
-fn fit_model(rows: &Rows, kind: TabularKind, fitting: &Fitting<'_>) -> Result<(Box<dyn RowModel>, String), LearnError> {
-    let table = Table { values: &rows.values, columns: rows.columns };
-    let examples = Examples { table, labels: &rows.labels, classes: rows.classes, weights: None };
-    let seed = fitting.seed;
-    let count = |full: usize| if fitting.quick { full.min(QUICK) } else { full };
-    let forest = |settings: ForestSettings| -> Result<(Box<dyn RowModel>, String), LearnError> {
-        let settings = ForestSettings { seed, trees: count(settings.trees), ..settings };
-        Ok((Box::new(Forest::fit(&examples, &settings)?), format!("{settings:?}")))
-    };
-    let rus = |form: RusBoostForm, max_depth: Option<usize>| -> Result<(Box<dyn RowModel>, String), LearnError> {
-        let base = RusBoostSettings::default();
-        let tree = TreeSettings { max_depth, ..base.tree };
-        let settings = RusBoostSettings { form, seed, rounds: count(base.rounds), tree, ..base };
-        Ok((Box::new(RusBoost::fit(&examples, &settings)?), format!("{settings:?}")))
-    };
-    match kind {
-        TabularKind::DecisionTree => forest(ForestSettings::decision_tree()),
-        TabularKind::RandomForest | TabularKind::MeasuresForest => forest(ForestSettings::random_forest()),
-        TabularKind::BaggedTrees => forest(ForestSettings::bagged_trees()),
-        TabularKind::GradientBoosting => {
-            let base = GradientBoostingSettings::default();
-            let tree = TreeSettings { min_leaf: 10, features: FeatureSampling::Sqrt, ..base.tree };
-            let settings = GradientBoostingSettings { seed, rounds: count(base.rounds), tree, ..base };
-            Ok((Box::new(GradientBoosting::fit(&examples, &settings)?), format!("{settings:?}")))
-        }
-        TabularKind::RusBoostM2 => rus(RusBoostForm::M2, None),
-        TabularKind::RusBoostSamme => rus(RusBoostForm::Samme, Some(4)),
-        TabularKind::Neighbours => Ok((Box::new(Neighbours::fit(rows)?), Neighbours::DESCRIPTION.to_owned())),
-        TabularKind::Svm | TabularKind::MeasuresSvm => {
-            let model = Svm::fit(rows, fitting)?;
-            let description = model.described();
-            Ok((Box::new(model), description))
-        }
-    }
-}
 
 /// Mean and one over the standard deviation of each column; the factor of a constant column is zero.
 fn scaling(rows: &Rows) -> Vec<(f32, f32)> {
@@ -202,9 +369,14 @@ fn scale(row: &mut [f32], scaling: &[(f32, f32)]) {
 
 impl Recogniser for Tabular {
     fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
-        let mut row = self.learned.features.row(grasp);
-        scale(&mut row, &self.learned.scaling);
-        let pmf = Pmf::from_weights(self.model.predict(&row));
+        let scaled = |mut row: Vec<f32>| {
+            scale(&mut row, &self.learned.scaling);
+            row
+        };
+        let own = scaled(self.learned.features.row(grasp));
+        let mirrored = if self.learned.both_views { self.learned.features.mirrored(grasp).map(scaled) } else { None };
+        let pmf = answer(self.model.as_ref(), &own, mirrored.as_deref());
+        let pmf = self.learned.temperature.map_or_else(|| pmf.clone(), |temperature| pmf.at_temperature(temperature));
         Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
     }
 

@@ -51,6 +51,11 @@ impl Warping {
         Ok(Self { learned, classes: data.labels.classes.len(), sequences, labels: data.truth() })
     }
 
+    /// Everything that decides a fit.
+    pub(crate) fn decided_by() -> serde_json::Value {
+        serde_json::json!({ "voters": VOTERS, "rate_hz": RATE_HZ, "band": BAND, "revision": 1 })
+    }
+
     /// Restores a recogniser from a model file.
     pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
         let learned: Learned = card.settings_as()?;

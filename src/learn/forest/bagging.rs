@@ -1,9 +1,10 @@
 //! One tree, or the average of many on rows drawn with replacement: bagging (Breiman 1996), and with few columns searched
-//! in every node the random forest (Breiman 2001).
+//! in every node the random forest (Breiman 2001). With random cuts of all rows: extremely randomised trees (Geurts, Ernst and
+//! Wehenkel 2006).
 
 use super::bins::Bins;
 use super::split::Target;
-use super::tree::{FeatureSampling, Ground, Tree, TreeSettings};
+use super::tree::{Cuts, FeatureSampling, Ground, Tree, TreeSettings};
 use super::tree_arrays::{load_class_trees, save_trees};
 use super::{Examples, normalise, random_of};
 use crate::arrays::{ArrayError, Arrays};
@@ -48,6 +49,13 @@ impl ForestSettings {
     pub(crate) fn random_forest() -> Self {
         let tree = TreeSettings { features: FeatureSampling::Sqrt, ..TreeSettings::default() };
         Self { trees: 200, rows: RowSampling::Bootstrap, tree, seed: 0 }
+    }
+
+    /// 250 trees on all rows, grown until leaves are pure; each node compares one random cut of each of the square root of
+    /// the number of columns.
+    pub(crate) fn extra_trees() -> Self {
+        let tree = TreeSettings { features: FeatureSampling::Sqrt, cuts: Cuts::OneDrawn, ..TreeSettings::default() };
+        Self { trees: 250, rows: RowSampling::All, tree, seed: 0 }
     }
 }
 
@@ -122,6 +130,7 @@ fn grow_one(examples: &Examples<'_>, bins: &Bins, settings: &ForestSettings, num
 
 #[cfg(test)]
 mod tests {
+    use super::super::tree::Node;
     use super::super::{Table, scikit_learn_tests};
     use super::*;
 
@@ -164,6 +173,40 @@ mod tests {
         let forest = Forest::fit(&Examples { labels: &labels, ..train.examples() }, &settings)?;
         let recall = scikit_learn_tests::Data::new(360..1360).macro_recall(|row| forest.predict(row));
         assert!((recall - 1.0 / 6.0).abs() < 0.06, "{recall}");
+        Ok(())
+    }
+
+    #[test]
+    fn extra_trees_of_two_values_are_the_same_as_the_best_cut() -> Result<(), LearnError> {
+        // Two values leave no choice but where between them the threshold is.
+        let examples = Examples {
+            table: Table { values: &[0.0, 1.0, 0.0, 1.0], columns: 1 },
+            labels: &[0, 1, 0, 1],
+            classes: 2,
+            weights: None,
+        };
+        let settings = ForestSettings { trees: 20, ..ForestSettings::extra_trees() };
+        let forest = Forest::fit(&examples, &settings)?;
+        let thresholds: Vec<f32> = forest
+            .trees
+            .iter()
+            .filter_map(|tree| match tree.nodes[..] {
+                [Node::Cut { feature: 0, threshold, right: 2 }, Node::Leaf(0), Node::Leaf(1)] => Some(threshold),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(thresholds.len(), 20);
+        assert!(thresholds.iter().all(|threshold| (0.0..1.0).contains(threshold)));
+        assert_eq!([forest.predict(&[0.0]), forest.predict(&[1.0])], [[1.0, 0.0], [0.0, 1.0]]);
+        Ok(())
+    }
+
+    #[test]
+    fn extra_trees_remember_their_rows() -> Result<(), LearnError> {
+        // No bootstrap and pure leaves: every training row is answered with certainty.
+        let data = scikit_learn_tests::Data::new(0..200);
+        let forest = Forest::fit(&data.examples(), &ForestSettings { trees: 10, ..ForestSettings::extra_trees() })?;
+        assert!((0..200).all(|row| forest.predict(data.row(row))[data.labels[row]] == 1.0));
         Ok(())
     }
 

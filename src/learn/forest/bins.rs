@@ -14,6 +14,8 @@ pub(super) struct Bins {
 
 /// Feature of all training rows.
 pub(super) struct Column {
+    /// Value of each row.
+    pub(super) values: Vec<f32>,
     /// Bin of each row, ascending with the value.
     pub(super) codes: Vec<u8>,
     /// Smallest training value of each bin.
@@ -26,15 +28,15 @@ impl Bins {
     pub(super) fn new(table: &Table<'_>) -> Self {
         let column = |k: usize| {
             let values: Vec<f32> = table.values.iter().copied().skip(k).step_by(table.columns).collect();
-            Column::new(&values)
+            Column::new(values)
         };
         Self { columns: (0..table.columns).map(column).collect() }
     }
 }
 
 impl Column {
-    fn new(values: &[f32]) -> Self {
-        let mut sorted = values.to_vec();
+    fn new(values: Vec<f32>) -> Self {
+        let mut sorted = values.clone();
         sorted.sort_unstable_by(f32::total_cmp);
         let runs = || sorted.chunk_by(|a, b| a == b);
         let is_exact = runs().count() <= MOST_BINS;
@@ -53,7 +55,7 @@ impl Column {
             below += run.len();
         }
         let codes = values.iter().map(|value| most.partition_point(|most| most < value) as u8).collect();
-        Self { codes, least, most }
+        Self { values, codes, least, most }
     }
 
     /// Number of bins.
@@ -76,7 +78,7 @@ mod tests {
 
     #[test]
     fn few_values_have_a_bin_each() {
-        let column = Column::new(&[3.0, -1.0, 3.0, 0.0, -0.0, 10.0]);
+        let column = Column::new(vec![3.0, -1.0, 3.0, 0.0, -0.0, 10.0]);
         assert_eq!(column.codes, [2, 0, 2, 1, 1, 3]);
         assert_eq!(column.threshold(1, 2), 1.5);
         assert_eq!(column.threshold(0, 3), 4.5);
@@ -85,7 +87,7 @@ mod tests {
     #[test]
     fn many_values_share_bins_equally() {
         let values: Vec<f32> = (0..2550u32).map(|k| ((k * 7919) % 2550) as f32).collect();
-        let column = Column::new(&values);
+        let column = Column::new(values.clone());
         assert_eq!(column.bins(), 255);
         for (code, value) in column.codes.iter().zip(&values) {
             assert_eq!(usize::from(*code), *value as usize / 10);
@@ -96,7 +98,7 @@ mod tests {
     #[test]
     fn equal_values_share_a_bin() {
         let values: Vec<f32> = (0..1000u32).map(|k| k.min(500) as f32).collect();
-        let column = Column::new(&values);
+        let column = Column::new(values);
         assert!(column.bins() <= 255);
         assert!(column.codes[500..].iter().all(|code| *code == column.codes[500]));
     }
@@ -105,7 +107,7 @@ mod tests {
     fn a_threshold_lies_between_neighbouring_numbers() {
         for low in [1.0_f32, f32::MAX.next_down(), f32::MIN, 1e-45, -1e-45] {
             let high = low.next_up();
-            let threshold = Column::new(&[low, high]).threshold(0, 1);
+            let threshold = Column::new(vec![low, high]).threshold(0, 1);
             assert!(low <= threshold && threshold < high, "{low:e} {threshold:e} {high:e}");
         }
     }

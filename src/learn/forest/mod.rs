@@ -2,7 +2,7 @@
 //!
 //! | model | method | source |
 //! |---|---|---|
-//! | [`Forest`] | one tree, bagged trees or a random forest, by its settings | Breiman 1984, 1996, 2001 |
+//! | [`Forest`] | one tree, bagged trees, a random forest or extra-trees, by its settings | Breiman 1984, 1996, 2001; Geurts 2006 |
 //! | [`GradientBoosting`] | a regression tree per class and round, on the softmax deviance | Friedman 2001 |
 //! | [`RusBoost`] | boosting on subsets with equally many rows of each class | Seiffert et al. 2010 |
 //!
@@ -28,6 +28,9 @@ pub(crate) use tree::{FeatureSampling, TreeSettings};
 use crate::fitting::LearnError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+/// Version of how trees are grown, part of the fingerprint of methods that use them.
+pub(crate) const REVISION: u32 = 1;
 
 /// Rows of features, in any units: trees depend on their order only.
 #[derive(Clone, Copy, Debug)]

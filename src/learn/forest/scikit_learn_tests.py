@@ -2,7 +2,12 @@
 
 import numpy as np
 from imblearn.ensemble import RUSBoostClassifier
-from sklearn.ensemble import BaggingClassifier, GradientBoostingClassifier, RandomForestClassifier
+from sklearn.ensemble import (
+    BaggingClassifier,
+    ExtraTreesClassifier,
+    GradientBoostingClassifier,
+    RandomForestClassifier,
+)
 from sklearn.metrics import recall_score
 from sklearn.tree import DecisionTreeClassifier
 
@@ -70,6 +75,7 @@ print("  probabilities of the first test row", model.predict_proba(tx[:1]).round
 
 banded("decision tree", lambda s: tree(random_state=s))
 banded("random forest", lambda s: RandomForestClassifier(100, random_state=s))
+banded("extra-trees", lambda s: ExtraTreesClassifier(100, random_state=s))
 banded("bagged trees", lambda s: BaggingClassifier(n_estimators=50, random_state=s))
 banded("gradient boosting", lambda s: GradientBoostingClassifier(n_estimators=50, subsample=0.5, random_state=s))
 for depth in (2, 4):

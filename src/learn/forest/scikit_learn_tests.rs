@@ -151,6 +151,9 @@ fn forests_are_as_good() -> Result<(), LearnError> {
     agree("random forest", 0.6181, 0.0093, |seed| {
         recall(&ForestSettings { trees: 100, seed, ..ForestSettings::random_forest() })
     })?;
+    agree("extra-trees", 0.6195, 0.0084, |seed| {
+        recall(&ForestSettings { trees: 100, seed, ..ForestSettings::extra_trees() })
+    })?;
     agree("bagged trees", 0.6158, 0.0098, |seed| {
         recall(&ForestSettings { trees: 50, seed, ..ForestSettings::bagged_trees() })
     })

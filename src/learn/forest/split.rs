@@ -1,4 +1,4 @@
-//! Search for the best cut of one column for the rows of a node.
+//! Search for the best cut of one column for the rows of a node, or one at random.
 //!
 //! A cut into sides L and R is scored by
 //!
@@ -12,6 +12,8 @@
 //! subtracted, so the small weights of boosting lose no digits to large ones.
 
 use super::bins::Column;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 
 /// Target of one row.
 #[derive(Clone, Copy, Debug)]
@@ -57,10 +59,9 @@ impl Target {
     }
 }
 
-/// Rows with a code up to `code` go left, values up to `threshold` likewise.
+/// Rows with values up to `threshold` go left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cut {
-    pub(super) code: u8,
     pub(super) threshold: f32,
     /// Larger is better; comparable within a node only.
     pub(super) score: f64,
@@ -99,6 +100,8 @@ impl Sums {
 /// Search with its scratch memory.
 pub(super) struct Search {
     sums: Sums,
+    /// Sums of the other side of a random cut.
+    others: Sums,
     /// Code and row, sorted by code.
     ordered: Vec<(u8, u32)>,
     /// Score of the rows from here to the end, at the start of each bin.
@@ -110,7 +113,8 @@ const FEW_ROWS: usize = 32;
 
 impl Search {
     pub(super) fn new(channels: usize) -> Self {
-        Self { sums: Sums::new(channels), ordered: Vec::new(), right: Vec::new() }
+        let sums = || Sums::new(channels);
+        Self { sums: sums(), others: sums(), ordered: Vec::new(), right: Vec::new() }
     }
 
     /// Finds the best cut with `min_leaf` rows on both sides; of equally good ones, that with the smallest threshold.
@@ -138,7 +142,44 @@ impl Search {
         }
         let (k, score) = best?;
         let (left, right) = (self.ordered[k - 1].0, self.ordered[k].0);
-        Some(Cut { code: left, threshold: column.threshold(left, right), score })
+        Some(Cut { threshold: column.threshold(left, right), score })
+    }
+
+    /// Draws a threshold between the smallest and the largest value of the rows (extremely randomised trees, Geurts et al.
+    /// 2006). `None` if all values are equal, or a side would have fewer than `min_leaf` rows.
+    pub(super) fn random_cut(
+        &mut self,
+        column: &Column,
+        target: &Target,
+        rows: &[u32],
+        min_leaf: usize,
+        random: &mut ChaCha8Rng,
+    ) -> Option<Cut> {
+        let value = |row: &u32| column.values[*row as usize];
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for x in rows.iter().map(value) {
+            (low, high) = (low.min(x), high.max(x));
+        }
+        if low >= high {
+            return None;
+        }
+        let drawn = (f64::from(low) + random.random::<f64>() * (f64::from(high) - f64::from(low))) as f32;
+        // Rounding may reach the largest value, which would leave the right side empty.
+        let threshold = if (low..high).contains(&drawn) { drawn } else { low };
+        self.sums.clear();
+        self.others.clear();
+        let mut left = 0;
+        for row in rows {
+            let item = &target.items[*row as usize];
+            if value(row) <= threshold {
+                self.sums.add(item);
+                left += 1;
+            } else {
+                self.others.add(item);
+            }
+        }
+        let enough = left.min(rows.len() - left) >= min_leaf;
+        enough.then(|| Cut { threshold, score: self.sums.score() + self.others.score() })
     }
 
     fn score_right_sides(&mut self, target: &Target) {
@@ -181,8 +222,8 @@ impl Search {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Table;
     use super::super::bins::Bins;
+    use super::super::{Table, random_of};
     use super::*;
 
     fn cut_of(values: &[f32], target: &Target, min_leaf: usize) -> Option<Cut> {
@@ -197,9 +238,9 @@ mod tests {
         let target = Target::classes(&[0, 0, 1, 1, 1, 2], 3, |_| 1.0);
         let values = [1.0, 2.0, 5.0, 6.0, 7.0, 8.0];
         let cut = cut_of(&values, &target, 1).expect("a cut");
-        assert_eq!((cut.code, cut.threshold, cut.score), (1, 3.5, 4.5));
+        assert_eq!((cut.threshold, cut.score), (3.5, 4.5));
         let cut = cut_of(&values, &target, 3).expect("a cut");
-        assert_eq!((cut.code, cut.threshold), (2, 5.5));
+        assert_eq!(cut.threshold, 5.5);
         assert_eq!(cut_of(&values, &target, 4), None);
         assert_eq!(cut_of(&[1.0; 6], &target, 1), None);
     }
@@ -221,6 +262,38 @@ mod tests {
         let target = Target { channels: 1, items: values.iter().map(item).collect() };
         let cut = cut_of(&values, &target, 1).expect("a cut");
         assert_eq!((cut.threshold, cut.score), (39.5, 40.0 + 240.0));
+    }
+
+    fn random_cut_of(values: &[f32], target: &Target, min_leaf: usize, seed: u64) -> Option<Cut> {
+        let bins = Bins::new(&Table { values, columns: 1 });
+        let rows: Vec<u32> = (0..values.len() as u32).collect();
+        let mut search = Search::new(target.channels);
+        search.random_cut(&bins.columns[0], target, &rows, min_leaf, &mut random_of(seed, 0))
+    }
+
+    #[test]
+    fn a_random_cut_is_scored_like_the_best_one() {
+        let target = Target::classes(&[0, 0, 1, 1, 1, 2], 3, |_| 1.0);
+        let values = [1.0, 2.0, 5.0, 6.0, 7.0, 8.0];
+        // Sum of squared class counts over rows, of both sides, for one to five rows on the left.
+        let scores = [1.0 + 11.0 / 5.0, 4.5, 5.0 / 3.0 + 5.0 / 3.0, 2.0 + 1.0, 13.0 / 5.0 + 1.0];
+        let mut met = [0; 5];
+        for seed in 0..2000 {
+            let cut = random_cut_of(&values, &target, 1, seed).expect("values differ");
+            let left = values.iter().filter(|x| **x <= cut.threshold).count();
+            assert!((cut.score - scores[left - 1]).abs() < 1e-12, "{cut:?}");
+            met[left - 1] += 1;
+        }
+        // Thresholds are uniform between 1 and 8: three sevenths between 2 and 5, one seventh in each other gap.
+        for (share, sevenths) in met.map(|n| f64::from(n) / 2000.0).into_iter().zip([1.0, 3.0, 1.0, 1.0, 1.0]) {
+            assert!((share - sevenths / 7.0).abs() < 0.05, "{met:?}");
+        }
+        assert_eq!(random_cut_of(&[3.0; 6], &target, 1, 0), None);
+        let halves = (0..200).filter_map(|seed| random_cut_of(&values, &target, 3, seed));
+        assert!(halves.map(|cut| cut.threshold).all(|threshold| (5.0..6.0).contains(&threshold)));
+        let next = [1.0_f32, 1.0_f32.next_up()];
+        let target = Target::classes(&[0, 1], 2, |_| 1.0);
+        assert!((0..50).all(|seed| random_cut_of(&next, &target, 1, seed).is_some_and(|cut| cut.threshold == 1.0)));
     }
 
     #[test]

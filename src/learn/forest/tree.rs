@@ -20,12 +20,23 @@ pub(crate) struct TreeSettings {
     pub(crate) min_split: usize,
     /// Columns that a node searches. Default: all.
     pub(crate) features: FeatureSampling,
+    /// Cuts of a column that are compared. Default: all.
+    pub(crate) cuts: Cuts,
 }
 
 impl Default for TreeSettings {
     fn default() -> Self {
-        Self { max_depth: None, min_leaf: 1, min_split: 2, features: FeatureSampling::All }
+        Self { max_depth: None, min_leaf: 1, min_split: 2, features: FeatureSampling::All, cuts: Cuts::All }
     }
+}
+
+/// Cuts of a column that a node compares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cuts {
+    /// Those between all neighbouring bins.
+    All,
+    /// One, drawn between the smallest and the largest value of the node (Geurts et al. 2006).
+    OneDrawn,
 }
 
 /// Columns searched for the best cut, drawn anew in every node. If none of those drawn can be cut, more are drawn.
@@ -114,8 +125,8 @@ impl Ground<'_> {
                 continue;
             };
             tree.nodes.push(Node::Cut { feature, threshold: cut.threshold, right: 0 });
-            let codes = &self.bins.columns[feature as usize].codes;
-            let (left, right) = rows.iter().partition(|&&row| codes[row as usize] <= cut.code);
+            let values = &self.bins.columns[feature as usize].values;
+            let (left, right) = rows.iter().partition(|&&row| values[row as usize] <= cut.threshold);
             waiting.push(Waiting { rows: right, depth: depth + 1, right_of: Some(number) });
             waiting.push(Waiting { rows: left, depth: depth + 1, right_of: None });
         }
@@ -171,7 +182,11 @@ impl<'a> NodeSearch<'a> {
                 self.features.swap(searched, self.random.random_range(searched..columns));
             }
             let feature = self.features[searched];
-            let cut = self.search.best_cut(&bins.columns[feature as usize], target, rows, settings.min_leaf);
+            let column = &bins.columns[feature as usize];
+            let cut = match settings.cuts {
+                Cuts::All => self.search.best_cut(column, target, rows, settings.min_leaf),
+                Cuts::OneDrawn => self.search.random_cut(column, target, rows, settings.min_leaf, self.random),
+            };
             best = match (best, cut) {
                 (Some((_, old)), Some(new)) if new.score > old.score => Some((feature, new)),
                 (None, Some(new)) => Some((feature, new)),

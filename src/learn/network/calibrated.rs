@@ -11,6 +11,7 @@ use super::training::{Training, TrainingSequence, TrainingSet, train, train_on};
 use super::training_set::StageInputs;
 use crate::fitting::{Fitting, LearnError};
 use crate::pmf::Pmf;
+use crate::temperature::{Temperatures, best_temperature};
 use std::ops::Range;
 
 /// Networks and their temperatures.
@@ -40,9 +41,9 @@ pub(super) struct Plan<'a> {
 pub(super) type HeldOut = Vec<Option<Vec<f32>>>;
 
 /// Some of the sequences of a stage.
-struct Subset<'a> {
-    inputs: &'a StageInputs,
-    kept: Vec<usize>,
+pub(super) struct Subset<'a> {
+    pub(super) inputs: &'a StageInputs,
+    pub(super) kept: Vec<usize>,
 }
 
 impl TrainingSet for Subset<'_> {
@@ -168,7 +169,7 @@ fn seed_of(seed: u64, member: usize) -> u64 {
 }
 
 /// Callback of the training loop: reports progress, and stops on request.
-fn progress_of<'a>(
+pub(super) fn progress_of<'a>(
     fitting: &'a Fitting<'_>,
     from: f64,
     share: f64,
@@ -207,8 +208,8 @@ fn scores_at_every_step(members: &[MacroLayer], x: &[f32]) -> Vec<f32> {
 
 /// Number of equal sections of a grasp with one temperature each.
 const SECTIONS: usize = 8;
-/// Number of temperatures tried, from 0.5 to 8.
-const TRIED: usize = 60;
+/// Temperatures tried.
+const TRIED: Temperatures = Temperatures { range: 0.5..=8.0, count: 60 };
 
 /// Temperatures per group and step that maximise the likelihood of held-out scores: one per section, interpolated.
 fn fit_temperatures(answered: &[(&[f32], &[usize])], groups: &[usize]) -> Vec<Vec<f32>> {
@@ -228,7 +229,7 @@ fn fit_temperatures(answered: &[(&[f32], &[usize])], groups: &[usize]) -> Vec<Ve
                         rows.map(|row| (&row[from..from + classes], targets[group]))
                     })
                     .collect();
-                best_temperature(&rows)
+                best_temperature(&rows, &TRIED).0
             })
             .collect();
         from += classes;
@@ -245,22 +246,6 @@ fn interpolated(knots: &[f64], share: f64) -> f32 {
     let (low, rest) = (at.floor() as usize, at.fract());
     let high = (low + 1).min(knots.len() - 1);
     (knots[low] * (1.0 - rest) + knots[high] * rest) as f32
-}
-
-fn best_temperature(rows: &[(&[f32], usize)]) -> f64 {
-    if rows.is_empty() {
-        return 1.0;
-    }
-    let loss = |temperature: f64| -> f64 {
-        let of_row = |(scores, target): &(&[f32], usize)| {
-            let highest = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            let scaled = |s: f32| f64::from(s - highest) / temperature;
-            scores.iter().map(|s| scaled(*s).exp()).sum::<f64>().ln() - scaled(scores[*target])
-        };
-        rows.iter().map(of_row).sum()
-    };
-    let candidate = |k: usize| 0.5 * 16f64.powf(k as f64 / (TRIED - 1) as f64);
-    (0..TRIED).map(candidate).min_by(|a, b| loss(*a).total_cmp(&loss(*b))).unwrap_or(1.0)
 }
 
 /// Committee that takes one sample at a time.
@@ -323,20 +308,6 @@ impl LiveCalibrated {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_known_temperature_is_recovered() {
-        // Scores of a calibrated binary classifier, multiplied by three.
-        let mut rows = Vec::new();
-        for k in 0..400 {
-            let p = 0.5 + 0.49 * (k as f32 / 400.0);
-            let score = 3.0 * (p / (1.0 - p)).ln();
-            rows.push(([score, 0.0], usize::from((k * 7919 % 1000) as f32 >= 1000.0 * p)));
-        }
-        let rows: Vec<(&[f32], usize)> = rows.iter().map(|(scores, target)| (&scores[..], *target)).collect();
-        let found = best_temperature(&rows);
-        assert!((found - 3.0).abs() < 0.4, "{found}");
-    }
 
     #[test]
     fn knots_are_interpolated_linearly() {

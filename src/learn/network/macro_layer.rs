@@ -72,6 +72,15 @@ impl MacroShape {
             .collect()
     }
 
+    /// True if a shape from a file has these inputs and groups of outputs, and a reasonable size.
+    pub(super) fn fits(&self, inputs: usize, groups: &[usize]) -> bool {
+        self.inputs == inputs
+            && self.groups == groups
+            && (1..=4096).contains(&self.units)
+            && self.hidden.is_none_or(|hidden| (1..=4096).contains(&hidden))
+            && groups.iter().all(|classes| *classes > 0)
+    }
+
     /// Number of parameters.
     pub fn parameters(&self) -> usize {
         self.blocks().last().map_or(0, |block| block.place.end)

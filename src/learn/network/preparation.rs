@@ -3,7 +3,7 @@
 //!
 //! Each channel becomes two inputs: its scaled value, and its deviation from the mean course of all training grasps at
 //! that step, in standard deviations at that step. The closing motion common to all grasps is much larger than the
-//! differences between objects.
+//! differences between objects. Strict networks read the standardised channels only.
 
 use crate::data::{Dataset, Sequence};
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,8 @@ pub(crate) struct Preparation {
     pub(crate) rate_hz: f32,
     /// Scale of each channel.
     pub(crate) scales: Vec<Scale>,
-    /// Mean scaled value, `[steps][channels]`; the last step applies to later ones.
+    /// Mean scaled value, `[steps][channels]`; the last step applies to later ones. Empty for channels that are only
+    /// standardised.
     pub(crate) course: Vec<Vec<f32>>,
     /// One over the standard deviation from it, `[steps][channels]`.
     pub(crate) factors: Vec<Vec<f32>>,
@@ -51,37 +52,44 @@ const MOST_DEVIATIONS: f32 = 20.0;
 impl Preparation {
     /// Fits scales to training data; `rate_hz` is the rate of time steps (Hz).
     pub(crate) fn fit(data: &Dataset, rate_hz: f32) -> Self {
-        let channels = data.channels.len();
-        let mut columns: Vec<Vec<f32>> = vec![Vec::new(); channels];
-        for example in &data.examples {
-            let plain = Binner::plain(rate_hz, channels).whole(&example.grasp);
-            for row in plain.chunks_exact(channels.max(1)) {
-                columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
-            }
-        }
-        let scales: Vec<Scale> = columns.iter_mut().map(|column| fitted(column)).collect();
+        let scales: Vec<Scale> = columns(data, rate_hz).iter_mut().map(|column| fitted(column)).collect();
         let (course, factors) = mean_course(data, rate_hz, &scales);
         Self { rate_hz, scales, course, factors }
     }
 
+    /// Fits mean and standard deviation of each channel only.
+    pub(super) fn standardising(data: &Dataset, rate_hz: f32) -> Self {
+        let scales = columns(data, rate_hz).iter_mut().map(|column| standardised(column, 0.0)).collect();
+        Self { rate_hz, scales, course: Vec::new(), factors: Vec::new() }
+    }
+
     /// Number of inputs per step.
     pub(crate) fn width(&self) -> usize {
-        2 * self.scales.len()
+        if self.course.is_empty() { self.scales.len() } else { 2 * self.scales.len() }
     }
 
     /// True if a mapping from a file is valid for this number of channels.
     pub(crate) fn is_sound(&self, channels: usize) -> bool {
         let finite = |rows: &[Vec<f32>]| rows.iter().flatten().all(|x| x.is_finite());
         let fits = |rows: &[Vec<f32>]| !rows.is_empty() && rows.iter().all(|row| row.len() == self.scales.len());
-        let scales = self.scales.iter().all(|s| s.knee.is_finite() && s.mean.is_finite() && s.factor.is_finite());
         let parts = [&self.course, &self.factors];
-        self.rate_hz > 0.0
-            && self.rate_hz <= 1000.0
-            && scales
-            && channels > 0
-            && self.scales.len() == channels
+        self.has_sound_scales(channels)
             && parts.iter().all(|rows| fits(rows) && finite(rows))
             && self.course.len() == self.factors.len()
+    }
+
+    /// True if a mapping from a file only standardises this number of channels.
+    pub(super) fn is_sound_and_standardising(&self, channels: usize) -> bool {
+        self.has_sound_scales(channels) && self.course.is_empty() && self.factors.is_empty()
+    }
+
+    fn has_sound_scales(&self, channels: usize) -> bool {
+        let is_sound = |s: &Scale| s.knee.is_finite() && s.mean.is_finite() && s.factor.is_finite();
+        self.rate_hz > 0.0
+            && self.rate_hz <= 1000.0
+            && channels > 0
+            && self.scales.len() == channels
+            && self.scales.iter().all(is_sound)
     }
 
     /// Inputs of a sequence, `[steps][width]`.
@@ -122,12 +130,29 @@ fn mean_course(data: &Dataset, rate_hz: f32, scales: &[Scale]) -> (Vec<Vec<f32>>
     (sums.iter().map(mean).collect(), sums.iter().map(factor).collect())
 }
 
+/// Values of each channel at all steps of all grasps.
+fn columns(data: &Dataset, rate_hz: f32) -> Vec<Vec<f32>> {
+    let channels = data.channels.len();
+    let mut columns: Vec<Vec<f32>> = vec![Vec::new(); channels];
+    for example in &data.examples {
+        let plain = Binner::plain(rate_hz, channels).whole(&example.grasp);
+        for row in plain.chunks_exact(channels.max(1)) {
+            columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
+        }
+    }
+    columns
+}
+
 fn fitted(column: &mut [f32]) -> Scale {
     let mut sizes: Vec<f32> = column.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
     sizes.sort_by(f32::total_cmp);
     let at = |share: f64| sizes.get(((sizes.len() as f64 - 1.0).max(0.0) * share) as usize).copied().unwrap_or(0.0);
     let typical = at(0.5);
-    let knee = if typical > 0.0 && at(0.995) > WIDE * typical { typical } else { 0.0 };
+    standardised(column, if typical > 0.0 && at(0.995) > WIDE * typical { typical } else { 0.0 })
+}
+
+/// Scale with this knee that gives no mean and unit standard deviation.
+fn standardised(column: &mut [f32], knee: f32) -> Scale {
     let scale = Scale { knee, mean: 0.0, factor: 1.0 };
     column.iter_mut().for_each(|x| *x = scale.compressed(*x));
     let count = column.len().max(1) as f64;
@@ -256,6 +281,22 @@ mod tests {
             let deviation = (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
             assert!(mean.abs() < 1e-3 && deviation < 1.001, "input {input}: {mean} {deviation}");
             assert!(input >= width / 2 || deviation > 0.999, "scaled values: {deviation}");
+        }
+    }
+
+    #[test]
+    fn strict_inputs_are_standardised_channels() {
+        let data = made_up(10, 1);
+        let preparation = Preparation::standardising(&data, 75.0);
+        let channels = data.channels.len();
+        assert!(preparation.is_sound_and_standardising(channels) && !preparation.is_sound(channels));
+        assert_eq!(preparation.width(), channels);
+        let grasp = &data.examples[0].grasp;
+        let inputs = preparation.inputs(grasp);
+        // At 20 Hz every sample is a step of its own.
+        assert_eq!(inputs.len(), grasp.values.len());
+        for ((input, x), scale) in inputs.iter().zip(&grasp.values).zip(preparation.scales.iter().cycle()) {
+            assert!((input - (x - scale.mean) * scale.factor).abs() < 1e-5 && scale.knee == 0.0);
         }
     }
 

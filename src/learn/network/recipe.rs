@@ -5,7 +5,7 @@ use crate::fitting::{Fitting, LearnError};
 use serde::{Deserialize, Serialize};
 
 /// Structure and training of a network.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
     /// Rate of time steps, to which readings are averaged (Hz).
@@ -30,12 +30,19 @@ pub struct Recipe {
     pub mirror: bool,
     /// Standard deviation of the noise added to inputs while training, in standard deviations of the input.
     pub noise: f32,
+    /// True for the network as the paper has it: channels are only standardised, stage two reads the size and shape that
+    /// stage one decides after the whole grasp, PMFs are those of the softmax, and of earlier grasps only the PMF is read.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub strict: bool,
     /// Training.
     pub training: Training,
 }
 
 /// Largest committee.
 pub(super) const MOST_MEMBERS: usize = 20;
+
+/// Sampling rate of the paper: 300 samples in 4 s (Hz).
+const PAPER_RATE_HZ: f32 = 75.0;
 
 /// Committee size in files without one.
 pub(super) fn one() -> usize {
@@ -44,7 +51,7 @@ pub(super) fn one() -> usize {
 
 impl Recipe {
     /// The macro-layer alone (Fig. 2a).
-    pub fn macro_layer() -> Self {
+    pub const fn macro_layer() -> Self {
         Self {
             rate_hz: 8.0,
             units: 128,
@@ -56,6 +63,7 @@ impl Recipe {
             cross_fitted: false,
             mirror: true,
             noise: 0.2,
+            strict: false,
             training: Training {
                 epochs: 180,
                 batch: 32,
@@ -71,43 +79,118 @@ impl Recipe {
     }
 
     /// A committee of four macro-layers.
-    pub fn committee() -> Self {
+    pub const fn committee() -> Self {
         Self { members: 4, ..Self::macro_layer() }
+    }
+
+    /// The macro-layer as the paper has it. The paper leaves open how it was trained; see
+    /// [`deviations`](Self::deviations) for what is not left open.
+    pub const fn paper_macro_layer() -> Self {
+        let base = Self::macro_layer();
+        let training =
+            Training { epochs: 60, learning_rate: 3e-3, weight_decay: 0.01, early_read_outs: 0, ..base.training };
+        Self { rate_hz: PAPER_RATE_HZ, parts: 2, mirror: false, noise: 0.0, strict: true, training, ..base }
+    }
+
+    /// The dual-stage LSTM as the paper has it (Fig. 2b).
+    pub const fn paper_dual_stage() -> Self {
+        Self { two_stages: true, ..Self::paper_macro_layer() }
+    }
+
+    /// The iterated dual-stage LSTM as the paper has it (Fig. 2c).
+    pub const fn paper_iterated() -> Self {
+        Self { iterated: true, ..Self::paper_dual_stage() }
     }
 
     /// The four-layer network of Zuo et al., which the paper builds on: fewer units, no first fully connected layer, more
     /// dropout.
-    pub fn zuo() -> Self {
-        let base = Self::macro_layer();
-        Self { units: 64, hidden: 0, training: Training { dropout: 0.6, ..base.training.clone() }, ..base }
+    pub const fn zuo() -> Self {
+        let base = Self::paper_macro_layer();
+        Self { units: 64, hidden: 0, training: Training { dropout: 0.6, ..base.training }, ..base }
     }
 
     /// A plain LSTM with one output at the end.
-    pub fn plain_lstm() -> Self {
+    pub const fn plain_lstm() -> Self {
         let base = Self::macro_layer();
-        let training = Training { dropout: 0.0, early_read_outs: 0, weight_decay: 0.01, ..base.training.clone() };
+        let training = Training { dropout: 0.0, early_read_outs: 0, weight_decay: 0.01, ..base.training };
         Self { hidden: 0, mirror: false, noise: 0.0, training, ..base }
     }
 
     /// The paper's dual-stage LSTM (Fig. 2b).
-    pub fn dual_stage() -> Self {
+    pub const fn dual_stage() -> Self {
         Self { two_stages: true, ..Self::macro_layer() }
     }
 
     /// The paper's iterated dual-stage LSTM (Fig. 2c).
-    pub fn iterated() -> Self {
+    pub const fn iterated() -> Self {
         Self { iterated: true, ..Self::dual_stage() }
     }
 
     /// The same network, trained by cross-fitting.
-    pub fn cross_fitted(self) -> Self {
+    pub const fn cross_fitted(self) -> Self {
         Self { cross_fitted: true, ..self }
     }
 
     /// Fine-tuning with further inputs: an eighth of the epochs, a tenth of the learning rate.
     pub(super) fn refining(&self) -> Training {
         let base = &self.training;
-        Training { epochs: base.epochs.div_ceil(8), learning_rate: 0.1 * base.learning_rate, ..base.clone() }
+        Training { epochs: base.epochs.div_ceil(8), learning_rate: 0.1 * base.learning_rate, ..*base }
+    }
+
+    /// Differences from the paper, section III, V-C and V-E, for people; none for strict recipes.
+    pub fn deviations(&self) -> Vec<String> {
+        let mut list = Vec::new();
+        let mut differs = |yes: bool, what: &str| {
+            if yes {
+                list.push(what.to_owned());
+            }
+        };
+        if (self.rate_hz - PAPER_RATE_HZ).abs() > f32::EPSILON {
+            differs(
+                true,
+                &format!("averages readings to {} steps a second; the paper reads 75 samples a second", self.rate_hz),
+            );
+        }
+        differs(
+            !self.strict,
+            "compresses channels that span decades and adds the deviation from the mean course of all grasps to each; the \
+             paper reads the channels as they are",
+        );
+        differs(self.mirror, "mirrors half of the grasps while training; the paper augments nothing");
+        differs(self.noise > 0.0, "adds noise to the readings while training; the paper augments nothing");
+        differs(
+            self.training.early_read_outs > 0,
+            "also learns from outputs during the grasp; the paper reads out at the end",
+        );
+        differs(self.members > 1, "averages several networks; the paper has one");
+        differs(
+            !self.strict,
+            "calibrates probabilities by temperatures from held-out grasps; the paper takes them as they come",
+        );
+        if self.two_stages {
+            differs(
+                !self.strict,
+                "gives stage two the PMFs of size and shape at every step; the paper gives the size and the shape that stage one \
+                 decides (one-hot)",
+            );
+            differs(
+                self.cross_fitted,
+                "trains both stages on all grasps, the second on out-of-fold outputs of the first; the paper trains each on \
+                 grasps of its own (40/40/20)",
+            );
+        }
+        if self.iterated {
+            differs(
+                !self.strict,
+                "adds the logarithm of the earlier PMF to the scores, starts as a product of experts and is only fine-tuned; the \
+                 paper feeds the PMF in and learns the rest",
+            );
+            differs(
+                !self.strict,
+                "learns from the PMF of up to three earlier grasps; the paper learns from pairs of grasps",
+            );
+        }
+        list
     }
 
     /// Applies the settings of a fit, and shortens it if quick. Refuses settings that are unknown or out of range.
@@ -160,6 +243,11 @@ impl Recipe {
         within("smoothing", f64::from(training.smoothing), 0.0, 0.9)?;
         within("early_read_outs", training.early_read_outs as f64, 0.0, 1000.0)?;
         within("early_share", f64::from(training.early_share), 0.0, 1.0)?;
-        within("longest_gradient", training.longest_gradient, 1e-6, 1e6)
+        within("longest_gradient", training.longest_gradient, 1e-6, 1e6)?;
+        if self.strict && (self.members > 1 || self.cross_fitted) {
+            let cause = "a strict network has one member and is not cross-fitted".to_owned();
+            return Err(LearnError::Setting { name: "strict".to_owned(), cause });
+        }
+        Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! The paper's recognisers: the macro-layer alone, the dual-stage LSTM, and its iterated form (Fig. 2).
+//! The paper's recognisers, tuned: the macro-layer alone, the dual-stage LSTM, and its iterated form (Fig. 2).
 //!
 //! ```text
 //! readings --+--> stage one: macro-layer --> PMF of size, PMF of shape --+
@@ -31,7 +31,7 @@ use std::ops::Range;
 
 /// Fitted network of the paper, with one stage or two.
 #[derive(Clone, Debug)]
-pub struct TactileNetwork {
+pub(super) struct TactileNetwork {
     learned: Learned,
     stage_one: Option<Calibrated>,
     stage_two: Calibrated,
@@ -73,6 +73,8 @@ const CALIBRATION: usize = 6;
 const REJECTED_SHARE: f64 = 0.02;
 /// Fewest held-out grasps of which this share is a whole grasp.
 const LEAST_FOR_REJECTION: usize = (1.0 / REJECTED_SHARE) as usize - 1;
+/// Largest number of earlier grasps while training.
+const MOST_EARLIER: usize = 3;
 /// Number of beliefs drawn to calibrate the rejection after each number of grasps.
 const DRAWN_BELIEFS: usize = 4000;
 /// Largest number of grasps for which the rejection is calibrated.
@@ -80,7 +82,7 @@ const MOST_GRASPS: usize = 6;
 
 impl TactileNetwork {
     /// Fits a network. `method` is its title in errors.
-    pub fn fit(
+    pub(super) fn fit(
         data: &Dataset,
         recipe: Recipe,
         method: &'static str,
@@ -88,14 +90,23 @@ impl TactileNetwork {
     ) -> Result<Self, LearnError> {
         // Every class must have a grasp outside the held-out part.
         let halves = if recipe.two_stages && !recipe.cross_fitted { 2 } else { 1 };
-        check_enough(data, 2 * halves)?;
+        let (own, data) = (data, fitting.joined(data)?);
+        let data = data.as_ref();
+        match fitting.second.filter(|_| halves == 2) {
+            Some(second) => check_enough(own, 2).and(check_enough(second, 2))?,
+            None => check_enough(data, 2 * halves)?,
+        }
         if recipe.two_stages && !data.labels.have_properties() {
             return Err(LearnError::NoProperties { method });
         }
         let work = StageFitting { data, recipe: &recipe, fitting, preparation: Preparation::fit(data, recipe.rate_hz) };
         let readings: Vec<Vec<f32>> = data.examples.iter().map(|e| work.preparation.inputs(&e.grasp)).collect();
         let everything: Vec<usize> = (0..readings.len()).collect();
-        let (for_one, for_two) = if halves == 2 { work.halves() } else { (everything.clone(), everything) };
+        let (for_one, for_two) = match (halves, fitting.second) {
+            (1, _) => (everything.clone(), everything),
+            (_, Some(_)) => (everything[..own.examples.len()].to_vec(), everything[own.examples.len()..].to_vec()),
+            (_, None) => halves_of(data, fitting.seed),
+        };
         let end_of_one = if recipe.two_stages { if recipe.iterated { 0.4 } else { 0.6 } } else { 0.0 };
         let (stage_one, beside) = if recipe.two_stages {
             let (network, held_out) = work.fit_stage_one(&readings, &for_one, 0.0..end_of_one)?;
@@ -116,7 +127,7 @@ impl TactileNetwork {
     }
 
     /// Restores a network from a model file.
-    pub fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
+    pub(super) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
         let learned: Learned = card.settings_as()?;
         learned.recipe.check()?;
         if !learned.preparation.is_sound(card.channels.len()) {
@@ -163,12 +174,8 @@ fn read_network(
     groups: &[usize],
 ) -> Result<Calibrated, LoadError> {
     let shape = &card.shape;
-    let valid = shape.inputs == inputs
-        && shape.groups == groups
+    let valid = shape.fits(inputs, groups)
         && (1..=MOST_MEMBERS).contains(&card.members)
-        && (1..=4096).contains(&shape.units)
-        && shape.hidden.is_none_or(|hidden| (1..=4096).contains(&hidden))
-        && groups.iter().all(|classes| *classes > 0)
         && card.temperatures.len() == groups.len()
         && card.temperatures.iter().flatten().all(|t| t.is_finite() && *t > 0.0);
     if !valid {
@@ -190,6 +197,13 @@ fn array_name(stage: &str, member: usize, block: &str) -> String {
     if member == 0 { format!("{stage}.{block}") } else { format!("{stage}.{}.{block}", member + 1) }
 }
 
+/// Indices of the grasps for stage one and for stage two.
+pub(super) fn halves_of(data: &Dataset, seed: u64) -> (Vec<usize>, Vec<usize>) {
+    let half_of = data.folds(2, seed ^ 0x5eed);
+    let of = |half: usize| (0..half_of.len()).filter(|k| half_of[*k] == half).collect();
+    (of(0), of(1))
+}
+
 /// Data and settings shared by the stages of a fit.
 struct StageFitting<'a> {
     data: &'a Dataset,
@@ -199,13 +213,6 @@ struct StageFitting<'a> {
 }
 
 impl StageFitting<'_> {
-    /// Indices of the grasps for stage one and for stage two.
-    fn halves(&self) -> (Vec<usize>, Vec<usize>) {
-        let half_of = self.data.folds(2, self.fitting.seed ^ 0x5eed);
-        let of = |half: usize| (0..half_of.len()).filter(|k| half_of[*k] == half).collect();
-        (of(0), of(1))
-    }
-
     /// Part of each of some grasps, stratified by class.
     fn parts(&self, grasps: &[usize], parts: usize) -> Vec<usize> {
         self.data.part(grasps).folds(parts, self.fitting.seed ^ 0xf01d)
@@ -379,13 +386,8 @@ impl StageFitting<'_> {
         let parts = self.parts(grasps, recipe.parts);
         let of_mock = Calibrated::cross_fit(&mock, (&parts, recipe.parts), &complete, self.fitting)?;
         let alone = last_of(&network, &of_mock);
-        let mut of_class = vec![Vec::new(); classes];
-        alone.iter().enumerate().for_each(|(place, (n, _))| of_class[truth(*n)].push(place));
-        let mut same = vec![Vec::new(); grasps.len()];
-        for (place, (n, _)) in alone.iter().enumerate() {
-            same[*n] = of_class[truth(*n)].iter().copied().filter(|other| *other != place).collect();
-        }
-        let earlier = Earlier { alone: alone.iter().map(|(_, pmf)| pmf.clone()).collect(), same, classes };
+        let class_of: Vec<usize> = (0..grasps.len()).map(truth).collect();
+        let earlier = Earlier::new(alone.clone(), &class_of, classes, MOST_EARLIER);
         // The network starts as the product of experts and learns corrections.
         let gain = network.last_temperature();
         network.change(|layer| layer.with_inputs(classes).with_prior(gain));

@@ -28,7 +28,7 @@ pub(super) struct TrainingSequence {
 }
 
 /// Settings of the training of a network.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
     /// Passes over the training set.

@@ -33,17 +33,27 @@ pub(super) struct Earlier {
     pub(super) same: Vec<Vec<usize>>,
     /// Number of classes.
     pub(super) classes: usize,
+    /// Largest number of earlier grasps.
+    pub(super) most: usize,
 }
 
-/// Largest number of earlier grasps while training.
-const MOST_EARLIER: usize = 3;
-
 impl Earlier {
-    /// Draws the belief after up to three other grasps of the same object; uniform after none.
+    /// PMFs of held-out grasps, each with the number of its grasp, to be fed back to others of the same class.
+    pub(super) fn new(alone: Vec<(usize, Pmf)>, class_of: &[usize], classes: usize, most: usize) -> Self {
+        let mut of_class = vec![Vec::new(); classes];
+        alone.iter().enumerate().for_each(|(place, (k, _))| of_class[class_of[*k]].push(place));
+        let mut same = vec![Vec::new(); class_of.len()];
+        for (place, (k, _)) in alone.iter().enumerate() {
+            same[*k] = of_class[class_of[*k]].iter().copied().filter(|other| *other != place).collect();
+        }
+        Self { alone: alone.into_iter().map(|(_, pmf)| pmf).collect(), same, classes, most }
+    }
+
+    /// Draws the belief after up to [`most`](Self::most) other grasps of the same object; uniform after none.
     fn draw(&self, k: usize, random: &mut dyn Rng) -> Pmf {
         let mut before = Pmf::uniform(self.classes);
         if !self.same[k].is_empty() {
-            for _ in 0..random.random_range(0..=MOST_EARLIER) {
+            for _ in 0..random.random_range(0..=self.most) {
                 let other = self.same[k][random.random_range(0..self.same[k].len())];
                 before = before.times(&self.alone[other]);
             }

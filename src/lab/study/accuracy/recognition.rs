@@ -113,7 +113,7 @@ impl<'a> RecognitionBench<'a> {
             if method.recipe.is_some() {
                 settings.insert("epochs".to_owned(), self.plan.epochs.into());
             }
-            let fitting = Fitting { seed: 1, quick: false, settings, progress: &|_| (), stop: cancelled };
+            let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &|_| (), stop: cancelled };
             let recogniser = match (method.fit)(&train, &fitting) {
                 Err(_) if stopped() => return Ok(None),
                 outcome => outcome.map_err(|cause| AccuracyStudyError::Fit { method: method.key, cause })?,

@@ -1,0 +1,318 @@
+//! Networks in plain candle: a network is one file that implements [`CandleNetwork`] and one line in the table of methods.
+//! Inputs, training, files and answers are the same for all and live here.
+//!
+//! Every grasp is divided into [`STEPS`] equal steps of the median training grasp. Training draws each grasp or its mirror
+//! image with some noise; answers average both views. A last network learns from all grasps; the temperature of its
+//! probabilities comes from one that learned without a sixth of them.
+
+use crate::arrays::Arrays;
+use crate::data::{Dataset, Sequence};
+use crate::fitting::{Fitting, LearnError, check_enough};
+use crate::mirror::mirror;
+use crate::model::{LoadError, ModelCard};
+use crate::network::Preparation;
+use crate::pmf::Pmf;
+use crate::recogniser::{Recogniser, Verdict};
+use crate::temperature::{Temperatures, best_temperature};
+use candle_core::{DType, Device, Result, Tensor, Var};
+use candle_nn::{AdamW, Optimizer as _, ParamsAdamW, VarBuilder, VarMap};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Time steps of the inputs.
+pub(super) const STEPS: usize = 30;
+
+/// Network in plain candle.
+pub(crate) trait CandleNetwork: Sized + Send + Sync + 'static {
+    /// Version of the network and its constants, part of the fingerprint: count it up whenever the code changes.
+    const REVISION: u32;
+    /// Passes over the training grasps.
+    const EPOCHS: usize = 60;
+    /// Highest learning rate.
+    const RATE: f64 = 2e-3;
+    /// Weight decay per unit of learning rate.
+    const WEIGHT_DECAY: f64 = 0.05;
+    /// Standard deviation of the noise on inputs while training; inputs have unit deviation.
+    const NOISE: f32 = 0.15;
+
+    /// Creates the layers. Inputs are `[batch][inputs][STEPS]`, outputs `[batch][classes]`.
+    fn new(inputs: usize, classes: usize, variables: &VarBuilder<'_>) -> Result<Self>;
+
+    /// Computes the score of each class.
+    fn scores(&self, x: &Tensor, pass: &mut Pass<'_>) -> Result<Tensor>;
+}
+
+/// What a forward pass is for: training, with random numbers, or answering.
+pub(crate) struct Pass<'a>(Option<&'a mut ChaCha8Rng>);
+
+impl Pass<'_> {
+    /// True while training.
+    pub(super) fn is_training(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Sets a share of the values to zero while training. candle's own dropout cannot be seeded on the CPU.
+    pub(super) fn dropout(&mut self, x: &Tensor, share: f32) -> Result<Tensor> {
+        let Some(random) = &mut self.0 else { return Ok(x.clone()) };
+        let keep = 1.0 / (1.0 - share);
+        let mask = (0..x.elem_count()).map(|_| if random.random::<f32>() < share { 0.0 } else { keep });
+        x.mul(&Tensor::from_vec(mask.collect::<Vec<f32>>(), x.shape(), &Device::Cpu)?)
+    }
+}
+
+/// Fitted network in plain candle.
+pub(crate) struct Candle<N> {
+    learned: Learned,
+    network: Variables<N>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Learned {
+    preparation: Preparation,
+    /// Counterpart of each input on the other finger; `None` if grasps cannot be mirrored.
+    mirror: Option<Vec<usize>>,
+    revision: u32,
+    epochs: usize,
+    temperature: f64,
+}
+
+/// Sequences per optimiser step.
+const BATCH: usize = 32;
+/// One in this many grasps is held out for calibration.
+const CALIBRATION: usize = 6;
+/// Share of the training in which the learning rate rises.
+const WARM_UP: f64 = 0.25;
+const TEMPERATURES: Temperatures = Temperatures { range: 0.1..=10.0, count: 100 };
+/// Version of inputs and training, part of the fingerprint.
+const REVISION: u32 = 1;
+
+/// Network with its variables by name.
+struct Variables<N> {
+    network: N,
+    by_name: BTreeMap<String, Var>,
+}
+
+impl<N: CandleNetwork> Variables<N> {
+    /// Creates a network whose weights are drawn uniformly within one over the root of the fan-in, in the order of their
+    /// names; vectors keep the values that their layer gives them.
+    fn new(inputs: usize, classes: usize, random: &mut ChaCha8Rng) -> Result<Self> {
+        let variables = VarMap::new();
+        let builder = VarBuilder::from_varmap(&variables, DType::F32, &Device::Cpu);
+        let network = N::new(inputs, classes, &builder)?;
+        let named = variables.data().lock();
+        let named = named.map_err(|_poisoned| candle_core::Error::Msg("the variables are locked".to_owned()))?;
+        let by_name: BTreeMap<String, Var> = named.iter().map(|(name, var)| (name.clone(), var.clone())).collect();
+        for (name, var) in &by_name {
+            if var.dims().len() > 1 {
+                let most = 1.0 / (var.dims().iter().skip(1).product::<usize>().max(1) as f32).sqrt();
+                let values = (0..var.elem_count()).map(|_| most * (2.0 * random.random::<f32>() - 1.0));
+                var.set(&Tensor::from_vec(values.collect::<Vec<f32>>(), var.dims(), &Device::Cpu)?)?;
+            } else if name.ends_with("bias") {
+                // Linear layers of candle draw their biases from a generator that cannot be seeded.
+                var.set(&var.zeros_like()?)?;
+            }
+        }
+        Ok(Self { network, by_name })
+    }
+
+    /// Scores of sequences `[inputs][STEPS]`, one class after the other.
+    fn scores(&self, sequences: &[&[f32]], width: usize) -> Result<Vec<Vec<f32>>> {
+        let x: Vec<f32> = sequences.iter().flat_map(|sequence| sequence.iter().copied()).collect();
+        let x = Tensor::from_vec(x, (sequences.len(), width, STEPS), &Device::Cpu)?;
+        self.network.scores(&x, &mut Pass(None))?.to_vec2()
+    }
+}
+
+impl<N: CandleNetwork> Candle<N> {
+    /// Fits the network and its temperature.
+    pub(crate) fn fit(data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Self, LearnError> {
+        check_enough(data, 2)?;
+        fitting.refuse_settings()?;
+        let mut lengths: Vec<f32> = data.examples.iter().filter_map(|e| e.grasp.t_s.last().copied()).collect();
+        lengths.sort_by(f32::total_cmp);
+        let duration_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0).max(0.05);
+        let preparation = Preparation::fit(data, (STEPS as f32 / duration_s).clamp(0.1, 1000.0));
+        let channels = data.channels.len();
+        let of_inputs = |own: Vec<usize>| -> Vec<usize> {
+            (0..preparation.width()).map(|input| input / channels * channels + own[input % channels]).collect()
+        };
+        let mirror = mirror(&data.channels).map(of_inputs);
+        let epochs = if fitting.quick { N::EPOCHS.div_ceil(2) } else { N::EPOCHS };
+        let mut learned = Learned { preparation, mirror, revision: N::REVISION, epochs, temperature: 1.0 };
+        let sequences: Vec<Vec<f32>> = data.examples.iter().map(|e| inputs(&learned, &e.grasp)).collect();
+        let part_of = data.folds(CALIBRATION, fitting.seed ^ 0xca11b);
+        let of = |inside: bool| (0..part_of.len()).filter(|k| (part_of[*k] == 0) == inside).collect::<Vec<usize>>();
+        let work = Work { data, learned: &learned, sequences: &sequences, fitting };
+        let first: Variables<N> = work.train(&of(false), 0.0).map_err(LearnError::failed)?;
+        fitting.check()?;
+        let answered: Vec<(Vec<f32>, usize)> = of(true)
+            .into_iter()
+            .map(|k| Ok((logarithms(&first, &learned, &sequences[k])?, data.examples[k].class)))
+            .collect::<Result<_>>()
+            .map_err(LearnError::failed)?;
+        let answered: Vec<(&[f32], usize)> = answered.iter().map(|(scores, class)| (&scores[..], *class)).collect();
+        let temperature = best_temperature(&answered, &TEMPERATURES).0;
+        let network = work.train(&of(false).into_iter().chain(of(true)).collect::<Vec<_>>(), 0.5);
+        let network = network.map_err(LearnError::failed)?;
+        fitting.check()?;
+        learned.temperature = temperature;
+        Ok(Self { learned, network })
+    }
+
+    /// Everything that decides a fit, besides the data, the seed and the options of the fit.
+    pub(crate) fn decided_by() -> serde_json::Value {
+        serde_json::json!({
+            "revisions": [REVISION, N::REVISION],
+            "training": [N::EPOCHS as f64, N::RATE, N::WEIGHT_DECAY, f64::from(N::NOISE), BATCH as f64],
+        })
+    }
+
+    /// Restores a recogniser from a model file.
+    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> std::result::Result<Self, LoadError> {
+        let learned: Learned = card.settings_as()?;
+        if learned.revision != N::REVISION {
+            return Err(LoadError::Card { part: "the version of the network" });
+        }
+        if !learned.preparation.is_sound(card.channels.len()) {
+            return Err(LoadError::Card { part: "the input scaling" });
+        }
+        let width = learned.preparation.width();
+        let is_place = |to: &usize| *to < width;
+        if !learned.mirror.as_ref().is_none_or(|m| m.len() == width && m.iter().all(is_place)) {
+            return Err(LoadError::Card { part: "the mirror image" });
+        }
+        if !TEMPERATURES.range.contains(&learned.temperature) {
+            return Err(LoadError::Card { part: "the temperature" });
+        }
+        let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
+        let mut random = ChaCha8Rng::seed_from_u64(0);
+        let network = Variables::<N>::new(width, card.labels.classes.len(), &mut random).map_err(failed)?;
+        for (name, var) in &network.by_name {
+            let values = Tensor::from_slice(arrays.f32s(name, var.dims())?, var.dims(), &Device::Cpu);
+            values.and_then(|values| var.set(&values)).map_err(failed)?;
+        }
+        Ok(Self { learned, network })
+    }
+}
+
+/// Inputs of a grasp, `[inputs][STEPS]`, truncated or padded with the last step.
+fn inputs(learned: &Learned, grasp: &Sequence) -> Vec<f32> {
+    let width = learned.preparation.width();
+    let rows = learned.preparation.inputs(grasp);
+    let last = (rows.len() / width.max(1)).checked_sub(1);
+    let at = |step: usize, input: usize| last.map_or(0.0, |last| rows[step.min(last) * width + input]);
+    (0..width).flat_map(|input| (0..STEPS).map(move |step| at(step, input))).collect()
+}
+
+/// The same inputs with left and right exchanged.
+fn mirrored(mirror: &[usize], own: &[f32]) -> Vec<f32> {
+    mirror.iter().flat_map(|from| own[from * STEPS..(from + 1) * STEPS].iter().copied()).collect()
+}
+
+/// Logarithms of the probabilities, not calibrated: means over both views.
+fn logarithms<N: CandleNetwork>(network: &Variables<N>, learned: &Learned, own: &[f32]) -> Result<Vec<f32>> {
+    let width = learned.preparation.width();
+    let other = learned.mirror.as_ref().map(|mirror| mirrored(mirror, own));
+    let views: Vec<&[f32]> = std::iter::once(own).chain(other.as_deref()).collect();
+    let views: Vec<Pmf> =
+        network.scores(&views, width)?.into_iter().map(|s| Pmf::from_scores(s.into_iter().map(f64::from))).collect();
+    let share = 1.0 / views.len() as f32;
+    let mut sums = vec![0.0; views.first().map_or(0, Pmf::classes)];
+    for view in &views {
+        sums.iter_mut().zip(view.logarithms()).for_each(|(sum, log)| *sum += share * log as f32);
+    }
+    Ok(sums)
+}
+
+/// Training data of a fit.
+struct Work<'a> {
+    data: &'a Dataset,
+    learned: &'a Learned,
+    sequences: &'a [Vec<f32>],
+    fitting: &'a Fitting<'a>,
+}
+
+impl Work<'_> {
+    /// Trains on some of the grasps. Progress goes on from `start` by a half.
+    fn train<N: CandleNetwork>(&self, grasps: &[usize], start: f64) -> Result<Variables<N>> {
+        let Self { learned, sequences, fitting, .. } = *self;
+        let (width, classes) = (learned.preparation.width(), self.data.labels.classes.len());
+        let mut random = ChaCha8Rng::seed_from_u64(fitting.seed);
+        let network = Variables::<N>::new(width, classes, &mut random)?;
+        let settings = ParamsAdamW { lr: N::RATE, weight_decay: N::WEIGHT_DECAY, ..ParamsAdamW::default() };
+        let mut optimiser = AdamW::new(network.by_name.values().cloned().collect(), settings)?;
+        let mut order = grasps.to_vec();
+        // Batches of nearly equal size: normalisation needs more than one sequence.
+        let of_epoch = order.len().div_ceil(BATCH).max(1);
+        let (size, batches) = (order.len().div_ceil(of_epoch).max(1), (of_epoch * learned.epochs) as f64);
+        let mut done = 0;
+        for epoch in 0..learned.epochs {
+            order.shuffle(&mut random);
+            for group in order.chunks(size) {
+                let mut x = Vec::with_capacity(group.len() * width * STEPS);
+                for k in group {
+                    match learned.mirror.as_ref().filter(|_| random.random::<bool>()) {
+                        Some(mirror) => x.extend(mirrored(mirror, &sequences[*k])),
+                        None => x.extend_from_slice(&sequences[*k]),
+                    }
+                }
+                // Uniform noise of unit deviation reaches to the root of three.
+                x.iter_mut().for_each(|x| *x += N::NOISE * 3.0_f32.sqrt() * (2.0 * random.random::<f32>() - 1.0));
+                let y: Vec<u32> = group.iter().map(|k| self.data.examples[*k].class as u32).collect();
+                let x = Tensor::from_vec(x, (group.len(), width, STEPS), &Device::Cpu)?;
+                let y = Tensor::from_vec(y, group.len(), &Device::Cpu)?;
+                let scores = network.network.scores(&x, &mut Pass(Some(&mut random)))?;
+                optimiser.set_learning_rate(N::RATE * one_cycle(f64::from(done) / batches));
+                optimiser.backward_step(&candle_nn::loss::cross_entropy(&scores, &y)?)?;
+                done += 1;
+            }
+            (fitting.progress)(start + 0.5 * (epoch + 1) as f64 / learned.epochs as f64);
+            if fitting.check().is_err() {
+                break;
+            }
+        }
+        Ok(network)
+    }
+}
+
+/// Share of the highest learning rate at a share of the training: half a cosine up, another down.
+fn one_cycle(share: f64) -> f64 {
+    let half_cosine = |from: f64, to: f64, x: f64| from + (to - from) * 0.5 * (1.0 - (PI * x).cos());
+    if share < WARM_UP {
+        half_cosine(0.04, 1.0, share / WARM_UP)
+    } else {
+        half_cosine(1.0, 1e-4, (share - WARM_UP) / (1.0 - WARM_UP))
+    }
+}
+
+impl<N: CandleNetwork> Recogniser for Candle<N> {
+    fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
+        // Shapes were checked when the network was made; on failure all classes would be equally likely.
+        let logarithms = logarithms(&self.network, &self.learned, &inputs(&self.learned, grasp)).unwrap_or_default();
+        let temperature = self.learned.temperature;
+        let pmf = Pmf::from_scores(logarithms.into_iter().map(|log| f64::from(log) / temperature));
+        Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
+    }
+
+    fn arrays(&self) -> Arrays {
+        let mut arrays = Arrays::default();
+        for (name, var) in &self.network.by_name {
+            // Reading a tensor in the memory of the CPU does not fail.
+            let values = var.as_tensor().flatten_all().and_then(|flat| flat.to_vec1()).unwrap_or_default();
+            arrays.put(name.clone(), var.dims(), values);
+        }
+        arrays
+    }
+
+    fn parameters(&self) -> usize {
+        self.network.by_name.values().map(|var| var.elem_count()).sum()
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(&self.learned).unwrap_or_default()
+    }
+}
