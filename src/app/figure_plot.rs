@@ -116,8 +116,8 @@ const ROOM_FOR_LEGEND: [f32; 2] = [380.0, 220.0];
 fn add_series(plot_ui: &mut egui_plot::PlotUi<'_>, plot: &Plot, series: &DataSeries, ink: Color32) {
     let places: Vec<[f64; 2]> = series.points.iter().filter_map(|point| plot.place(point.at)).collect();
     for point in &series.points {
-        let Some([low, high]) = point.spread else { continue };
-        if let (Some(low), Some(high)) = (plot.place([point.at[0], low]), plot.place([point.at[0], high])) {
+        let Some(ends) = plot.spread(point) else { continue };
+        if let [Some(low), Some(high)] = ends.map(|end| plot.place(end)) {
             plot_ui.line(Line::new("", vec![low, high]).color(ink.gamma_multiply(0.5)).width(1.0).allow_hover(false));
         }
     }

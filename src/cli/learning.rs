@@ -35,7 +35,8 @@ pub(super) struct DataArguments {
     pub(super) quick: bool,
 }
 
-fn parse_sensors(text: &str) -> Result<SensorModel, String> {
+/// Parser of a sensor model's name.
+pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
     SensorModel::named(text).ok_or_else(|| "choose virtual or physical-like".to_owned())
 }
 

@@ -224,7 +224,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Doctor(doctor)) => return doctor::run(doctor),
         Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
-        Some(Command::Study(study)) => study::run(study)?,
+        Some(Command::Study(study)) => study::run(study, store)?,
         Some(Command::Help(help)) => help::run(help)?,
         None => window(arguments)?,
     }

@@ -3,13 +3,17 @@
 mod accuracy;
 mod effects;
 mod files;
+mod paper;
 mod stability;
 
 use super::Failure;
+use std::path::Path;
 
 /// Arguments of `palpate study`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
+  palpate study models --quick
+  palpate study all --quick
   palpate study accuracy --quick
   palpate study effects --quick
   palpate study effects --out studies/
@@ -28,12 +32,16 @@ enum Study {
     Effects(effects::EffectsArguments),
     /// Run hard cases at every accuracy, search holds for chatter, and count silently wrong random scenes; resumes.
     Stability(stability::StabilityArguments),
+    /// Studies of the paper.
+    #[command(flatten)]
+    Paper(paper::PaperCommand),
 }
 
-pub(super) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<(), Failure> {
     match &arguments.study {
         Study::Accuracy(arguments) => accuracy::run(arguments),
         Study::Effects(arguments) => effects::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
+        Study::Paper(command) => paper::run(command, store),
     }
 }

@@ -2,9 +2,15 @@
 
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
-use palpate_lab::study::generated_sections;
+use palpate_lab::study::paper::{
+    Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport,
+    StudySize, StudyStep, StudyWork, run_study,
+};
+use palpate_lab::study::{StoredStudy, generated_sections};
 use palpate_render::figure_svg;
+use palpate_store::Store;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 type TestResult = Result<(), Box<dyn std::error::Error>>;
 
@@ -23,5 +29,79 @@ fn the_stored_picture_is_that_of_the_stored_result() -> TestResult {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/studies/accuracy.svg");
     let drawn = figure_svg(&accuracy_figure(&stored_accuracy()?), Theme::Light, [960, 860])?;
     assert!(std::fs::read_to_string(path)? == drawn, "run `palpate study accuracy --out assets/studies` again");
+    Ok(())
+}
+
+/// Runs a study on a sample: four objects, six grasps of each. It is stopped once that many units are done.
+fn sample(
+    study: &dyn PaperStudy,
+    folder: &Path,
+    threads: usize,
+    stop_after: Option<usize>,
+) -> Result<Option<StoredStudy<StudyReport>>, StudyError> {
+    let plan = StudyPlan::of_size(StudySize::Sample { objects: 4, trials: 6 });
+    let cancelled = AtomicBool::new(false);
+    let progress = |progress: StudyProgress| {
+        if progress.step == StudyStep::Measuring && stop_after.is_some_and(|most| progress.done >= most) {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+    };
+    let store = Store::open(&folder.join("store.sqlite")).expect("opens");
+    let work = StudyWork { threads, cancelled: &cancelled, progress: &progress };
+    let results = stop_after.map(|_| folder.join(format!("{}.jsonl", study.card().key)));
+    run_study(study, &StudyBench::new(store, &plan, work), results.as_deref())
+}
+
+/// The tables without columns of CPU times, which differ from run to run.
+fn without_times(report: &StudyReport) -> Vec<(String, Vec<(Vec<Cell>, Vec<i64>)>)> {
+    let tables = report.tables.iter().map(|table| {
+        let is_time = |at: usize| ["CPU s", "µs", "ms"].contains(&table.columns[at].unit.as_str());
+        let cells = |cells: &[Cell]| (0..cells.len()).filter(|at| !is_time(*at)).map(|at| cells[at].clone()).collect();
+        (table.name.clone(), table.rows.iter().map(|row| (cells(&row.cells), row.trials.clone())).collect())
+    });
+    tables.collect()
+}
+
+#[test]
+fn studies_of_the_paper_run_resume_and_repeat() -> TestResult {
+    let folder = tempfile::tempdir()?;
+    for study in PAPER_STUDIES {
+        let card = study.card();
+        let start = std::time::Instant::now();
+        assert!(sample(*study, folder.path(), 2, Some(1))?.is_none(), "{}: stopped after a unit", card.key);
+        let stored = sample(*study, folder.path(), 2, Some(usize::MAX))?.expect("finished");
+        let report = &stored.result;
+        assert!(!report.data.is_empty() && !report.tables.is_empty(), "{}: {report:?}", card.key);
+        assert!(report.data.iter().all(|line| line.contains("preset")), "{}: {:?}", card.key, report.data);
+        for table in &report.tables {
+            assert!(!table.rows.is_empty(), "{}: {} is empty", card.key, table.name);
+            assert!(table.rows.iter().all(|row| row.cells.len() == table.columns.len()), "{}", table.name);
+            assert!(table.csv().lines().count() == table.rows.len() + 1, "{}", table.name);
+        }
+        assert!(report.tables.iter().any(|table| table.rows.iter().any(|row| !row.trials.is_empty())), "{}", card.key);
+        assert!(!report.findings.is_empty(), "{} has findings", card.key);
+        for finding in &report.findings {
+            assert!(finding.section.starts_with('V') && !finding.why.is_empty(), "{finding:?}");
+        }
+        let figures = study.figures(report);
+        assert!(!figures.is_empty(), "{} has figures", card.key);
+        for linked in &figures {
+            assert!(!linked.links.is_empty(), "{}: marks lead to trials", linked.name);
+            for link in &linked.links {
+                let plot = &linked.figure.plots[link.plot];
+                let is_there = match link.mark {
+                    FigureMark::Point(series, point) => plot.series[series].points.len() > point,
+                    FigureMark::Cell(row, column) => {
+                        plot.heat.as_ref().is_some_and(|h| h.y.count > row && h.x.count > column)
+                    }
+                };
+                assert!(is_there && report.tables[link.table].rows.len() > link.row, "{}: {link:?}", linked.name);
+            }
+            figure_svg(&linked.figure, Theme::Dark, linked.size)?;
+        }
+        let again = sample(*study, folder.path(), 1, None)?.expect("finished");
+        assert_eq!(without_times(&again.result), without_times(report), "{} on one thread", card.key);
+        println!("{}: {:.1} s", card.key, start.elapsed().as_secs_f64());
+    }
     Ok(())
 }

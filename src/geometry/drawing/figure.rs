@@ -37,6 +37,8 @@ pub struct Plot {
     pub bands: Vec<SpreadBand>,
     /// Series; later ones are drawn over earlier ones.
     pub series: Vec<DataSeries>,
+    /// True where spreads are those of x: plots with a named row for each point.
+    pub sideways: bool,
 }
 
 /// A filled band, such as a mean with its spread.
@@ -79,7 +81,7 @@ pub struct DataSeries {
 pub struct DataPoint {
     /// Its place: x, y.
     pub at: [f64; 2],
-    /// Spread of y, drawn as a thin bar.
+    /// Spread of y, or of x where the plot is sideways, drawn as a thin bar.
     pub spread: Option<[f64; 2]>,
     /// Text beside it; none where empty.
     pub label: String,
@@ -142,10 +144,17 @@ impl Plot {
         let spreads = points().flat_map(|point| point.spread.into_iter().flatten());
         let bands = || self.bands.iter().flat_map(|band| &band.points);
         let edges = bands().flat_map(|[_, low, high]| [*low, *high]);
-        [
-            self.x.bounds(points().map(|point| point.at[0]).chain(bands().map(|at| at[0])).chain(lines(false))),
-            self.y.bounds(points().map(|point| point.at[1]).chain(spreads).chain(edges).chain(lines(true))),
-        ]
+        let (of_x, of_y): (Vec<f64>, Vec<f64>) =
+            if self.sideways { (spreads.collect(), Vec::new()) } else { (Vec::new(), spreads.collect()) };
+        let x = points().map(|point| point.at[0]).chain(of_x).chain(bands().map(|at| at[0]));
+        let y = points().map(|point| point.at[1]).chain(of_y).chain(edges);
+        [self.x.bounds(x.chain(lines(false))), self.y.bounds(y.chain(lines(true)))]
+    }
+
+    /// Ends of a point's spread, as values of x and y.
+    pub fn spread(&self, point: &DataPoint) -> Option<[[f64; 2]; 2]> {
+        let [x, y] = point.at;
+        point.spread.map(|ends| ends.map(|end| if self.sideways { [end, y] } else { [x, end] }))
     }
 
     /// Marks of the vertical axis, with their texts.
@@ -181,5 +190,10 @@ mod tests {
         assert_eq!((plot.place([10.0, 5.0]), plot.place([0.0, 5.0])), (Some([1.0, 5.0]), None));
         plot.x.range = Some([1.0, 10.0]);
         assert_eq!(plot.bounds()[0], 0.0..=1.0);
+        let row = DataPoint { spread: Some([20.0, 60.0]), ..DataPoint::new(40.0, 3.0) };
+        let series = vec![DataSeries { points: vec![row.clone()], ..DataSeries::default() }];
+        let plot = Plot { sideways: true, series, ..Plot::default() };
+        assert!(plot.bounds()[0].contains(&20.0) && !plot.bounds()[1].contains(&20.0), "{:?}", plot.bounds());
+        assert_eq!(plot.spread(&row), Some([[20.0, 3.0], [60.0, 3.0]]));
     }
 }

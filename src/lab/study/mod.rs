@@ -9,6 +9,7 @@ mod finger_fit;
 mod generated;
 mod labelled_training;
 mod network_cost;
+pub mod paper;
 mod peer_costs;
 mod physics_cost;
 mod recognition_scores;

@@ -8,6 +8,7 @@ use super::labels::{Box2, NEAR, Wanted, place};
 use palpate_geometry::drawing::{Align, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_geometry::palette::{Rgb, series_colour};
 use plotters::prelude::DrawingBackend;
+use std::ops::RangeInclusive;
 
 /// Sizes of text (points per em).
 const TITLE: f64 = 15.0;
@@ -279,11 +280,12 @@ fn draw_series<B: DrawingBackend>(
     let colour = series_colour(series.colour, canvas.theme);
     let spread_colour = colour.mix(canvas.colours.background, 0.45);
     for point in &series.points {
-        let Some([low, high]) = point.spread else { continue };
-        let ends = [low, high].map(|y| {
-            let place = plot.place([point.at[0], y])?;
+        let Some(ends) = plot.spread(point) else { continue };
+        let ends = ends.map(|end| {
+            let [x, y] = plot.place(end)?;
             // A bar that leaves the axes ends there.
-            Some(frame.at([place[0], place[1].clamp(*frame.y.start(), *frame.y.end())]))
+            let within = |value: f64, range: &RangeInclusive<f64>| value.clamp(*range.start(), *range.end());
+            Some(frame.at([within(x, &frame.x), within(y, &frame.y)]))
         });
         if let [Some(low), Some(high)] = ends {
             canvas.path(&[low, high], 1.0, spread_colour)?;

@@ -1,0 +1,252 @@
+//! The paper's studies: one subcommand for each, from the table of studies, and `all`.
+
+use super::super::Failure;
+use super::super::interrupt::stop_flag;
+use super::super::learning::parse_sensors;
+use super::super::setup::open_store;
+use super::super::terminal::{note, say, say_json, table};
+use super::files::note_stopped;
+use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+use palpate_geometry::palette::Theme;
+use palpate_lab::datasets::DatasetQuery;
+use palpate_lab::study::StoredStudy;
+use palpate_lab::study::paper::{
+    PAPER_STUDIES, PaperStudy, STUDY_PRESET, StudyBench, StudyCard, StudyColumn, StudyPlan, StudyProgress, StudyReport,
+    StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
+};
+use palpate_render::figure_svg;
+use palpate_sim::scene::PosePreset;
+use palpate_tactile::model::SensorModel;
+use palpate_tactile::trial::TrialSource;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Arguments of every study of the paper.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct PaperArguments {
+    /// Take less than a minute: fewer grasps, small networks, few epochs.
+    #[arg(long)]
+    quick: bool,
+    /// Poses of simulated grasps: A, M, B or C.
+    #[arg(long, value_name = "A|M|B|C", default_value = STUDY_PRESET, value_parser = parse_preset)]
+    preset: String,
+    /// Sensor model of simulated grasps: virtual or physical-like (default: both).
+    #[arg(long, value_name = "MODEL", value_parser = parse_sensors)]
+    sensors: Option<SensorModel>,
+    /// Use trials of this collection in the store; a prefix of its name is enough (default: simulate grasps).
+    #[arg(long, value_name = "NAME")]
+    collection: Option<String>,
+    /// Use trials of this gripper in the store: sim (simulated) or serial (real).
+    #[arg(long, value_name = "NAME")]
+    rig: Option<TrialSource>,
+    /// Use trials of these objects in the store, separated by commas.
+    #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
+    objects: Vec<String>,
+    /// Random seed of fits and splits.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder for results, which the same command continues, tables (CSV) and figures (SVG) (default: palpate-studies,
+    /// with --quick palpate-studies-quick).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Number of threads (default: one per core). The results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print one JSON object instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_preset(text: &str) -> Result<String, String> {
+    let preset = PosePreset::named(text).ok_or_else(|| "choose A, M, B or C".to_owned())?;
+    Ok(preset.name.to_owned())
+}
+
+/// A study by its key, or all of them.
+#[derive(Clone, Debug)]
+pub(super) struct PaperCommand {
+    /// None for all studies.
+    key: Option<String>,
+    arguments: PaperArguments,
+}
+
+const ALL: &str = "all";
+
+/// Subcommands, one for each study.
+fn subcommands() -> Vec<Command> {
+    let of = |name: &'static str, about: String, examples: String| {
+        PaperArguments::augment_args(Command::new(name)).about(about).after_help(examples)
+    };
+    let studies = PAPER_STUDIES.iter().map(|study| {
+        let StudyCard { key, about, paper, budget, .. } = study.card();
+        let examples = format!(
+            "Cost: {budget}, with --quick less than a minute. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study \
+             {key} --quick\n  palpate study {key} --out studies/\n  palpate study {key} --preset A --sensors physical-like\n  \
+             palpate study {key} --rig serial --json\n\nSee also: palpate help studies"
+        );
+        of(key, format!("{} ({paper} of the paper): {about}.", study.card().title), examples)
+    });
+    let all = of(
+        ALL,
+        "Run all studies of the paper, one after the other.".to_owned(),
+        "Cost: about 4 CPU hours, with --quick a few minutes. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study all \
+         --quick\n  palpate study all --out studies/\n\nSee also: palpate help studies"
+            .to_owned(),
+    );
+    studies.chain([all]).collect()
+}
+
+impl FromArgMatches for PaperCommand {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (name, own) = matches.subcommand().ok_or_else(missing)?;
+        let key = (name != ALL).then(|| name.to_owned());
+        Ok(Self { key, arguments: PaperArguments::from_arg_matches(own)? })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Subcommand for PaperCommand {
+    fn augment_subcommands(command: Command) -> Command {
+        command.subcommands(subcommands())
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        name == ALL || paper_study(name).is_some()
+    }
+}
+
+impl PaperArguments {
+    fn plan(&self) -> StudyPlan {
+        let size = if self.quick { StudySize::Quick } else { StudySize::Full };
+        let stored = self.collection.is_some() || self.rig.is_some() || !self.objects.is_empty();
+        let query = stored.then(|| DatasetQuery {
+            collection: self.collection.clone(),
+            source: self.rig,
+            objects: self.objects.clone(),
+            ..DatasetQuery::default()
+        });
+        let usual = StudyPlan::of_size(size);
+        // Recorded trials have the sensors that they have.
+        let sensors = match (self.sensors, &query) {
+            (Some(sensors), _) => vec![sensors],
+            (None, Some(_)) => vec![SensorModel::Virtual],
+            (None, None) => usual.sensors.clone(),
+        };
+        StudyPlan { preset: self.preset.clone(), sensors, query, seed: self.seed, ..usual }
+    }
+
+    fn folder(&self) -> PathBuf {
+        let named = || PathBuf::from(format!("palpate-studies{}", if self.quick { "-quick" } else { "" }));
+        self.out.clone().unwrap_or_else(named)
+    }
+}
+
+pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Failure> {
+    let PaperCommand { key, arguments } = command;
+    let studies = PAPER_STUDIES.iter().filter(|study| key.as_ref().is_none_or(|key| study.card().key == key));
+    let (plan, folder) = (arguments.plan(), arguments.folder());
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let stop = stop_flag()?;
+    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta} left")?);
+    let progress = |progress: StudyProgress| {
+        let what = match progress.step {
+            StudyStep::Collecting => "collecting",
+            StudyStep::Measuring => "measuring",
+        };
+        bar.set_message(what);
+        bar.set_length(progress.of as u64);
+        bar.set_position(progress.done as u64);
+    };
+    let threads = arguments.threads.map_or_else(cores, usize::from);
+    let bench =
+        StudyBench::new(open_store(store)?, &plan, StudyWork { threads, cancelled: &stop, progress: &progress });
+    let mut reports = Vec::new();
+    for study in studies {
+        let key = study.card().key;
+        bar.reset();
+        let outcome = run_study(*study, &bench, Some(&folder.join(format!("{key}.jsonl"))));
+        bar.finish_and_clear();
+        let Some(stored) = outcome? else {
+            note_stopped(&format!("a part of {key}"));
+            return Ok(());
+        };
+        let written = write(*study, &stored, &folder)?;
+        if arguments.json {
+            reports.push((key, stored));
+        } else {
+            print(*study, &stored)?;
+            say(format!("\n{:.0} CPU minutes. {written}\n", stored.cpu_hours * 60.0))?;
+        }
+    }
+    match (reports.as_slice(), key) {
+        ([(_, only)], Some(_)) => say_json(only),
+        ([], _) => Ok(()),
+        (several, _) => say_json(&several.iter().map(|(key, stored)| (*key, stored)).collect::<BTreeMap<_, _>>()),
+    }
+}
+
+/// Writes a study's result, its tables and figures; returns a sentence that names the files.
+fn write(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, folder: &Path) -> Result<String, Failure> {
+    let key = study.card().key;
+    let mut names = vec![format!("{key}.json")];
+    stored.write(&folder.join(&names[0]))?;
+    for table in &stored.result.tables {
+        let name = format!("{}.csv", table.name);
+        std::fs::write(folder.join(&name), table.csv())?;
+        names.push(name);
+    }
+    for mut linked in study.figures(&stored.result) {
+        let name = format!("{}.svg", linked.name);
+        linked.figure.note += &format!("\n{}", stored.origin().replace('`', ""));
+        std::fs::write(folder.join(&name), figure_svg(&linked.figure, Theme::Light, linked.size)?)?;
+        names.push(name);
+    }
+    Ok(format!("Written to {}: {}", folder.display(), names.join(", ")))
+}
+
+fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>) -> Result<(), Failure> {
+    let card = study.card();
+    say(format!("{} ({} of the paper)", card.title, card.paper))?;
+    for line in &stored.result.data {
+        say(format!("  {line}"))?;
+    }
+    for table in &stored.result.tables {
+        print_table(table)?;
+    }
+    for finding in &stored.result.findings {
+        say(format!("\n[{}] {}: {}", finding.verdict.name(), finding.section, finding.claim))?;
+        say(format!("  found: {}", finding.found))?;
+        say(format!("  {}", finding.why))?;
+    }
+    if stored.command.contains("--quick") {
+        note("a quick study: do not quote its numbers");
+    }
+    Ok(())
+}
+
+/// Rows of long tables that are printed; the files have all.
+const MOST_ROWS: usize = 60;
+
+fn print_table(of: &StudyTable) -> Result<(), Failure> {
+    say(format!("\n{}", of.title))?;
+    let header: Vec<String> = of.columns.iter().map(StudyColumn::titled).collect();
+    let row = |row: &StudyRow| -> Vec<String> {
+        row.cells.iter().zip(&of.columns).map(|(cell, column)| cell.shown(&column.unit)).collect()
+    };
+    let rows: Vec<Vec<String>> = of.rows.iter().take(MOST_ROWS).map(row).collect();
+    table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows)?;
+    match of.rows.len().saturating_sub(MOST_ROWS) {
+        0 => Ok(()),
+        more => say(format!("and {more} more rows in {}.csv", of.name)),
+    }
+}

@@ -1,0 +1,295 @@
+//! Models fitted and judged in a study: their answers to test grasps, with intervals and paired differences.
+
+use super::bench::{StudyBench, StudyError};
+use palpate_learn::evaluation::answer;
+use palpate_learn::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, McNemar};
+use palpate_learn::{Dataset, Method, Model};
+use palpate_tactile::trial::TrialId;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Answers of a model to test grasps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct ModelAnswers {
+    /// Description of the data.
+    pub(super) data: String,
+    /// Names of the classes.
+    pub(super) classes: Vec<String>,
+    /// Test grasps.
+    pub(super) trials: Vec<TrialId>,
+    /// Their classes.
+    pub(super) truth: Vec<usize>,
+    /// The model's decisions.
+    pub(super) decided: Vec<usize>,
+    /// Expected calibration error.
+    pub(super) ece: f64,
+    /// Cost of the model.
+    pub(super) cost: ModelCost,
+}
+
+/// Cost of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct ModelCost {
+    /// CPU time of the fit (s).
+    pub(super) train_cpu_s: f64,
+    /// CPU time of the answer to a whole grasp (ms).
+    pub(super) answer_ms: f64,
+    /// CPU time per sample as it arrives (µs); none for methods that need the whole grasp.
+    pub(super) step_us: Option<f64>,
+    /// Size of the model file (bytes).
+    pub(super) bytes: usize,
+    /// Number of learned parameters.
+    pub(super) parameters: usize,
+}
+
+/// A model's answers, or the reason why it could not be fitted to these data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Judged {
+    /// It answered.
+    Answers(ModelAnswers),
+    /// It could not be fitted.
+    NotFitted(String),
+}
+
+impl Judged {
+    /// The answers, where there are some.
+    pub(super) fn answers(&self) -> Option<&ModelAnswers> {
+        match self {
+            Self::Answers(answers) => Some(answers),
+            Self::NotFitted(_) => None,
+        }
+    }
+}
+
+/// A division into training and test grasps: one of several equal parts is the test set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TestPart {
+    /// Number of parts.
+    pub(super) of: usize,
+    /// The part to test on, from 0.
+    pub(super) part: usize,
+    /// Largest number of training grasps of each class. Parts take different ones.
+    pub(super) train: usize,
+}
+
+impl TestPart {
+    /// Training and test set.
+    pub(super) fn split(self, data: &Dataset, seed: u64) -> Result<(Dataset, Dataset), StudyError> {
+        for (class, members) in data.labels.classes.iter().zip(data.by_class()) {
+            if members.len() < self.of.max(2) {
+                let (least, name, found) = (self.of.max(2), &class.name, members.len());
+                let what = format!("at least {least} grasps of each object, but there are {found} of \"{name}\"");
+                return Err(StudyError::Missing(what));
+            }
+        }
+        let fold = data.folds(self.of, seed);
+        let (test, others): (Vec<usize>, Vec<usize>) = (0..fold.len()).partition(|k| fold[*k] == self.part);
+        let others = data.part(&others);
+        let train = others.by_class().into_iter().flat_map(|members| {
+            let (count, first) = (members.len(), self.part * self.train);
+            (0..self.train.min(count)).map(move |k| members[(first + k) % count]).collect::<Vec<_>>()
+        });
+        let mut train: Vec<usize> = train.collect();
+        train.sort_unstable();
+        Ok((others.part(&train), data.part(&test)))
+    }
+}
+
+/// Fits a method and judges it; none where it was cancelled.
+pub(super) fn fit_and_judge(
+    bench: &StudyBench<'_>,
+    method: &Method,
+    train: &Dataset,
+    test: &Dataset,
+) -> Result<Option<Judged>, StudyError> {
+    match bench.fit(method, train) {
+        Ok(Some(model)) => Ok(Some(Judged::Answers(judge(&model, test)))),
+        Ok(None) => Ok(None),
+        Err(StudyError::Fit { cause, .. }) => Ok(Some(Judged::NotFitted(cause.to_string()))),
+        Err(other) => Err(other),
+    }
+}
+
+/// A model's answers to test grasps.
+pub(super) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
+    let recogniser = model.recogniser.as_ref();
+    let answers = answer(recogniser, test);
+    let samples: usize = test.examples.iter().map(|example| example.grasp.len()).sum();
+    let probabilities: Vec<Vec<f64>> = answers.verdicts.iter().map(|v| v.pmf.probabilities().to_vec()).collect();
+    let forecasts = Forecasts::new(&answers.truth, &probabilities);
+    ModelAnswers {
+        data: test.about.described(),
+        classes: test.labels.classes.iter().map(|class| class.name.clone()).collect(),
+        trials: test.examples.iter().map(|example| example.id).collect(),
+        decided: answers.verdicts.iter().map(|verdict| verdict.pmf.top().0).collect(),
+        ece: forecasts.map_or(f64::NAN, |forecasts| forecasts.calibration_error(CALIBRATION_BINS)),
+        cost: ModelCost {
+            train_cpu_s: model.card.train_cpu_s,
+            answer_ms: 1e-3 * answers.step_us * samples as f64 / test.examples.len().max(1) as f64,
+            step_us: live_step_us(model, test),
+            bytes: model.to_bytes().map_or(0, |bytes| bytes.len()),
+            parameters: model.card.parameters,
+        },
+        truth: answers.truth,
+    }
+}
+
+/// Grasps on which a live step is timed.
+const TIMED: usize = 20;
+
+/// CPU time of a sample as it arrives (µs).
+fn live_step_us(model: &Model, test: &Dataset) -> Option<f64> {
+    let mut live = model.recogniser.live()?;
+    let (mut samples, start) = (0, cpu_time::ThreadTime::now());
+    for example in test.examples.iter().take(TIMED) {
+        live.begin(None);
+        for (t, row) in example.grasp.rows() {
+            std::hint::black_box(live.push(t, row));
+            samples += 1;
+        }
+    }
+    (samples > 0).then(|| 1e6 * start.elapsed().as_secs_f64() / f64::from(samples))
+}
+
+/// Answers of one kind of model over several test parts, by trial.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Pool {
+    pub(super) classes: Vec<String>,
+    /// Class and decisions of each trial.
+    trials: BTreeMap<TrialId, (usize, Vec<usize>)>,
+}
+
+/// Resamples of an interval: its ends vary between seeds by 2 % of its width.
+const BOOTSTRAP: Bootstrap = Bootstrap { resamples: 1000, seed: 0 };
+
+/// One kind of model against another on the same trials.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PairedDifference {
+    /// Macro F1 of the first minus that of the second.
+    pub(super) f1: Interval,
+    /// Exact McNemar test.
+    pub(super) p: f64,
+}
+
+impl Pool {
+    /// Pools the answers of several parts; those with other classes than the first are left out.
+    pub(super) fn of<'a>(parts: impl IntoIterator<Item = &'a ModelAnswers>) -> Self {
+        let mut pool = Self::default();
+        for part in parts {
+            if pool.classes.is_empty() {
+                pool.classes.clone_from(&part.classes);
+            }
+            if pool.classes == part.classes {
+                for ((trial, truth), decided) in part.trials.iter().zip(&part.truth).zip(&part.decided) {
+                    pool.trials.entry(*trial).or_insert((*truth, Vec::new())).1.push(*decided);
+                }
+            }
+        }
+        pool
+    }
+
+    /// Number of trials.
+    pub(super) fn len(&self) -> usize {
+        self.trials.len()
+    }
+
+    /// Macro F1 with its interval.
+    pub(super) fn f1(&self) -> Option<Interval> {
+        self.scored(Confusion::macro_f1)
+    }
+
+    /// Macro-accuracy with its interval.
+    pub(super) fn accuracy(&self) -> Option<Interval> {
+        self.scored(Confusion::macro_accuracy)
+    }
+
+    fn scored(&self, score: impl Fn(&Confusion) -> Option<f64>) -> Option<Interval> {
+        let all: Vec<&(usize, Vec<usize>)> = self.trials.values().collect();
+        let objects: Vec<usize> = all.iter().map(|(truth, _)| *truth).collect();
+        BOOTSTRAP.interval(&objects, |trials| score(&confusion(self.classes.len(), &all, trials)?))
+    }
+
+    /// This kind of model against another on the trials that both answered.
+    pub(super) fn against(&self, other: &Self) -> Option<PairedDifference> {
+        if self.classes != other.classes {
+            return None;
+        }
+        let both: Vec<_> = self.trials.iter().filter_map(|(id, own)| Some((own, other.trials.get(id)?))).collect();
+        let objects: Vec<usize> = both.iter().map(|(own, _)| own.0).collect();
+        let [own, others]: [Vec<_>; 2] =
+            [both.iter().map(|pair| pair.0).collect(), both.iter().map(|pair| pair.1).collect()];
+        let f1 = |of: &[&(usize, Vec<usize>)], trials: &[usize]| confusion(self.classes.len(), of, trials)?.macro_f1();
+        let f1 = BOOTSTRAP.difference(&objects, |trials| f1(&own, trials), |trials| f1(&others, trials))?;
+        let (mut truth, mut first, mut second) = (Vec::new(), Vec::new(), Vec::new());
+        for (own, other) in &both {
+            for (a, b) in own.1.iter().zip(&other.1) {
+                truth.push(own.0);
+                first.push(Some(*a));
+                second.push(Some(*b));
+            }
+        }
+        Some(PairedDifference { f1, p: McNemar::of(&truth, &first, &second)?.p_value() })
+    }
+
+    /// Trials that were misjudged, one of each object in turn.
+    pub(super) fn misjudged(&self) -> Vec<TrialId> {
+        let wrong = |class: usize| {
+            let own = self.trials.iter().filter(move |(_, (truth, _))| *truth == class);
+            own.filter(|(_, (truth, decided))| decided.iter().any(|d| d != truth)).map(|(id, _)| *id)
+        };
+        let mut each: Vec<_> = (0..self.classes.len()).map(wrong).collect();
+        let mut found = Vec::new();
+        while found.len() < SHOWN {
+            let before = found.len();
+            found.extend(each.iter_mut().filter_map(Iterator::next));
+            if found.len() == before {
+                break;
+            }
+        }
+        found.truncate(SHOWN);
+        found
+    }
+}
+
+/// Most trials behind a row of a table.
+pub(super) const SHOWN: usize = 12;
+
+fn confusion(classes: usize, all: &[&(usize, Vec<usize>)], trials: &[usize]) -> Option<Confusion> {
+    let pairs = trials.iter().flat_map(|k| all[*k].1.iter().map(|decided| (all[*k].0, Some(*decided))));
+    Confusion::from_pairs(classes, pairs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twenty trials of two classes, of which each `wrong`th is misjudged.
+    fn answers(wrong: usize) -> ModelAnswers {
+        let truth: Vec<usize> = (0..20).map(|k| k % 2).collect();
+        ModelAnswers {
+            data: String::new(),
+            classes: ["ball", "cube"].map(str::to_owned).to_vec(),
+            trials: (0..20).collect(),
+            decided: truth.iter().enumerate().map(|(k, t)| if k % wrong == 0 { 1 - t } else { *t }).collect(),
+            truth,
+            ece: 0.0,
+            cost: ModelCost { train_cpu_s: 0.0, answer_ms: 0.0, step_us: None, bytes: 0, parameters: 0 },
+        }
+    }
+
+    #[test]
+    fn pooled_answers_keep_trials_together() {
+        let (good, bad) = (answers(10), answers(4));
+        let pool = Pool::of([&good, &good]);
+        assert_eq!((pool.len(), pool.misjudged()), (20, vec![0, 10]));
+        let accuracy = pool.accuracy().expect("trials");
+        assert!((accuracy.estimate - 0.9).abs() < 1e-12, "{accuracy:?}");
+        // A trial that counts twice makes the interval no narrower.
+        assert_eq!(accuracy, Pool::of([&good]).accuracy().expect("trials"));
+        let difference = Pool::of([&good]).against(&Pool::of([&bad])).expect("the same trials");
+        assert!(difference.f1.estimate > 0.1 && difference.p > 0.05, "{difference:?}");
+        let same = pool.against(&pool).expect("the same trials");
+        assert_eq!((same.f1.low, same.f1.high, same.p), (0.0, 0.0, 1.0));
+    }
+}

@@ -1,0 +1,174 @@
+//! The bench of a study: its store, from which data sets are read, and where missing grasps are collected.
+
+use super::plan::{DataWanted, StudyPlan};
+use crate::datasets::{DatasetError, DatasetQuery};
+use crate::grasping::{CollectionError, CollectionPlan, collect};
+use crate::study::result_file::ResultFileError;
+use palpate_learn::{Dataset, Fitting, LearnError, Method, Model};
+use palpate_sim::scene::{PosePreset, Scene};
+use palpate_store::Store;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Error of a study.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// Grasps could not be collected.
+    #[error(transparent)]
+    Collect(#[from] CollectionError),
+    /// Grasps could not be read.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The file of finished units failed.
+    #[error(transparent)]
+    Results(#[from] ResultFileError),
+    /// A method could not be fitted.
+    #[error("{method}: {cause}")]
+    Fit {
+        /// Key of the method.
+        method: String,
+        /// Cause.
+        cause: LearnError,
+    },
+    /// A preset or method that is not there.
+    #[error("there is no {0}")]
+    Unknown(String),
+    /// The trials lack something that the study needs.
+    #[error("the study needs {0}")]
+    Missing(String),
+    /// The result of a unit is not of this study.
+    #[error("the result of a unit cannot be read: {0}")]
+    Unit(#[from] serde_json::Error),
+}
+
+/// Step of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StudyStep {
+    /// Simulates grasps that the store lacks.
+    Collecting,
+    /// Computes units.
+    Measuring,
+}
+
+/// Progress of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StudyProgress {
+    /// Step.
+    pub step: StudyStep,
+    /// Grasps or units done.
+    pub done: usize,
+    /// Grasps or units in all.
+    pub of: usize,
+}
+
+/// Threads, stop flag and progress of a study.
+#[derive(Clone, Copy)]
+pub struct StudyWork<'a> {
+    /// Number of threads. The results do not depend on it.
+    pub threads: usize,
+    /// Flag that stops the study. The same plan continues it.
+    pub cancelled: &'a AtomicBool,
+    /// Receives progress.
+    pub progress: &'a (dyn Fn(StudyProgress) + Sync),
+}
+
+/// Bench of a study.
+pub struct StudyBench<'a> {
+    plan: &'a StudyPlan,
+    work: StudyWork<'a>,
+    store: Mutex<Store>,
+    /// Data sets read last, newest last.
+    read: Mutex<Vec<(DataWanted, Arc<Dataset>)>>,
+}
+
+/// Seed of the poses of collected grasps: not one that settings were chosen with.
+const POSES: u64 = 7;
+/// Data sets kept in memory: as many as are in use at a time.
+const KEPT: usize = 4;
+
+impl<'a> StudyBench<'a> {
+    /// A bench on a store.
+    pub fn new(store: Store, plan: &'a StudyPlan, work: StudyWork<'a>) -> Self {
+        Self { plan, work, store: Mutex::new(store), read: Mutex::new(Vec::new()) }
+    }
+
+    /// Plan of the study.
+    pub fn plan(&self) -> &StudyPlan {
+        self.plan
+    }
+
+    /// Threads, stop flag and progress.
+    pub fn work(&self) -> StudyWork<'a> {
+        self.work
+    }
+
+    /// True once the study is to stop.
+    pub fn is_cancelled(&self) -> bool {
+        self.work.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Reads grasps: those of the plan's query, or simulated ones, which are collected where the store lacks them. The
+    /// empty hand is left out. None where it was cancelled.
+    pub fn data(&self, wanted: &DataWanted) -> Result<Option<Arc<Dataset>>, StudyError> {
+        // One thread collects and reads, others wait for it and find the data set here.
+        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = read.iter().position(|(own, _)| own == wanted) {
+            let found = read.remove(at);
+            let data = Arc::clone(&found.1);
+            read.push(found);
+            return Ok(Some(data));
+        }
+        let mut store = self.store.lock().unwrap_or_else(PoisonError::into_inner);
+        let query = match &self.plan.query {
+            Some(query) => Some(query.clone()),
+            None => self.collected(&mut store, wanted)?,
+        };
+        let Some(query) = query else { return Ok(None) };
+        let most_of_each = Some(query.most_of_each.map_or(wanted.grasps, |most| most.min(wanted.grasps)));
+        let query = DatasetQuery { without_empty: true, most_of_each, ..query };
+        let data = Arc::new(query.read(&store, &wanted.view, &mut |_, _| ())?);
+        if read.len() == KEPT {
+            read.remove(0);
+        }
+        read.push((wanted.clone(), Arc::clone(&data)));
+        Ok(Some(data))
+    }
+
+    /// Collects what is missing; returns the query for it, none where it was cancelled.
+    fn collected(&self, store: &mut Store, wanted: &DataWanted) -> Result<Option<DatasetQuery>, StudyError> {
+        let preset = PosePreset::named(&wanted.preset);
+        let preset = preset.ok_or_else(|| StudyError::Unknown(format!("preset {}", wanted.preset)))?;
+        let mut scene = Scene { pose: preset.poses(), ..Scene::default() };
+        scene.object.fixed = wanted.fixed;
+        scene.pose.between = wanted.between;
+        let objects = self.plan.objects();
+        let plan = CollectionPlan {
+            objects: objects.clone(),
+            ..CollectionPlan::of_all_objects(scene, wanted.grasps as u32, POSES)
+        };
+        let report = collect(&plan, store, self.work.threads, &mut |made| {
+            let (done, of) = (made.done as usize, made.of as usize);
+            (self.work.progress)(StudyProgress { step: StudyStep::Collecting, done, of });
+            if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        let query = DatasetQuery { collection: Some(report.collection), objects, ..DatasetQuery::default() };
+        Ok((!report.interrupted).then_some(query))
+    }
+
+    /// Fits a method; none where it was cancelled.
+    pub fn fit(&self, method: &Method, data: &Dataset) -> Result<Option<Model>, StudyError> {
+        let fitting = Fitting {
+            seed: self.plan.seed,
+            quick: self.plan.has_quick_fits(),
+            settings: serde_json::Map::new(),
+            progress: &|_| (),
+            stop: self.work.cancelled,
+        };
+        match method.train(data, &fitting) {
+            Ok(model) => Ok(Some(model)),
+            Err(LearnError::Stopped) => Ok(None),
+            Err(cause) => Err(StudyError::Fit { method: method.key.to_owned(), cause }),
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The paper's studies: each figure of its section V, and two of its future work, from one command each.
+//!
+//! A [`PaperStudy`] divides its work into units. A unit takes a data set from the [`StudyBench`] and returns a
+//! [`UnitResult`]; finished units are kept, so that a study that was stopped goes on where it stopped. From all units it
+//! makes a [`StudyReport`]: tables, and a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
+//!
+//! To add a study, write its file and add it to [`PAPER_STUDIES`].
+
+mod answers;
+mod bench;
+mod drawing;
+mod models;
+mod plan;
+mod report;
+mod run;
+
+pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
+pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
+pub use report::{
+    Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow, StudyTable,
+    Verdict,
+};
+pub use run::run_study;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// All studies of the paper, in the order of its figures.
+pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[&models::Models];
+
+/// Finds a study by its key.
+pub fn paper_study(key: &str) -> Option<&'static dyn PaperStudy> {
+    PAPER_STUDIES.iter().copied().find(|study| study.card().key == key)
+}
+
+/// Name and purpose of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StudyCard {
+    /// Key on the command line and in files.
+    pub key: &'static str,
+    /// Display name.
+    pub title: &'static str,
+    /// What it shows, in a sentence without full stop.
+    pub about: &'static str,
+    /// Figure or section of the paper.
+    pub paper: &'static str,
+    /// CPU time of the full form, without collecting grasps.
+    pub budget: &'static str,
+}
+
+/// A study of the paper.
+pub trait PaperStudy: Sync {
+    /// Name and purpose.
+    fn card(&self) -> StudyCard;
+
+    /// Names of the units of work. Units of the same data set follow each other.
+    fn units(&self, plan: &StudyPlan) -> Vec<String>;
+
+    /// Computes a unit; none where it was cancelled.
+    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError>;
+
+    /// Tables and findings from the results of all units.
+    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError>;
+
+    /// Figures, drawn from the tables.
+    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure>;
+}
+
+/// Result of a unit, in a form of its study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct UnitResult(serde_json::Value);
+
+impl UnitResult {
+    /// Result of a unit.
+    pub fn new(result: &impl Serialize) -> Result<Self, StudyError> {
+        Ok(Self(serde_json::to_value(result)?))
+    }
+
+    /// The result in the form of its study.
+    pub fn read<T: DeserializeOwned>(&self) -> Result<T, StudyError> {
+        Ok(T::deserialize(&self.0)?)
+    }
+}

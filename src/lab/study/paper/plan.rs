@@ -1,0 +1,156 @@
+//! What a study is to run on: its size, grasps, sensors and seed.
+
+use crate::datasets::{DatasetQuery, SensorView};
+use palpate_learn::METHODS;
+use palpate_sim::objects::catalogue;
+use palpate_sim::scene::Between;
+use palpate_tactile::model::SensorModel;
+use serde::{Deserialize, Serialize};
+
+/// Amount of work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StudySize {
+    /// The full form, whose results are quoted.
+    Full,
+    /// Less than a minute: fewer grasps, small networks, few epochs.
+    Quick,
+    /// A few objects and grasps, to test the program.
+    Sample {
+        /// Number of objects.
+        objects: usize,
+        /// Grasps of each.
+        trials: usize,
+    },
+}
+
+/// Grasps that a study wants, and the sensors that it reads them through.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DataWanted {
+    /// Name of the pose preset.
+    pub preset: String,
+    /// True for objects that are fixed in place.
+    pub fixed: bool,
+    /// Treatment of the object between two grasps.
+    pub between: Between,
+    /// Grasps of each object.
+    pub grasps: usize,
+    /// Sensors.
+    pub view: SensorView,
+}
+
+/// Plan of a study: everything that its results depend on, but the program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyPlan {
+    /// Amount of work.
+    pub size: StudySize,
+    /// Name of the pose preset of simulated grasps.
+    pub preset: String,
+    /// Sensor models that simulated grasps are read through.
+    pub sensors: Vec<SensorModel>,
+    /// Trials to read from the store; simulated ones are collected where there is none.
+    pub query: Option<DatasetQuery>,
+    /// Seed of fits, splits and draws.
+    pub seed: u64,
+}
+
+/// Preset of all studies: objects that lie on any of their faces.
+pub const STUDY_PRESET: &str = "B";
+
+impl StudyPlan {
+    /// The usual plan of a size: preset B, virtual and physical-like sensors.
+    pub fn of_size(size: StudySize) -> Self {
+        let (preset, sensors) = (STUDY_PRESET.to_owned(), SensorModel::BOTH.to_vec());
+        Self { size, preset, sensors, query: None, seed: 1 }
+    }
+
+    /// What belongs to the size: of a full study, a quick one, or a sample.
+    pub fn pick<T>(&self, full: T, quick: T, sample: T) -> T {
+        match self.size {
+            StudySize::Full => full,
+            StudySize::Quick => quick,
+            StudySize::Sample { .. } => sample,
+        }
+    }
+
+    /// Grasps of each object: of a full study, of a quick one, or those of the sample.
+    pub fn grasps(&self, full: usize, quick: usize) -> usize {
+        match self.size {
+            StudySize::Full => full,
+            StudySize::Quick => quick,
+            StudySize::Sample { trials, .. } => trials,
+        }
+    }
+
+    /// True where fits are shortened; their results are not to be quoted.
+    pub fn has_quick_fits(&self) -> bool {
+        self.size != StudySize::Full
+    }
+
+    /// Built-in objects that are grasped: all sixteen, or some of a sample, spread over the catalogue.
+    pub fn objects(&self) -> Vec<String> {
+        let all: Vec<String> = catalogue().iter().map(|built_in| built_in.name.clone()).collect();
+        match self.size {
+            StudySize::Full | StudySize::Quick => all,
+            StudySize::Sample { objects, .. } => {
+                let count = objects.clamp(1, all.len());
+                (0..count).map(|k| all[k * all.len() / count].clone()).collect()
+            }
+        }
+    }
+
+    /// Free objects that are put down anew for each grasp, read through the default layout.
+    pub fn wanted(&self, grasps: usize, sensors: SensorModel) -> DataWanted {
+        DataWanted {
+            preset: self.preset.clone(),
+            fixed: false,
+            between: Between::Reposed,
+            grasps,
+            view: SensorView { sensors, ..SensorView::default() },
+        }
+    }
+
+    /// The plan as stored with results: other plans do not continue them. Methods are part of it, since a method whose
+    /// recipe has changed gives other results.
+    pub(super) fn header(&self) -> serde_json::Value {
+        let recipes: Vec<_> = METHODS.iter().map(|method| (method.key, method.recipe.map(|recipe| recipe()))).collect();
+        serde_json::json!({
+            "size": self.size,
+            "preset": self.preset,
+            "sensors": self.sensors,
+            "query": self.query.as_ref().map(|query| format!("{query:?}")),
+            "seed": self.seed,
+            "methods": recipes,
+        })
+    }
+
+    /// Options of the command line that give this plan.
+    pub(super) fn options(&self) -> String {
+        let mut options = String::new();
+        let usual = Self::of_size(self.size);
+        match self.size {
+            StudySize::Full => {}
+            StudySize::Quick => options += " --quick",
+            StudySize::Sample { objects, trials } => {
+                options += &format!(" (a sample of {objects} objects, {trials} trials)")
+            }
+        }
+        if self.preset != usual.preset {
+            options += &format!(" --preset {}", self.preset);
+        }
+        if let ([only], None) = (self.sensors.as_slice(), &self.query) {
+            options += &format!(" --sensors {}", only.name());
+        }
+        if let Some(query) = &self.query {
+            options += &query.collection.as_ref().map_or(String::new(), |name| format!(" --collection {name}"));
+            options += &query.source.map_or(String::new(), |source| format!(" --rig {source}"));
+            if !query.objects.is_empty() {
+                options += &format!(" --objects {}", query.objects.join(","));
+            }
+        }
+        if self.seed != usual.seed {
+            options += &format!(" --seed {}", self.seed);
+        }
+        options
+    }
+}

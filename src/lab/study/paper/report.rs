@@ -1,0 +1,350 @@
+//! What a study reports: tables, findings beside the paper's claims, and figures whose points lead to trials.
+
+use palpate_geometry::drawing::Figure;
+use palpate_learn::metrics::Interval;
+use palpate_tactile::trial::TrialId;
+use serde::{Deserialize, Serialize};
+
+/// Result of a study, as stored.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StudyReport {
+    /// Data that it rests on, a line for each kind.
+    pub data: Vec<String>,
+    /// Tables.
+    pub tables: Vec<StudyTable>,
+    /// The paper's claims beside our numbers.
+    pub findings: Vec<Finding>,
+}
+
+/// A table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StudyTable {
+    /// Name in files.
+    pub name: String,
+    /// Title.
+    pub title: String,
+    /// Columns.
+    pub columns: Vec<StudyColumn>,
+    /// Rows.
+    pub rows: Vec<StudyRow>,
+}
+
+/// A column of a table.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StudyColumn {
+    /// Heading.
+    pub name: String,
+    /// Unit; empty for text and plain numbers.
+    pub unit: String,
+}
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StudyRow {
+    /// One cell for each column.
+    pub cells: Vec<Cell>,
+    /// Some trials behind the row, to look at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trials: Vec<TrialId>,
+}
+
+/// A cell of a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cell {
+    /// Text.
+    Text(String),
+    /// Number in the unit of its column.
+    Number(f64),
+    /// Estimate with its 95 % interval.
+    Interval(Interval),
+    /// Not measured, or undefined.
+    Missing,
+}
+
+/// A claim of the paper, and what we find.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Section of the paper.
+    pub section: String,
+    /// Its claim, in short.
+    pub claim: String,
+    /// Our result, with numbers.
+    pub found: String,
+    /// Agreement.
+    pub verdict: Verdict,
+    /// Rule of the verdict, or reason of a difference.
+    pub why: String,
+}
+
+/// Agreement of a finding with the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Our numbers support the claim.
+    Agrees,
+    /// Our numbers contradict the claim.
+    Disagrees,
+    /// Our numbers support a part of it, or do not decide.
+    Partly,
+    /// Not measured.
+    NotMeasured,
+}
+
+impl Verdict {
+    /// Word for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Agrees => "agrees",
+            Self::Disagrees => "disagrees",
+            Self::Partly => "partly",
+            Self::NotMeasured => "not measured",
+        }
+    }
+
+    /// Verdict on a claim that a difference is positive: settled only where its interval leaves out zero.
+    pub fn of_gain(difference: Option<Interval>) -> Self {
+        match difference {
+            None => Self::NotMeasured,
+            Some(gain) if gain.low > 0.0 => Self::Agrees,
+            Some(gain) if gain.high < 0.0 => Self::Disagrees,
+            Some(_) => Self::Partly,
+        }
+    }
+
+    /// Verdict on several claims at once: all agree, all disagree, or something between.
+    pub fn of_all(parts: impl IntoIterator<Item = Self>) -> Self {
+        let measured: Vec<Self> = parts.into_iter().filter(|part| *part != Self::NotMeasured).collect();
+        match measured.as_slice() {
+            [] => Self::NotMeasured,
+            [first, rest @ ..] if rest.iter().all(|part| part == first) => *first,
+            _ => Self::Partly,
+        }
+    }
+}
+
+/// A figure whose marks lead to rows of tables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkedFigure {
+    /// Name in files.
+    pub name: String,
+    /// The figure.
+    pub figure: Figure,
+    /// Width and height of its files (points).
+    pub size: [u32; 2],
+    /// Rows behind its marks.
+    pub links: Vec<FigureLink>,
+}
+
+/// A mark of a figure, and the row of a table behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FigureLink {
+    /// Number of the plot.
+    pub plot: usize,
+    /// The mark.
+    pub mark: FigureMark,
+    /// Number of the table.
+    pub table: usize,
+    /// Number of its row.
+    pub row: usize,
+}
+
+/// Mark of a plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FigureMark {
+    /// Point of a series, by their numbers.
+    Point(usize, usize),
+    /// Row and column of a cell of a heat map.
+    Cell(usize, usize),
+}
+
+impl Cell {
+    /// Text of a cell.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+
+    /// A number where there is one.
+    pub fn number(value: Option<f64>) -> Self {
+        value.filter(|value| value.is_finite()).map_or(Self::Missing, Self::Number)
+    }
+
+    /// An interval where there is one.
+    pub fn interval(interval: Option<Interval>) -> Self {
+        interval.map_or(Self::Missing, Self::Interval)
+    }
+
+    /// Estimate or number.
+    pub fn value(&self) -> Option<f64> {
+        match self {
+            Self::Number(value) => Some(*value),
+            Self::Interval(interval) => Some(interval.estimate),
+            Self::Text(_) | Self::Missing => None,
+        }
+    }
+
+    /// Ends of the interval.
+    pub fn spread(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Interval(interval) => Some([interval.low, interval.high]),
+            Self::Number(_) | Self::Text(_) | Self::Missing => None,
+        }
+    }
+
+    /// The cell for reading, rounded. Shares are shown in percent.
+    pub fn shown(&self, unit: &str) -> String {
+        let scale = if unit == PERCENT { 100.0 } else { 1.0 };
+        let number = |value: f64| match unit {
+            PERCENT => format!("{:.1}", scale * value),
+            "" if value.fract() == 0.0 => format!("{value:.0}"),
+            _ => palpate_geometry::units::three_digits(value),
+        };
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number(value) => number(*value),
+            Self::Interval(Interval { estimate, low, high }) => {
+                format!("{} ({} to {})", number(*estimate), number(*low), number(*high))
+            }
+            Self::Missing => "-".to_owned(),
+        }
+    }
+}
+
+/// Unit of columns of shares: stored from 0 to 1, shown in percent.
+pub const PERCENT: &str = "%";
+
+impl StudyColumn {
+    /// Heading with its unit.
+    pub fn titled(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) }
+    }
+}
+
+impl StudyTable {
+    /// An empty table; columns are pairs of heading and unit.
+    pub fn new(name: &str, title: impl Into<String>, columns: &[(&str, &str)]) -> Self {
+        let column = |(name, unit): &(&str, &str)| StudyColumn { name: (*name).to_owned(), unit: (*unit).to_owned() };
+        Self {
+            name: name.to_owned(),
+            title: title.into(),
+            columns: columns.iter().map(column).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, cells: Vec<Cell>, trials: Vec<TrialId>) {
+        self.rows.push(StudyRow { cells, trials });
+    }
+
+    /// Cell of a row in the column with a heading.
+    pub fn cell(&self, row: usize, column: &str) -> &Cell {
+        let at = self.columns.iter().position(|own| own.name == column);
+        at.and_then(|at| self.rows.get(row)?.cells.get(at)).unwrap_or(&Cell::Missing)
+    }
+
+    /// Text of a row in a column; empty for numbers.
+    pub fn text(&self, row: usize, column: &str) -> &str {
+        match self.cell(row, column) {
+            Cell::Text(text) => text,
+            Cell::Number(_) | Cell::Interval(_) | Cell::Missing => "",
+        }
+    }
+
+    /// Different texts of a column, in the order of the rows.
+    pub fn texts(&self, column: &str) -> Vec<&str> {
+        let mut texts: Vec<&str> = Vec::new();
+        for row in 0..self.rows.len() {
+            let text = self.text(row, column);
+            if !texts.contains(&text) {
+                texts.push(text);
+            }
+        }
+        texts
+    }
+
+    /// Numbers of the rows with certain texts in some columns.
+    pub fn rows_with(&self, wanted: &[(&str, &str)]) -> Vec<usize> {
+        let fits = |row: &usize| wanted.iter().all(|(column, text)| self.text(*row, column) == *text);
+        (0..self.rows.len()).filter(fits).collect()
+    }
+
+    /// The table as comma-separated values. An interval takes three columns.
+    pub fn csv(&self) -> String {
+        let is_interval =
+            |column: usize| self.rows.iter().any(|row| matches!(row.cells.get(column), Some(Cell::Interval(_))));
+        let intervals: Vec<bool> = (0..self.columns.len()).map(is_interval).collect();
+        let mut lines = Vec::new();
+        let unit = |column: &StudyColumn| if column.unit == PERCENT { String::new() } else { column.unit.clone() };
+        let headings = self.columns.iter().zip(&intervals).flat_map(|(column, interval)| {
+            let plain = StudyColumn { name: column.name.clone(), unit: unit(column) }.titled();
+            let ends = interval.then(|| [format!("{} low", column.name), format!("{} high", column.name)]);
+            std::iter::once(plain).chain(ends.into_iter().flatten())
+        });
+        lines.push(headings.map(|text| quoted(&text)).collect::<Vec<_>>().join(","));
+        for row in &self.rows {
+            let cells = row.cells.iter().zip(&intervals).flat_map(|(cell, interval)| {
+                let plain = match cell {
+                    Cell::Text(text) => quoted(text),
+                    Cell::Missing => String::new(),
+                    Cell::Number(_) | Cell::Interval(_) => {
+                        cell.value().map_or(String::new(), |value| value.to_string())
+                    }
+                };
+                let ends = interval.then(|| {
+                    cell.spread().map_or([const { String::new() }; 2], |ends| ends.map(|end| end.to_string()))
+                });
+                std::iter::once(plain).chain(ends.into_iter().flatten())
+            });
+            lines.push(cells.collect::<Vec<_>>().join(","));
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+impl StudyReport {
+    /// A table by its name.
+    pub fn table(&self, name: &str) -> Option<(usize, &StudyTable)> {
+        self.tables.iter().enumerate().find(|(_, table)| table.name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interval(estimate: f64, low: f64, high: f64) -> Interval {
+        Interval { estimate, low, high }
+    }
+
+    #[test]
+    fn tables_are_read_by_people_and_programs() {
+        let mut table = StudyTable::new("models", "Models", &[("model", ""), ("F1", PERCENT), ("time", "s")]);
+        table.push(vec![Cell::text("a, \"b\""), Cell::Interval(interval(0.5, 0.25, 0.75)), Cell::Number(1.5)], vec![7]);
+        table.push(vec![Cell::text("c"), Cell::Missing, Cell::Missing], Vec::new());
+        assert_eq!(table.csv(), "model,F1,F1 low,F1 high,time (s)\n\"a, \"\"b\"\"\",0.5,0.25,0.75,1.5\nc,,,,\n");
+        assert_eq!(table.cell(0, "F1").shown(PERCENT), "50.0 (25.0 to 75.0)");
+        assert_eq!((table.cell(1, "F1").shown(PERCENT), table.cell(0, "none")), ("-".to_owned(), &Cell::Missing));
+        assert_eq!((table.texts("model"), table.rows_with(&[("model", "c")])), (vec!["a, \"b\"", "c"], vec![1]));
+        let report = StudyReport { tables: vec![table], ..StudyReport::default() };
+        let text = serde_json::to_string(&report).expect("writes");
+        assert_eq!(serde_json::from_str::<StudyReport>(&text).expect("reads"), report);
+    }
+
+    #[test]
+    fn a_verdict_needs_an_interval_without_zero() {
+        let of = |low: f64, high: f64| Verdict::of_gain(Some(interval(0.5 * (low + high), low, high)));
+        assert_eq!(
+            [of(0.1, 0.2), of(-0.2, -0.1), of(-0.1, 0.2), Verdict::of_gain(None)],
+            [Verdict::Agrees, Verdict::Disagrees, Verdict::Partly, Verdict::NotMeasured]
+        );
+        let all = |parts: &[Verdict]| Verdict::of_all(parts.iter().copied());
+        assert_eq!(all(&[Verdict::Agrees, Verdict::Agrees, Verdict::NotMeasured]), Verdict::Agrees);
+        assert_eq!(all(&[Verdict::Agrees, Verdict::Disagrees]), Verdict::Partly);
+        assert_eq!(all(&[]), Verdict::NotMeasured);
+    }
+}
