@@ -296,7 +296,7 @@ mod tests {
         librarian.ask(LibraryCommand::Draw(vec![id]));
         let begun = until(&librarian, &woken, |view| view.sparklines.contains_key(&id)).sparklines[&id].clone();
         theirs.append(id, &frames[60..])?;
-        theirs.finish(id, &trial.data.quality, &[])?;
+        theirs.finish(id, &trial.data.quality, &trial.header)?;
         let whole = stored_sparkline(&theirs, id)?;
         assert_ne!(begun, whole);
         until(&librarian, &woken, |view| view.sparklines[&id] == whole);

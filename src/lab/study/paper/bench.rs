@@ -164,6 +164,7 @@ impl<'a> StudyBench<'a> {
             settings: serde_json::Map::new(),
             progress: &|_| (),
             stop: self.work.cancelled,
+            second: None,
         };
         match method.train(data, &fitting) {
             Ok(model) => Ok(Some(model)),
