@@ -44,6 +44,7 @@ topics! {
     engines
     datasets
     recognition
+    paper
     sensors
     gripper
     labelling

@@ -4,9 +4,9 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
 use palpate_lab::study::paper::{
     Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport,
-    StudySize, StudyStep, StudyWork, run_study,
+    StudySize, StudyStep, StudyWork, run_study, stored_report,
 };
-use palpate_lab::study::{StoredStudy, generated_sections};
+use palpate_lab::study::{StoredStudy, generated_sections, program};
 use palpate_render::figure_svg;
 use palpate_store::Store;
 use std::path::Path;
@@ -20,6 +20,18 @@ fn tables_in_manual_and_readme_are_those_of_the_stored_results() -> TestResult {
         let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(section.document))?;
         let written = section.put_into(&text).ok_or_else(|| format!("{} has no {}", section.document, section.name))?;
         assert!(written == text, "{}: run `cargo run -p palpate-workshop -- tables`", section.document);
+    }
+    Ok(())
+}
+
+#[test]
+fn results_stored_for_the_page_of_the_paper_are_of_this_version() -> TestResult {
+    for study in PAPER_STUDIES {
+        let Some(stored) = stored_report(*study)? else { continue };
+        let key = study.card().key;
+        assert_eq!(stored.program, program(), "{key}: other physics; run the study again");
+        let fingerprint = StudyPlan::of_size(StudySize::Full).fingerprint();
+        assert_eq!(stored.result.fingerprint, fingerprint, "{key}: other recognisers; run the study again");
     }
     Ok(())
 }

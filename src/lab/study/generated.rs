@@ -3,7 +3,7 @@
 use super::accuracy::{accuracy_tables, stored_accuracy};
 use super::effect_audit::{AuditReport, audit_table, stored_effects};
 use super::stored_study::{GeneratedSection, StoredStudy};
-use super::{peer_costs, recognition_scores, stability};
+use super::{paper, peer_costs, recognition_scores, stability};
 
 /// All generated sections; a test checks that the documents hold them, and
 /// `cargo run -p palpate-workshop -- tables` writes them.
@@ -18,8 +18,14 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
         name: "effects",
         text: effects_text(&stored_effects()?),
     };
-    Ok([vec![accuracy, effects], stability::sections()?, recognition_scores::sections()?, peer_costs::sections()?]
-        .concat())
+    Ok([
+        vec![accuracy, effects],
+        stability::sections()?,
+        recognition_scores::sections()?,
+        paper::sections()?,
+        peer_costs::sections()?,
+    ]
+    .concat())
 }
 
 fn effects_text(stored: &StoredStudy<AuditReport>) -> String {

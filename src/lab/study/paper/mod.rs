@@ -8,6 +8,7 @@
 
 mod answers;
 mod bench;
+mod claims;
 mod drawing;
 mod models;
 mod plan;
@@ -15,6 +16,8 @@ mod report;
 mod run;
 
 pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
+pub(in crate::study) use claims::sections;
+pub use claims::stored_report;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub use report::{
     Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow, StudyTable,

@@ -110,10 +110,15 @@ impl StudyPlan {
         }
     }
 
+    /// Fingerprint of the plan and of the recognisers: results with another one are out of date.
+    pub fn fingerprint(&self) -> String {
+        format!("{:016x}", palpate_sim::fingerprint([self.header().to_string().as_bytes()]))
+    }
+
     /// The plan as stored with results: other plans do not continue them. Methods are part of it, since a method whose
     /// recipe has changed gives other results.
     pub(super) fn header(&self) -> serde_json::Value {
-        let recipes: Vec<_> = METHODS.iter().map(|method| (method.key, method.recipe.map(|recipe| recipe()))).collect();
+        let recipes: Vec<_> = METHODS.iter().map(|method| (method.key, method.fingerprint())).collect();
         serde_json::json!({
             "size": self.size,
             "preset": self.preset,

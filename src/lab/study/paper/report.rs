@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 /// Result of a study, as stored.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StudyReport {
+    /// Fingerprint of the plan and of the recognisers.
+    #[serde(default)]
+    pub fingerprint: String,
     /// Data that it rests on, a line for each kind.
     pub data: Vec<String>,
     /// Tables.

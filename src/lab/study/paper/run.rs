@@ -25,7 +25,7 @@ pub fn run_study(
     if !file.complete(&units, &how, |unit: &String| study.measure(unit, bench))? {
         return Ok(None);
     }
-    let report = study.report(plan, file.units())?;
+    let report = StudyReport { fingerprint: plan.fingerprint(), ..study.report(plan, file.units())? };
     let command = format!("palpate study {key}{}", plan.options());
     Ok(Some(StoredStudy::new(&command, file.cpu_hours(), report)))
 }
